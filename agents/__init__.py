@@ -1,0 +1,1 @@
+"""Training, search and comparison of protective layouts."""

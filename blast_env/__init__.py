@@ -1,0 +1,36 @@
+"""Protective-layout optimisation on a two-dimensional discrete-element blast model.
+
+Importing the package registers its environments with Gymnasium.
+"""
+
+from importlib.metadata import version
+
+import gymnasium as _gymnasium
+
+from blast_env.scenario import (
+    Charge,
+    Scenario,
+    bundled_scenarios,
+    load_layout,
+    load_scenario,
+    save_scenario,
+)
+from blast_env.simulation import Blast, BlastResult, simulate
+
+__version__ = version("blast-env")
+__all__ = [
+    "Blast",
+    "BlastResult",
+    "Charge",
+    "Scenario",
+    "bundled_scenarios",
+    "load_layout",
+    "load_scenario",
+    "save_scenario",
+    "simulate",
+]
+
+_gymnasium.register(
+    id="BlastSimulator-v0",
+    entry_point="blast_env.envs.simulator_env:BlastSimulatorEnv",
+)

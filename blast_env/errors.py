@@ -1,0 +1,36 @@
+"""The errors that a user can cause, each with a message that says what to change."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class BlastEnvError(ValueError):
+    """Base class: something that the user gave is not usable."""
+
+
+class LayoutError(BlastEnvError):
+    """A layout names a cell that does not exist, is kept out, is repeated or exceeds the stock."""
+
+
+class UnknownNameError(BlastEnvError):
+    """A name (preset, engine, structure, bundled scenario) that does not exist.
+
+    Args:
+        kind: What was named, e.g. `"preset"`.
+        name: The name given.
+        known: The names that exist.
+    """
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        names = sorted(known)
+        super().__init__(f"no {kind} {name!r}{suggestion(name, names)}; known: {', '.join(names)}")
+        self._arguments = (kind, name, names)
+
+    def __reduce__(self) -> tuple[type["UnknownNameError"], tuple[str, str, list[str]]]:
+        return type(self), self._arguments
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return `", did you mean 'x'?"` for the nearest known name, or an empty string."""
+    nearest = get_close_matches(name, list(known), n=1, cutoff=0.6)
+    return f", did you mean {nearest[0]!r}?" if nearest else ""

@@ -1,0 +1,64 @@
+"""Axis-parallel rectangles, the only plane figure that sites are made of."""
+
+from typing import NamedTuple
+
+
+class Rectangle(NamedTuple):
+    """An axis-parallel rectangle from (`left`, `bottom`) to (`right`, `top`)."""
+
+    left: float
+    bottom: float
+    right: float
+    top: float
+
+    @classmethod
+    def from_corner(cls, corner: tuple[float, float], size: tuple[float, float]) -> "Rectangle":
+        """Return the rectangle with this lower left corner and (width, height)."""
+        return cls(corner[0], corner[1], corner[0] + size[0], corner[1] + size[1])
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """The centre point."""
+        return (self.left + self.right) / 2, (self.bottom + self.top) / 2
+
+    def grown(self, margin: float) -> "Rectangle":
+        """Return the rectangle with every side moved outwards by `margin`."""
+        return Rectangle(
+            self.left - margin, self.bottom - margin, self.right + margin, self.top + margin
+        )
+
+    def scaled(self, factor: float) -> "Rectangle":
+        """Return the rectangle with all coordinates multiplied by `factor`."""
+        return Rectangle(*(factor * value for value in self))
+
+    def contains(self, other: "Rectangle", tolerance: float = 1e-9) -> bool:
+        """Whether `other` lies inside, its sides touching allowed."""
+        return (
+            other.left >= self.left - tolerance
+            and other.bottom >= self.bottom - tolerance
+            and other.right <= self.right + tolerance
+            and other.top <= self.top + tolerance
+        )
+
+    def overlaps(self, other: "Rectangle", tolerance: float = 1e-9) -> bool:
+        """Whether the interiors meet; rectangles that only touch do not overlap."""
+        return (
+            self.left < other.right - tolerance
+            and other.left < self.right - tolerance
+            and self.bottom < other.top - tolerance
+            and other.bottom < self.top - tolerance
+        )
+
+    def meets_segment(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
+        """Whether the segment from `start` to `end` has a point in the open rectangle."""
+        enter, leave = 0.0, 1.0
+        bounds = ((self.left, self.right), (self.bottom, self.top))
+        for (low, high), begin, finish in zip(bounds, start, end, strict=True):
+            step = finish - begin
+            if step == 0.0:
+                if not low < begin < high:
+                    return False
+                continue
+            first, last = sorted(((low - begin) / step, (high - begin) / step))
+            enter, leave = max(enter, first), min(leave, last)
+        return enter < leave or (start == end and enter <= leave)

@@ -1,0 +1,77 @@
+"""The record of collisions with modules that an engine writes (section 2.8)."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+COLLISION_DTYPE = np.dtype(
+    [
+        ("time_s", np.float64),
+        ("kind", np.uint8),  # CollisionType of the ball
+        ("ball", np.int64),  # index into the scene's balls
+        ("module", np.int64),  # index into the scene's modules
+        ("mass", np.float64),  # before the collision
+        ("vx", np.float64),  # velocity before the collision, units per second
+        ("vy", np.float64),
+        ("normal_x", np.float64),  # unit vector out of the module
+        ("normal_y", np.float64),
+        ("impulse", np.float64),  # m |v| before the collision, see `Scene.impulse_quantum`
+        ("transferred_impulse", np.float64),  # along the normal, what the solver really gave
+        ("earlier_collisions", np.int64),  # of this ball, with anything
+        ("first_contact", np.bool_),  # of this module
+    ]
+)
+
+CollisionArray = NDArray[np.void]
+
+_FIELDS: Final = COLLISION_DTYPE.names or ()
+
+
+class CollisionLog:
+    """Collisions in the order in which they happened."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[float, ...]] = []
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def append(
+        self,
+        *,
+        time_s: float,
+        kind: int,
+        ball: int,
+        module: int,
+        mass: float,
+        velocity: tuple[float, float],
+        normal: tuple[float, float],
+        impulse: float,
+        transferred_impulse: float,
+        earlier_collisions: int,
+        first_contact: bool,
+    ) -> None:
+        """Add a collision; the arguments are the fields of `COLLISION_DTYPE`."""
+        who = (time_s, kind, ball, module, mass)
+        what = (*velocity, *normal, impulse, transferred_impulse)
+        self._rows.append((*who, *what, earlier_collisions, first_contact))
+
+    def to_array(self, start: int = 0) -> CollisionArray:
+        """Return the collisions from `start` on as an array of `COLLISION_DTYPE`."""
+        return np.array(self._rows[start:], dtype=COLLISION_DTYPE)
+
+
+def incidence_angle_rad(collisions: CollisionArray) -> NDArray[np.float64]:
+    """Return the angle of incidence (n,): 0 is head-on, pi/2 grazing.
+
+    The angle between the reversed velocity before the collision and the module's normal.
+    """
+    towards = -(
+        collisions["vx"] * collisions["normal_x"] + collisions["vy"] * collisions["normal_y"]
+    )
+    across = np.abs(
+        collisions["vx"] * collisions["normal_y"] - collisions["vy"] * collisions["normal_x"]
+    )
+    angle: NDArray[np.float64] = np.arctan2(across, towards)
+    return angle

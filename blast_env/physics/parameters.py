@@ -1,0 +1,125 @@
+"""The parameters of the blast model (paper, sections 2.3 to 2.8), with units and bounds.
+
+Every default is the `ballistic` preset's value; `blast_env.physics.presets` gives the reasons.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]
+
+
+class Parameters(BaseModel):
+    """Base of all parameter groups: frozen, and an unknown key is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class BallParameters(Parameters):
+    """Properties of one kind of ball (section 2.5).
+
+    Attributes:
+        mass: Mass, simulation mass units.
+        radius_units: Radius, simulation units (4 units are 1 m).
+        elasticity: Chipmunk multiplies the two elasticities of a contact: 0.8 on both is a
+            restitution of 0.64.
+        friction: Coulomb friction; multiplied over the two sides of a contact as well.
+        inertia_factor: Moment of inertia as a multiple of m r^2; 0.5 is a solid disc.
+    """
+
+    mass: Annotated[float, Field(ge=1e-6, le=1e6)]
+    radius_units: Annotated[float, Field(ge=0.01, le=100.0)]
+    elasticity: Fraction
+    friction: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    inertia_factor: Annotated[float, Field(ge=0.01, le=1.0)] = 0.5
+
+
+class ExplosiveParameters(BallParameters):
+    """The charge: a fan of `ExplosionBall`s (section 2.3).
+
+    Attributes:
+        ball_count: N, the number of balls at the angles 2 pi i / N.
+        speed_units_per_s: v0, the radial speed that every ball starts with.
+        offset_units: Distance of the ball centres from the charge's centre at the start.
+        fan_phase: `"random"` turns the whole fan by an angle drawn from the seed; `"fixed"` does
+            not turn it.
+        collide_within_charge: Whether balls of one charge collide with each other.
+        reference_tnt_kg: The TNT-equivalent mass that `mass` stands for. The specific energy of
+            TNT is a constant, so another charge mass keeps v0 and scales the mass of the balls.
+    """
+
+    mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
+    radius_units: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
+    elasticity: Fraction = 0.8
+    ball_count: Annotated[int, Field(ge=1, le=100_000)] = 720
+    speed_units_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = 2000.0
+    offset_units: Annotated[float, Field(ge=0.0, le=1000.0)] = 1.0
+    fan_phase: Literal["fixed", "random"] = "random"
+    collide_within_charge: bool = False
+    reference_tnt_kg: Positive = 100.0
+
+
+class AirParameters(BallParameters):
+    """The air: `AirBall`s on a square lattice (section 2.3).
+
+    Attributes:
+        spacing_units: Distance between neighbours; 0 means no air at all.
+        jitter: How far a seed may move each ball off its lattice point, as a fraction of the
+            gap that keeps neighbours apart, (spacing - 2 radius) / 2; 0 is the bare lattice.
+    """
+
+    mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.1
+    radius_units: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
+    elasticity: Fraction = 0.8
+    spacing_units: Annotated[float, Field(ge=0.0, le=1e6)] = 8.0
+    jitter: Fraction = 0.5
+
+
+class ContactParameters(Parameters):
+    """What a collision does beside the rebound (section 2.4).
+
+    Attributes:
+        module_restitution: C_e, the restitution of a ball's contact with a `ModularPart`.
+        module_friction: Friction of a `ModularPart`, multiplied with the ball's.
+        module_shrink: Factor on radius and mass of an explosive ball that hits a module; the
+            paper's "scaled by 30 %" is read as reduced by 30 %.
+        air_shrink: Factor on radius and mass of an explosive ball that hits an air ball.
+        minimum_radius_units: r_min; an explosive ball that shrinks below it is removed.
+        base_impulse: I_b, mass units times units per second, which any two balls get along the
+            normal of a new contact, equal and opposite.
+    """
+
+    module_restitution: Fraction = 0.5
+    module_friction: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    module_shrink: Annotated[float, Field(gt=0.0, le=1.0)] = 0.7
+    air_shrink: Annotated[float, Field(gt=0.0, le=1.0)] = 0.9
+    minimum_radius_units: Annotated[float, Field(ge=1e-3, le=100.0)] = 0.1
+    base_impulse: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
+
+
+class SteppingParameters(Parameters):
+    """How the motion is integrated and when it ends.
+
+    Attributes:
+        step_radii: Distance that the fastest ball may cover in one step, in radii of the
+            smallest ball (or half modules, if those are smaller).
+        longest_step_s: Bound of the time step, however slow the balls are.
+        solver_iterations: Iterations of Chipmunk's contact solver.
+        time_limit_s: Simulated time after which the run ends in any case.
+    """
+
+    step_radii: Annotated[float, Field(ge=0.01, le=0.5)] = 0.5
+    longest_step_s: Annotated[float, Field(ge=1e-7, le=1.0)] = 0.002
+    solver_iterations: Annotated[int, Field(ge=1, le=100)] = 10
+    time_limit_s: Annotated[float, Field(gt=0.0, le=60.0)] = 1.0
+
+
+class SimulationParameters(Parameters):
+    """All parameters of the blast model."""
+
+    explosive: ExplosiveParameters = ExplosiveParameters()
+    air: AirParameters = AirParameters()
+    contact: ContactParameters = ContactParameters()
+    stepping: SteppingParameters = SteppingParameters()

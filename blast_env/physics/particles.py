@@ -1,0 +1,176 @@
+"""The balls of the model: a fan of explosive balls and a lattice of air balls (section 2.3)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.geometry import Rectangle
+from blast_env.physics.parameters import AirParameters, BallParameters, ExplosiveParameters
+
+FloatArray = NDArray[np.float64]
+
+
+class CollisionType(IntEnum):
+    """The paper's four kinds of objects (section 2.4), by its names."""
+
+    ExplosionBall = 1
+    AirBall = 2
+    ModularPart = 3
+    Border = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Any number of balls, in simulation units.
+
+    Attributes:
+        kind: `CollisionType` of each ball, uint8 (n,).
+        position: Centres (n, 2).
+        velocity: Velocities, units per second (n, 2).
+        mass: Masses (n,).
+        radius: Radii (n,).
+    """
+
+    kind: NDArray[np.uint8]
+    position: FloatArray
+    velocity: FloatArray
+    mass: FloatArray
+    radius: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    @classmethod
+    def of_one_kind(
+        cls,
+        kind: CollisionType,
+        parameters: BallParameters,
+        position: FloatArray,
+        velocity: FloatArray,
+        mass_factor: float = 1.0,
+    ) -> "Balls":
+        """Return balls of one kind, all with the mass and radius of `parameters`."""
+        count = len(position)
+        return cls(
+            kind=np.full(count, kind, dtype=np.uint8),
+            position=position,
+            velocity=velocity,
+            mass=np.full(count, parameters.mass * mass_factor),
+            radius=np.full(count, parameters.radius_units),
+        )
+
+    @classmethod
+    def concatenate(cls, groups: Sequence["Balls"]) -> "Balls":
+        """Return the balls of all groups, in their order."""
+        return cls(
+            kind=np.concatenate([group.kind for group in groups]),
+            position=np.concatenate([group.position for group in groups]),
+            velocity=np.concatenate([group.velocity for group in groups]),
+            mass=np.concatenate([group.mass for group in groups]),
+            radius=np.concatenate([group.radius for group in groups]),
+        )
+
+
+def explosion_fan(
+    parameters: ExplosiveParameters,
+    centre: tuple[float, float],
+    tnt_kg: float,
+    rng: np.random.Generator,
+) -> Balls:
+    """Return the charge: N `ExplosionBall`s at the angles 2 pi i / N (section 2.3).
+
+    Args:
+        parameters: The explosive's parameters.
+        centre: The charge's centre, units.
+        tnt_kg: TNT-equivalent mass; scales the mass of the balls.
+        rng: Draws the phase of the fan; drawn from in any case, so that a fixed phase does not
+            shift the stream of the air.
+    """
+    drawn = rng.random()
+    phase = drawn if parameters.fan_phase == "random" else 0.0
+    index = np.arange(1, parameters.ball_count + 1)
+    angle = 2.0 * np.pi * (index + phase) / parameters.ball_count
+    direction = np.column_stack((np.cos(angle), np.sin(angle)))
+    return Balls.of_one_kind(
+        CollisionType.ExplosionBall,
+        parameters,
+        position=np.asarray(centre) + parameters.offset_units * direction,
+        velocity=parameters.speed_units_per_s * direction,
+        mass_factor=tnt_kg / parameters.reference_tnt_kg,
+    )
+
+
+def air_lattice(
+    parameters: AirParameters,
+    site: Rectangle,
+    obstacles: Sequence[Rectangle],
+    charge_centre: tuple[float, float],
+    charge_radius: float,
+    rng: np.random.Generator,
+) -> Balls:
+    """Return the air: `AirBall`s at rest on a square lattice that fills the site.
+
+    The lattice is centred in the site. A ball that would touch an obstacle, the charge or the
+    border is left out.
+
+    Args:
+        parameters: The air's parameters.
+        site: The simulated area, units.
+        obstacles: Rectangles that hold no air, units.
+        charge_centre: The charge's centre, units.
+        charge_radius: Radius of the disc that the charge fills, units.
+        rng: Draws the jitter.
+    """
+    if parameters.spacing_units == 0.0:
+        empty = np.empty((0, 2))
+        return Balls.of_one_kind(CollisionType.AirBall, parameters, empty, empty)
+    spacing, radius = parameters.spacing_units, parameters.radius_units
+    x = _lattice_axis(site.left, site.right, spacing)
+    y = _lattice_axis(site.bottom, site.top, spacing)
+    position = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    reach = parameters.jitter * max(0.0, spacing / 2.0 - radius)
+    position = position + rng.uniform(-reach, reach, size=position.shape)
+
+    inner = site.grown(-radius)
+    free = (
+        (position[:, 0] > inner.left)
+        & (position[:, 0] < inner.right)
+        & (position[:, 1] > inner.bottom)
+        & (position[:, 1] < inner.top)
+        & (np.hypot(*(position - charge_centre).T) > charge_radius + radius)
+    )
+    for obstacle in obstacles:
+        free &= distance_to_rectangle(position, obstacle) > radius
+    position = position[free]
+    return Balls.of_one_kind(CollisionType.AirBall, parameters, position, np.zeros_like(position))
+
+
+def distance_to_rectangle(position: FloatArray, rectangle: Rectangle) -> FloatArray:
+    """Return the distance (n,) of points (n, 2) to a rectangle, 0 inside."""
+    low = np.array([rectangle.left, rectangle.bottom])
+    high = np.array([rectangle.right, rectangle.top])
+    outside = np.maximum(np.maximum(low - position, position - high), 0.0)
+    distance: FloatArray = np.hypot(outside[:, 0], outside[:, 1])
+    return distance
+
+
+def lattice_capacity(parameters: AirParameters, site: Rectangle) -> int:
+    """Return the number of air balls on an empty site, which no scene on it exceeds."""
+    if parameters.spacing_units == 0.0:
+        return 0
+    columns = _lattice_count(site.left, site.right, parameters.spacing_units)
+    return columns * _lattice_count(site.bottom, site.top, parameters.spacing_units)
+
+
+def _lattice_count(low: float, high: float, spacing: float) -> int:
+    return int((high - low) // spacing)
+
+
+def _lattice_axis(low: float, high: float, spacing: float) -> FloatArray:
+    """Return the lattice coordinates between two borders, centred between them."""
+    count = _lattice_count(low, high, spacing)
+    margin = (high - low - (count - 1) * spacing) / 2.0
+    return low + margin + spacing * np.arange(count, dtype=np.float64)

@@ -1,0 +1,1 @@
+"""Tables of a blast, and their export to Excel and Parquet."""

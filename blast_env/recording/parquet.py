@@ -1,0 +1,104 @@
+"""The collision table as Parquet, with the run record, the units and the meanings in the file."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from blast_env.atomic import write_atomically
+from blast_env.errors import BlastEnvError
+from blast_env.recording.tables import COLLISION_COLUMNS
+
+if TYPE_CHECKING:
+    from blast_env.simulation import BlastResult
+
+METADATA_KEY: Final = b"blast_env"
+"""Key of the run record, as JSON, in the metadata of the file."""
+
+SUFFIX: Final = ".parquet"
+
+
+def write_parquet(result: "BlastResult", path: str | Path) -> Path:
+    """Write the collision table, exact to the last bit, with the run record in the metadata.
+
+    The metadata of each field has its `unit` and its `meaning`. The file is written whole or not
+    at all.
+
+    Args:
+        result: The blast.
+        path: The file, with the suffix `.parquet`; an existing one is replaced.
+
+    Returns:
+        The path.
+
+    Raises:
+        BlastEnvError: If the suffix is another one or the file cannot be written there.
+    """
+    path = Path(path)
+    if path.suffix.lower() != SUFFIX:
+        raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
+    table = _arrow_table(result)
+    with write_atomically(path) as temporary:
+        try:
+            pq.write_table(table, temporary)
+        except (OSError, pa.ArrowException) as error:
+            raise BlastEnvError(f"{path}: cannot be written: {error}") from error
+    return path
+
+
+def read_parquet(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """Read a file of `write_parquet`.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The collision table and the run record.
+
+    Raises:
+        BlastEnvError: If there is no such file, if it is damaged or no Parquet, or if something
+            else wrote it.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise BlastEnvError(f"{path}: there is no such file")
+    try:
+        # Not read_table: it takes the folder's name for a partition, "seed=3" for a column.
+        with pq.ParquetFile(path) as file:
+            table = file.read()
+    except (OSError, pa.ArrowException) as error:
+        raise BlastEnvError(f"{path}: damaged or not a Parquet file: {error}") from error
+    return table.to_pandas(), _run_record(path, table.schema.metadata or {})
+
+
+def _arrow_table(result: "BlastResult") -> pa.Table:
+    """Return the collision table with all its metadata."""
+    table = pa.Table.from_pandas(result.collisions, preserve_index=False)
+    columns = {column.name: column for column in COLLISION_COLUMNS}
+    fields = [
+        field.with_metadata(
+            {"unit": columns[field.name].unit, "meaning": columns[field.name].meaning}
+        )
+        for field in table.schema
+    ]
+    record = json.dumps(result.run_record, ensure_ascii=False).encode()
+    metadata = {**table.schema.metadata, METADATA_KEY: record}
+    return table.cast(pa.schema(fields, metadata=metadata))
+
+
+def _run_record(path: Path, metadata: dict[bytes, bytes]) -> dict[str, Any]:
+    """Return the run record in the metadata of a file."""
+    if METADATA_KEY not in metadata:
+        raise BlastEnvError(
+            f"{path}: has no run record, so it is not a collision table that blast_env wrote"
+        )
+    try:
+        record = json.loads(metadata[METADATA_KEY])
+    except ValueError as error:
+        raise BlastEnvError(f"{path}: its run record is damaged: {error}") from error
+    if not isinstance(record, dict):
+        raise BlastEnvError(f"{path}: its run record is damaged: not a JSON object")
+    return record

@@ -1,0 +1,159 @@
+"""The tables of a blast as data frames, with the unit and the meaning of every column."""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
+from blast_env.physics.particles import CollisionType
+from blast_env.physics.structure import ModularObstacle
+from blast_env.units import UNITS_PER_M
+
+
+class Column(NamedTuple):
+    """A column of a table.
+
+    Attributes:
+        name: Name in the data frame.
+        unit: Unit; empty for counts, names and pure numbers. "sim" stands for the simulation's
+            own units: mass units, and 4 length units to the metre.
+        meaning: What it is.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+
+
+COLLISION_COLUMNS: Final = (
+    Column("time_s", "s", "time of the collision, from the detonation"),
+    Column("particle_type", "", "ExplosionBall or AirBall"),
+    Column("particle_id", "", "index of the ball in the scene"),
+    Column("mass", "sim mass", "mass of the ball before the collision"),
+    Column("vx", "sim units/s", "velocity to the right before the collision"),
+    Column("vy", "sim units/s", "velocity upwards before the collision"),
+    Column("speed", "sim units/s", "speed before the collision"),
+    Column("impulse_sim", "sim", "m |v| before the collision, the paper's measure"),
+    Column("transferred_impulse_sim", "sim", "momentum that the contact really transferred"),
+    Column("angle_rad", "rad", "angle of incidence, 0 is head-on"),
+    Column("angle_deg", "deg", "angle of incidence, 0 is head-on"),
+    Column("normal_x", "", "unit normal out of the module, to the right"),
+    Column("normal_y", "", "unit normal out of the module, upwards"),
+    Column("module_id", "", "module that was hit, named by its centre in metres"),
+    Column("structure", "", "structure that the module is part of"),
+    Column("earlier_collisions", "", "collisions of this ball before, with anything"),
+    Column("first_contact", "", "whether this is the first hit on the module"),
+)
+
+MODULE_COLUMNS: Final = (
+    Column("module_id", "", "name of the module, made from its centre in metres"),
+    Column("structure", "", "structure that the module is part of"),
+    Column("row", "", "row in the structure's grid, upwards from 0"),
+    Column("column", "", "column in the structure's grid, to the right from 0"),
+    Column("x_m", "m", "centre, from the left border"),
+    Column("y_m", "m", "centre, from the lower border"),
+    Column("hits", "", "collisions"),
+    Column("impulse_sim", "sim", "sum of m |v| over the collisions"),
+    Column("transferred_impulse_sim", "sim", "sum of the momentum really transferred"),
+    Column("first_hit_s", "s", "time of the first collision"),
+    Column("destroyed", "", "whether the impulse passed the module's capacity"),
+)
+
+STRUCTURE_COLUMNS: Final = (
+    Column("structure", "", "name of the structure"),
+    Column("kind", "", "ConcreteSquare or ModularObstacle"),
+    Column("protected", "", "whether its load counts"),
+    Column("weight", "", "its weight among the protected structures"),
+    Column("modules", "", "number of modules"),
+    Column("hits", "", "collisions"),
+    Column("impulse_sim", "sim", "sum of m |v| over the collisions"),
+    Column("transferred_impulse_sim", "sim", "sum of the momentum really transferred"),
+    Column("first_hit_s", "s", "time of the first collision"),
+    Column("modules_destroyed", "", "modules whose impulse passed their capacity"),
+)
+
+
+def collision_table(
+    collisions: CollisionArray, obstacles: Sequence[ModularObstacle]
+) -> pd.DataFrame:
+    """Return one row a collision, in the order of time; see `COLLISION_COLUMNS`.
+
+    Args:
+        collisions: Records of `COLLISION_DTYPE` (n,).
+        obstacles: The obstacles of the blast, whose modules the records count through.
+    """
+    parts = [part for obstacle in obstacles for part in obstacle.parts]
+    module_ids = np.array([part.module_id for part in parts], dtype=object)
+    structures = np.array([part.structure for part in parts], dtype=object)
+    angle = incidence_angle_rad(collisions)
+    values = {
+        "time_s": collisions["time_s"],
+        "particle_type": [CollisionType(kind).name for kind in collisions["kind"]],
+        "particle_id": collisions["ball"],
+        "mass": collisions["mass"],
+        "vx": collisions["vx"],
+        "vy": collisions["vy"],
+        "speed": np.hypot(collisions["vx"], collisions["vy"]),
+        "impulse_sim": collisions["impulse"],
+        "transferred_impulse_sim": collisions["transferred_impulse"],
+        "angle_rad": angle,
+        "angle_deg": np.degrees(angle),
+        "normal_x": collisions["normal_x"],
+        "normal_y": collisions["normal_y"],
+        "module_id": pd.array(module_ids[collisions["module"]], dtype="str"),
+        "structure": pd.array(structures[collisions["module"]], dtype="str"),
+        "earlier_collisions": collisions["earlier_collisions"],
+        "first_contact": collisions["first_contact"],
+    }
+    table = pd.DataFrame(values)[[column.name for column in COLLISION_COLUMNS]]
+    return table.astype({"particle_type": "str"})
+
+
+def module_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
+    """Return one row a module; see `MODULE_COLUMNS`."""
+    rows = [
+        (
+            part.module_id,
+            part.structure,
+            part.row,
+            part.column,
+            part.x / UNITS_PER_M,
+            part.y / UNITS_PER_M,
+            part.hits,
+            part.impulse,
+            part.transferred_impulse,
+            _or_nan(part.first_hit_s),
+            part.destroyed,
+        )
+        for obstacle in obstacles
+        for part in obstacle.parts
+    ]
+    table = pd.DataFrame(rows, columns=[column.name for column in MODULE_COLUMNS])
+    return table.astype({"module_id": "str", "structure": "str"})
+
+
+def structure_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
+    """Return one row a structure; see `STRUCTURE_COLUMNS`."""
+    rows = [
+        (
+            obstacle.name,
+            obstacle.kind,
+            obstacle.protected,
+            obstacle.weight,
+            len(obstacle.parts),
+            obstacle.hits,
+            obstacle.impulse,
+            obstacle.transferred_impulse,
+            _or_nan(obstacle.first_hit_s),
+            sum(part.destroyed for part in obstacle.parts),
+        )
+        for obstacle in obstacles
+    ]
+    table = pd.DataFrame(rows, columns=[column.name for column in STRUCTURE_COLUMNS])
+    return table.astype({"structure": "str", "kind": "str"})
+
+
+def _or_nan(value: float | None) -> float:
+    return np.nan if value is None else value

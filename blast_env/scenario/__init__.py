@@ -1,0 +1,59 @@
+"""Scenario files: models, validation, loading and saving."""
+
+from blast_env.scenario.files import (
+    bundled_scenarios,
+    find_problems,
+    load_scenario,
+    parse_scenario,
+    save_scenario,
+    scenario_hash,
+)
+from blast_env.scenario.layout import blocked_reason, check_layout, load_layout, usable_cells
+from blast_env.scenario.models import (
+    SCHEMA_VERSION,
+    AnySource,
+    AnyStructure,
+    BuildZone,
+    Cell,
+    Charge,
+    ConcreteSquareSection,
+    KeepOut,
+    ModularObstacleSection,
+    PointSource,
+    RectangleSource,
+    Scenario,
+    SegmentSource,
+    SimulationSection,
+    Site,
+)
+from blast_env.scenario.problems import Problem, ScenarioError
+
+__all__ = [
+    "SCHEMA_VERSION",
+    "AnySource",
+    "AnyStructure",
+    "BuildZone",
+    "Cell",
+    "Charge",
+    "ConcreteSquareSection",
+    "KeepOut",
+    "ModularObstacleSection",
+    "PointSource",
+    "Problem",
+    "RectangleSource",
+    "Scenario",
+    "ScenarioError",
+    "SegmentSource",
+    "SimulationSection",
+    "Site",
+    "blocked_reason",
+    "bundled_scenarios",
+    "check_layout",
+    "find_problems",
+    "load_layout",
+    "load_scenario",
+    "parse_scenario",
+    "save_scenario",
+    "scenario_hash",
+    "usable_cells",
+]

@@ -1,0 +1,234 @@
+"""Checks between the sections of a scenario: what overlaps what, and what lies outside."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, Final, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from blast_env.geometry import Rectangle
+from blast_env.physics.parameters import AirParameters, SimulationParameters
+from blast_env.physics.particles import lattice_capacity
+from blast_env.physics.structure import BARRIER_NAME
+from blast_env.scenario.clearance import distance_m, source_bounds_m
+from blast_env.scenario.problems import Problem
+from blast_env.scenario.sections import AnySource, AnyStructure, BuildZone, Site
+from blast_env.scenario.simulation import SimulationSection
+from blast_env.scenario.usability import TOLERANCE_M, usable_mask
+from blast_env.units import UNITS_PER_M
+
+Item = TypeVar("Item")
+
+MOST_AIR_BALLS: Final = 1_000_000
+"""What fits into the memory of a common computer."""
+
+MAX_ITEMS: Final = 100
+"""Longer arrays are errors of their own; their other items are not compared with each other."""
+
+
+_SITE: Final = TypeAdapter(Site)
+_SOURCE: Final[TypeAdapter[AnySource]] = TypeAdapter(AnySource)
+_STRUCTURE: Final[TypeAdapter[AnyStructure]] = TypeAdapter(AnyStructure)
+_BUILD_ZONE: Final = TypeAdapter(BuildZone)
+_SIMULATION: Final = TypeAdapter(SimulationSection)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The sections of a scenario that are sound by themselves.
+
+    Attributes:
+        site: The site, if it is sound.
+        sources: The sound sources, by their index.
+        structures: The sound structures, by their index.
+        all_structures: Whether there are no structures but the sound ones.
+        build_zone: The build zone, if there is one and it is sound.
+        parameters: The parameters of the blast model, if they are sound.
+    """
+
+    site: Site | None
+    sources: Mapping[int, AnySource]
+    structures: Mapping[int, AnyStructure]
+    all_structures: bool
+    build_zone: BuildZone | None
+    parameters: SimulationParameters | None
+
+    @property
+    def charge_radius_m(self) -> float:
+        """Radius of the charge; where it is unknown, a length that any charge exceeds."""
+        return 1e-6 if self.parameters is None else charge_radius_m(self.parameters)
+
+
+def charge_radius_m(parameters: SimulationParameters) -> float:
+    """Return the radius of the disc that the charge fills at the start."""
+    explosive = parameters.explosive
+    return (explosive.offset_units + explosive.radius_units) / UNITS_PER_M
+
+
+def sound_parts(document: Mapping[str, Any]) -> Parts:
+    """Return those sections of a scenario file that are sound by themselves."""
+    listed = document.get("structures")
+    structures = _sound_items(_STRUCTURE, listed)
+    simulation = _sound(_SIMULATION, document.get("simulation", {}))
+    return Parts(
+        site=_sound(_SITE, document.get("site")),
+        sources=_sound_items(_SOURCE, document.get("charge")),
+        structures=structures,
+        all_structures=isinstance(listed, list | tuple) and len(structures) == len(listed) > 0,
+        build_zone=_sound(_BUILD_ZONE, document.get("build_zone")),
+        parameters=None if simulation is None else simulation.parameters,
+    )
+
+
+def check_parts(parts: Parts) -> tuple[Problem, ...]:
+    """Return everything that is wrong between the sections."""
+    return (
+        *_name_problems(parts),
+        *_structure_problems(parts),
+        *_charge_problems(parts),
+        *_build_zone_problems(parts),
+        *_simulation_problems(parts),
+    )
+
+
+def _sound(adapter: TypeAdapter[Item], value: object) -> Item | None:
+    """Return the section, or `None` if it is missing or unsound."""
+    try:
+        return adapter.validate_python(value)
+    except ValidationError:
+        return None
+
+
+def _sound_items(adapter: TypeAdapter[Item], values: object) -> dict[int, Item]:
+    """Return the sound items of an array by their index."""
+    if not isinstance(values, list | tuple):
+        return {}
+    items = ((index, _sound(adapter, value)) for index, value in enumerate(values[:MAX_ITEMS]))
+    return {index: item for index, item in items if item is not None}
+
+
+def _name_problems(parts: Parts) -> Iterator[Problem]:
+    """Check the names of the structures, and that one of them is protected."""
+    first_use: dict[str, int] = {}
+    for index, structure in parts.structures.items():
+        key = f"structures[{index}].name"
+        if structure.name == BARRIER_NAME:
+            yield Problem(key, f"is {BARRIER_NAME!r}, the name of the modules of a layout")
+        used = first_use.setdefault(structure.name, index)
+        if used != index:
+            yield Problem(key, f"is {structure.name!r}, already the name of structures[{used}]")
+    protected = any(structure.protected for structure in parts.structures.values())
+    if parts.all_structures and not protected:
+        yield Problem("structures", "none is protected, at least one must have protected = true")
+
+
+def _structure_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that the structures lie inside the site and apart from each other."""
+    for index, structure in parts.structures.items():
+        yield from _outside_site(
+            parts, f"structures[{index}]", _described(structure), structure.rectangle_m
+        )
+    for (i, one), (j, other) in combinations(parts.structures.items(), 2):
+        if one.rectangle_m.overlaps(other.rectangle_m):
+            message = f"{_described(other)} overlaps structures[{i}], {_described(one)}"
+            yield Problem(f"structures[{j}]", message)
+
+
+def _charge_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that the charge, wherever it is, fits between the structures and the border."""
+    radius = parts.charge_radius_m
+    words = "" if parts.parameters is None else f" by {radius:g} m, the charge's radius"
+    for index, source in parts.sources.items():
+        bounds = source_bounds_m(source)
+        if parts.site and not parts.site.rectangle_m.contains(bounds.grown(radius)):
+            where, site = extent(bounds), extent(parts.site.rectangle_m)
+            message = f"its centre may be at {where}, must lie inside the site ({site}){words}"
+            yield Problem(f"charge[{index}]", message)
+        for j, structure in parts.structures.items():
+            distance = distance_m(source, structure.rectangle_m)
+            if distance < radius - TOLERANCE_M:
+                message = (
+                    f"its centre comes as near as {distance:g} m to structures[{j}],"
+                    f" {_described(structure)}, must keep clear of it{words}"
+                )
+                yield Problem(f"charge[{index}]", message)
+
+
+def _build_zone_problems(parts: Parts) -> Iterator[Problem]:
+    """Check where the build zone and its keep-outs lie, and that the stock can be used."""
+    zone = parts.build_zone
+    if zone is None:
+        return
+    yield from _outside_site(
+        parts, "build_zone", f"the zone ({extent(zone.rectangle_m)})", zone.rectangle_m
+    )
+    for index, keep_out in enumerate(zone.keep_outs):
+        if not keep_out.rectangle_m.overlaps(zone.rectangle_m):
+            where, bound = extent(keep_out.rectangle_m), extent(zone.rectangle_m)
+            message = f"covers {where}, must overlap the build zone ({bound})"
+            yield Problem(f"build_zone.keep_outs[{index}]", message)
+    structures, sources = parts.structures.values(), parts.sources.values()
+    usable = int(usable_mask(zone, structures, sources, parts.charge_radius_m).sum())
+    if zone.stock > usable:
+        message = f"is {zone.stock}, must be at most {usable}, the number of usable cells"
+        yield Problem("build_zone.stock", message)
+
+
+def _simulation_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that no balls overlap at the start."""
+    if parts.parameters is None:
+        return
+    air, explosive = parts.parameters.air, parts.parameters.explosive
+    if 0.0 < air.spacing_units < 2.0 * air.radius_units:
+        yield Problem(
+            "simulation.overrides.air.spacing_units",
+            f"is {air.spacing_units:g}, must be 0 (no air) or at least"
+            f" {2.0 * air.radius_units:g}, twice radius_units: the balls would overlap",
+        )
+    else:
+        yield from _too_much_air(parts.site, air)
+    if explosive.collide_within_charge and explosive.ball_count > 1:
+        sine = math.sin(math.pi / explosive.ball_count)
+        if 2.0 * explosive.offset_units * sine < 2.0 * explosive.radius_units - TOLERANCE_M:
+            least = explosive.radius_units / sine
+            yield Problem(
+                "simulation.overrides.explosive.offset_units",
+                f"is {explosive.offset_units:g}, must be at least {least:g} for"
+                f" {explosive.ball_count} balls of one charge that collide with each other"
+                " (collide_within_charge): they would overlap",
+            )
+
+
+def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:
+    """Check that the air is not so fine that the computer's memory cannot hold it."""
+    if site is None:
+        return
+    balls = lattice_capacity(air, site.rectangle_m.scaled(UNITS_PER_M))
+    if balls > MOST_AIR_BALLS:
+        yield Problem(
+            "simulation.overrides.air.spacing_units",
+            f"is {air.spacing_units:g}, which makes {balls:,} air balls on a site of"
+            f" {site.width_m:g} x {site.height_m:g} m, must make at most {MOST_AIR_BALLS:,}",
+        )
+
+
+def _outside_site(
+    parts: Parts, key: str, description: str, rectangle: Rectangle
+) -> Iterator[Problem]:
+    """Yield a problem if the rectangle sticks out of the site."""
+    if parts.site and not parts.site.rectangle_m.contains(rectangle):
+        site = extent(parts.site.rectangle_m)
+        yield Problem(key, f"{description} must lie inside the site ({site})")
+
+
+def _described(structure: AnyStructure) -> str:
+    """Return the name and the extent of a structure."""
+    return f"{structure.name!r} ({extent(structure.rectangle_m)})"
+
+
+def extent(rectangle: Rectangle) -> str:
+    """Return the extent of a rectangle in words."""
+    left, bottom, right, top = rectangle
+    return f"x {left:g} to {right:g} m, y {bottom:g} to {top:g} m"

@@ -1,0 +1,149 @@
+"""Scenario files: finding, loading and saving them."""
+
+import os
+import re
+import tomllib
+from pathlib import Path
+from typing import Final
+
+import tomli_w
+
+from blast_env.atomic import write_atomically
+from blast_env.scenario.models import Scenario
+from blast_env.scenario.problems import Problem, ScenarioError, unknown_name
+from blast_env.scenario.reading import read_text
+from blast_env.scenario.wording import shortened
+
+SUFFIX: Final = ".toml"
+
+
+def bundled_scenarios() -> tuple[str, ...]:
+    """Return the names of the scenarios that come with the package."""
+    return tuple(sorted(path.stem for path in _bundled_folder().glob(f"*{SUFFIX}")))
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """Return a scenario.
+
+    Args:
+        name_or_path: The name of a bundled scenario, or the path of a `.toml` file. What has
+            neither a suffix nor a folder is a name.
+
+    Raises:
+        ScenarioError: If there is no such scenario, or if anything is wrong with it; all its
+            problems are in the error.
+    """
+    path = _located(name_or_path)
+    try:
+        text = read_text(path)
+    except ValueError as error:
+        raise ScenarioError(str(path), [Problem("", str(error))]) from error
+    return parse_scenario(text, str(path))
+
+
+def parse_scenario(text: str, source: str) -> Scenario:
+    """Return the scenario that the text of a file describes.
+
+    Args:
+        text: TOML.
+        source: Name of the file, for the error.
+
+    Raises:
+        ScenarioError: If anything is wrong; all problems are in the error.
+    """
+    try:
+        document = tomllib.loads(text)
+    except RecursionError as error:
+        problem = Problem(f"line {_deepest_line(text)}", "is nested too deeply")
+        raise ScenarioError(source, [problem]) from error
+    except ValueError as error:
+        raise ScenarioError(source, [_syntax_problem(str(error), text)]) from error
+    return Scenario.from_document(document, source)
+
+
+def find_problems(name_or_path: str | Path) -> tuple[Problem, ...]:
+    """Return everything that is wrong with a scenario; nothing if it can be used.
+
+    Args:
+        name_or_path: As for `load_scenario`.
+    """
+    try:
+        load_scenario(name_or_path)
+    except ScenarioError as error:
+        return error.problems
+    return ()
+
+
+def save_scenario(scenario: Scenario, path: str | Path) -> None:
+    """Write a scenario to a file that `load_scenario` reads back as an equal scenario.
+
+    The file is replaced as a whole: after an error the old one is untouched.
+
+    Raises:
+        ScenarioError: If the scenario could not be read back: one that `model_copy` made unsound,
+            or a name that is not a `.toml` file's.
+        BlastEnvError: If the file cannot be written.
+    """
+    if Path(path).suffix != SUFFIX:
+        raise ScenarioError(str(path), [Problem("", f"must be a {SUFFIX} file")])
+    document = scenario.model_dump(mode="json", exclude_none=True)
+    Scenario.from_document(document, str(path))
+    content = tomli_w.dumps(document)
+    with write_atomically(path) as temporary:
+        temporary.write_text(content, encoding="utf-8", newline="\n")
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """Return the SHA-256 of everything in a scenario that affects a result."""
+    return scenario.content_hash
+
+
+def _bundled_folder() -> Path:
+    """Return the folder of the bundled scenarios: inside the package, or beside it."""
+    package = Path(__file__).resolve().parents[1]
+    installed = package / "scenarios"
+    return installed if installed.is_dir() else package.parent / "scenarios"
+
+
+def _located(name_or_path: str | Path) -> Path:
+    """Return the path of the file that a name or path stands for."""
+    path = Path(name_or_path)
+    is_folder = os.path.isdir(path)
+    if path.name == str(name_or_path) and not path.suffix:
+        known = bundled_scenarios()
+        if path.name in known:
+            return _bundled_folder() / f"{path.name}{SUFFIX}"
+        if not is_folder:
+            message = unknown_name("bundled scenario", path.name, known)
+            raise ScenarioError(path.name, [Problem("", message)])
+    if path.suffix != SUFFIX and not is_folder:
+        raise ScenarioError(str(path), [Problem("", f"must be a {SUFFIX} file")])
+    return path
+
+
+def _deepest_line(text: str) -> int:
+    """Return the number of the line with the most open brackets."""
+    depth = 0
+    depths = [0]
+    for line in text.split("\n"):
+        depth += sum(line.count(bracket) for bracket in "[{")
+        depths.append(depth)
+        depth -= sum(line.count(bracket) for bracket in "]}")
+    return depths.index(max(depths))
+
+
+def _syntax_problem(message: str, text: str) -> Problem:
+    """Return the problem for a message of the TOML parser, with its place as the key."""
+    match = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.S)
+    if match is None:
+        # The only error without a place: an integer that Python refuses to read.
+        digits = re.search(r"[0-9_]{1000,}", text)
+        number = text.count("\n", 0, digits.start() if digits else len(text)) + 1
+        what = shortened(message.split(";")[0], 200)
+        return Problem(f"line {number}", f"is not usable: {what}")
+    what, line, column = match.groups()
+    if line is None:
+        lines = text.split("\n")
+        line, column = str(len(lines)), str(len(lines[-1]) + 1)
+    place = f"line {line}, column {column}"
+    return Problem(place, f"is not TOML: {shortened(what, 200)}")

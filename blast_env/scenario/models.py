@@ -1,0 +1,235 @@
+"""What a scenario is: its sections together.
+
+All lengths are in metres, x to the right and y upwards from the lower left corner of the site.
+"""
+
+import json
+from collections.abc import Mapping
+from hashlib import sha256
+from typing import Annotated, Any, Final, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, StrictInt, ValidationError, model_validator
+
+from blast_env.errors import BlastEnvError
+from blast_env.physics.parameters import SimulationParameters
+from blast_env.scenario.checks import Parts, charge_radius_m, check_parts, sound_parts
+from blast_env.scenario.problems import ScenarioError, problems_from
+from blast_env.scenario.sections import (
+    AnySource,
+    AnyStructure,
+    BuildZone,
+    Cell,
+    Charge,
+    ChargeSource,
+    ConcreteSquareSection,
+    KeepOut,
+    ModularObstacleSection,
+    Name,
+    PointM,
+    PointSource,
+    RectangleSource,
+    Section,
+    SegmentSource,
+    Site,
+    SizeM,
+    StructureSection,
+)
+from blast_env.scenario.simulation import SimulationSection
+from blast_env.units import MODULE_SIDE_M
+
+__all__ = [
+    "SCHEMA_VERSION",
+    "AnySource",
+    "AnyStructure",
+    "BuildZone",
+    "Cell",
+    "Charge",
+    "ChargeSource",
+    "ConcreteSquareSection",
+    "KeepOut",
+    "ModularObstacleSection",
+    "PointM",
+    "PointSource",
+    "RectangleSource",
+    "Scenario",
+    "Section",
+    "SegmentSource",
+    "SimulationSection",
+    "Site",
+    "SizeM",
+    "StructureSection",
+]
+
+SCHEMA_VERSION: Final = 1
+"""The version of the file format that this release reads and writes."""
+
+
+def _check_version(version: int) -> int:
+    """Refuse a file of another version of the format."""
+    if version != SCHEMA_VERSION:
+        raise ValueError(f"must be {SCHEMA_VERSION}, the only version that this release reads")
+    return version
+
+
+class Scenario(Section):
+    """A protective-layout problem: everything but the layout and the seed.
+
+    Attributes:
+        schema_version: Version of the file format.
+        name: Short name, as in `load_scenario("courtyard")`.
+        description: What the scenario models, for people.
+        site: The simulated area.
+        charge: Where the charge comes from: one source or several with weights.
+        structures: Structures, protected or not.
+        build_zone: Where barrier modules may be placed; without it, nowhere.
+        simulation: Parameters of the blast model.
+        calibration: Name of the calibration that turns impulses into pascal seconds.
+    """
+
+    schema_version: Annotated[StrictInt, AfterValidator(_check_version)]
+    name: Name
+    description: Annotated[str, Field(max_length=2000)] = ""
+    site: Site
+    charge: Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
+    structures: Annotated[tuple[AnyStructure, ...], Field(min_length=1, max_length=100)]
+    build_zone: BuildZone | None = None
+    simulation: SimulationSection = SimulationSection()
+    calibration: Name | None = None
+
+    @property
+    def parameters(self) -> SimulationParameters:
+        """The parameters of the blast model."""
+        return self.simulation.parameters
+
+    @property
+    def charge_radius_m(self) -> float:
+        """Radius of the disc that the charge fills at the start."""
+        return charge_radius_m(self.parameters)
+
+    @property
+    def content_hash(self) -> str:
+        """SHA-256 of everything that affects a result: not of the words for people.
+
+        Two scenarios that differ only in name, description, the reasons of keep-outs, the order
+        of keys or in how they arrive at the same simulation parameters have the same hash.
+        """
+        content = self.model_dump(mode="json", exclude={"name", "description", "simulation"})
+        for keep_out in (content["build_zone"] or {}).get("keep_outs", ()):
+            del keep_out["reason"]
+        content["parameters"] = self.parameters.model_dump(mode="json")
+        text = json.dumps(_without_negative_zero(content), sort_keys=True, allow_nan=False)
+        return sha256(text.encode()).hexdigest()
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any], source: str) -> "Scenario":
+        """Return the scenario that a parsed file describes.
+
+        Args:
+            document: Nested like the models.
+            source: Name of the file, for the error.
+
+        Raises:
+            ScenarioError: If anything is wrong; all problems are in it.
+        """
+        try:
+            return cls.model_validate(document)
+        except ValidationError as error:
+            problems = problems_from(error, cls)
+        # Pydantic skips the checks between sections if any section is unsound.
+        problems += check_parts(sound_parts(document))
+        raise ScenarioError(source, dict.fromkeys(problems))
+
+    def at_stand_off(self, distance_m: float) -> "Scenario":
+        """Return the scenario with the structure at another distance from the charge.
+
+        The structure moves along x, and the site's right border with it: the strip behind the
+        structure keeps its width.
+
+        Args:
+            distance_m: Distance from the charge's centre to the near face of the structure.
+
+        Raises:
+            BlastEnvError: If there is not exactly one structure, to the right of a charge at one
+                fixed point, or if the distance is not positive.
+            ScenarioError: If the scenario would be out of bounds.
+        """
+        source, structure = self.charge[0], self.structures[0]
+        single = len(self.charge) == len(self.structures) == 1
+        if not (single and isinstance(source, PointSource)):
+            raise BlastEnvError(f"{self.name}: needs one point charge and one structure to move")
+        x_m, near_m = source.position_m[0], structure.rectangle_m.left
+        if near_m <= x_m:
+            raise BlastEnvError(f"{self.name}: the structure must stand to the right of the charge")
+        if not distance_m > 0.0:
+            raise BlastEnvError(f"stand-off is {distance_m} m, must be greater than 0")
+        strip_m = self.site.width_m - structure.rectangle_m.right
+        corner_m = (x_m + distance_m, structure.corner_m[1])
+        document = self.model_dump()
+        document["structures"][0]["corner_m"] = corner_m
+        document["site"]["width_m"] = corner_m[0] + structure.columns * MODULE_SIDE_M + strip_m
+        return Scenario.from_document(document, f"{self.name} at {distance_m:g} m")
+
+    def with_charge(self, charge: Charge) -> "Scenario":
+        """Return the scenario with the charge at one fixed point.
+
+        Raises:
+            ScenarioError: If the charge would not be clear of a structure or the border.
+        """
+        document = self.model_dump()
+        document["charge"] = [{"kind": "point", **charge._asdict()}]
+        return Scenario.from_document(document, self.name)
+
+    def with_simulation(
+        self, preset: str | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
+    ) -> "Scenario":
+        """Return the scenario with other parameters of the blast model.
+
+        Args:
+            preset: Name of another preset; the scenario's overrides stay.
+            overrides: Added to the scenario's: `{"air": {"spacing_units": 3.0}}`.
+
+        Raises:
+            ScenarioError: If there is no such preset or parameter, or a value is out of bounds.
+        """
+        document = self.model_dump()
+        simulation = document["simulation"]
+        simulation["preset"] = preset or simulation["preset"]
+        for group, values in (overrides or {}).items():
+            old = simulation["overrides"].get(group, {})
+            simulation["overrides"][group] = {**old, **values}
+        return Scenario.from_document(document, self.name)
+
+    def sample_charge(self, rng: np.random.Generator) -> Charge:
+        """Draw a charge: a source by its weight, then a place in it."""
+        weights = np.array([source.weight for source in self.charge])
+        # Drawn also for a single source, so that adding one does not shift the stream.
+        chosen = int(rng.choice(len(weights), p=weights / weights.sum()))
+        source = self.charge[chosen]
+        return Charge(source.sample_position_m(rng), source.tnt_kg)
+
+    @model_validator(mode="after")
+    def _check_sections_together(self) -> Self:
+        """Refuse a scenario whose sections do not fit each other."""
+        problems = check_parts(
+            Parts(
+                site=self.site,
+                sources=dict(enumerate(self.charge)),
+                structures=dict(enumerate(self.structures)),
+                all_structures=True,
+                build_zone=self.build_zone,
+                parameters=self.parameters,
+            )
+        )
+        if problems:
+            raise ScenarioError(self.name, problems)
+        return self
+
+
+def _without_negative_zero(value: Any) -> Any:
+    """Return nested values with every -0.0 made 0.0, which is the same place on a site."""
+    if isinstance(value, dict):
+        return {key: _without_negative_zero(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_negative_zero(item) for item in value]
+    return value + 0.0 if isinstance(value, float) else value

@@ -1,0 +1,239 @@
+"""What can be wrong with a scenario, as sentences for the person who wrote it."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from types import UnionType
+from typing import Any, Final, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from blast_env.errors import BlastEnvError, suggestion
+from blast_env.scenario.wording import alternatives, key_path, type_word, value_text
+
+KeyParts = tuple[str | int, ...]
+
+MAX_PROBLEMS: Final = 1000
+"""More problems than this are counted only: no person reads them, and naming them takes long."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong.
+
+    Attributes:
+        key: Path of the key, e.g. `structures[1].rows`; a place such as `line 3, column 5` if the
+            text could not be read; empty if the file as a whole is meant.
+        message: What is wrong, with the value and its bound.
+    """
+
+    key: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.message}" if self.key else self.message
+
+    def below(self, parts: KeyParts) -> "Problem":
+        """Return the problem with its key understood as lying below `parts`."""
+        above = key_path(parts)
+        joint = "." if above and self.key and not self.key.startswith("[") else ""
+        return Problem(f"{above}{joint}{self.key}", self.message)
+
+
+class ScenarioError(BlastEnvError):
+    """A scenario that cannot be used; the message has one line for each problem.
+
+    Args:
+        source: The file, or a name for where the scenario came from.
+        problems: All that is wrong.
+
+    Attributes:
+        source: As given.
+        problems: As given.
+    """
+
+    def __init__(self, source: str, problems: Iterable[Problem]) -> None:
+        self.source = source
+        self.problems = tuple(problems)
+        super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
+
+    def __reduce__(self) -> tuple[type["ScenarioError"], tuple[str, tuple[Problem, ...]]]:
+        return type(self), (self.source, self.problems)
+
+
+def unknown_key(parts: KeyParts, known: Iterable[str]) -> Problem:
+    """Return the problem of a key that does not exist, with the nearest one that does."""
+    names = list(known)
+    nearest = suggestion(str(parts[-1]), names) or f"; known: {', '.join(names)}"
+    return Problem(key_path(parts), f"unknown key{nearest}")
+
+
+def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return the message for a name that does not exist, with the nearest one that does."""
+    names = sorted(known)
+    nearest = suggestion(name, names) or f"; known: {', '.join(names)}"
+    return f"is {value_text(name)}, there is no such {kind}{nearest}"
+
+
+def problems_from(
+    error: ValidationError, model: type[BaseModel], prefix: KeyParts = ()
+) -> tuple[Problem, ...]:
+    """Translate what pydantic found.
+
+    Args:
+        error: The error that `model` raised.
+        model: The model that was validated.
+        prefix: Where the validated value lies in the file.
+    """
+    details = error.errors(include_url=False)
+    problems: list[Problem] = []
+    for detail in details[:MAX_PROBLEMS]:
+        problems += (problem.below(prefix) for problem in _translated(detail, model))
+    if len(details) > MAX_PROBLEMS:
+        problems.append(Problem("", f"{len(details) - MAX_PROBLEMS} more problems"))
+    return tuple(problems)
+
+
+def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Problem]:
+    """Yield the problems that one pydantic error stands for."""
+    kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        parts, annotation = _followed(model, detail["loc"])
+        yield from _kind_problems(parts, annotation, value, context["discriminator"].strip("'"))
+        return
+    if kind == "extra_forbidden":
+        parts, annotation = _followed(model, detail["loc"][:-1])
+        yield unknown_key((*parts, detail["loc"][-1]), _options(annotation)[0].model_fields)
+        return
+    parts, annotation = _followed(model, detail["loc"])
+    if kind == "value_error" and isinstance(cause := context["error"], ScenarioError):
+        yield from (problem.below(parts) for problem in cause.problems)
+    # Pydantic counts only the sound items of an array; the others have their own errors.
+    elif kind != "too_short" or len(value) < context["min_length"]:
+        yield Problem(key_path(parts), _sentence(detail, annotation))
+
+
+def _sentence(detail: ErrorDetails, annotation: object) -> str:
+    """Return the message for an error about one value."""
+    kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
+    if kind == "missing":
+        return "missing"
+    if kind in _BOUNDS:
+        key, words = _BOUNDS[kind]
+        return f"is {value_text(value)}, must be {words} {context[key]:.10g}"
+    if kind in _LENGTHS:
+        key, what, words = _LENGTHS[kind]
+        return f"has {len(value)} {what}, must have {words} {context[key]}"
+    if kind == "literal_error":
+        known = get_args(annotation)
+        nearest = suggestion(value, known) if isinstance(value, str) else ""
+        return f"is {value_text(value)}, must be {alternatives(known)}{nearest}"
+    if kind == "value_error":
+        return f"is {value_text(value)}, {context['error']}"
+    if kind not in _TYPES:
+        return f"is {value_text(value)}: {detail['msg']}"
+    if kind == "float_type" and isinstance(value, int) and not isinstance(value, bool):
+        return f"is {value_text(value)}, which is too large"
+    if kind == "tuple_type" and isinstance(value, Mapping):
+        return "is a table, must be an array (for a list of tables, write [[...]])"
+    return f"is {type_word(value)}, must be {_TYPES[kind]}"
+
+
+_BOUNDS: Final[Mapping[str, tuple[str, str]]] = {
+    "greater_than_equal": ("ge", "at least"),
+    "greater_than": ("gt", "greater than"),
+    "less_than_equal": ("le", "at most"),
+    "less_than": ("lt", "less than"),
+}
+_LENGTHS: Final[Mapping[str, tuple[str, str, str]]] = {
+    "too_short": ("min_length", "values", "at least"),
+    "too_long": ("max_length", "values", "at most"),
+    "string_too_short": ("min_length", "characters", "at least"),
+    "string_too_long": ("max_length", "characters", "at most"),
+}
+_TYPES: Final[Mapping[str, str]] = {
+    "bool_type": "true or false",
+    "dict_type": "a table",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "int_from_float": "a whole number",
+    "int_type": "a whole number",
+    "model_attributes_type": "a table",
+    "model_type": "a table",
+    "string_type": "a string",
+    "string_unicode": "a string of valid characters",
+    "tuple_type": "an array",
+}
+
+
+def _kind_problems(
+    parts: KeyParts, annotation: object, value: Mapping[str, Any], kind_key: str
+) -> Iterator[Problem]:
+    """Yield the problems of a table whose kind is missing or unknown.
+
+    Pydantic looks no further in such a table; where the kind can be guessed, this does.
+    """
+    models = {_tag(option, kind_key): option for option in _options(annotation)}
+    key, misspelt = kind_key, get_close_matches(kind_key, value, n=1)
+    if kind_key in value:
+        given = value[kind_key]
+        nearest = suggestion(given, models) if isinstance(given, str) else ""
+        message = f"is {value_text(given)}, must be {alternatives(models)}{nearest}"
+        yield Problem(key_path((*parts, kind_key)), message)
+    else:
+        yield Problem(key_path((*parts, kind_key)), f"missing, must be {alternatives(models)}")
+        if misspelt:
+            key = misspelt[0]
+            yield unknown_key((*parts, key), [kind_key])
+    given = value.get(key)
+    guess = get_close_matches(given, models, n=1) if isinstance(given, str) else []
+    if guess:
+        rest = {name: item for name, item in value.items() if name != key}
+        try:
+            models[guess[0]].model_validate({**rest, kind_key: guess[0]})
+        except ValidationError as error:
+            yield from problems_from(error, models[guess[0]], parts)
+
+
+def _followed(model: type[BaseModel], location: KeyParts) -> tuple[KeyParts, Any]:
+    """Return the keys of a pydantic location, without union tags, and the annotation there."""
+    parts: list[str | int] = []
+    annotation: Any = model
+    for part in location:
+        options = _options(annotation)
+        if len(options) > 1:
+            annotation = next(option for option in options if _has_tag(option, part))
+            continue
+        parts.append(part)
+        arguments = get_args(options[0])
+        if isinstance(part, int):
+            annotation = arguments[0]
+        elif arguments:
+            annotation = arguments[1]
+        else:
+            field = options[0].model_fields.get(part)
+            annotation = None if field is None else field.annotation
+    return tuple(parts), annotation
+
+
+def _options(annotation: Any) -> tuple[Any, ...]:
+    """Return the members of a union without `None`, or the one type that there is."""
+    if hasattr(annotation, "__metadata__"):
+        return _options(annotation.__origin__)
+    if get_origin(annotation) in (Union, UnionType):
+        return tuple(member for member in get_args(annotation) if member is not type(None))
+    return (annotation,)
+
+
+def _tag(model: type[BaseModel], kind_key: str) -> str:
+    """Return the value of a model's `kind`."""
+    return str(get_args(model.model_fields[kind_key].annotation)[0])
+
+
+def _has_tag(model: type[BaseModel], tag: str | int) -> bool:
+    """Whether one of the model's literal fields has this value."""
+    return any(
+        get_origin(field.annotation) is Literal and tag in get_args(field.annotation)
+        for field in model.model_fields.values()
+    )

@@ -1,0 +1,201 @@
+"""A scene: everything that an engine needs to run one blast, as plain arrays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from blast_env.geometry import Rectangle
+from blast_env.physics.parameters import SimulationParameters
+from blast_env.physics.particles import Balls, air_lattice, explosion_fan
+from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
+from blast_env.scenario import Cell, Charge, Scenario, check_layout
+from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
+from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """The initial state of one blast, in simulation units.
+
+    Attributes:
+        site: The simulated area.
+        charge_centre: Centre of the charge.
+        charge: The charge in metres and kilograms.
+        balls: All balls; air first, then the charge.
+        structures: The structures and, when there is one, the barrier; see `obstacles`.
+        parameters: Parameters of the blast model.
+    """
+
+    site: Rectangle
+    charge_centre: tuple[float, float]
+    charge: Charge
+    balls: Balls
+    structures: tuple["StructureOutline", ...]
+    parameters: SimulationParameters
+
+    @cached_property
+    def impulse_quantum(self) -> float:
+        """The power of two, simulation units, of which every recorded impulse is a multiple.
+
+        About 2^-36 of the largest momentum at the start, which is far below what matters. Sums of
+        recorded impulses are then exact, up to 2^17 such momenta, in any order and however they
+        are cut into parts: the rewards of an episode add up to the impulse of the blast.
+        """
+        momentum = self.balls.mass * np.hypot(*self.balls.velocity.T)
+        return float(2.0 ** (np.ceil(np.log2(momentum.max())) - 36))
+
+    @property
+    def largest_exact_impulse(self) -> float:
+        """Up to here sums of recorded impulses are exact, simulation units."""
+        return self.impulse_quantum * 2.0**53
+
+    def round_impulse(self, impulse: float) -> float:
+        """Return an impulse rounded to a multiple of the quantum."""
+        return round(impulse / self.impulse_quantum) * self.impulse_quantum
+
+    def obstacles(self) -> tuple[ModularObstacle, ...]:
+        """Return fresh obstacles without any hit, in the order of `structures`."""
+        return tuple(outline.build() for outline in self.structures)
+
+
+@dataclass(frozen=True)
+class StructureOutline:
+    """What a structure is before any blast; attributes as in `ModularObstacle`."""
+
+    kind: type[ModularObstacle]
+    name: str
+    corner: tuple[float, float]
+    rows: int
+    columns: int
+    protected: bool
+    weight: float
+    cells: tuple[Cell, ...] | None
+    capacity: float | None
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """The rectangle of the whole grid, units."""
+        size = (self.columns * MODULE_SIDE_UNITS, self.rows * MODULE_SIDE_UNITS)
+        return Rectangle.from_corner(self.corner, size)
+
+    def build(self) -> ModularObstacle:
+        """Return the obstacle with all its parts unloaded."""
+        return self.kind(
+            name=self.name,
+            corner=self.corner,
+            rows=self.rows,
+            columns=self.columns,
+            protected=self.protected,
+            weight=self.weight,
+            cells=self.cells,
+            capacity=self.capacity,
+        )
+
+
+def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
+    """Return independent generators for the charge, the fan and the air.
+
+    Separate streams, so that a charge fixed by hand leaves fan and air as they were.
+
+    Raises:
+        ValueError: If the seed is negative.
+    """
+    if seed < 0:
+        raise ValueError(f"seed is {seed}, must be at least 0")
+    return tuple(np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3))
+
+
+def build_scene(
+    scenario: Scenario,
+    layout: Sequence[Cell] = (),
+    seed: int = 0,
+    charge: Charge | None = None,
+) -> Scene:
+    """Lay out a scenario for one blast.
+
+    Args:
+        scenario: The scenario.
+        layout: (row, column) of the build-zone cells that hold a barrier module.
+        seed: Decides the charge (where the scenario leaves it open), the fan's phase and the
+            air's jitter. The barrier does not shift any of them.
+        charge: The charge, instead of one drawn from the scenario.
+
+    Raises:
+        LayoutError: If the layout does not fit the build zone, or the charge.
+        ScenarioError: If the charge is not clear of a structure or the border.
+        ValueError: If the seed is negative.
+    """
+    cells = check_layout(scenario, layout)
+    if charge is not None:
+        check_layout(scenario.with_charge(charge), cells)
+    charge_rng, fan_rng, air_rng = random_streams(seed)
+    drawn = scenario.sample_charge(charge_rng)
+    charge = drawn if charge is None else charge
+    parameters = scenario.parameters
+    site = scenario.site.rectangle_m.scaled(UNITS_PER_M)
+    structures = tuple(_outline(section) for section in scenario.structures)
+    if cells:
+        structures += (_barrier_outline(scenario, cells),)
+    centre = (charge.position_m[0] * UNITS_PER_M, charge.position_m[1] * UNITS_PER_M)
+    air = air_lattice(
+        parameters.air,
+        site,
+        _solid_rectangles(structures),
+        centre,
+        parameters.explosive.offset_units + parameters.explosive.radius_units,
+        air_rng,
+    )
+    fan = explosion_fan(parameters.explosive, centre, charge.tnt_kg, fan_rng)
+    return Scene(
+        site=site,
+        charge_centre=centre,
+        charge=charge,
+        balls=Balls.concatenate((air, fan)),
+        structures=structures,
+        parameters=parameters,
+    )
+
+
+def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]:
+    """Return rectangles that cover the modules: whole grids, and single cells of a barrier."""
+    rectangles: list[Rectangle] = []
+    for outline in structures:
+        if outline.cells is None:
+            rectangles.append(outline.rectangle)
+        else:
+            rectangles.extend(part.rectangle for part in outline.build().parts)
+    return rectangles
+
+
+def _outline(section: AnyStructure) -> StructureOutline:
+    is_square = isinstance(section, ConcreteSquareSection)
+    return StructureOutline(
+        kind=ConcreteSquare if is_square else ModularObstacle,
+        name=section.name,
+        corner=(section.corner_m[0] * UNITS_PER_M, section.corner_m[1] * UNITS_PER_M),
+        rows=section.rows,
+        columns=section.columns,
+        protected=section.protected,
+        weight=section.weight,
+        cells=None,
+        capacity=section.module_capacity,
+    )
+
+
+def _barrier_outline(scenario: Scenario, cells: tuple[Cell, ...]) -> StructureOutline:
+    zone = scenario.build_zone
+    if zone is None:  # check_layout refuses a layout without a zone
+        raise AssertionError("a layout was accepted without a build zone")
+    return StructureOutline(
+        kind=ModularObstacle,
+        name=BARRIER_NAME,
+        corner=(zone.corner_m[0] * UNITS_PER_M, zone.corner_m[1] * UNITS_PER_M),
+        rows=zone.rows,
+        columns=zone.columns,
+        protected=False,
+        weight=1.0,
+        cells=cells,
+        capacity=zone.module_capacity,
+    )

@@ -1,0 +1,266 @@
+"""Running a blast: a pure function of scenario, layout, seed and engine."""
+
+import platform
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.physics.collisions import CollisionArray
+from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, find_engine
+from blast_env.physics.structure import ModularObstacle
+from blast_env.recording.tables import collision_table, module_table, structure_table
+from blast_env.scenario import Cell, Charge, Scenario
+from blast_env.scene import Scene, build_scene
+
+_PROGRESS_CALLS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Blast:
+    """One blast that can be run: what `simulate` is called with.
+
+    Attributes:
+        scenario: The scenario.
+        layout: Cells of the build zone that hold a barrier module.
+        seed: Decides the charge, where the scenario leaves it open, the fan and the air.
+        engine: The engine that runs it.
+        charge: The charge, instead of one drawn from the scenario.
+    """
+
+    scenario: Scenario
+    layout: Sequence[Cell] = ()
+    seed: int = 0
+    engine: str | Engine = "pymunk"
+    charge: Charge | None = None
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The initial state."""
+        return build_scene(self.scenario, self.layout, self.seed, self.charge)
+
+    def with_charge_at(self, position_m: Sequence[float]) -> "Blast":
+        """Return the same blast with the charge at (x, y) and the mass that it had.
+
+        Raises:
+            BlastEnvError: If that is not a pair of finite numbers.
+        """
+        try:
+            x_m, y_m = (float(coordinate) for coordinate in position_m)
+        except (TypeError, ValueError):
+            raise BlastEnvError(
+                f"charge_position_m is {position_m!r}, must be a pair of numbers (x, y)"
+            ) from None
+        return replace(self, charge=Charge((x_m, y_m), self.scene.charge.tnt_kg))
+
+    def start(self) -> BlastRun:
+        """Return a run at time 0."""
+        return find_engine(self.engine).start(self.scene)
+
+    def run(self, progress: Callable[[float], None] | None = None) -> "BlastResult":
+        """Run the blast to its end.
+
+        Args:
+            progress: Called from time to time with the share of the time limit that has passed.
+        """
+        run = self.start()
+        limit_s = self.scene.parameters.stepping.time_limit_s
+        while run.end_reason is None:
+            run.advance(np.inf if progress is None else run.time_s + limit_s / _PROGRESS_CALLS)
+            if progress is not None:
+                progress(min(run.time_s / limit_s, 1.0))
+        return self.result(run)
+
+    def result(self, run: BlastRun) -> "BlastResult":
+        """Return what happened in a run that has ended.
+
+        Raises:
+            ValueError: If the run has not ended.
+        """
+        if run.end_reason is None:
+            raise ValueError(f"the run is at {run.time_s} s and has not ended: advance it first")
+        engine = find_engine(self.engine)
+        return BlastResult(
+            blast=self,
+            engine_name=engine.name,
+            engine_version=engine.version,
+            collision_array=run.log.to_array(),
+            obstacles=run.obstacles,
+            final_balls=run.balls(),
+            time_s=run.time_s,
+            steps=run.steps,
+            end_reason=run.end_reason,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BlastResult:
+    """What happened in a blast.
+
+    Attributes:
+        blast: What was run.
+        engine_name: Name of the engine.
+        engine_version: Version of the library that did the physics.
+        collision_array: The collisions with modules, of `COLLISION_DTYPE` (n,).
+        obstacles: The structures and, with a layout, the barrier, with the hits they took.
+        final_balls: The balls that were left at the end.
+        time_s: Simulated time at the end.
+        steps: Steps of the engine.
+        end_reason: Why the run ended.
+    """
+
+    blast: Blast
+    engine_name: str
+    engine_version: str
+    collision_array: CollisionArray
+    obstacles: tuple[ModularObstacle, ...]
+    final_balls: BallStates
+    time_s: float
+    steps: int
+    end_reason: EndReason
+
+    @cached_property
+    def collisions(self) -> pd.DataFrame:
+        """One row a collision; the columns are `recording.tables.COLLISION_COLUMNS`."""
+        return collision_table(self.collision_array, self.obstacles)
+
+    @cached_property
+    def modules(self) -> pd.DataFrame:
+        """One row a module; the columns are `recording.tables.MODULE_COLUMNS`."""
+        return module_table(self.obstacles)
+
+    @cached_property
+    def structures(self) -> pd.DataFrame:
+        """One row a structure; the columns are `recording.tables.STRUCTURE_COLUMNS`."""
+        return structure_table(self.obstacles)
+
+    def obstacle(self, name: str) -> ModularObstacle:
+        """Return a structure, or the barrier, by its name.
+
+        Raises:
+            UnknownNameError: If there is none of that name; the message names the nearest one.
+        """
+        by_name = {obstacle.name: obstacle for obstacle in self.obstacles}
+        if name not in by_name:
+            raise UnknownNameError("structure", name, by_name)
+        return by_name[name]
+
+    def impulse_sim(self, structure: str) -> float:
+        """Return the sum of m |v| over the collisions with a structure, simulation units.
+
+        Args:
+            structure: Name of the structure.
+
+        Raises:
+            UnknownNameError: If there is no structure of that name.
+        """
+        return self.obstacle(structure).impulse
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the whole outcome, as hexadecimal digits.
+
+        Two runs have the same digest exactly if all collisions, all module loads, the end and
+        all balls that were left are the same to the last bit.
+        """
+        state = sha256(self.collision_array.tobytes())
+        loads = [
+            (part.x, part.y, part.hits, part.impulse, part.transferred_impulse)
+            for obstacle in self.obstacles
+            for part in obstacle.parts
+        ]
+        state.update(np.array(loads).tobytes())
+        balls = self.final_balls
+        for array in (balls.index, balls.position, balls.velocity, balls.mass, balls.radius):
+            state.update(np.ascontiguousarray(array).tobytes())
+        state.update(np.array([self.time_s, self.steps]).tobytes())
+        return state.hexdigest()
+
+    @cached_property
+    def run_record(self) -> dict[str, str | int | float]:
+        """Everything needed to repeat the run: what was run, with which versions."""
+        blast, charge = self.blast, self.blast.scene.charge
+        record: dict[str, str | int | float] = {
+            "scenario": blast.scenario.name,
+            "scenario hash": blast.scenario.content_hash,
+            "layout (row, column)": " ".join(f"{row},{column}" for row, column in blast.layout),
+            "seed": blast.seed,
+            "charge x (m)": charge.position_m[0],
+            "charge y (m)": charge.position_m[1],
+            "charge TNT equivalent (kg)": charge.tnt_kg,
+            "engine": self.engine_name,
+            "engine version": self.engine_version,
+            "blast-env version": version("blast-env"),
+            "python version": platform.python_version(),
+            "numpy version": np.__version__,
+            "balls at the start": len(blast.scene.balls),
+            "balls at the end": len(self.final_balls),
+            "steps": self.steps,
+            "simulated time (s)": self.time_s,
+            "ended because": str(self.end_reason),
+            "digest": self.digest,
+        }
+        for group, values in blast.scenario.parameters.model_dump().items():
+            record |= {f"parameter {group}.{name}": value for name, value in values.items()}
+        return record
+
+    def to_excel(self, path: str | Path) -> Path:
+        """Write a workbook with collisions, modules, structures and the run record.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        from blast_env.recording.excel import write_workbook
+
+        return write_workbook(self, Path(path))
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write the collision table as Parquet, the run record in its metadata.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        from blast_env.recording.parquet import write_parquet
+
+        return write_parquet(self, Path(path))
+
+
+def simulate(
+    scenario: Scenario,
+    layout: Sequence[Cell] = (),
+    seed: int = 0,
+    engine: str | Engine = "pymunk",
+    charge: Charge | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> BlastResult:
+    """Run a blast to its end.
+
+    The result is a pure function of the arguments, to the last bit and in any process.
+
+    Args:
+        scenario: The scenario; see `load_scenario`.
+        layout: (row, column) of the build-zone cells that hold a barrier module.
+        seed: Decides the charge, where the scenario leaves it open, the fan and the air.
+        engine: Name of an engine, or an engine.
+        charge: The charge, instead of one drawn from the scenario.
+        progress: Called from time to time with the share of the time limit that has passed.
+
+    Raises:
+        LayoutError: If the layout does not fit the build zone.
+        UnknownNameError: If there is no such engine.
+        ScenarioError: If the charge is not clear of a structure or the border.
+        ValueError: If the seed is negative.
+    """
+    return Blast(scenario, tuple(layout), seed, engine, charge).run(progress)

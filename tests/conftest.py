@@ -1,0 +1,7 @@
+"""Settings for all tests."""
+
+import os
+
+# Windows of render_mode="human" need no screen here. Set before pygame is imported.
+os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")

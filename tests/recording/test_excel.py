@@ -1,0 +1,293 @@
+import tempfile
+from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
+
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.recording.excel import EXCEL_ROWS, write_workbook
+from blast_env.recording.excel_cells import record_cells
+from blast_env.recording.tables import COLLISION_COLUMNS, MODULE_COLUMNS, STRUCTURE_COLUMNS
+from blast_env.simulation import BlastResult
+from tests.recording import workbooks
+from tests.recording.conftest import SEED
+
+TABLES = (
+    ("Structures", "structures"),
+    ("Modules", "modules"),
+    ("Collisions", "collisions"),
+)
+
+
+@pytest.fixture(scope="module")
+def workbook(blast: BlastResult, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    path = tmp_path_factory.mktemp("workbook") / "blast.xlsx"
+    assert blast.to_excel(path) == path
+    return workbooks.load(path)
+
+
+def run_record(sheet: Any) -> dict[str, Any]:
+    return dict(workbooks.rows(sheet)[1:])
+
+
+def test_sheets(workbook: Any) -> None:
+    names = ["Run", "Structures", "Modules", "Collisions", "Most loaded", "Columns"]
+    assert workbook.sheetnames == names
+
+
+@pytest.mark.parametrize(("sheet", "attribute"), TABLES)
+def test_a_sheet_has_the_values_of_its_table(
+    workbook: Any, blast: BlastResult, sheet: str, attribute: str
+) -> None:
+    written = workbooks.rows(workbook[sheet])[1:]
+    assert written == workbooks.expected(getattr(blast, attribute))
+
+
+def test_headings_have_units(workbook: Any) -> None:
+    assert workbooks.rows(workbook["Structures"])[0] == [
+        "structure",
+        "kind",
+        "protected",
+        "weight",
+        "modules",
+        "hits",
+        "impulse, m|v| (sim)",
+        "transferred impulse (sim)",
+        "first hit (s)",
+        "modules destroyed",
+    ]
+    collisions = workbooks.rows(workbook["Collisions"])[0]
+    for heading in ("time (s)", "vx (sim units/s)", "mass (sim mass)", "angle (deg)"):
+        assert heading in collisions
+
+
+@pytest.mark.parametrize(
+    ("sheet", "columns"),
+    [
+        ("Structures", STRUCTURE_COLUMNS),
+        ("Modules", MODULE_COLUMNS),
+        ("Collisions", COLLISION_COLUMNS),
+    ],
+)
+def test_every_column_is_explained_in_a_note_and_on_a_sheet(
+    workbook: Any, sheet: str, columns: Any
+) -> None:
+    meanings = [column.meaning for column in columns]
+    assert [cell.comment.text for cell in workbook[sheet][1]] == meanings
+    explained = [row for row in workbooks.rows(workbook["Columns"]) if row[0] == sheet]
+    assert [row[1] for row in explained] == workbooks.rows(workbook[sheet])[0]
+    assert [row[3] for row in explained] == meanings
+
+
+def test_the_collisions_add_up_to_the_impulse_on_each_structure(
+    workbook: Any, blast: BlastResult
+) -> None:
+    heading, *rows = workbooks.rows(workbook["Collisions"])
+    structure, impulse = heading.index("structure"), heading.index("impulse, m|v| (sim)")
+    for name in blast.structures["structure"]:
+        total = sum(row[impulse] for row in rows if row[structure] == name)
+        assert total == pytest.approx(blast.impulse_sim(name), rel=1e-12)
+
+
+def test_the_run_sheet_has_the_run_record(workbook: Any, blast: BlastResult) -> None:
+    written, record = run_record(workbook["Run"]), blast.run_record
+    assert list(written) == list(record)
+    for name in ("scenario", "layout (row, column)", "digest", "engine version", "steps"):
+        assert written[name] == record[name]
+    assert written["parameter explosive.ball_count"] == 480
+    assert written["parameter explosive.collide_within_charge"] == "no"
+
+
+def test_a_seed_that_excel_would_round_is_kept_as_text(workbook: Any) -> None:
+    assert run_record(workbook["Run"])["seed"] == str(SEED)
+
+
+def test_headings_are_frozen_and_tables_have_filters(workbook: Any) -> None:
+    for sheet in workbook:
+        assert sheet.freeze_panes == "A2"
+        if sheet.title != "Run":
+            assert sheet.auto_filter.ref == sheet.dimensions
+
+
+def test_numbers_have_the_format_of_their_unit(workbook: Any) -> None:
+    headings, first = workbook["Collisions"]["1:2"]
+    formats = {
+        heading.value: cell.number_format for heading, cell in zip(headings, first, strict=True)
+    }
+    assert formats["time (s)"] == "0.000000"
+    assert formats["impulse, m|v| (sim)"] == "#,##0.00"
+    assert formats["particle id"] == "0"
+
+
+def test_no_number_is_wider_than_its_column(workbook: Any) -> None:
+    for sheet in (workbook["Structures"], workbook["Modules"], workbook["Collisions"]):
+        for column in sheet.iter_cols(min_row=2):
+            numbers = [cell for cell in column if isinstance(cell.value, int | float)]
+            shown = [len(f"{cell.value:,.{_decimals(cell)}f}") for cell in numbers]
+            if shown:
+                assert max(shown) < sheet.column_dimensions[numbers[0].column_letter].width
+
+
+def _decimals(cell: Any) -> int:
+    return len(cell.number_format.partition(".")[2])
+
+
+def test_charts_show_the_most_loaded_modules_in_order(workbook: Any, blast: BlastResult) -> None:
+    modules = blast.modules[blast.modules["hits"] > 0].set_index("module_id")
+    protected, barrier = workbook["Run"]._charts
+    for chart, names in ((protected, ["building", "facade"]), (barrier, ["barrier"])):
+        loads = modules[modules["structure"].isin(names)]["impulse_sim"]
+        loads = loads.sort_values(ascending=False, kind="stable").head(30)
+        shown: dict[str, float] = {}
+        for series in chart.series:
+            module_ids = workbooks.cells(workbook, workbooks.reference(series, "cat"))
+            impulses = workbooks.cells(workbook, workbooks.reference(series, "val"))
+            assert module_ids == loads.index.tolist()
+            shown |= {m: i for m, i in zip(module_ids, impulses, strict=True) if i is not None}
+        assert shown == pytest.approx(loads.to_dict(), rel=1e-15)
+        assert [series.tx.v for series in chart.series] == names
+
+
+def test_charts_say_what_they_show(workbook: Any, blast: BlastResult) -> None:
+    protected, barrier = workbook["Run"]._charts
+    total = blast.impulse_sim("building") + blast.impulse_sim("facade")
+    hit = blast.modules[blast.modules["structure"].isin(["building", "facade"])]["hits"].gt(0)
+    assert hit.sum() > 30
+    assert workbooks.title(protected) == (
+        f"Impulse on the protected structures: {total:,.0f} (sim), "
+        f"the 30 most loaded of {hit.sum()} modules hit"
+    )
+    assert workbooks.title(barrier).endswith("(sim), 3 modules hit")
+    for chart in (protected, barrier):
+        assert workbooks.title(chart.y_axis) == "impulse, m|v| (sim)"
+        assert workbooks.title(chart.x_axis) == "module, by its centre (m)"
+
+
+def test_charts_carry_their_values_for_programs_that_do_not_calculate(workbook: Any) -> None:
+    for chart in workbook["Run"]._charts:
+        for series in chart.series:
+            cached = {point.idx: float(point.v) for point in series.val.numRef.numCache.pt}
+            in_cells = workbooks.cells(workbook, workbooks.reference(series, "val"))
+            assert cached == {
+                index: pytest.approx(value)
+                for index, value in enumerate(in_cells)
+                if value is not None
+            }
+
+
+def test_a_blast_without_a_hit_has_empty_tables_and_no_chart(
+    quiet_blast: BlastResult, tmp_path: Path
+) -> None:
+    workbook = workbooks.load(quiet_blast.to_excel(tmp_path / "quiet.xlsx"))
+    assert workbook["Collisions"].max_row == 1
+    assert workbook["Modules"].max_row == 1 + len(quiet_blast.modules)
+    assert not workbook["Run"]._charts
+
+
+@pytest.mark.parametrize("sheets", [1, 2, 3])
+def test_a_long_table_goes_on_in_further_sheets(
+    blast: BlastResult, tmp_path: Path, sheets: int
+) -> None:
+    per_sheet = -(-len(blast.collisions) // sheets)
+    path = write_workbook(blast, tmp_path / "long.xlsx", max_rows_per_sheet=per_sheet + 1)
+    workbook = workbooks.load(path)
+    names = ["Collisions", "Collisions 2", "Collisions 3"][:sheets]
+    assert [name for name in workbook.sheetnames if "Collisions" in name] == names
+    parts = [workbooks.rows(workbook[name]) for name in names]
+    assert all(part[0] == parts[0][0] for part in parts)
+    assert max(len(part) for part in parts) == per_sheet + 1
+    times = [row[0] for part in parts for row in part[1:]]
+    assert times == pytest.approx(blast.collisions["time_s"].tolist(), rel=1e-15)
+
+
+def test_the_charts_do_not_depend_on_the_limit(blast: BlastResult, tmp_path: Path) -> None:
+    path = write_workbook(blast, tmp_path / "short.xlsx", max_rows_per_sheet=10)
+    workbook = workbooks.load(path)
+    series = workbook["Run"]._charts[0].series[0]
+    assert None not in workbooks.cells(workbook, workbooks.reference(series, "cat"))
+
+
+def test_a_long_layout_is_not_cut(blast: BlastResult) -> None:
+    layout = " ".join(f"{row},{column}" for row in range(100) for column in range(100))
+    lines = record_cells(layout)
+    assert max(len(str(line)) for line in lines) < 32_767  # what a cell can hold
+    assert " ".join(map(str, lines)) == layout
+
+
+def test_the_same_result_gives_the_same_bytes(blast: BlastResult, tmp_path: Path) -> None:
+    first, second = (blast.to_excel(tmp_path / f"{name}.xlsx") for name in "ab")
+    assert first.read_bytes() == second.read_bytes()
+    with ZipFile(first) as archive:
+        assert {entry.date_time[0] for entry in archive.infolist()} == {1980}
+        assert b"2000-01-01T00:00:00Z" in archive.read("docProps/core.xml")
+
+
+@pytest.mark.parametrize("name", ["blast.xls", "blast", "blast.parquet"])
+def test_another_suffix_is_refused_by_name(blast: BlastResult, tmp_path: Path, name: str) -> None:
+    with pytest.raises(BlastEnvError, match=rf"suffix {Path(name).suffix!r}, must have '\.xlsx'"):
+        write_workbook(blast, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("limit", [1, EXCEL_ROWS + 1])
+def test_a_limit_that_excel_cannot_have_is_refused(
+    blast: BlastResult, tmp_path: Path, limit: int
+) -> None:
+    with pytest.raises(ValueError, match=f"is {limit}, must be between 2 and {EXCEL_ROWS}"):
+        write_workbook(blast, tmp_path / "blast.xlsx", limit)
+
+
+@pytest.mark.parametrize(
+    ("error", "raised"),
+    [
+        (OSError(28, "No space left on device"), BlastEnvError),
+        (RuntimeError("a bug"), RuntimeError),
+        (KeyboardInterrupt(), KeyboardInterrupt),
+    ],
+)
+@pytest.mark.parametrize(
+    "step", ["blast_env.recording.excel.add_charts", "xlsxwriter.workbook.Packager"]
+)
+def test_a_failure_in_the_middle_leaves_nothing_behind(
+    blast: BlastResult,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    error: BaseException,
+    raised: type[BaseException],
+    step: str,
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    target = tmp_path / "target" / "blast.xlsx"
+    scratch = tmp_path / "scratch"
+    target.parent.mkdir()
+    scratch.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    monkeypatch.setattr(step, fail)
+    with pytest.raises(raised):
+        write_workbook(blast, target)
+    assert not list(target.parent.iterdir())
+    assert not list(scratch.iterdir())
+    target.write_bytes(b"old")
+    with pytest.raises(raised):
+        write_workbook(blast, target)
+    assert target.read_bytes() == b"old"
+    assert list(target.parent.iterdir()) == [target]
+
+
+@pytest.mark.parametrize("folder", ["nowhere", "file"])
+def test_a_folder_that_cannot_be_written_to_is_named(
+    blast: BlastResult, tmp_path: Path, folder: str
+) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(BlastEnvError, match=folder):
+        write_workbook(blast, tmp_path / folder / "blast.xlsx")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder closed even to root")
+def test_a_folder_closed_to_everybody(blast: BlastResult) -> None:
+    with pytest.raises(BlastEnvError, match=r"/proc/blast\.xlsx: cannot be written"):
+        write_workbook(blast, Path("/proc/blast.xlsx"))

@@ -1,0 +1,143 @@
+"""Valid scenario documents for the tests to damage."""
+
+import tomllib
+from collections.abc import Iterator
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from blast_env.scenario import Scenario, ScenarioError, bundled_scenarios
+
+REPOSITORY = Path(__file__).parents[2]
+Document = dict[str, Any]
+KeyPath = tuple[str | int, ...]
+
+_FULL: Document = {
+    "schema_version": 1,
+    "name": "full",
+    "description": 'Every key of the format, with "quotes", \\ and\nümlauts.',
+    "calibration": "some_calibration",
+    "site": {"width_m": 30, "height_m": 20.0},
+    "charge": [
+        {"kind": "point", "position_m": [2.0, 10.0], "tnt_kg": 50.0, "weight": 2.0},
+        {"kind": "segment", "start_m": [3.0, 2.0], "end_m": [5.0, 18.0], "tnt_kg": 100.0},
+        {"kind": "rectangle", "corner_m": [2.0, 2.0], "size_m": [3.0, 4.0], "tnt_kg": 10.0},
+    ],
+    "structures": [
+        {
+            "kind": "ModularObstacle",
+            "name": "house",
+            "corner_m": [20.0, 8.0],
+            "rows": 8,
+            "columns": 4,
+            "protected": True,
+            "weight": 3.0,
+        },
+        {
+            "kind": "ConcreteSquare",
+            "name": "bunker",
+            "corner_m": [15.0, 15.0],
+            "side_modules": 4,
+            "module_capacity": 500.0,
+        },
+    ],
+    "build_zone": {
+        "corner_m": [8.0, 5.0],
+        "rows": 20,
+        "columns": 10,
+        "stock": 12,
+        "module_capacity": 100.0,
+        "keep_outs": [{"corner_m": [8.0, 9.0], "size_m": [5.0, 1.0], "reason": "path"}],
+    },
+    "simulation": {
+        "preset": "ballistic",
+        "overrides": {
+            "air": {"spacing_units": 6.0, "jitter": 0.25},
+            "explosive": {"ball_count": 360, "collide_within_charge": False},
+        },
+    },
+}
+
+
+def full_document() -> Document:
+    """Return a valid document in which every key of the format occurs."""
+    return deepcopy(_FULL)
+
+
+def minimal_document() -> Document:
+    """Return a valid document with nothing but required keys."""
+    return {
+        "schema_version": 1,
+        "name": "minimal",
+        "site": {"width_m": 20.0, "height_m": 10.0},
+        "charge": [{"kind": "point", "position_m": [3.0, 5.0], "tnt_kg": 100.0}],
+        "structures": [
+            {
+                "kind": "ConcreteSquare",
+                "name": "house",
+                "corner_m": [10.0, 4.0],
+                "side_modules": 4,
+                "protected": True,
+            }
+        ],
+    }
+
+
+def all_documents() -> list[Document]:
+    """Return the documents above and those of the bundled scenarios."""
+    folder = REPOSITORY / "scenarios"
+    bundled = [
+        tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8"))
+        for name in bundled_scenarios()
+    ]
+    return [full_document(), minimal_document(), *bundled]
+
+
+def key_paths(value: object, path: KeyPath = ()) -> Iterator[KeyPath]:
+    """Yield the path of everything inside a document."""
+    if isinstance(value, dict):
+        items: list[tuple[str | int, object]] = list(value.items())
+    elif isinstance(value, list):
+        items = list(enumerate(value))
+    else:
+        return
+    for key, item in items:
+        yield (*path, key)
+        yield from key_paths(item, (*path, key))
+
+
+def value_at(document: Document, path: KeyPath) -> Any:
+    """Return what lies at a path."""
+    value: Any = document
+    for key in path:
+        value = value[key]
+    return value
+
+
+def changed(document: Document, path: KeyPath, value: object) -> Document:
+    """Return a copy with another value at a path; the last key may be new."""
+    copy = deepcopy(document)
+    value_at(copy, path[:-1])[path[-1]] = value
+    return copy
+
+
+def without(document: Document, path: KeyPath) -> Document:
+    """Return a copy without the key at a path."""
+    copy = deepcopy(document)
+    del value_at(copy, path[:-1])[path[-1]]
+    return copy
+
+
+def written(path: KeyPath) -> str:
+    """Return a path as messages write it."""
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
+    return text.removeprefix(".")
+
+
+def lines_for(document: Document) -> list[str]:
+    """Return the lines of the error that a document raises; none if it is valid."""
+    try:
+        Scenario.from_document(document, "f.toml")
+    except ScenarioError as error:
+        return str(error).split("\n")
+    return []

@@ -1,0 +1,100 @@
+import os
+from pathlib import Path
+
+import pytest
+
+from blast_env.atomic import write_atomically
+from blast_env.errors import BlastEnvError
+
+
+def test_file_appears_only_when_the_block_ends(tmp_path: Path) -> None:
+    target = tmp_path / "table.xlsx"
+    with write_atomically(target) as temporary:
+        assert temporary.parent == tmp_path
+        assert temporary.suffix == ".xlsx"
+        temporary.write_text("new")
+        assert not target.exists()
+    assert target.read_text() == "new"
+    assert os.listdir(tmp_path) == ["table.xlsx"]
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_interrupted_write_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, error: type[BaseException]
+) -> None:
+    target = tmp_path / "a.txt"
+    target.write_text("old")
+
+    def write_half() -> None:
+        with write_atomically(target) as temporary:
+            temporary.write_text("half")
+            raise error
+
+    with pytest.raises(error):
+        write_half()
+    assert target.read_text() == "old"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_existing_file_keeps_its_permissions(tmp_path: Path) -> None:
+    target = tmp_path / "a.txt"
+    target.write_text("old")
+    target.chmod(0o604)
+    with write_atomically(target) as temporary:
+        temporary.write_text("new")
+    assert target.stat().st_mode & 0o777 == 0o604
+
+
+def test_new_file_has_the_permissions_of_any_new_file(tmp_path: Path) -> None:
+    (tmp_path / "plain").write_text("")
+    with write_atomically(tmp_path / "a.txt"):
+        pass
+    assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_link_stays_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real.txt").write_text("old")
+    link = tmp_path / "link.txt"
+    link.symlink_to("real.txt")
+    with write_atomically(link) as temporary:
+        temporary.write_text("new")
+    assert link.is_symlink()
+    assert (tmp_path / "real.txt").read_text() == "new"
+
+
+def test_missing_folder_is_named(tmp_path: Path) -> None:
+    with (
+        pytest.raises(BlastEnvError, match=r"there is no folder '.*missing'"),
+        write_atomically(tmp_path / "missing" / "a.txt"),
+    ):
+        pass
+
+
+def test_folder_is_not_a_file(tmp_path: Path) -> None:
+    with pytest.raises(BlastEnvError, match="is a folder"), write_atomically(tmp_path):
+        pass
+
+
+def test_folder_without_write_permission_is_a_clear_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    # The superuser may write anywhere, so the refusal is made here.
+    monkeypatch.setattr(Path, "open", refuse)
+    with (
+        pytest.raises(BlastEnvError, match="cannot be written: Permission denied"),
+        write_atomically(tmp_path / "a.txt"),
+    ):
+        pass
+    assert os.listdir(tmp_path) == []
+
+
+def test_name_too_long_for_the_file_system_leaves_nothing(tmp_path: Path) -> None:
+    with (
+        pytest.raises(BlastEnvError, match="cannot be written"),
+        write_atomically(tmp_path / ("x" * 300)),
+    ):
+        pass
+    assert os.listdir(tmp_path) == []

@@ -1,0 +1,181 @@
+"""`simulate`: determinism, seeds, the result object."""
+
+import multiprocessing
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import blast_env
+from blast_env import Blast, Charge, load_scenario, simulate
+from blast_env.errors import LayoutError, UnknownNameError
+from blast_env.physics.particles import CollisionType
+from blast_env.scenario import ScenarioError
+
+COURTYARD = load_scenario("courtyard")
+LAYOUT = ((4, 0), (5, 0), (6, 1))
+
+
+def digest(seed: int) -> str:
+    return simulate(COURTYARD, LAYOUT, seed=seed).digest
+
+
+def test_one_seed_gives_one_digest_and_another_seed_another() -> None:
+    assert digest(7) == digest(7)
+    assert digest(7) != digest(8)
+
+
+def test_a_spawned_process_gives_the_same_digest() -> None:
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(digest, (7,)) == digest(7)
+
+
+@pytest.mark.parametrize("hash_seed", ["0", "12345"])
+def test_hash_seeds_and_other_objects_in_memory_do_not_matter(hash_seed: str) -> None:
+    """Chipmunk hashes pairs of addresses; the order of our records must not follow them."""
+    code = (
+        "import blast_env; ballast = [bytearray(997) for _ in range(12345)];"
+        "print(blast_env.simulate(blast_env.load_scenario('courtyard'),"
+        f"{LAYOUT}, seed=7).digest)"
+    )
+    printed = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONHASHSEED": hash_seed},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert printed.strip() == digest(7)
+
+
+def test_progress_does_not_change_a_blast_and_ends_at_one_or_below() -> None:
+    shares: list[float] = []
+    result = simulate(COURTYARD, LAYOUT, seed=7, progress=shares.append)
+    assert result.digest == digest(7)
+    assert shares == sorted(shares)
+    assert 0.0 < shares[0] <= shares[-1] <= 1.0
+
+
+def test_the_layout_shifts_neither_charge_nor_fan_nor_air() -> None:
+    bare, protected = (Blast(COURTYARD, layout, seed=3).scene for layout in ((), LAYOUT))
+    assert bare.charge == protected.charge
+    fans = [
+        s.balls.position[s.balls.kind == CollisionType.ExplosionBall] for s in (bare, protected)
+    ]
+    assert (fans[0] == fans[1]).all()
+    air = [s.balls.position[s.balls.kind == CollisionType.AirBall] for s in (bare, protected)]
+    kept = {tuple(position) for position in air[1].tolist()}
+    assert kept < {tuple(position) for position in air[0].tolist()}
+
+
+def test_a_charge_fixed_by_hand_leaves_the_fan_as_it_was() -> None:
+    drawn = Blast(COURTYARD, seed=3).scene
+    fixed = Blast(COURTYARD, seed=3, charge=Charge((5.0, 15.0), 100.0)).scene
+    moved = np.array(fixed.charge_centre) - drawn.charge_centre
+    is_fan = drawn.balls.kind == CollisionType.ExplosionBall
+    fan = fixed.balls.position[fixed.balls.kind == CollisionType.ExplosionBall]
+    assert fan == pytest.approx(drawn.balls.position[is_fan] + moved)
+
+
+def test_charges_are_drawn_from_the_whole_threat() -> None:
+    """The road of the courtyard runs from y = 6 m to y = 24 m at x = 5 m."""
+    charges = [Blast(COURTYARD, seed=seed).scene.charge for seed in range(200)]
+    y_m = np.array([charge.position_m[1] for charge in charges])
+    assert {charge.position_m[0] for charge in charges} == {5.0}
+    assert 6.0 <= y_m.min() < 7.0
+    assert 23.0 < y_m.max() <= 24.0
+
+
+def test_the_tables_agree_with_each_other() -> None:
+    result = simulate(COURTYARD, LAYOUT, seed=1)
+    by_module = result.collisions.groupby("module_id").impulse_sim.sum()
+    loaded = result.modules.set_index("module_id").impulse_sim
+    assert (loaded[loaded > 0.0].sort_index() == by_module.sort_index()).all()
+    for name in ("building", "barrier"):
+        of_structure = result.collisions[result.collisions.structure == name]
+        assert result.impulse_sim(name) == of_structure.impulse_sim.sum()
+        (row,) = result.structures[result.structures.structure == name].itertuples()
+        assert row.hits == len(of_structure)
+        assert row.first_hit_s == of_structure.time_s.min()
+    assert result.collisions.time_s.is_monotonic_increasing
+    assert result.collisions.first_contact.sum() == (result.modules.hits > 0).sum()
+    speed = np.hypot(result.collisions.vx, result.collisions.vy)
+    momentum = (result.collisions["mass"] * speed).to_numpy()
+    quantum = result.blast.scene.impulse_quantum
+    assert result.collisions.impulse_sim.to_numpy() == pytest.approx(momentum, abs=quantum)
+    normal = result.collisions[["normal_x", "normal_y"]].to_numpy()
+    assert np.hypot(*normal.T) == pytest.approx(1.0)
+    assert result.collisions.angle_deg.between(0.0, 90.0).all()
+
+
+def test_a_wall_in_front_takes_load_off_the_building() -> None:
+    """From (5, 20) m the building is seen through x = 13 m between y = 16.4 m and y = 20 m."""
+    rows = [(row, 0) for row in range(22, 32)]
+    charge = Charge((5.0, 20.0), 100.0)
+    bare, walled = (
+        np.mean(
+            [
+                simulate(COURTYARD, cells, seed=s, charge=charge).impulse_sim("building")
+                for s in range(3)
+            ]
+        )
+        for cells in ((), rows)
+    )
+    assert walled < 0.3 * bare
+
+
+def test_more_tnt_gives_more_impulse() -> None:
+    light, heavy = (
+        simulate(COURTYARD, charge=Charge((5.0, 15.0), kg)).impulse_sim("building")
+        for kg in (50.0, 200.0)
+    )
+    assert heavy > 2.0 * light
+
+
+def test_the_run_record_has_what_repeats_the_run() -> None:
+    record = simulate(COURTYARD, LAYOUT, seed=7).run_record
+    assert record["scenario hash"] == COURTYARD.content_hash
+    assert record["seed"] == 7
+    assert record["layout (row, column)"] == "4,0 5,0 6,1"
+    assert record["digest"] == digest(7)
+    assert str(record["engine version"]).startswith("pymunk 7")
+    assert record["parameter air.spacing_units"] == 8.0
+
+
+def test_wrong_names_are_answered_with_the_nearest_one() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'pymunk'"):
+        simulate(COURTYARD, engine="pymonk")
+    with pytest.raises(UnknownNameError, match="did you mean 'building'"):
+        simulate(COURTYARD).impulse_sim("bilding")
+
+
+def test_layouts_and_charges_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(LayoutError, match=r"\(0, 99\)"):
+        simulate(COURTYARD, [(0, 99)])
+    with pytest.raises(ScenarioError, match="building"):
+        simulate(COURTYARD, charge=Charge((29.0, 15.0), 100.0))
+    with pytest.raises(ValueError, match="seed is -1"):
+        simulate(COURTYARD, seed=-1)
+
+
+def test_a_run_on_its_way_has_no_result() -> None:
+    blast = Blast(COURTYARD)
+    with pytest.raises(ValueError, match="has not ended"):
+        blast.result(blast.start())
+
+
+def test_importing_the_package_loads_neither_drawing_nor_agents() -> None:
+    code = (
+        "import sys, blast_env, blast_env.cli;"
+        "print([m for m in ('pygame', 'matplotlib', 'torch', 'imageio') if m in sys.modules])"
+    )
+    printed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
+    assert printed.strip() == "[]"
+
+
+def test_the_version_is_the_distribution_s() -> None:
+    assert blast_env.__version__ == "0.1.0"
