@@ -1,0 +1,1 @@
+"""Pictures of blasts: frames, a window, films and figures; needs the extra `render`."""

@@ -1,0 +1,215 @@
+"""Films of a blast, as MP4 or GIF, with the real-time factor in every frame."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import floor, inf
+from pathlib import Path
+
+from blast_env.atomic import write_atomically
+from blast_env.errors import BlastEnvError
+from blast_env.physics.engine import BallStates, BlastRun
+from blast_env.rendering.film_files import FilmFile, GifFile, Mp4File
+from blast_env.rendering.frames import FramePainter
+from blast_env.rendering.span import shown_until_s
+from blast_env.rendering.style import nice_ceiling, nice_numbers
+from blast_env.simulation import Blast, BlastResult
+from blast_env.units import MS_PER_S
+
+SUFFIXES = (".mp4", ".gif")
+"""The kinds of film files that can be written."""
+
+Progress = Callable[[float], None]
+
+_SHORTEST_S, _USUAL_S, _LONGEST_S = 8.0, 10.0, 12.0
+_SHARE_OF_FIRST_RUN = 0.2  # of the progress
+_MOST_FRAMES = 15_000
+_GIF_FRAMES_PER_S = 12.5
+_GIF_MOST_FRAMES = 300
+_GIF_WIDTH_PX = 640
+
+
+@dataclass(frozen=True)
+class FilmPlan:
+    """Which moments of a blast a film shows.
+
+    Attributes:
+        end_s: Simulated time of the last frame, about.
+        slow_motion: Seconds of the film for a second of the blast.
+        frames_per_s: Frames in a second of the film.
+    """
+
+    end_s: float
+    slow_motion: float
+    frames_per_s: float
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames."""
+        return floor(self.end_s * self.slow_motion * self.frames_per_s + 1e-6) + 1
+
+    @property
+    def real_time_factor(self) -> str:
+        """The real-time factor in words, as it stands in every frame."""
+        if self.slow_motion == 1.0:
+            return "real time"
+        if self.slow_motion > 1.0:
+            return f"1/{self.slow_motion:g} of real time"
+        return f"{1.0 / self.slow_motion:g} times real time"
+
+    def time_s(self, frame: int) -> float:
+        """Return the simulated time of a frame."""
+        return frame / (self.slow_motion * self.frames_per_s)
+
+
+def plan_film(
+    result: BlastResult, frames_per_s: float = 25.0, slow_motion: float | None = None
+) -> FilmPlan:
+    """Decide what a film of a blast shows.
+
+    It lasts 8 to 12 s and ends a little after 99.9 % of the impulse on the protected structures
+    has arrived (on all structures, if none is protected or hit), but not later than twice the
+    time that 95 % took.
+
+    Args:
+        result: The blast.
+        frames_per_s: Frames in a second of the film.
+        slow_motion: Seconds of the film for a second of the blast, instead of the factor that
+            gives the usual duration.
+
+    Raises:
+        BlastEnvError: If an argument is not positive or the film would have too many frames.
+    """
+    for name, value in (("frames_per_s", frames_per_s), ("slow_motion", slow_motion)):
+        if value is not None and not 0.0 < value < inf:
+            raise BlastEnvError(f"{name} is {value}, must be positive")
+    end_s = shown_until_s(result)
+    if slow_motion is None:
+        slow_motion = _usual_slow_motion(end_s) if end_s > 0.0 else 1.0
+    plan = FilmPlan(end_s, slow_motion, frames_per_s)
+    if plan.frame_count > _MOST_FRAMES:
+        raise BlastEnvError(
+            f"the film would have {plan.frame_count} frames, at most {_MOST_FRAMES} are possible: "
+            "lower slow_motion or frames_per_s"
+        )
+    return plan
+
+
+def write_film(
+    blast: Blast,
+    path: str | Path,
+    frames_per_s: float = 25.0,
+    slow_motion: float | None = None,
+    width_px: int = 960,
+    progress: Progress | None = None,
+    full_impulse: float | None = None,
+) -> BlastResult:
+    """Write a film of a blast; return what happened in it.
+
+    The blast is run twice: first to learn the loads and when they arrive, then to draw it.
+    Between the engine's steps balls are drawn where they fly without a collision.
+
+    Args:
+        blast: The blast.
+        path: The film, `.mp4` or `.gif`. A GIF is at most 640 pixels wide and has at most 12.5
+            frames a second, or it would get too large to send.
+        frames_per_s: Frames in a second of the film.
+        slow_motion: Seconds of the film for a second of the blast; see `plan_film`, which also
+            gives the real-time factor from the result.
+        width_px: Width of the film; made even.
+        progress: Called from time to time with the share of the work that is done.
+        full_impulse: Impulse of a module, simulation units, that has the last colour; give the
+            same one to films that are to be compared. Without it it is the largest load of a
+            protected module, rounded up.
+
+    Raises:
+        BlastEnvError: If the suffix is another one, an argument is out of bounds or the file
+            cannot be written; nothing is left behind then, nor after Ctrl-C.
+    """
+    suffix = _known_suffix(path)
+    tell = progress or _tell_nobody
+    with write_atomically(path) as temporary:
+        result = blast.run(lambda share: tell(_SHARE_OF_FIRST_RUN * share))
+        plan = plan_film(result, frames_per_s, slow_motion)
+        if suffix == ".gif":
+            plan, width_px = _for_gif(plan, width_px)
+        full_impulse = _largest_load(result) if full_impulse is None else full_impulse
+        even_px = width_px - width_px % 2
+        painter = FramePainter.for_blast(blast, width_px=even_px, full_impulse=full_impulse)
+        with _open_film(suffix, temporary, plan, blast) as film:
+            _draw(blast.start(), painter, plan, film, tell)
+    tell(1.0)
+    return result
+
+
+def _known_suffix(path: str | Path) -> str:
+    suffix = Path(path).suffix
+    if suffix.lower() not in SUFFIXES:
+        raise BlastEnvError(
+            f"{path}: cannot write a film with the suffix {suffix!r}, "
+            f"must be {' or '.join(SUFFIXES)}"
+        )
+    return suffix.lower()
+
+
+def _tell_nobody(share: float) -> None:
+    """Take the progress of a film that nobody waits for."""
+
+
+def _draw(
+    run: BlastRun, painter: FramePainter, plan: FilmPlan, film: FilmFile, progress: Progress
+) -> None:
+    for frame in range(plan.frame_count):
+        time_s = plan.time_s(frame)
+        run.advance(time_s)
+        balls = _moved(run.balls(), time_s - run.time_s)
+        film.append(painter.paint(balls, run.obstacles, time_s, plan.real_time_factor))
+        drawn = (frame + 1) / plan.frame_count
+        progress(_SHARE_OF_FIRST_RUN + (1.0 - _SHARE_OF_FIRST_RUN) * drawn)
+
+
+def _moved(balls: BallStates, by_s: float) -> BallStates:
+    """Return the balls where they are a part of a step earlier or later, in free flight."""
+    return replace(balls, position=balls.position + by_s * balls.velocity)
+
+
+def _open_film(suffix: str, path: Path, plan: FilmPlan, blast: Blast) -> FilmFile:
+    scenario = blast.scenario
+    comment = (
+        f"{scenario.name}, seed {blast.seed}, {plan.real_time_factor}, "
+        f"{plan.end_s * MS_PER_S:.4g} ms of simulated time, scenario {scenario.content_hash}"
+    )
+    if suffix == ".gif":
+        return GifFile(path, plan.frames_per_s, comment)
+    return Mp4File(path, plan.frames_per_s, scenario.name, comment)
+
+
+def _for_gif(plan: FilmPlan, width_px: int) -> tuple[FilmPlan, int]:
+    """Return a plan and a width with which a GIF stays small."""
+    frames_per_s = min(plan.frames_per_s, _GIF_FRAMES_PER_S)
+    # A GIF tells how long a frame lasts in whole hundredths of a second.
+    frames_per_s = 100.0 / round(100.0 / frames_per_s)
+    plan = replace(plan, frames_per_s=frames_per_s)
+    if plan.frame_count > _GIF_MOST_FRAMES:
+        raise BlastEnvError(
+            f"the GIF would have {plan.frame_count} frames, at most {_GIF_MOST_FRAMES} are "
+            "possible: lower slow_motion or write an .mp4"
+        )
+    return plan, min(width_px, _GIF_WIDTH_PX)
+
+
+def _usual_slow_motion(end_s: float) -> float:
+    """Return the factor of few digits whose duration is nearest to the usual one."""
+    factors = nice_numbers(_SHORTEST_S / end_s, _LONGEST_S / end_s)
+    return min(factors, key=lambda factor: abs(factor * end_s - _USUAL_S))
+
+
+def _largest_load(result: BlastResult) -> float | None:
+    """Return the largest load of a protected module, of any one if these have none, or None."""
+    for obstacles in (
+        [obstacle for obstacle in result.obstacles if obstacle.protected],
+        list(result.obstacles),
+    ):
+        loads = [part.impulse for obstacle in obstacles for part in obstacle.parts]
+        if max(loads, default=0.0) > 0.0:
+            return nice_ceiling(max(loads))
+    return None

@@ -1,0 +1,197 @@
+"""The impulse on every module, in its place on the site."""
+
+from math import isqrt
+
+from blast_env.physics.structure import ModularObstacle
+from blast_env.rendering.captions import write_heading, write_names
+from blast_env.rendering.extra import render_extra
+from blast_env.rendering.site_plan import (
+    draw_charge,
+    draw_loads,
+    draw_outline,
+    draw_site,
+    draw_zone,
+    in_metres,
+    legend_handles,
+    load_colours,
+)
+from blast_env.rendering.style import (
+    INK,
+    LOAD_LABEL,
+    PROTECTED,
+    blast_title,
+    count_of,
+    nice_ceiling,
+    number_on_axis,
+    short_number,
+    unit_interval,
+)
+from blast_env.simulation import BlastResult
+
+with render_extra():
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+    from matplotlib.ticker import FuncFormatter
+
+_HEIGHT_IN = 6.6
+_PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 4.6, (4.0, 8.0)
+_PANELS_HEIGHT_IN, _PANELS_WIDTHS_IN = 4.9, (2.2, 6.0)
+_PLAN_LABELS_IN, _PANEL_LABELS_IN, _COLOUR_BAR_IN = 1.0, 0.7, 1.3
+_LEGEND_ENTRY_IN = 1.5
+_MOST_PANELS = 4
+_POINTS_PER_IN = 72.0
+_LARGEST_NUMBER_PT, _SMALLEST_NUMBER_PT = 9.0, 5.5
+_DARK_SHARE = 0.55  # of the scale; numbers turn white there
+
+
+def heat_map(result: BlastResult, structure: str | None = None) -> Figure:
+    """Return the impulse on every module, on the site plan and enlarged.
+
+    Args:
+        result: The blast.
+        structure: The structure to enlarge. Without it these are the protected ones, or all if
+            none is protected; at most four, those with the largest impulses.
+
+    Raises:
+        UnknownNameError: If there is no structure of that name.
+    """
+    chosen = _chosen(result, structure)
+    loads = [part.impulse for obstacle in chosen for part in obstacle.parts]
+    scale = Normalize(0.0, nice_ceiling(max(loads)) if max(loads) > 0.0 else 1.0)
+    columns = isqrt(len(chosen) - 1) + 1
+    rows = -(-len(chosen) // columns)
+    widths_in = _widths_in(result, chosen, columns, rows)
+    layout = ConstrainedLayoutEngine(h_pad=0.08)
+    figure = Figure(figsize=(sum(widths_in), _HEIGHT_IN), layout=layout)
+    halves = figure.add_gridspec(1, 2, width_ratios=widths_in)
+    overview = figure.add_subplot(halves[0])
+    _draw_overview(overview, result, scale)
+    places = halves[1].subgridspec(rows, columns)
+    panels = [figure.add_subplot(places[index]) for index in range(len(chosen))]
+    room_in = (
+        (widths_in[1] - _COLOUR_BAR_IN) / columns - _PANEL_LABELS_IN,
+        _PANELS_HEIGHT_IN / rows,
+    )
+    for axes, obstacle in zip(panels, chosen, strict=True):
+        _draw_panel(axes, obstacle, scale, room_in)
+    _add_colour_bar(figure, panels, scale, result)
+    _add_legend(figure, result)
+    title, subtitle = blast_title(result.blast)
+    write_heading(figure, f"{title}: impulse per module", subtitle)
+    write_names(overview, result.obstacles)
+    return figure
+
+
+def _chosen(result: BlastResult, structure: str | None) -> list[ModularObstacle]:
+    if structure is not None:
+        return [result.obstacle(structure)]
+    structures = [obstacle for obstacle in result.obstacles if obstacle.cells is None]
+    protected = [obstacle for obstacle in structures if obstacle.protected]
+    by_impulse = sorted(protected or structures, key=lambda obstacle: -obstacle.impulse)
+    return by_impulse[:_MOST_PANELS]
+
+
+def _widths_in(
+    result: BlastResult, chosen: list[ModularObstacle], columns: int, rows: int
+) -> tuple[float, float]:
+    """Return widths for plan and panels that leave little empty beside them."""
+    site = result.blast.scene.site
+    plan = _PLAN_HEIGHT_IN * (site.right - site.left) / (site.top - site.bottom)
+    widest = max(obstacle.columns / obstacle.rows for obstacle in chosen)
+    panels = _PANELS_HEIGHT_IN / rows * widest * columns
+    plan, panels = (
+        min(max(width, least), most)
+        for width, (least, most) in ((plan, _PLAN_WIDTHS_IN), (panels, _PANELS_WIDTHS_IN))
+    )
+    return plan + _PLAN_LABELS_IN, panels + columns * _PANEL_LABELS_IN + _COLOUR_BAR_IN
+
+
+def _draw_overview(axes: Axes, result: BlastResult, scale: Normalize) -> None:
+    blast = result.blast
+    zone = blast.scenario.build_zone
+    draw_site(axes, in_metres(blast.scene.site))
+    if zone is not None:
+        draw_zone(axes, zone)
+    for obstacle in result.obstacles:
+        draw_loads(axes, obstacle, scale, linewidth=0.25)
+        draw_outline(axes, obstacle)
+    draw_charge(axes, blast.scene.charge.position_m)
+    axes.set_title("Site", fontsize=11)
+
+
+def _draw_panel(
+    axes: Axes, obstacle: ModularObstacle, scale: Normalize, room_in: tuple[float, float]
+) -> None:
+    rectangle = in_metres(obstacle.rectangle)
+    draw_loads(axes, obstacle, scale, linewidth=0.6)
+    draw_outline(axes, obstacle)
+    reach = 0.25
+    axes.set_xlim(rectangle.left - reach, rectangle.right + reach)
+    axes.set_ylim(rectangle.bottom - reach, rectangle.top + reach)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    axes.spines[:].set_visible(False)
+    hits = sum(part.hits for part in obstacle.parts)
+    axes.set_title(
+        f"{obstacle.name}{' (protected)' if obstacle.protected else ''}\n"
+        f"{obstacle.impulse:,.0f} in all from {count_of('hit', hits)}",
+        fontsize=11,
+        color=unit_interval(PROTECTED if obstacle.protected else INK),
+    )
+    cell_pt = _POINTS_PER_IN * min(
+        room_in[0] / (obstacle.columns + 1.0), room_in[1] / (obstacle.rows + 1.0)
+    )
+    _write_numbers(axes, obstacle, scale, min(0.34 * cell_pt, _LARGEST_NUMBER_PT))
+
+
+def _write_numbers(axes: Axes, obstacle: ModularObstacle, scale: Normalize, size_pt: float) -> None:
+    """Write the impulse into every module that was hit, if there is room."""
+    if size_pt < _SMALLEST_NUMBER_PT:
+        return
+    for part in obstacle.parts:
+        if part.hits:
+            dark = part.impulse > _DARK_SHARE * float(scale.vmax or 0.0)
+            centre = in_metres(part.rectangle).centre
+            number = axes.text(
+                *centre,
+                short_number(part.impulse),
+                ha="center",
+                va="center",
+                fontsize=size_pt,
+                color="white" if dark else unit_interval(INK),
+                zorder=4,
+            )
+            if part.destroyed:  # keep the cross off the number
+                ground = load_colours()(scale(part.impulse))
+                number.set_bbox({"facecolor": ground, "edgecolor": "none", "pad": 1.5})
+
+
+def _add_legend(figure: Figure, result: BlastResult) -> None:
+    handles = legend_handles(result.obstacles, result.blast.scenario.build_zone)
+    columns = min(len(handles), int(figure.get_figwidth() / _LEGEND_ENTRY_IN))
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
+    )
+
+
+def _add_colour_bar(
+    figure: Figure, panels: list[Axes], scale: Normalize, result: BlastResult
+) -> None:
+    beyond = any(
+        part.impulse > float(scale.vmax or 0.0)
+        for obstacle in result.obstacles
+        for part in obstacle.parts
+    )
+    bar = figure.colorbar(
+        ScalarMappable(scale, load_colours()),
+        ax=panels,
+        extend="max" if beyond else "neither",
+        shrink=0.85,
+        pad=0.03,
+        format=FuncFormatter(number_on_axis),
+    )
+    bar.set_label(f"{LOAD_LABEL}; white: not hit")

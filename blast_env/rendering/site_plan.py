@@ -1,0 +1,185 @@
+"""The plan of a site in a matplotlib figure, in metres."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from blast_env.geometry import Rectangle
+from blast_env.physics.structure import LoadColours, ModularObstacle
+from blast_env.rendering.extra import render_extra
+from blast_env.rendering.style import (
+    BARRIER,
+    BORDER,
+    EXPLOSIVE,
+    INK,
+    PAGE,
+    PROTECTED,
+    QUIET_INK,
+    SITE,
+    STRUCTURE,
+    unit_interval,
+)
+from blast_env.scenario.models import BuildZone
+from blast_env.scene import StructureOutline
+from blast_env.units import UNITS_PER_M
+
+with render_extra():
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.collections import LineCollection, PatchCollection
+    from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+    from matplotlib.patches import Rectangle as RectanglePatch
+
+Obstacle = ModularObstacle | StructureOutline
+
+
+def load_colours() -> Colormap:
+    """Return the colours of `load_colour` as a colour map, white where there is no load.
+
+    Their lightness falls all the way, so that the order shows without any colour vision.
+    """
+    colours = [unit_interval(colour) for colour in LoadColours()]
+    colour_map = LinearSegmentedColormap.from_list("load", colours)
+    return colour_map.with_extremes(bad=unit_interval(PAGE))
+
+
+def in_metres(rectangle: Rectangle) -> Rectangle:
+    """Return a rectangle in units as one in metres."""
+    return rectangle.scaled(1.0 / UNITS_PER_M)
+
+
+def rectangle_patch(rectangle: Rectangle) -> RectanglePatch:
+    """Return a rectangle as a patch without a style."""
+    left, bottom, right, top = rectangle
+    return RectanglePatch((left, bottom), right - left, top - bottom)
+
+
+def add_outline(axes: Axes, rectangle: Rectangle, **style: object) -> None:
+    """Add the outline of a rectangle in metres; `style` is matplotlib's."""
+    patch = rectangle_patch(rectangle)
+    patch.set(**({"fill": False} | style))
+    axes.add_patch(patch)
+
+
+def draw_site(axes: Axes, site_m: Rectangle, margin: float = 0.03) -> None:
+    """Set up axes in metres with equal scales and draw ground and border."""
+    reach = margin * max(site_m.right, site_m.top)
+    axes.set_xlim(site_m.left - reach, site_m.right + reach)
+    axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    axes.spines[:].set_visible(False)
+    ground = rectangle_patch(site_m)
+    ground.set(facecolor=unit_interval(SITE), edgecolor=unit_interval(BORDER), linewidth=1.8)
+    axes.add_patch(ground)
+
+
+def draw_zone(axes: Axes, zone: BuildZone) -> None:
+    """Draw where barrier modules may stand, and the keep-outs as hatched areas."""
+    quiet = unit_interval(QUIET_INK)
+    for keep_out in zone.keep_outs:
+        add_outline(
+            axes, keep_out.rectangle_m, hatch="////", edgecolor=(*quiet, 0.4), linewidth=0.0
+        )
+    add_outline(axes, zone.rectangle_m, edgecolor=quiet, linestyle="--", linewidth=0.9)
+
+
+def draw_outline(axes: Axes, obstacle: Obstacle, linewidth: float = 1.6) -> None:
+    """Draw the outline of a structure in the colour of its role; a barrier has none."""
+    if obstacle.cells is None:
+        colour = PROTECTED if obstacle.protected else STRUCTURE
+        add_outline(
+            axes,
+            in_metres(obstacle.rectangle),
+            edgecolor=unit_interval(colour),
+            linewidth=1.5 * linewidth if obstacle.protected else linewidth,
+            zorder=3,
+        )
+
+
+def draw_loads(
+    axes: Axes, obstacle: ModularObstacle, scale: Normalize, linewidth: float = 0.4
+) -> PatchCollection:
+    """Draw the modules in the colours of their loads; one that was not hit stays white.
+
+    Returns:
+        The modules; its array has their impulses in their order, masked where nothing hit.
+    """
+    impulse = np.ma.masked_array(
+        [part.impulse for part in obstacle.parts], [part.hits == 0 for part in obstacle.parts]
+    )
+    is_barrier = obstacle.cells is not None
+    modules = PatchCollection(
+        [rectangle_patch(in_metres(part.rectangle)) for part in obstacle.parts],
+        cmap=load_colours(),
+        norm=scale,
+        edgecolor=unit_interval(BARRIER if is_barrier else STRUCTURE),
+        linewidth=2.0 * linewidth if is_barrier else linewidth,
+    )
+    modules.set_array(impulse)
+    axes.add_collection(modules)
+    destroyed = [in_metres(part.rectangle) for part in obstacle.parts if part.destroyed]
+    crosses = [
+        line
+        for left, bottom, right, top in destroyed
+        for line in (((left, bottom), (right, top)), ((left, top), (right, bottom)))
+    ]
+    if crosses:
+        axes.add_collection(
+            LineCollection(crosses, colors=[unit_interval(INK)], linewidths=2.0 * linewidth)
+        )
+    return modules
+
+
+def draw_charge(axes: Axes, position_m: tuple[float, float]) -> None:
+    """Draw a star at the charge."""
+    axes.add_line(_star(*position_m))
+
+
+def legend_handles(obstacles: Sequence[Obstacle], zone: BuildZone | None) -> list[Artist]:
+    """Return the legend entries for what a site has."""
+    handles: list[Artist] = [_star()]
+    roles = (
+        ("protected structure", PROTECTED, 2.4, lambda o: o.protected),
+        ("other structure", STRUCTURE, 1.6, lambda o: not o.protected and o.cells is None),
+        ("barrier module", BARRIER, 1.2, lambda o: o.cells is not None),
+    )
+    for label, colour, linewidth, matches in roles:
+        if any(matches(obstacle) for obstacle in obstacles):
+            handles.append(_box(label, unit_interval(colour), linewidth))
+    if any(obstacle.capacity is not None for obstacle in obstacles):
+        ink = unit_interval(INK)
+        handles.append(Line2D([], [], marker="x", linestyle="none", color=ink, label="destroyed"))
+    if zone is not None:
+        handles.append(_box("build zone", unit_interval(QUIET_INK), 0.9, linestyle="--"))
+        if zone.keep_outs:
+            handles.append(_box("keep-out", unit_interval(QUIET_INK), 0.0, hatch="////"))
+    handles.append(_box("site border", unit_interval(BORDER), 1.8))
+    return handles
+
+
+def _box(
+    label: str, colour: tuple[float, float, float], linewidth: float, **style: object
+) -> Patch:
+    patch = Patch(fill=False, edgecolor=colour, linewidth=linewidth, label=label)
+    patch.set(**style)
+    return patch
+
+
+def _star(*position_m: float) -> Line2D:
+    """Return the star that marks a charge; without a position, one for the legend."""
+    return Line2D(
+        position_m[:1],
+        position_m[1:],
+        marker="*",
+        markersize=15.0,
+        color=unit_interval(EXPLOSIVE),
+        markeredgecolor=unit_interval(INK),
+        markeredgewidth=0.6,
+        linestyle="none",
+        label="charge",
+        zorder=5,
+    )

@@ -1,0 +1,103 @@
+"""What frames and figures have in common: colours, rules for numbers, wording."""
+
+from math import ceil, floor, log10, pi
+from typing import Final
+
+from blast_env.physics.particles import CollisionType, distance_to_rectangle
+from blast_env.physics.structure import Colour
+from blast_env.scene import Scene
+from blast_env.simulation import Blast
+from blast_env.units import MODULE_SIDE_UNITS
+
+PAGE: Final[Colour] = (255, 255, 255)
+SITE: Final[Colour] = (245, 247, 250)
+INK: Final[Colour] = (30, 34, 42)
+QUIET_INK: Final[Colour] = (92, 99, 110)
+FAINT: Final[Colour] = (206, 211, 219)
+EXPLOSIVE: Final[Colour] = (226, 28, 36)
+AIR: Final[Colour] = (30, 46, 122)
+BORDER: Final[Colour] = (200, 20, 40)
+STRUCTURE: Final[Colour] = (104, 98, 88)
+PROTECTED: Final[Colour] = (0, 128, 112)
+BARRIER: Final[Colour] = (12, 12, 14)
+
+LOAD_LABEL: Final = "impulse per module (simulation units)"
+
+_NICE_STEPS: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+
+
+def nice_numbers(lowest: float, highest: float) -> list[float]:
+    """Return the numbers between two positive bounds that have few digits."""
+    powers = range(floor(log10(lowest)), ceil(log10(highest)) + 1)
+    numbers = {float(f"{step * 10.0**power:.3g}") for power in powers for step in _NICE_STEPS}
+    return sorted(number for number in numbers if lowest <= number <= highest)
+
+
+def nice_ceiling(value: float) -> float:
+    """Return the smallest number of few digits that is at least a positive value."""
+    return nice_numbers(value * (1.0 - 1e-9), 2.0 * value)[0]
+
+
+def nice_floor(value: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, as large as a positive value allows."""
+    power = 10.0 ** floor(log10(value))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))
+
+
+def short_number(value: float, digits: int = 2) -> str:
+    """Return a number with so many significant digits at most, and k for thousands."""
+    if value == 0.0:
+        return "0"
+    rounded = float(f"{value:.{digits}g}")
+    for size, suffix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if rounded >= size:
+            return f"{rounded / size:g}{suffix}"
+    return f"{rounded:g}" if rounded >= 0.01 else f"{rounded:.0e}"
+
+
+def number_on_axis(value: float, position: int | None) -> str:  # noqa: ARG001
+    """Return the number at a tick, for matplotlib's `FuncFormatter`."""
+    return short_number(value, digits=4)
+
+
+def free_flight_impulse(scene: Scene) -> float:
+    """Return a load that depends on the scene alone, of the size that a blast brings.
+
+    It is what a module at the place nearest to the charge would get from a fan that nothing
+    slows down. Structures alone count, not the barrier, so that all layouts have the same one.
+    """
+    balls = scene.balls
+    explosive = balls.kind == CollisionType.ExplosionBall
+    speed = (balls.velocity[explosive] ** 2).sum(axis=1) ** 0.5
+    momentum = float((balls.mass[explosive] * speed).sum())
+    centre = balls.position[:1] * 0.0 + scene.charge_centre
+    distance = min(
+        float(distance_to_rectangle(centre, outline.rectangle)[0])
+        for outline in scene.structures
+        if outline.cells is None
+    )
+    share = min(MODULE_SIDE_UNITS / (2.0 * pi * max(distance, MODULE_SIDE_UNITS)), 1.0)
+    return momentum * share
+
+
+def count_of(noun: str, count: int) -> str:
+    """Return a count with its noun in the right number."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def blast_title(blast: Blast) -> tuple[str, str]:
+    """Return the heading of a picture of a blast, and the line under it."""
+    charge = blast.scene.charge
+    x, y = charge.position_m
+    parts = [
+        f"charge {charge.tnt_kg:g} kg TNT at ({x:.1f} m, {y:.1f} m)",
+        f"barrier of {count_of('module', len(blast.layout))}" if blast.layout else "no barrier",
+        f"seed {blast.seed}",
+    ]
+    return blast.scenario.name, ", ".join(parts)
+
+
+def unit_interval(colour: Colour) -> tuple[float, float, float]:
+    """Return a colour with its parts between 0 and 1, as matplotlib wants them."""
+    red, green, blue = (part / 255.0 for part in colour)
+    return red, green, blue

@@ -1,0 +1,24 @@
+import pytest
+
+from blast_env.simulation import Blast, BlastResult
+from tests.rendering.scenes import small_blast
+
+
+@pytest.fixture(scope="session")
+def blast() -> Blast:
+    return small_blast()
+
+
+@pytest.fixture(scope="session")
+def barrier_blast() -> Blast:
+    return small_blast(with_barrier=True)
+
+
+@pytest.fixture(scope="session")
+def result(blast: Blast) -> BlastResult:
+    return blast.run()
+
+
+@pytest.fixture(scope="session")
+def barrier_result(barrier_blast: Blast) -> BlastResult:
+    return barrier_blast.run()
