@@ -1,0 +1,18 @@
+"""The command line, `blast-env`: one module a command."""
+
+import typer
+
+from blast_env.cli.bench import bench
+from blast_env.cli.simulate import simulate
+from blast_env.cli.validate import validate
+
+app = typer.Typer(
+    name="blast-env",
+    help="Blast loads on structures, and layouts of barriers that lower them.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command()(simulate)
+app.command()(validate)
+app.command()(bench)

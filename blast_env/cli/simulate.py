@@ -1,0 +1,136 @@
+"""`blast-env simulate`: run one blast."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from blast_env.cli.output import make_table, progress_bar, result_console, user_errors
+from blast_env.scenario import Cell, Scenario, load_layout, load_scenario
+from blast_env.simulation import Blast, BlastResult
+from blast_env.units import MS_PER_S
+
+
+def simulate(
+    scenario: Annotated[str, typer.Argument(help="Bundled name, or a scenario file.")],
+    layout: Annotated[
+        Path | None, typer.Option(help="JSON file with the barrier's [row, column] cells.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Decides charge, fan and air.")] = 0,
+    preset: Annotated[
+        str | None, typer.Option(help="Parameters of this name instead of the scenario's.")
+    ] = None,
+    engine: Annotated[str, typer.Option(help="Engine that runs the blast.")] = "pymunk",
+    charge: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="X Y", help="Where the charge is, m, instead of drawing it."),
+    ] = None,
+    stand_off: Annotated[
+        float | None, typer.Option(help="Distance from charge to facade, m (free_field).")
+    ] = None,
+    film: Annotated[Path | None, typer.Option(help="Write a film: .mp4 or .gif.")] = None,
+    excel: Annotated[Path | None, typer.Option(help="Write a workbook: .xlsx.")] = None,
+    parquet: Annotated[Path | None, typer.Option(help="Write the collisions: .parquet.")] = None,
+    heat_map: Annotated[
+        Path | None, typer.Option(help="Write a picture of the load: .png, .svg, .pdf.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Run one blast and print what each structure took."""
+    with user_errors():
+        chosen = _choose(scenario, preset, stand_off)
+        cells: Sequence[Cell] = () if layout is None else load_layout(layout)
+        blast = Blast(chosen, cells, seed, engine)
+        if charge is not None:
+            blast = blast.with_charge_at(charge)
+        with progress_bar(f"blast in {chosen.name}") as progress:
+            result = _run(blast, film, progress)
+        written = [path for path in (film,) if path is not None]
+        written += _write(result, excel, parquet, heat_map)
+    if as_json:
+        result_console().print_json(json.dumps(_as_json(result, written)))
+    else:
+        print_summary(result, written)
+
+
+def _choose(name: str, preset: str | None, stand_off: float | None) -> Scenario:
+    scenario = load_scenario(name)
+    if stand_off is not None:
+        scenario = scenario.at_stand_off(stand_off)
+    return scenario.with_simulation(preset)
+
+
+def _run(blast: Blast, film: Path | None, progress: Callable[[float], None]) -> BlastResult:
+    if film is None:
+        return blast.run(progress)
+    from blast_env.rendering.film import write_film
+
+    return write_film(blast, film, progress=progress)
+
+
+def _write(
+    result: BlastResult, excel: Path | None, parquet: Path | None, heat_map: Path | None
+) -> list[Path]:
+    written = []
+    if excel is not None:
+        written.append(result.to_excel(excel))
+    if parquet is not None:
+        written.append(result.to_parquet(parquet))
+    if heat_map is not None:
+        from blast_env.rendering import figures
+
+        figures.save_figure(figures.heat_map(result), heat_map)
+        written.append(heat_map)
+    return written
+
+
+def print_summary(result: BlastResult, written: Sequence[Path]) -> None:
+    """Print a table of the structures' loads, how the run went, and the files."""
+    console = result_console()
+    scene, blast = result.blast.scene, result.blast
+    x_m, y_m = scene.charge.position_m
+    table = make_table(
+        f"{blast.scenario.name}: {scene.charge.tnt_kg:g} kg TNT at ({x_m:.2f}, {y_m:.2f}) m, "
+        f"seed {blast.seed}, {len(blast.layout)} barrier modules",
+        (
+            "structure",
+            "protected",
+            "modules",
+            "hits",
+            "impulse m|v| (sim)",
+            "transferred (sim)",
+            "first hit (ms)",
+        ),
+        text_columns=2,
+    )
+    for obstacle in result.obstacles:
+        first_hit_s = obstacle.first_hit_s
+        table.add_row(
+            obstacle.name,
+            "yes" if obstacle.protected else "no",
+            f"{len(obstacle.parts):,}",
+            f"{obstacle.hits:,}",
+            f"{obstacle.impulse:,.0f}",
+            f"{obstacle.transferred_impulse:,.0f}",
+            "never" if first_hit_s is None else f"{MS_PER_S * first_hit_s:.1f}",
+        )
+    console.print(table)
+    console.print(
+        f"{len(scene.balls):,} balls, {result.steps:,} steps, "
+        f"{MS_PER_S * result.time_s:.0f} ms simulated; ended because {result.end_reason}"
+    )
+    console.print(f"digest {result.digest}")
+    for path in written:
+        console.print(f"wrote {path}", markup=False)
+
+
+def _as_json(result: BlastResult, written: Sequence[Path]) -> dict[str, object]:
+    """Return the result as plain data; numbers that do not exist are null."""
+    return {
+        "run": result.run_record,
+        "structures": json.loads(result.structures.to_json(orient="records")),
+        "modules": json.loads(result.modules.to_json(orient="records")),
+        "files": [str(path) for path in written],
+    }

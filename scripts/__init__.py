@@ -1,0 +1,1 @@
+"""Studies and demonstrations whose results can be looked at."""

@@ -1,0 +1,207 @@
+"""The bare simulator as an environment."""
+
+import multiprocessing
+import pickle
+from math import fsum
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3.common.env_checker import check_env as check_env_for_agents
+
+import blast_env
+from blast_env.envs.simulator_env import BlastSimulatorEnv
+from blast_env.errors import BlastEnvError, LayoutError
+from blast_env.scenario import ScenarioError
+
+LAYOUT = ((4, 0), (5, 0), (6, 0))
+
+
+def make(**arguments: Any) -> BlastSimulatorEnv:
+    env = gym.make("BlastSimulator-v0", **arguments).unwrapped
+    assert isinstance(env, BlastSimulatorEnv)
+    return env
+
+
+def play(env: gym.Env, seed: int, **options: object) -> tuple[list, list[float], dict]:
+    """Return the observations, the rewards and the last information of an episode."""
+    observation, info = env.reset(seed=seed, options=options)
+    observations, rewards, ended = [observation], [], False
+    while not ended:
+        observation, reward, ended, truncated, info = env.step(0)
+        assert not truncated
+        observations.append(observation)
+        rewards.append(float(reward))
+    return observations, rewards, info
+
+
+@pytest.mark.parametrize("scenario", blast_env.bundled_scenarios())
+def test_both_checkers_pass_without_a_warning(scenario: str) -> None:
+    env = gym.make("BlastSimulator-v0", scenario=scenario, step_s=0.05, render_mode="rgb_array")
+    check_env(env.unwrapped)
+    check_env_for_agents(env.unwrapped)
+
+
+@pytest.mark.parametrize("step_s", [0.0007, 0.01, 10.0])
+def test_an_episode_adds_up_to_the_blast_exactly(step_s: float) -> None:
+    scenario = blast_env.load_scenario("courtyard")
+    result = blast_env.simulate(scenario, LAYOUT, seed=5)
+    env = make(scenario="courtyard", step_s=step_s)
+    observation, info = env.reset(seed=5, options={"layout": LAYOUT})
+    total, records, ended = 0.0, [], False
+    while not ended:
+        observation, reward, ended, _, info = env.step(0)
+        total += reward
+        records += info["collisions"]
+    assert total == -result.impulse_sim("building")
+    assert info["impulse_sim"] == result.impulse_sim("building")
+    assert info["digest"] == result.digest
+    assert info["end_reason"] == str(result.end_reason)
+    building = result.modules[result.modules.structure == "building"]
+    assert (observation["module_impulses"] == building.impulse_sim).all()
+    columns = [name for name in result.collisions if name != "transferred_impulse_sim"]
+    pd.testing.assert_frame_equal(
+        pd.DataFrame(records)[columns], result.collisions[columns], check_exact=True
+    )
+
+
+def test_time_passes_in_steps_of_the_given_length() -> None:
+    observations, *_ = play(make(step_s=0.01), seed=1)
+    times = np.array([observation["time_s"][0] for observation in observations])
+    expected = 0.01 * np.arange(len(times))
+    assert ((times >= expected) | (times == times[-1])).all()
+    assert (times[:-1] < expected[:-1] + 0.002).all()
+    assert times[0] == 0.0
+
+
+def test_balls_are_counted() -> None:
+    observations, *_ = play(make(step_s=0.02), seed=1)
+    counts = np.array([observation["particle_counts"] for observation in observations])
+    assert counts[0, 0] == 720
+    assert counts[0, 1] > 200
+    assert (np.diff(counts, axis=0) <= 0).all()
+    assert counts[-1, 0] < 100
+
+
+def test_one_seed_repeats_exactly_in_two_environments_and_after_a_reset() -> None:
+    one, other = make(step_s=0.02), make(step_s=0.02)
+    first, second, again = play(one, 3), play(other, 3), play(one, 3)
+    for episode in (second, again):
+        assert episode[1] == first[1]
+        assert episode[2]["digest"] == first[2]["digest"]
+        for a, b in zip(first[0], episode[0], strict=True):
+            assert all((a[key] == b[key]).all() for key in a)
+    assert play(one, 4)[2]["digest"] != first[2]["digest"]
+
+
+def test_without_a_seed_blasts_follow_from_the_first_seed() -> None:
+    env, twin = make(), make()
+    seeds = []
+    for each in (env, twin):
+        each.reset(seed=9)
+        seeds.append([each.reset()[1]["seed"] for _ in range(3)])
+    assert seeds[0] == seeds[1]
+    assert len(set(seeds[0])) == 3
+
+
+def _digest_in_process(queue: "multiprocessing.Queue[str]") -> None:
+    env = gym.make("blast_env:BlastSimulator-v0", scenario="courtyard", step_s=0.1)
+    queue.put(play(env, 3)[2]["digest"])
+
+
+def test_works_by_module_name_in_a_spawned_process_with_the_same_digest() -> None:
+    context = multiprocessing.get_context("spawn")
+    queue: multiprocessing.Queue[str] = context.Queue()
+    process = context.Process(target=_digest_in_process, args=(queue,))
+    process.start()
+    digest = queue.get(timeout=120)
+    process.join()
+    assert digest == play(make(step_s=0.1), 3)[2]["digest"]
+
+
+def test_vector_environments_run_it() -> None:
+    envs = gym.make_vec(
+        "BlastSimulator-v0",
+        num_envs=2,
+        vectorization_mode="async",
+        step_s=0.05,
+        vector_kwargs={"context": "spawn"},
+    )
+    observation, _ = envs.reset(seed=3)
+    assert observation["time_s"].shape == (2, 1)
+    envs.step(np.zeros(2, dtype=np.int64))
+    envs.close()
+
+
+def test_the_charge_can_be_placed() -> None:
+    env = make()
+    _, info = env.reset(seed=0, options={"charge_position_m": (8.0, 15.0)})
+    assert info["charge_position_m"] == (8.0, 15.0)
+    assert info["charge_tnt_kg"] == 100.0
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"layuot": ()}, BlastEnvError, "'layuot', did you mean 'layout'"),
+        ({"charge_position_m": (8.0,)}, BlastEnvError, "charge_position_m"),
+        ({"charge_position_m": "here"}, BlastEnvError, "charge_position_m is 'here'"),
+        ({"charge_position_m": (28.0, 15.0)}, ScenarioError, "building"),
+        ({"charge_position_m": (-1.0, 15.0)}, ScenarioError, "position_m"),
+        ({"layout": [(400, 0)]}, LayoutError, "(400, 0)"),
+    ],
+)
+def test_bad_options_are_named(options: dict, error: type, words: str) -> None:
+    env = make()
+    with pytest.raises(error) as caught:
+        env.reset(seed=0, options=options)
+    assert words in str(caught.value)
+
+
+def test_bad_arguments_are_named() -> None:
+    with pytest.raises(BlastEnvError, match="step_s is 0"):
+        make(step_s=0)
+    with pytest.raises(BlastEnvError, match="did you mean 'courtyard'"):
+        make(scenario="cortyard")
+    with pytest.raises(BlastEnvError, match="render mode 'rgb'"):
+        BlastSimulatorEnv(render_mode="rgb")
+
+
+def test_stepping_before_reset_and_after_the_end_is_refused() -> None:
+    env = make(step_s=10.0)
+    with pytest.raises(gym.error.ResetNeeded):
+        BlastSimulatorEnv().step(0)
+    with pytest.raises(gym.error.InvalidAction, match="action is 1"):
+        BlastSimulatorEnv().step(1)
+    play(env, 0)
+    with pytest.raises(gym.error.ResetNeeded):
+        env.step(0)
+
+
+def test_an_environment_that_is_not_running_pickles() -> None:
+    copy = pickle.loads(pickle.dumps(BlastSimulatorEnv(step_s=0.1)))
+    assert play(copy, 3)[2]["digest"] == play(make(step_s=0.1), 3)[2]["digest"]
+
+
+def test_weights_count_in_the_reward() -> None:
+    env = make(scenario="street_junction", step_s=10.0)
+    _, rewards, _ = play(env, 2)
+    result = env.result()
+    assert fsum(rewards) == -2.0 * result.impulse_sim("block_north_east")
+
+
+def test_frames_are_pictures() -> None:
+    env = make(render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    for _ in range(10):
+        env.step(0)
+    second = env.render()
+    assert first is not None
+    assert second is not None
+    assert first.dtype == np.uint8
+    assert first.shape == second.shape
+    assert (first != second).any()
