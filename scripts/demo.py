@@ -6,7 +6,7 @@ Writes the collision workbook, the heat map, the film and the other figures unde
 from pathlib import Path
 
 from blast_env import Blast, BlastResult, load_scenario
-from blast_env.cli.output import progress_bar, result_console, user_errors
+from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.cli.simulate import print_summary
 from blast_env.rendering.figures import (
     heat_map,
@@ -35,11 +35,10 @@ def main() -> None:
             save_figure(initial_velocities(scenario.parameters), OUT / "initial_velocities.png"),
             save_figure(model_scheme(behind.blast.scene), OUT / "model_scheme.png"),
         ]
-    console = result_console()
     for path in (workbook, *schemes):
-        console.print(f"wrote {path}", markup=False)
+        print_line(f"wrote {path}")
     share = behind.impulse_sim("building") / bare.impulse_sim("building")
-    console.print(
+    print_line(
         f"\nbehind the barrier the building took {100 * share:.0f} % of the impulse that it took "
         "without it, in this one blast (seed 0)"
     )

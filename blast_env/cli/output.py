@@ -20,6 +20,11 @@ def result_console() -> Console:
     return Console(highlight=False, width=width)
 
 
+def print_line(text: str, style: str | None = None) -> None:
+    """Print a line to standard output as it is: not wrapped, no markup in it."""
+    result_console().print(text, markup=False, soft_wrap=True, style=style)
+
+
 def message_console() -> Console:
     """Return the console for messages and progress (standard error)."""
     return Console(stderr=True, highlight=False, soft_wrap=True)

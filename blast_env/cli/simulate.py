@@ -5,9 +5,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
+import pandas as pd
 import typer
 
-from blast_env.cli.output import make_table, progress_bar, result_console, user_errors
+from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.scenario import Cell, Scenario, load_layout, load_scenario
 from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MS_PER_S
@@ -50,7 +51,7 @@ def simulate(
         written = [path for path in (film,) if path is not None]
         written += _write(result, excel, parquet, heat_map)
     if as_json:
-        result_console().print_json(json.dumps(_as_json(result, written)))
+        print_line(json.dumps(_as_json(result, written), indent=2))
     else:
         print_summary(result, written)
 
@@ -88,7 +89,6 @@ def _write(
 
 def print_summary(result: BlastResult, written: Sequence[Path]) -> None:
     """Print a table of the structures' loads, how the run went, and the files."""
-    console = result_console()
     scene, blast = result.blast.scene, result.blast
     x_m, y_m = scene.charge.position_m
     table = make_table(
@@ -116,21 +116,28 @@ def print_summary(result: BlastResult, written: Sequence[Path]) -> None:
             f"{obstacle.transferred_impulse:,.0f}",
             "never" if first_hit_s is None else f"{MS_PER_S * first_hit_s:.1f}",
         )
-    console.print(table)
-    console.print(
+    result_console().print(table)
+    print_line(
         f"{len(scene.balls):,} balls, {result.steps:,} steps, "
         f"{MS_PER_S * result.time_s:.0f} ms simulated; ended because {result.end_reason}"
     )
-    console.print(f"digest {result.digest}")
+    print_line(f"digest {result.digest}")
     for path in written:
-        console.print(f"wrote {path}", markup=False)
+        print_line(f"wrote {path}")
 
 
 def _as_json(result: BlastResult, written: Sequence[Path]) -> dict[str, object]:
     """Return the result as plain data; numbers that do not exist are null."""
     return {
         "run": result.run_record,
-        "structures": json.loads(result.structures.to_json(orient="records")),
-        "modules": json.loads(result.modules.to_json(orient="records")),
+        "structures": _records(result.structures),
+        "modules": _records(result.modules),
         "files": [str(path) for path in written],
     }
+
+
+def _records(table: pd.DataFrame) -> list[dict[str, object]]:
+    return [
+        {str(name): None if pd.isna(value) else value for name, value in row.items()}
+        for row in table.to_dict("records")
+    ]

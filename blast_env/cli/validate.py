@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from blast_env.cli.output import result_console, user_errors
+from blast_env.cli.output import print_line, user_errors
 from blast_env.scenario import find_problems
 
 
@@ -15,15 +15,14 @@ def validate(
 
     The exit code is 0 when all files are good, 1 when one has a problem.
     """
-    console = result_console()
     bad_files = 0
     with user_errors():
         for name in files:
             problems = find_problems(name)
             bad_files += bool(problems)
             if not problems:
-                console.print(f"{name}: good", markup=False, style="green")
+                print_line(f"{name}: good", style="green")
             for problem in problems:
-                console.print(f"{name}: {problem}", markup=False)
+                print_line(f"{name}: {problem}")
     if bad_files:
         raise typer.Exit(1)

@@ -17,7 +17,7 @@ _TOO_FAST: Final = 2.0
 The step is at most half a radius and half a half module, so twice the speed still leaves the
 centre of a ball in the outer half of a module that it hits.
 """
-_SLOW: Final = 0.25
+_SLOW: Final = 0.5
 """Below this share of the speed that the step was made for, the step is doubled."""
 
 

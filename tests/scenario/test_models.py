@@ -198,3 +198,25 @@ def test_strip_behind_the_structure_keeps_its_width() -> None:
     scenario = scenario_from(minimal_document()).at_stand_off(20.0)
     # 3 m before the charge, 20 m, 2 m of structure, 8 m behind it.
     assert scenario.site.width_m == 33.0
+
+
+def test_another_charge_replaces_the_threat_and_changes_the_hash() -> None:
+    scenario = load_scenario("courtyard")
+    fixed = scenario.with_charge(Charge((8.0, 15.0), 50.0))
+    drawn = fixed.sample_charge(np.random.default_rng(0))
+    assert drawn == Charge((8.0, 15.0), 50.0)
+    assert fixed.content_hash != scenario.content_hash
+    with pytest.raises(ScenarioError, match="building"):
+        scenario.with_charge(Charge((28.0, 15.0), 50.0))
+
+
+def test_other_parameters_are_added_to_the_scenario_s_own() -> None:
+    scenario = load_scenario("courtyard")
+    changed = scenario.with_simulation(overrides={"air": {"mass": 0.2}})
+    again = changed.with_simulation(overrides={"air": {"spacing_units": 6.0}})
+    assert (again.parameters.air.mass, again.parameters.air.spacing_units) == (0.2, 6.0)
+    assert scenario.parameters.air.mass == 0.1
+    with pytest.raises(ScenarioError, match="did you mean 'mass'"):
+        scenario.with_simulation(overrides={"air": {"mas": 0.2}})
+    with pytest.raises(ScenarioError, match="did you mean 'ballistic'"):
+        scenario.with_simulation(preset="balistic")

@@ -1,0 +1,120 @@
+"""The command line, run in this process."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from blast_env import load_scenario, simulate
+from blast_env.cli import app
+from blast_env.physics.pymunk_engine import PymunkRun
+
+COMMANDS = ("simulate", "validate", "bench")
+
+
+def run(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command: str) -> None:
+    result = run(command, "--help")
+    assert result.exit_code == 0
+    assert command in result.stdout
+
+
+def test_simulate_prints_loads_with_units_and_writes_all_files(tmp_path: Path) -> None:
+    names = ("film.mp4", "table.xlsx", "table.parquet", "map.png")
+    options = ("--film", "--excel", "--parquet", "--heat-map")
+    written = [tmp_path / name for name in names]
+    layout = tmp_path / "layout.json"
+    layout.write_text("[[4, 0], [5, 0]]")
+    pairs = [text for pair in zip(options, written, strict=True) for text in pair]
+    result = run("simulate", "courtyard", "--seed", "3", "--layout", layout, *pairs)
+    assert result.exit_code == 0, result.output
+    blast = simulate(load_scenario("courtyard"), [(4, 0), (5, 0)], seed=3)
+    assert f"{blast.impulse_sim('building'):,.0f}" in result.stdout
+    assert "impulse m|v| (sim)" in result.stdout
+    assert blast.digest in result.stdout
+    for path in written:
+        assert path.stat().st_size > 1000
+        assert str(path) in result.stdout.replace("\n", "")
+
+
+def test_simulate_prints_json_that_can_be_read() -> None:
+    result = run("simulate", "free_field", "--stand-off", "20", "--json")
+    assert result.exit_code == 0
+    content = json.loads(result.stdout)
+    expected = simulate(load_scenario("free_field").at_stand_off(20.0))
+    assert content["run"]["digest"] == expected.digest
+    assert content["structures"][0]["impulse_sim"] == expected.impulse_sim("building")
+    assert len(content["modules"]) == 100
+
+
+def test_simulate_takes_charge_and_preset() -> None:
+    result = run("simulate", "courtyard", "--charge", "8", "15", "--preset", "ballistic")
+    assert result.exit_code == 0
+    assert "at (8.00, 15.00) m" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("cortyard",), "did you mean 'courtyard'"),
+        (("courtyard", "--preset", "balistic"), "did you mean 'ballistic'"),
+        (("courtyard", "--engine", "pymonk"), "did you mean 'pymunk'"),
+        (("courtyard", "--layout", "nowhere.json"), "nowhere.json"),
+        (("courtyard", "--charge", "29", "15"), "building"),
+        (("courtyard", "--stand-off", "20"), "needs one point charge"),
+        (("courtyard", "--excel", "table.txt"), "table.txt"),
+        (("courtyard", "--film", "film.avi"), "film.avi"),
+        (("courtyard", "--heat-map", "no/such/folder/map.png"), "no/such/folder"),
+    ],
+)
+def test_bad_input_is_one_clear_message(
+    arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run("simulate", *arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert "Traceback" not in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interruption_leaves_nothing_half_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    advance = PymunkRun.advance
+
+    def interrupted(self: PymunkRun, until_s: float) -> None:
+        advance(self, until_s)
+        if self.time_s > 0.02:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(PymunkRun, "advance", interrupted)
+    result = run("simulate", "courtyard", "--film", tmp_path / "film.mp4")
+    assert result.exit_code == 130
+    assert "interrupted" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_validate_reports_all_problems_of_all_files(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "scenarios" / "courtyard.toml").read_text()
+    bad = tmp_path / "bad.toml"
+    bad.write_text(text.replace("width_m", "widht_m").replace("stock = 16", "stock = -1"))
+    result = run("validate", "courtyard", bad)
+    assert result.exit_code == 1
+    assert "courtyard: good" in result.stdout
+    output = result.stdout.replace("\n", " ")
+    assert "site.widht_m: unknown key, did you mean 'width_m'?" in output
+    assert "build_zone.stock: is -1, must be at least 1" in output
+    assert run("validate", "courtyard").exit_code == 0
+
+
+def test_bench_prints_the_hardware_and_the_ratios() -> None:
+    result = run("bench", "--repeats", "1", "--scenario", "courtyard", "--no-memory")
+    assert result.exit_code == 0, result.output
+    for words in ("cores", "pymunk 7", "courtyard", "blasts/s", "time / pymunk alone"):
+        assert words in result.stdout

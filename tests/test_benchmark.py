@@ -1,0 +1,60 @@
+"""The benchmark, and pytest-benchmark's view of the parts (`pytest --benchmark-enable`)."""
+
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from blast_env import Blast, load_scenario
+from blast_env.benchmark import measure_memory_mb, measure_speed
+from blast_env.physics.pymunk_engine import PymunkEngine
+from blast_env.physics.pymunk_space import build_space
+from blast_env.scene import build_scene
+
+COURTYARD = load_scenario("courtyard")
+
+
+def test_our_rules_and_records_cost_less_than_the_balls_they_take_out_save() -> None:
+    """The issue's bound: at most 1.3 times pymunk alone on the same scene and steps."""
+    speed = measure_speed(COURTYARD, "courtyard", repeats=3)
+    assert speed.ratio_all_balls < 1.3
+    assert speed.ratio_same_balls > speed.ratio_all_balls
+    assert speed.balls == len(build_scene(COURTYARD).balls)
+    assert speed.steps == Blast(COURTYARD).run().steps
+
+
+def test_a_blast_of_60_000_balls_fits_into_500_mb() -> None:
+    overrides = {
+        "air": {"spacing_units": 1.38, "radius_units": 0.5},
+        "stepping": {"time_limit_s": 0.002},
+    }
+    many = load_scenario("free_field").at_stand_off(60.0).with_simulation(overrides=overrides)
+    assert len(build_scene(many).balls) > 60_000
+    assert measure_memory_mb(many) < 500.0
+
+
+def test_time_to_lay_out_a_scene(benchmark: BenchmarkFixture) -> None:
+    assert len(benchmark(build_scene, COURTYARD).balls) > 1000
+
+
+def test_time_to_build_a_space(benchmark: BenchmarkFixture) -> None:
+    scene = build_scene(COURTYARD)
+    built = benchmark(lambda: build_space(scene, scene.obstacles()))
+    assert len(built.ball_bodies) == len(scene.balls)
+
+
+@pytest.mark.parametrize("until_s", [0.01, 1.0])
+def test_time_of_a_run(benchmark: BenchmarkFixture, until_s: float) -> None:
+    scene = build_scene(COURTYARD)
+
+    def run() -> float:
+        started = PymunkEngine().start(scene)
+        started.advance(until_s)
+        return started.time_s
+
+    assert benchmark(run) > 0.009
+
+
+def test_time_of_the_tables(benchmark: BenchmarkFixture) -> None:
+    blast = Blast(COURTYARD)
+    run = blast.start()
+    run.advance(1.0e9)
+    assert len(benchmark(lambda: blast.result(run).collisions)) > 100
