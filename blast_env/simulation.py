@@ -11,13 +11,22 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from blast_env.calibration.stored import (
+    CalibrationError,
+    ScaledImpulse,
+    load_calibration,
+    seen_width_m,
+    stored_calibrations,
+)
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.physics.collisions import CollisionArray
 from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, find_engine
+from blast_env.physics.particles import distance_to_rectangle
 from blast_env.physics.structure import ModularObstacle
 from blast_env.recording.tables import collision_table, module_table, structure_table
 from blast_env.scenario import Cell, Charge, Scenario
 from blast_env.scene import Scene, build_scene
+from blast_env.units import UNITS_PER_M
 
 _PROGRESS_CALLS = 200
 
@@ -161,6 +170,41 @@ class BlastResult:
             UnknownNameError: If there is no structure of that name.
         """
         return self.obstacle(structure).impulse
+
+    def impulse(self, structure: str) -> ScaledImpulse:
+        """Return the impulse per area on a structure, through the scenario's calibration.
+
+        Args:
+            structure: Name of the structure.
+
+        Returns:
+            `.psi_s`, `.pa_s`, and `.in_range` with `.notes`: whether the calibration was made
+            for this distance and charge.
+
+        Raises:
+            UnknownNameError: If there is no structure or no calibration of that name.
+            CalibrationError: If the scenario names no calibration, or one that was made with
+                other parameters or another engine.
+        """
+        scenario, charge = self.blast.scenario, self.blast.scene.charge
+        if scenario.calibration is None:
+            raise CalibrationError(
+                f"scenario {scenario.name!r} names no calibration: set calibration to one of "
+                f"{', '.join(stored_calibrations())}"
+            )
+        calibration = load_calibration(scenario.calibration)
+        calibration.check(scenario.parameters, self.engine_name)
+        obstacle = self.obstacle(structure)
+        if obstacle.cells is not None:
+            raise CalibrationError(f"{structure!r} is no structure: it has no facade of one width")
+        rectangle_m = obstacle.rectangle.scaled(1.0 / UNITS_PER_M)
+        position = np.array([charge.position_m])
+        return calibration.convert(
+            obstacle.impulse,
+            seen_width_m(rectangle_m, charge.position_m),
+            float(distance_to_rectangle(position, rectangle_m)[0]),
+            charge.tnt_kg,
+        )
 
     @cached_property
     def digest(self) -> str:

@@ -18,3 +18,6 @@ MODULE_SIDE_M: Final = MODULE_SIDE_UNITS / UNITS_PER_M
 
 MS_PER_S: Final = 1000.0
 """Milliseconds in a second."""
+
+PA_PER_PSI: Final = 6894.757293168
+"""Pascals in a pound-force per square inch; also Pa s in a psi s."""

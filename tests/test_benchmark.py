@@ -32,7 +32,7 @@ def test_a_blast_of_60_000_balls_fits_into_500_mb() -> None:
 
 
 def test_time_to_lay_out_a_scene(benchmark: BenchmarkFixture) -> None:
-    assert len(benchmark(build_scene, COURTYARD).balls) > 1000
+    assert len(benchmark(build_scene, COURTYARD).balls) > 800
 
 
 def test_time_to_build_a_space(benchmark: BenchmarkFixture) -> None:

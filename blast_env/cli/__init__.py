@@ -3,6 +3,7 @@
 import typer
 
 from blast_env.cli.bench import bench
+from blast_env.cli.calibrate import calibrate
 from blast_env.cli.simulate import simulate
 from blast_env.cli.validate import validate
 
@@ -15,4 +16,5 @@ app = typer.Typer(
 )
 app.command()(simulate)
 app.command()(validate)
+app.command()(calibrate)
 app.command()(bench)

@@ -3,6 +3,8 @@
 Every default is the `ballistic` preset's value; `blast_env.physics.presets` gives the reasons.
 """
 
+import json
+from hashlib import sha256
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -52,7 +54,7 @@ class ExplosiveParameters(BallParameters):
 
     mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
     radius_units: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
-    elasticity: Fraction = 0.8
+    elasticity: Fraction = 0.72
     ball_count: Annotated[int, Field(ge=1, le=100_000)] = 720
     speed_units_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = 2000.0
     offset_units: Annotated[float, Field(ge=0.0, le=1000.0)] = 1.0
@@ -70,10 +72,10 @@ class AirParameters(BallParameters):
             gap that keeps neighbours apart, (spacing - 2 radius) / 2; 0 is the bare lattice.
     """
 
-    mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.1
+    mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.3
     radius_units: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
-    elasticity: Fraction = 0.8
-    spacing_units: Annotated[float, Field(ge=0.0, le=1e6)] = 8.0
+    elasticity: Fraction = 0.72
+    spacing_units: Annotated[float, Field(ge=0.0, le=1e6)] = 11.1
     jitter: Fraction = 0.5
 
 
@@ -123,3 +125,9 @@ class SimulationParameters(Parameters):
     air: AirParameters = AirParameters()
     contact: ContactParameters = ContactParameters()
     stepping: SteppingParameters = SteppingParameters()
+
+
+def parameters_digest(parameters: SimulationParameters) -> str:
+    """Return the SHA-256 of all parameters, which a calibration is bound to."""
+    content = json.dumps(parameters.model_dump(mode="json"), sort_keys=True)
+    return sha256(content.encode()).hexdigest()

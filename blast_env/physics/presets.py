@@ -10,6 +10,9 @@ from blast_env.physics.parameters import SimulationParameters
 PRESETS: Final[Mapping[str, SimulationParameters]] = MappingProxyType(
     {
         # Sparse air, as the paper's figures suggest: balls fly almost free between collisions.
+        # v0, N, the radii, C_e and the 10 % and 30 % rules are the paper's or set beforehand;
+        # air spacing, air mass and elasticity come from `scripts/search_ballistic.py`, which
+        # matches the paper's UFC column and the shape of its own impulse-distance curve.
         "ballistic": SimulationParameters(),
     }
 )

@@ -111,6 +111,19 @@ def collision_table(
     return table.astype({"particle_type": "str"})
 
 
+def faces_hit(collisions: pd.DataFrame) -> pd.Series:
+    """Return the facade (n,) that each collision hit, told by its normal.
+
+    Args:
+        collisions: A collision table.
+    """
+    x, y = collisions["normal_x"], collisions["normal_y"]
+    sideways = np.where(x < 0.0, "left", "right")
+    upright = np.where(y < 0.0, "bottom", "top")
+    names = np.where(x.abs() >= y.abs(), sideways, upright)
+    return pd.Series(names, index=collisions.index, dtype="str")
+
+
 def module_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
     """Return one row a module; see `MODULE_COLUMNS`."""
     rows = [

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from blast_env.physics.structure import ModularObstacle
+from blast_env.recording.tables import faces_hit
 from blast_env.rendering.captions import write_heading
 from blast_env.rendering.extra import render_extra
 from blast_env.rendering.span import shown_until_s
@@ -46,7 +47,7 @@ def impulse_over_time(result: BlastResult) -> Figure:
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(max(4.6 * columns, 8.0), 1.2 + 3.6 * rows), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
-    table = result.collisions.assign(facade=facades(result.collisions))
+    table = result.collisions.assign(facade=faces_hit(result.collisions))
     end_ms = shown_until_s(result) * MS_PER_S
     for axes, obstacle in zip(panels, shown, strict=False):
         hits = table[table["structure"] == obstacle.name]
@@ -64,16 +65,6 @@ def impulse_over_time(result: BlastResult) -> Figure:
         color=unit_interval(QUIET_INK),
     )
     return figure
-
-
-def facades(collisions: pd.DataFrame) -> pd.Series:
-    """Return the facade (n,) that each collision hit: left, right, top or bottom."""
-    x, y = collisions["normal_x"], collisions["normal_y"]
-    sideways = x.abs() >= y.abs()
-    names = np.where(
-        sideways, np.where(x < 0.0, "left", "right"), np.where(y < 0.0, "bottom", "top")
-    )
-    return pd.Series(names, index=collisions.index, dtype="str")
 
 
 def _draw_structure(

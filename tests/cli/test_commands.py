@@ -3,14 +3,16 @@
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, simulate
+from blast_env.calibration.stored import load_calibration
 from blast_env.cli import app
 from blast_env.physics.pymunk_engine import PymunkRun
 
-COMMANDS = ("simulate", "validate", "bench")
+COMMANDS = ("simulate", "validate", "calibrate", "bench")
 
 
 def run(*arguments: str | Path) -> Result:
@@ -118,3 +120,44 @@ def test_bench_prints_the_hardware_and_the_ratios() -> None:
     assert result.exit_code == 0, result.output
     for words in ("cores", "pymunk 7", "courtyard", "blasts/s", "time / pymunk alone"):
         assert words in result.stdout
+
+
+def calibrate(*arguments: str, out: Path) -> Result:
+    fixed = ("calibrate", "--name", "mine", "--seeds", "2", "--out", out)
+    return run(*fixed, *arguments)
+
+
+def test_calibrate_writes_a_calibration_its_table_and_its_figure(tmp_path: Path) -> None:
+    distances = ("--distances", "8,11,15,20")
+    result = calibrate("--reference", "reflected_impulse", *distances, out=tmp_path)
+    assert result.exit_code == 0, result.output
+    stored = load_calibration(tmp_path / "mine.json")
+    assert stored.distances_m == (8.0, 11.0, 15.0, 20.0)
+    assert stored.seeds == (1000, 1001)
+    assert stored.reference.charge_kg == 100.0
+    table = pd.read_csv(tmp_path / "mine.csv")
+    assert table.i_sim.tolist() == pytest.approx(list(stored.i_sim))
+    assert (tmp_path / "mine.png").stat().st_size > 10_000
+    assert "leave-one-distance-out" in result.stdout
+    finished = (tmp_path / "mine.runs.jsonl").read_text()
+    again = calibrate("--reference", "reflected_impulse", *distances, out=tmp_path)
+    assert again.exit_code == 0
+    assert (tmp_path / "mine.runs.jsonl").read_text() == finished
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--reference", "paper_ufc", "--distances", "15,20"), "no value at 20 m"),
+        (("--reference", "paper_ufc", "--distances", "15,,20"), "--distances is '15,,20'"),
+        (("--reference", "paper_ufc", "--distances", "30,15"), "15 m follows 30 m"),
+        (("--reference", "paper_ufc", "--scenario", "courtyard"), "one point charge"),
+    ],
+)
+def test_bad_calibrations_are_one_clear_message(
+    arguments: tuple[str, ...], words: str, tmp_path: Path
+) -> None:
+    result = calibrate(*arguments, out=tmp_path)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert list(tmp_path.iterdir()) == []

@@ -42,7 +42,7 @@ def cloud(step_radii: float, elasticity: float = 1.0, base_impulse: float = 0.0)
         [FAR_WALL],
         parameters(
             explosive={"elasticity": elasticity},
-            air={"elasticity": elasticity},
+            air={"elasticity": elasticity, "mass": 0.1},
             contact={**KEEP_MASS, "base_impulse": base_impulse},
             stepping={"step_radii": step_radii},
         ),

@@ -9,6 +9,7 @@ from matplotlib.quiver import Quiver
 from PIL import Image
 
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.recording.tables import faces_hit
 from blast_env.rendering.figures import (
     heat_map,
     impulse_over_time,
@@ -16,7 +17,6 @@ from blast_env.rendering.figures import (
     model_scheme,
     save_figure,
 )
-from blast_env.rendering.history import facades
 from blast_env.rendering.style import short_number
 from blast_env.simulation import BlastResult
 
@@ -91,7 +91,7 @@ def test_impulse_over_time_ends_at_the_sums_of_the_facades(result: BlastResult) 
 
 def test_facades_are_told_by_the_normal(result: BlastResult) -> None:
     table = result.collisions
-    facade = facades(table)
+    facade = faces_hit(table)
     modules = result.modules.set_index("module_id")
     on_wall = table[(table["structure"] == "wall") & (facade == "bottom")]
     assert len(on_wall) > 10

@@ -1,0 +1,56 @@
+"""References, the laws that scale simulated impulses to them, and how well they agree."""
+
+from blast_env.calibration.friedlander import Friedlander
+from blast_env.calibration.laws import (
+    FewDistancesWarning,
+    LinearLaw,
+    PowerLaw,
+    ProportionalLaw,
+    ScalingLaw,
+    fit_linear,
+    fit_power_law,
+    fit_proportional,
+)
+from blast_env.calibration.metrics import (
+    FitMetrics,
+    Interval,
+    LeaveOneOut,
+    bootstrap_coefficients,
+    fit_metrics,
+    leave_one_out,
+)
+from blast_env.calibration.pressure import PressureHistory, facade_history
+from blast_env.calibration.references import (
+    PAPER_COLUMNS,
+    PAPER_UFC_LABEL,
+    kingery_bulmash,
+    paper_table,
+    paper_ufc_column,
+    scaled_distance,
+)
+
+__all__ = [
+    "PAPER_COLUMNS",
+    "PAPER_UFC_LABEL",
+    "FewDistancesWarning",
+    "FitMetrics",
+    "Friedlander",
+    "Interval",
+    "LeaveOneOut",
+    "LinearLaw",
+    "PowerLaw",
+    "PressureHistory",
+    "ProportionalLaw",
+    "ScalingLaw",
+    "bootstrap_coefficients",
+    "facade_history",
+    "fit_linear",
+    "fit_metrics",
+    "fit_power_law",
+    "fit_proportional",
+    "kingery_bulmash",
+    "leave_one_out",
+    "paper_table",
+    "paper_ufc_column",
+    "scaled_distance",
+]

@@ -1,0 +1,234 @@
+"""What simulated impulses are compared with: the paper's own table, and Kingery & Bulmash.
+
+Kingery and Bulmash's polynomials ("Airblast parameters from TNT spherical air burst and
+hemispherical surface burst", ARBRL-TR-02555, 1984) are the curves behind figures 2-7 and 2-15 of
+UFC 3-340-02. `data/README.md` says where the coefficients come from.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from io import StringIO
+from types import MappingProxyType
+from typing import Final, Literal, get_args, overload
+
+import numpy as np
+import pandas as pd
+
+from blast_env.calibration.laws import FloatArray, Numbers, checked_array
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.recording.tables import Column
+
+Quantity = Literal[
+    "incident_overpressure",
+    "reflected_overpressure",
+    "incident_impulse",
+    "reflected_impulse",
+    "arrival_time",
+    "positive_duration",
+    "shock_speed",
+]
+"""A quantity of `kingery_bulmash`."""
+
+Burst = Literal["hemispherical", "spherical"]
+"""Hemispherical: the charge lies on rigid ground. Spherical: far from any surface."""
+
+PAPER_UFC_LABEL: Final = "the paper's UFC column"
+"""What its i_ufc must be called: it matches no curve of UFC 3-340-02 at all distances."""
+
+PAPER_COLUMNS: Final = (
+    Column("r_m", "m", "distance R"),
+    Column("i_ufc_psi_s", "psi*s", "impulse i_ufc that the paper ascribes to UFC 3-340-02"),
+    Column("i_sim", "sim", "impulse i_sim of the paper's simulation"),
+    Column("t1_scaled", "psi*s", "Table 1, proportional law: i_scaled as printed"),
+    Column("t1_abs", "psi*s", "Table 1: E_abs as printed"),
+    Column("t1_pct", "%", "Table 1: E% as printed"),
+    Column("t2_scaled", "psi*s", "Table 2, linear law: i_scaled as printed"),
+    Column("t2_abs", "psi*s", "Table 2: E_abs as printed"),
+    Column("t2_pct", "%", "Table 2: E% as printed"),
+    Column("t3_scaled", "psi*s", "Table 3, power law: i_scaled as printed"),
+    Column("t3_abs", "psi*s", "Table 3: E_abs as printed"),
+    Column("t3_pct", "%", "Table 3: E% as printed"),
+)
+"""The columns of `paper_table`."""
+
+# A unit of the data file: its factor to SI, and whether W^(1/3) scales the value.
+_TO_SI: Final[Mapping[str, tuple[float, bool]]] = MappingProxyType(
+    {
+        "kPa": (1e3, False),
+        "kPa*ms/kg^(1/3)": (1.0, True),
+        "ms/kg^(1/3)": (1e-3, True),
+        "m/ms": (1e3, False),
+    }
+)
+_BURST_KEYS: Final[Mapping[str, str]] = MappingProxyType(
+    {"hemispherical": "hemispherical_surface_burst", "spherical": "spherical_free_air_burst"}
+)
+_ROUNDING: Final = 1e-9  # relative; R / W^(1/3) of a charge made for an end of the range
+
+
+@dataclass(frozen=True)
+class _Segment:
+    """log10 Y = sum c[k] U^k, U = a + b log10 Z, for z_min <= Z < z_max."""
+
+    z_min: float
+    z_max: float
+    a: float
+    b: float
+    c: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """One quantity over the scaled distance Z, m/kg^(1/3), in ascending segments."""
+
+    factor_to_si: float
+    scales_with_charge: bool
+    segments: tuple[_Segment, ...]
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The least and the largest Z."""
+        return self.segments[0].z_min, self.segments[-1].z_max
+
+    def at(self, z: FloatArray) -> FloatArray:
+        """Return the scaled quantity, SI, at scaled distances within the range."""
+        joints = [segment.z_min for segment in self.segments[1:]]
+        which = np.searchsorted(joints, z, side="right")
+        value = np.empty_like(z)
+        for index, segment in enumerate(self.segments):
+            own = which == index
+            u = segment.a + segment.b * np.log10(z[own])
+            value[own] = 10.0 ** np.polynomial.polynomial.polyval(u, segment.c)
+        return self.factor_to_si * value
+
+
+def paper_table() -> pd.DataFrame:
+    """Return Tables 1 to 3 of the paper, one row a distance; see `PAPER_COLUMNS`.
+
+    A new frame in every call.
+    """
+    return pd.read_csv(StringIO(_read("paper_tables.csv")), dtype=np.float64)
+
+
+def paper_ufc_column() -> pd.Series:
+    """Return the paper's UFC column, psi*s, by the distance in metres.
+
+    It is what the paper prints as UFC 3-340-02, not the standard itself: at 30 to 120 m it is
+    within 8 % of Kingery and Bulmash's incident impulse of about 10 t TNT on the ground, at 15 m
+    1.9 times as large. For the standard's curves take `kingery_bulmash`.
+    """
+    table = paper_table()
+    index = pd.Index(table["r_m"], name="distance_m")
+    return pd.Series(table["i_ufc_psi_s"].to_numpy(), index=index, name=PAPER_UFC_LABEL)
+
+
+@overload
+def kingery_bulmash(
+    quantity: Quantity, distance_m: float, charge_kg: float, burst: Burst = ...
+) -> float: ...
+
+
+@overload
+def kingery_bulmash(
+    quantity: Quantity, distance_m: Numbers, charge_kg: float | Numbers, burst: Burst = ...
+) -> FloatArray: ...
+
+
+@overload
+def kingery_bulmash(
+    quantity: Quantity, distance_m: float, charge_kg: Numbers, burst: Burst = ...
+) -> FloatArray: ...
+
+
+def kingery_bulmash(
+    quantity: Quantity,
+    distance_m: float | Numbers,
+    charge_kg: float | Numbers,
+    burst: Burst = "hemispherical",
+) -> float | FloatArray:
+    """Return an airblast parameter of TNT at sea level (Kingery & Bulmash 1984), SI units.
+
+    Hopkinson-Cranz scaling: the curves hold over Z = R / W^(1/3), and impulses and times grow
+    with W^(1/3). Distance and mass are broadcast against each other.
+
+    Args:
+        quantity: What to return: overpressures in Pa, impulses in Pa*s, times in s, the shock
+            speed in m/s. Reflected values are for normal incidence on an infinite rigid wall.
+        distance_m: Distance R from the charge, above 0.
+        charge_kg: TNT-equivalent mass W, above 0.
+        burst: `"hemispherical"`, a charge on rigid ground, or `"spherical"`, in free air.
+
+    Raises:
+        UnknownNameError: If there is no such quantity or burst; names the nearest one.
+        BlastEnvError: If a number is not above 0, if distance and mass cannot be broadcast, or if
+            Z is outside the range of the curve; the message gives Z and the range.
+    """
+    curve = _curve(quantity, burst)
+    charge = checked_array("charge_kg", charge_kg, above=0.0)
+    z = scaled_distance(distance_m, charge_kg)
+    low, high = curve.range
+    bad = (z < low * (1.0 - _ROUNDING)) | (z > high * (1.0 + _ROUNDING))
+    if bad.any():
+        index = tuple(np.argwhere(bad)[0].tolist())
+        place = f" at [{', '.join(map(str, index))}]" if index else ""
+        raise BlastEnvError(
+            f"scaled distance Z{place} is {z[index]:.6g} m/kg^(1/3), must be {low:g} to {high:g}: "
+            f"the range of Kingery and Bulmash's {burst} {quantity}"
+        )
+    value = curve.at(np.clip(z, low, high))
+    if curve.scales_with_charge:
+        value = value * np.cbrt(charge)
+    return float(value) if value.ndim == 0 else value
+
+
+def scaled_distance(distance_m: float | Numbers, charge_kg: float | Numbers) -> FloatArray:
+    """Return Z = R / W^(1/3), m/kg^(1/3) (Hopkinson-Cranz).
+
+    Args:
+        distance_m: Distance R, above 0.
+        charge_kg: TNT-equivalent mass W, above 0.
+
+    Raises:
+        BlastEnvError: If a number is not above 0, or if the shapes cannot be broadcast.
+    """
+    distance = checked_array("distance_m", distance_m, above=0.0)
+    charge = checked_array("charge_kg", charge_kg, above=0.0)
+    try:
+        np.broadcast_shapes(distance.shape, charge.shape)
+    except ValueError as error:
+        raise BlastEnvError(
+            f"distance_m has the shape {distance.shape} and charge_kg {charge.shape}, "
+            "must be broadcastable"
+        ) from error
+    return np.asarray(distance / np.cbrt(charge))
+
+
+def _curve(quantity: str, burst: str) -> _Curve:
+    """Return a curve by the names that a user gave."""
+    if quantity not in get_args(Quantity):
+        raise UnknownNameError("quantity", quantity, get_args(Quantity))
+    if burst not in get_args(Burst):
+        raise UnknownNameError("burst", burst, get_args(Burst))
+    return _curves()[burst, quantity]
+
+
+@cache
+def _curves() -> Mapping[tuple[str, str], _Curve]:
+    """Return all curves by burst and quantity."""
+    document = json.loads(_read("kingery_bulmash.json"))
+    curves = {}
+    for burst, key in _BURST_KEYS.items():
+        for quantity, entry in document[key].items():
+            segments = tuple(
+                _Segment(**(segment | {"c": tuple(segment["c"])})) for segment in entry["segments"]
+            )
+            curves[burst, quantity] = _Curve(*_TO_SI[entry["unit"]], segments)
+    return MappingProxyType(curves)
+
+
+def _read(name: str) -> str:
+    """Return the text of a file of the package's data."""
+    return (files("blast_env.calibration") / "data" / name).read_text(encoding="utf-8")

@@ -1,0 +1,246 @@
+"""Stored calibrations: a law, what it was made from, and where it holds."""
+
+import json
+from collections.abc import Mapping
+from hashlib import sha256
+from importlib.resources import files
+from math import hypot
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from blast_env.atomic import write_atomically
+from blast_env.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.geometry import Rectangle
+from blast_env.physics.parameters import SimulationParameters, parameters_digest
+from blast_env.units import PA_PER_PSI
+
+SUFFIX: Final = ".json"
+LAWS: Final[Mapping[str, type[ScalingLaw]]] = MappingProxyType(
+    {"proportional": ProportionalLaw, "linear": LinearLaw, "power": PowerLaw}
+)
+
+
+class CalibrationError(BlastEnvError):
+    """A calibration that cannot be read, or does not belong to a simulation."""
+
+
+class ScaledImpulse(NamedTuple):
+    """A simulated impulse in the units of the reference.
+
+    Attributes:
+        psi_s: Impulse per area, psi*s.
+        in_range: Whether the calibration was made for a case like this one.
+        notes: Why not, a sentence each.
+    """
+
+    psi_s: float
+    in_range: bool
+    notes: tuple[str, ...]
+
+    @property
+    def pa_s(self) -> float:
+        """Impulse per area, Pa*s."""
+        return self.psi_s * PA_PER_PSI
+
+
+class Section(BaseModel):
+    """Base of the parts of a calibration file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class ReferenceSection(Section):
+    """What the law was fitted to.
+
+    Attributes:
+        source: The paper's UFC column, or Kingery-Bulmash.
+        quantity: What is compared, e.g. `reflected_impulse`.
+        burst: `hemispherical` or `spherical`; None where the source does not say.
+        charge_kg: TNT-equivalent mass; None where the source does not say.
+    """
+
+    source: Literal["paper UFC column", "Kingery-Bulmash"]
+    quantity: str
+    burst: str | None = None
+    charge_kg: float | None = None
+
+
+class MetricsSection(Section):
+    """How well the law agrees with the reference (`FitMetrics`), rmse in psi*s."""
+
+    mape_percent: float
+    rmse: float
+    integral_error_percent: float
+    leave_one_out_mape_percent: float
+
+
+class Calibration(Section):
+    """A law from simulated impulse to psi*s, and everything that it depends on.
+
+    Attributes:
+        schema_version: Version of the file format.
+        name: Name, as in `load_calibration("ballistic_ufc")`.
+        law: Kind of the law.
+        coefficients: Its coefficients, by the paper's names.
+        coefficient_intervals: Their 95 % intervals (low, high) from the scatter between seeds.
+        reference: What it was fitted to.
+        preset: Preset of the simulations.
+        parameters_digest: Digest of all their parameters.
+        engine: Engine that ran them.
+        engine_version: Its version then.
+        blast_env_version: The package's version then.
+        facade_width_m: Width of the reference structure's facade.
+        tnt_kg: TNT-equivalent mass of the simulated charge.
+        distances_m: Distances, ascending; the first and last are the range of validity.
+        seeds: Seeds at every distance.
+        i_sim: Mean simulated impulse at each distance.
+        i_sim_ci95: Half-width of its 95 % confidence interval.
+        i_reference_psi_s: Reference impulse at each distance.
+        metrics: How well the law agrees.
+    """
+
+    schema_version: Literal[1] = 1
+    name: str
+    law: Literal["proportional", "linear", "power"]
+    coefficients: dict[str, float]
+    coefficient_intervals: dict[str, tuple[float, float]]
+    reference: ReferenceSection
+    preset: str
+    parameters_digest: str
+    engine: str
+    engine_version: str
+    blast_env_version: str
+    facade_width_m: Annotated[float, Field(gt=0.0)]
+    tnt_kg: Annotated[float, Field(gt=0.0)]
+    distances_m: Annotated[tuple[float, ...], Field(min_length=2)]
+    seeds: Annotated[tuple[int, ...], Field(min_length=1)]
+    i_sim: tuple[float, ...]
+    i_sim_ci95: tuple[float, ...]
+    i_reference_psi_s: tuple[float, ...]
+    metrics: MetricsSection
+
+    @property
+    def scaling_law(self) -> ScalingLaw:
+        """The law; it takes i_sim on the reference facade and gives psi*s."""
+        return LAWS[self.law](**self.coefficients)
+
+    def check(self, parameters: SimulationParameters, engine: str) -> None:
+        """Refuse a simulation that the calibration was not made with.
+
+        Raises:
+            CalibrationError: If the engine or any parameter of the blast model differs.
+        """
+        if engine != self.engine:
+            raise CalibrationError(
+                f"calibration {self.name!r} was made with engine {self.engine!r}, "
+                f"the simulation ran on {engine!r}"
+            )
+        digest = parameters_digest(parameters)
+        if digest != self.parameters_digest:
+            raise CalibrationError(
+                f"calibration {self.name!r} was made with the parameters of preset "
+                f"{self.preset!r} ({self.parameters_digest[:12]}), the simulation has others "
+                f"({digest[:12]}): use that preset without overrides, or calibrate anew"
+            )
+
+    def convert(
+        self, impulse_sim: float, seen_width_m: float, distance_m: float, tnt_kg: float
+    ) -> ScaledImpulse:
+        """Convert the impulse on a structure.
+
+        The law holds for the impulse on the reference facade. Another structure's impulse is
+        first taken per metre of the width that the charge sees, times the reference width: a
+        wider building collects more balls without being loaded more.
+
+        Args:
+            impulse_sim: Sum of m |v| on the structure, simulation units.
+            seen_width_m: Its width as seen from the charge; see `seen_width_m`.
+            distance_m: From the charge's centre to the structure.
+            tnt_kg: TNT-equivalent mass of the charge.
+        """
+        on_reference = impulse_sim / seen_width_m * self.facade_width_m
+        notes = []
+        first_m, last_m = self.distances_m[0], self.distances_m[-1]
+        if not first_m <= distance_m <= last_m:
+            notes.append(f"distance {distance_m:.2f} m is outside {first_m:g} to {last_m:g} m")
+        if tnt_kg != self.tnt_kg:
+            notes.append(f"charge {tnt_kg:g} kg TNT is not {self.tnt_kg:g} kg")
+        return ScaledImpulse(self.scaling_law(on_reference), not notes, tuple(notes))
+
+
+def seen_width_m(structure_m: Rectangle, charge_m: tuple[float, float]) -> float:
+    """Return the width of a structure across the line from the charge to its centre, m."""
+    (x0, y0), (x1, y1) = charge_m, structure_m.centre
+    along_x, along_y = x1 - x0, y1 - y0
+    length = hypot(along_x, along_y)
+    width, height = structure_m.right - structure_m.left, structure_m.top - structure_m.bottom
+    return (abs(along_y) * width + abs(along_x) * height) / length
+
+
+def stored_calibrations() -> tuple[str, ...]:
+    """Return the names of the calibrations that come with the package."""
+    folder = files("blast_env.calibration") / "stored"
+    names = (entry.name for entry in folder.iterdir())
+    return tuple(sorted(name.removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX)))
+
+
+def load_calibration(name_or_path: str | Path) -> Calibration:
+    """Return a calibration by its name in the package, or from a `.json` file.
+
+    Raises:
+        UnknownNameError: If there is none of that name.
+        CalibrationError: If the file cannot be read, was cut short or was edited.
+    """
+    path = Path(name_or_path)
+    if path.suffix != SUFFIX:
+        known = stored_calibrations()
+        if str(name_or_path) not in known:
+            raise UnknownNameError("calibration", str(name_or_path), known)
+        entry = files("blast_env.calibration") / "stored" / f"{name_or_path}{SUFFIX}"
+        return _parse(entry.read_text(encoding="utf-8"), str(name_or_path))
+    try:
+        return _parse(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise CalibrationError(f"{path}: cannot be read: {error}") from error
+
+
+def save_calibration(calibration: Calibration, path: Path) -> None:
+    """Write a calibration to a file, with a checksum that shows later edits.
+
+    Raises:
+        BlastEnvError: If it cannot be written.
+    """
+    content = calibration.model_dump(mode="json")
+    document = {**content, "checksum": _checksum(content)}
+    with write_atomically(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+
+
+def _parse(text: str, source: str) -> Calibration:
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise CalibrationError(
+            f"{source}: line {error.lineno}: is not JSON ({error.msg}): was it cut short?"
+        ) from error
+    if not isinstance(document, dict):
+        raise CalibrationError(f"{source}: is not a calibration")
+    checksum = document.pop("checksum", None)
+    if checksum != _checksum(document):
+        raise CalibrationError(
+            f"{source}: the checksum does not match: the file was edited after it was made"
+        )
+    try:
+        return Calibration.model_validate_json(json.dumps(document))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise CalibrationError(f"{source}: {key}: {first['msg']}") from error
+
+
+def _checksum(content: dict[str, Any]) -> str:
+    return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
