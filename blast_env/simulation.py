@@ -1,11 +1,9 @@
 """Running a blast: a pure function of scenario, layout, seed and engine."""
 
-import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +21,7 @@ from blast_env.physics.collisions import CollisionArray
 from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, find_engine
 from blast_env.physics.particles import distance_to_rectangle
 from blast_env.physics.structure import ModularObstacle
+from blast_env.recording.run_record import RunRecord, run_record
 from blast_env.recording.tables import collision_table, module_table, structure_table
 from blast_env.scenario import Cell, Charge, Scenario
 from blast_env.scene import Scene, build_scene
@@ -227,32 +226,9 @@ class BlastResult:
         return state.hexdigest()
 
     @cached_property
-    def run_record(self) -> dict[str, str | int | float]:
+    def run_record(self) -> RunRecord:
         """Everything needed to repeat the run: what was run, with which versions."""
-        blast, charge = self.blast, self.blast.scene.charge
-        record: dict[str, str | int | float] = {
-            "scenario": blast.scenario.name,
-            "scenario hash": blast.scenario.content_hash,
-            "layout (row, column)": " ".join(f"{row},{column}" for row, column in blast.layout),
-            "seed": blast.seed,
-            "charge x (m)": charge.position_m[0],
-            "charge y (m)": charge.position_m[1],
-            "charge TNT equivalent (kg)": charge.tnt_kg,
-            "engine": self.engine_name,
-            "engine version": self.engine_version,
-            "blast-env version": version("blast-env"),
-            "python version": platform.python_version(),
-            "numpy version": np.__version__,
-            "balls at the start": len(blast.scene.balls),
-            "balls at the end": len(self.final_balls),
-            "steps": self.steps,
-            "simulated time (s)": self.time_s,
-            "ended because": str(self.end_reason),
-            "digest": self.digest,
-        }
-        for group, values in blast.scenario.parameters.model_dump().items():
-            record |= {f"parameter {group}.{name}": value for name, value in values.items()}
-        return record
+        return run_record(self)
 
     def to_excel(self, path: str | Path) -> Path:
         """Write a workbook with collisions, modules, structures and the run record.

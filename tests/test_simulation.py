@@ -141,7 +141,7 @@ def test_the_run_record_has_what_repeats_the_run() -> None:
     assert record["layout (row, column)"] == "4,0 5,0 6,1"
     assert record["digest"] == digest(7)
     assert str(record["engine version"]).startswith("pymunk 7")
-    assert record["parameter air.spacing_units"] == 11.1
+    assert record["parameter air.spacing_units"] == 11.5
 
 
 def test_wrong_names_are_answered_with_the_nearest_one() -> None:

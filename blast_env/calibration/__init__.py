@@ -18,6 +18,7 @@ from blast_env.calibration.metrics import (
     bootstrap_coefficients,
     fit_metrics,
     leave_one_out,
+    shape_rms_percent,
 )
 from blast_env.calibration.pressure import PressureHistory, facade_history
 from blast_env.calibration.references import (
@@ -28,10 +29,20 @@ from blast_env.calibration.references import (
     paper_ufc_column,
     scaled_distance,
 )
+from blast_env.calibration.stored import (
+    Calibration,
+    CalibrationError,
+    ScaledImpulse,
+    load_calibration,
+    save_calibration,
+    stored_calibrations,
+)
 
 __all__ = [
     "PAPER_COLUMNS",
     "PAPER_UFC_LABEL",
+    "Calibration",
+    "CalibrationError",
     "FewDistancesWarning",
     "FitMetrics",
     "Friedlander",
@@ -41,6 +52,7 @@ __all__ = [
     "PowerLaw",
     "PressureHistory",
     "ProportionalLaw",
+    "ScaledImpulse",
     "ScalingLaw",
     "bootstrap_coefficients",
     "facade_history",
@@ -50,7 +62,11 @@ __all__ = [
     "fit_proportional",
     "kingery_bulmash",
     "leave_one_out",
+    "load_calibration",
     "paper_table",
     "paper_ufc_column",
+    "save_calibration",
     "scaled_distance",
+    "shape_rms_percent",
+    "stored_calibrations",
 ]

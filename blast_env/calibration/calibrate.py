@@ -22,7 +22,7 @@ from blast_env.calibration.study import FreeFieldStudy, impulse_by_seed, summari
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import find_engine
 from blast_env.physics.parameters import parameters_digest
-from blast_env.units import PA_PER_PSI
+from blast_env.units import PA_PER_PSI, UNITS_PER_M
 
 FITS: Final[Mapping[str, Fit]] = MappingProxyType(
     {"proportional": fit_proportional, "linear": fit_linear, "power": fit_power_law}
@@ -136,6 +136,7 @@ class CalibrationReport:
             engine_version=find_engine(study.engine).version,
             blast_env_version=version("blast-env"),
             facade_width_m=structure.rectangle_m.top - structure.rectangle_m.bottom,
+            ball_radius_m=study.scenario.parameters.air.radius_units / UNITS_PER_M,
             tnt_kg=source.tnt_kg,
             distances_m=study.distances_m,
             seeds=study.seeds,

@@ -95,6 +95,22 @@ def fit_metrics(distance_m: Numbers, predicted: Numbers, reference: Numbers) -> 
     )
 
 
+def shape_rms_percent(i_sim: Numbers, expected: Numbers) -> float:
+    """Return how far impulses are from others in shape: rms of c i_sim / expected - 1, percent.
+
+    Args:
+        i_sim: Simulated impulse at each distance (n,).
+        expected: Impulse at each distance that it should be proportional to, above 0 (n,).
+
+    Raises:
+        BlastEnvError: If the numbers are not usable or their numbers differ.
+    """
+    wanted = checked_array("expected", expected, above=0.0, dimensions=1)
+    share = _checked_column("i_sim", i_sim, len(wanted), above=0.0) / wanted
+    factor = share.sum() / (share @ share)  # the c with the least rms
+    return float(100.0 * np.sqrt(np.mean((factor * share - 1.0) ** 2)))
+
+
 def leave_one_out(
     distance_m: Numbers, i_sim: Numbers, i_reference: Numbers, fit: Fit
 ) -> LeaveOneOut:

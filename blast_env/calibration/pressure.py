@@ -32,6 +32,7 @@ DURATION_SHARE: Final = 0.95
 
 _MOST_BINS: Final = 10_000
 _LEAST_BINS_FOR_FIT: Final = 4
+_MOST_RUNNER_BINS: Final = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,10 +113,12 @@ class PressureHistory:
         return int(np.argmax(self.pressure > ARRIVAL_SHARE * self.peak))
 
     def friedlander(self) -> Friedlander:
-        """Fit a Friedlander waveform that starts at `arrival_s` (paper, equation 1).
+        """Fit a Friedlander waveform (paper, equation 1).
 
-        Least squares over peak, duration and decay, of the mean pressure in each bin from the
-        arrival on; all bins count alike. The mean of the waveform over a bin is exact.
+        Least squares over arrival, peak, duration and decay, of the mean pressure in each bin
+        from `arrival_s` on; all bins count alike. The arrival is the start of one of the bins up
+        to the one of the peak: a particle front has runners ahead of it, a shock has none. The
+        mean of the waveform over a bin is exact.
 
         Raises:
             BlastEnvError: If fewer than four bins have any pressure.
@@ -127,8 +130,16 @@ class PressureHistory:
                 f"must be at least {_LEAST_BINS_FOR_FIT} for a Friedlander fit: take shorter bins "
                 "or more seeds"
             )
-        start = self._arrival_bin
-        return fit_friedlander(self.edges_s[start:], self.pressure[start:])
+        first, last = self._arrival_bin, int(np.argmax(self.pressure))
+        starts = range(max(first, last - _MOST_RUNNER_BINS), last + 1)
+        edges_s, pressure = self.edges_s, self.pressure
+        fits = (fit_friedlander(edges_s[start:], pressure[start:]) for start in starts)
+        return min(fits, key=lambda wave: self._squared_error(wave, first))
+
+    def _squared_error(self, wave: Friedlander, first: int) -> float:
+        edges_s = self.edges_s[first:]
+        means = np.diff(wave.impulse_until(edges_s)) / np.diff(edges_s)
+        return float(((means - self.pressure[first:]) ** 2).sum())
 
 
 def facade_history(

@@ -94,6 +94,7 @@ class Calibration(Section):
         engine_version: Its version then.
         blast_env_version: The package's version then.
         facade_width_m: Width of the reference structure's facade.
+        ball_radius_m: Radius of an air ball, by which a facade collects on either side.
         tnt_kg: TNT-equivalent mass of the simulated charge.
         distances_m: Distances, ascending; the first and last are the range of validity.
         seeds: Seeds at every distance.
@@ -115,6 +116,7 @@ class Calibration(Section):
     engine_version: str
     blast_env_version: str
     facade_width_m: Annotated[float, Field(gt=0.0)]
+    ball_radius_m: Annotated[float, Field(gt=0.0)]
     tnt_kg: Annotated[float, Field(gt=0.0)]
     distances_m: Annotated[tuple[float, ...], Field(min_length=2)]
     seeds: Annotated[tuple[int, ...], Field(min_length=1)]
@@ -153,8 +155,9 @@ class Calibration(Section):
         """Convert the impulse on a structure.
 
         The law holds for the impulse on the reference facade. Another structure's impulse is
-        first taken per metre of the width that the charge sees, times the reference width: a
-        wider building collects more balls without being loaded more.
+        first taken per metre of the width that collects balls, times that width of the reference:
+        a wider building is hit by more balls without being loaded more. The width is the one that
+        the charge sees, and a ball radius on either side, from where balls touch it as well.
 
         Args:
             impulse_sim: Sum of m |v| on the structure, simulation units.
@@ -162,14 +165,15 @@ class Calibration(Section):
             distance_m: From the charge's centre to the structure.
             tnt_kg: TNT-equivalent mass of the charge.
         """
-        on_reference = impulse_sim / seen_width_m * self.facade_width_m
+        margin_m = 2.0 * self.ball_radius_m
+        share = (self.facade_width_m + margin_m) / (seen_width_m + margin_m)
         notes = []
         first_m, last_m = self.distances_m[0], self.distances_m[-1]
         if not first_m <= distance_m <= last_m:
             notes.append(f"distance {distance_m:.2f} m is outside {first_m:g} to {last_m:g} m")
         if tnt_kg != self.tnt_kg:
             notes.append(f"charge {tnt_kg:g} kg TNT is not {self.tnt_kg:g} kg")
-        return ScaledImpulse(self.scaling_law(on_reference), not notes, tuple(notes))
+        return ScaledImpulse(self.scaling_law(share * impulse_sim), not notes, tuple(notes))
 
 
 def seen_width_m(structure_m: Rectangle, charge_m: tuple[float, float]) -> float:

@@ -16,6 +16,8 @@ from blast_env.calibration.calibrate import (
 from blast_env.calibration.calibrate import (
     calibrate as fit_laws,
 )
+from blast_env.calibration.metrics import shape_rms_percent
+from blast_env.calibration.references import paper_table
 from blast_env.calibration.stored import Calibration, save_calibration
 from blast_env.calibration.study import FreeFieldStudy
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
@@ -128,3 +130,7 @@ def _print(report: CalibrationReport, stored: Calibration) -> None:
         f"stored: {stored.law}; 95 % intervals over seeds: {intervals}; leave-one-distance-out "
         f"MAPE {stored.metrics.leave_one_out_mape_percent:.2f} %"
     )
+    if stored.reference.source == "paper UFC column":
+        own = paper_table().set_index("r_m").i_sim.loc[list(stored.distances_m)].to_numpy()
+        rms = shape_rms_percent(stored.i_sim, own)
+        print_line(f"against the paper's own i_sim: {rms:.1f} % rms after one common factor")

@@ -3,15 +3,28 @@
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import pandas as pd
 import typer
 
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
+from blast_env.errors import BlastEnvError
+from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Cell, Scenario, load_layout, load_scenario
 from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MS_PER_S
+
+_HEADERS: Final = (
+    "structure",
+    "protected",
+    "modules",
+    "hits",
+    "impulse m|v| (sim)",
+    "transferred (sim)",
+    "impulse (Pa s)",
+    "first hit (ms)",
+)
 
 
 def simulate(
@@ -94,17 +107,10 @@ def print_summary(result: BlastResult, written: Sequence[Path]) -> None:
     table = make_table(
         f"{blast.scenario.name}: {scene.charge.tnt_kg:g} kg TNT at ({x_m:.2f}, {y_m:.2f}) m, "
         f"seed {blast.seed}, {len(blast.layout)} barrier modules",
-        (
-            "structure",
-            "protected",
-            "modules",
-            "hits",
-            "impulse m|v| (sim)",
-            "transferred (sim)",
-            "first hit (ms)",
-        ),
+        _HEADERS,
         text_columns=2,
     )
+    notes: set[str] = set()
     for obstacle in result.obstacles:
         first_hit_s = obstacle.first_hit_s
         table.add_row(
@@ -114,6 +120,7 @@ def print_summary(result: BlastResult, written: Sequence[Path]) -> None:
             f"{obstacle.hits:,}",
             f"{obstacle.impulse:,.0f}",
             f"{obstacle.transferred_impulse:,.0f}",
+            _scaled_text(result, obstacle, notes),
             "never" if first_hit_s is None else f"{MS_PER_S * first_hit_s:.1f}",
         )
     result_console().print(table)
@@ -121,9 +128,24 @@ def print_summary(result: BlastResult, written: Sequence[Path]) -> None:
         f"{len(scene.balls):,} balls, {result.steps:,} steps, "
         f"{MS_PER_S * result.time_s:.0f} ms simulated; ended because {result.end_reason}"
     )
+    for note in sorted(notes):
+        print_line(f"impulse (Pa s): {note}")
     print_line(f"digest {result.digest}")
     for path in written:
         print_line(f"wrote {path}")
+
+
+def _scaled_text(result: BlastResult, obstacle: ModularObstacle, notes: set[str]) -> str:
+    """Return the calibrated impulse of a structure; `notes` gets what there is to say about it."""
+    if obstacle.cells is not None:
+        return "-"
+    try:
+        scaled = result.impulse(obstacle.name)
+    except BlastEnvError as error:
+        notes.add(str(error))
+        return "-"
+    notes.update(f"outside the calibration (~): {obstacle.name}, {note}" for note in scaled.notes)
+    return f"{scaled.pa_s:,.0f}" if scaled.in_range else f"~{scaled.pa_s:,.0f}"
 
 
 def _as_json(result: BlastResult, written: Sequence[Path]) -> dict[str, object]:
@@ -131,9 +153,23 @@ def _as_json(result: BlastResult, written: Sequence[Path]) -> dict[str, object]:
     return {
         "run": result.run_record,
         "structures": _records(result.structures),
+        "impulse": _scaled(result),
         "modules": _records(result.modules),
         "files": [str(path) for path in written],
     }
+
+
+def _scaled(result: BlastResult) -> dict[str, object]:
+    """Return the calibrated impulses of the structures by name; the error where there is none."""
+    scaled: dict[str, object] = {}
+    for obstacle in result.obstacles:
+        try:
+            impulse = result.impulse(obstacle.name)
+        except BlastEnvError as error:
+            scaled[obstacle.name] = {"error": str(error)}
+        else:
+            scaled[obstacle.name] = {**impulse._asdict(), "pa_s": impulse.pa_s}
+    return scaled
 
 
 def _records(table: pd.DataFrame) -> list[dict[str, object]]:

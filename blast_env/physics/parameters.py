@@ -54,7 +54,7 @@ class ExplosiveParameters(BallParameters):
 
     mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
     radius_units: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
-    elasticity: Fraction = 0.72
+    elasticity: Fraction = 0.74
     ball_count: Annotated[int, Field(ge=1, le=100_000)] = 720
     speed_units_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = 2000.0
     offset_units: Annotated[float, Field(ge=0.0, le=1000.0)] = 1.0
@@ -70,13 +70,17 @@ class AirParameters(BallParameters):
         spacing_units: Distance between neighbours; 0 means no air at all.
         jitter: How far a seed may move each ball off its lattice point, as a fraction of the
             gap that keeps neighbours apart, (spacing - 2 radius) / 2; 0 is the bare lattice.
+        lattice_offset: `"random"` shifts the whole lattice by less than a spacing, drawn from the
+            seed; `"centred"` keeps it centred in the site. A lattice that lies the same way in
+            every blast leaves free lanes, always to the same modules.
     """
 
-    mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.3
+    mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.79
     radius_units: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
-    elasticity: Fraction = 0.72
-    spacing_units: Annotated[float, Field(ge=0.0, le=1e6)] = 11.1
-    jitter: Fraction = 0.5
+    elasticity: Fraction = 0.74
+    spacing_units: Annotated[float, Field(ge=0.0, le=1e6)] = 11.5
+    jitter: Fraction = 1.0
+    lattice_offset: Literal["centred", "random"] = "random"
 
 
 class ContactParameters(Parameters):

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from math import ceil, prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,8 +114,7 @@ def air_lattice(
 ) -> Balls:
     """Return the air: `AirBall`s at rest on a square lattice that fills the site.
 
-    The lattice is centred in the site. A ball that would touch an obstacle, the charge or the
-    border is left out.
+    A ball that would touch an obstacle, the charge or the border is left out.
 
     Args:
         parameters: The air's parameters.
@@ -122,14 +122,19 @@ def air_lattice(
         obstacles: Rectangles that hold no air, units.
         charge_centre: The charge's centre, units.
         charge_radius: Radius of the disc that the charge fills, units.
-        rng: Draws the jitter.
+        rng: Draws the offset of the lattice and the jitter.
     """
     if parameters.spacing_units == 0.0:
         empty = np.empty((0, 2))
         return Balls.of_one_kind(CollisionType.AirBall, parameters, empty, empty)
     spacing, radius = parameters.spacing_units, parameters.radius_units
-    x = _lattice_axis(site.left, site.right, spacing)
-    y = _lattice_axis(site.bottom, site.top, spacing)
+    # Drawn in any case, so that a centred lattice does not shift the stream of the jitter.
+    drawn_x, drawn_y = rng.random(2)
+    if parameters.lattice_offset == "centred":
+        drawn_x = _centring_share(site.right - site.left, spacing)
+        drawn_y = _centring_share(site.top - site.bottom, spacing)
+    x = np.arange(site.left + drawn_x * spacing, site.right, spacing)
+    y = np.arange(site.bottom + drawn_y * spacing, site.top, spacing)
     position = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     reach = parameters.jitter * max(0.0, spacing / 2.0 - radius)
     position = position + rng.uniform(-reach, reach, size=position.shape)
@@ -161,16 +166,13 @@ def lattice_capacity(parameters: AirParameters, site: Rectangle) -> int:
     """Return the number of air balls on an empty site, which no scene on it exceeds."""
     if parameters.spacing_units == 0.0:
         return 0
-    columns = _lattice_count(site.left, site.right, parameters.spacing_units)
-    return columns * _lattice_count(site.bottom, site.top, parameters.spacing_units)
+    return prod(
+        ceil(length / parameters.spacing_units)
+        for length in (site.right - site.left, site.top - site.bottom)
+    )
 
 
-def _lattice_count(low: float, high: float, spacing: float) -> int:
-    return int((high - low) // spacing)
-
-
-def _lattice_axis(low: float, high: float, spacing: float) -> FloatArray:
-    """Return the lattice coordinates between two borders, centred between them."""
-    count = _lattice_count(low, high, spacing)
-    margin = (high - low - (count - 1) * spacing) / 2.0
-    return low + margin + spacing * np.arange(count, dtype=np.float64)
+def _centring_share(length: float, spacing: float) -> float:
+    """Return the offset, in spacings, that leaves equal margins at both borders."""
+    margin = (length - (length // spacing - 1) * spacing) / 2.0
+    return margin / spacing

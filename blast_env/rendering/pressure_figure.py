@@ -38,8 +38,10 @@ class PressureCase:
 def pressure_figure(cases: Sequence[PressureCase], subtitle: str) -> Figure:
     """Return one panel a distance: simulated bins, their fit, and the reference."""
     figure = Figure(figsize=(6.0 * len(cases), 5.4), layout="constrained")
-    for axes, case in zip(figure.subplots(1, len(cases), squeeze=False)[0], cases, strict=True):
+    panels = figure.subplots(1, len(cases), squeeze=False)[0]
+    for axes, case in zip(panels, cases, strict=True):
         _draw(axes, case)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     write_heading(figure, "Reflected pressure on the facade", subtitle)
     return figure
 
@@ -72,7 +74,6 @@ def _draw(axes: Axes, case: PressureCase) -> None:
     axes.set_xlabel("time since the detonation (ms)")
     axes.set_ylabel("overpressure (kPa)")
     axes.grid(alpha=0.3)
-    axes.legend()
 
 
 def _positive_kpa(wave: Friedlander, time_s: np.ndarray) -> np.ndarray:

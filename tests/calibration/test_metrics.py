@@ -16,6 +16,7 @@ from blast_env.calibration import (
     fit_proportional,
     leave_one_out,
     paper_table,
+    shape_rms_percent,
 )
 from blast_env.calibration.laws import Fit
 from blast_env.errors import BlastEnvError
@@ -196,3 +197,12 @@ def test_bad_input_of_the_bootstrap_is_named(changes: dict[str, object], message
     arguments = {"i_sim_by_seed": by_seed, "i_reference": np.array([1.0, 2.0, 3.0, 4.0])}
     with pytest.raises(BlastEnvError, match=message):
         bootstrap_coefficients(fit=fit_power_law, **(arguments | changes))  # type: ignore[arg-type]
+
+
+def test_the_shape_error_forgets_a_common_factor() -> None:
+    expected = np.array([5.0, 3.0, 2.0])
+    assert shape_rms_percent(1e4 * expected, expected) == pytest.approx(0.0, abs=1e-9)
+    # Shares 1 and 3: the best factor is 4 / 10, which leaves -0.6 and 0.2.
+    assert shape_rms_percent([1.0, 3.0], [1.0, 1.0]) == pytest.approx(100.0 * np.sqrt(0.2))
+    with pytest.raises(BlastEnvError, match=r"i_sim\[1\] is 0"):
+        shape_rms_percent([1.0, 0.0], [1.0, 1.0])

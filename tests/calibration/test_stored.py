@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from blast_env import Charge, load_scenario, simulate
-from blast_env.calibration import PowerLaw
+from blast_env.calibration import PowerLaw, paper_table, shape_rms_percent
 from blast_env.calibration.calibrate import calibrate, kingery_bulmash_reference, paper_reference
 from blast_env.calibration.stored import (
     Calibration,
@@ -21,6 +21,7 @@ from blast_env.calibration.study import FreeFieldStudy
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.scenario import Scenario
+from scripts.facade_width import wider
 
 CALIBRATION = load_calibration("ballistic_kb_100kg")
 
@@ -30,6 +31,7 @@ def test_the_ballistic_preset_meets_its_bounds_on_held_out_seeds() -> None:
     ufc = load_calibration("ballistic_ufc")
     assert ufc.metrics.mape_percent <= 8.0
     assert ufc.metrics.integral_error_percent <= 1.5
+    assert shape_rms_percent(ufc.i_sim, paper_table().i_sim.to_numpy()) <= 20.0
     assert min(ufc.seeds) >= 1000
     assert ufc.distances_m == tuple(15.0 * n for n in range(1, 9))
 
@@ -87,25 +89,15 @@ def test_the_impulse_on_the_reference_facade_is_the_law_s() -> None:
     assert scaled.in_range
 
 
-def wider(factor: int) -> Scenario:
-    """The free field with a facade that is so many times as wide."""
-    document = load_scenario("free_field").model_dump()
-    (structure,) = document["structures"]
-    middle_m = document["site"]["height_m"] / 2
-    side = structure["side_modules"] * factor
-    structure |= {"side_modules": side, "corner_m": (45.0, middle_m - side / 4)}
-    document["site"]["width_m"] = 45.0 + side / 2 + 10.0
-    return Scenario.from_document(document, "wider")
-
-
 def test_twice_the_width_is_not_twice_the_load() -> None:
-    seeds = range(6)
+    """Within the noise: three standard errors of the ratio are about 0.12 with 16 seeds."""
+    seeds = range(16)
     raw, scaled = [], []
     for factor in (1, 2):
-        results = [simulate(wider(factor).at_stand_off(60.0), seed=seed) for seed in seeds]
+        results = [simulate(wider(factor).at_stand_off(40.0), seed=seed) for seed in seeds]
         raw.append(np.mean([result.impulse_sim("building") for result in results]))
         scaled.append(np.mean([result.impulse("building").psi_s for result in results]))
-    assert raw[1] / raw[0] > 1.7
+    assert raw[1] / raw[0] > 1.6
     assert scaled[1] / scaled[0] == pytest.approx(1.0, abs=0.12)
 
 

@@ -51,7 +51,7 @@ def test_simulate_prints_json_that_can_be_read() -> None:
     expected = simulate(load_scenario("free_field").at_stand_off(20.0))
     assert content["run"]["digest"] == expected.digest
     assert content["structures"][0]["impulse_sim"] == expected.impulse_sim("building")
-    assert len(content["modules"]) == 100
+    assert len(content["modules"]) == 400
 
 
 def test_simulate_takes_charge_and_preset() -> None:

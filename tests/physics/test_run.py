@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle
 from blast_env.physics.engine import EndReason
-from blast_env.physics.particles import Balls, CollisionType, air_lattice, explosion_fan
+from blast_env.physics.particles import (
+    Balls,
+    CollisionType,
+    air_lattice,
+    explosion_fan,
+    lattice_capacity,
+)
 from blast_env.physics.pymunk_engine import PymunkEngine, PymunkRun
 from blast_env.scene import Scene
 from tests.physics.scenes import AIR, EXPLOSIVE, balls, parameters, scene, wall
@@ -64,7 +70,29 @@ def test_air_keeps_clear_of_everything() -> None:
     assert not ((abs(x - 50.0) < 11.0) & (abs(y - 30.0) < 10.0)).any()
     gaps = np.hypot(*(lattice.position[:, None] - lattice.position[None]).transpose(2, 0, 1))
     assert gaps[~np.eye(len(lattice), dtype=bool)].min() >= 2.0  # no two overlap
-    assert len(lattice) == pytest.approx((90 * 60 - 22 * 22 - np.pi * 9) / 9.0, rel=0.05)
+    assert len(lattice) == pytest.approx((88 * 58 - 22 * 22 - np.pi * 9) / 9.0, rel=0.05)
+
+
+def test_a_bare_centred_lattice_is_the_same_for_every_seed_and_symmetric() -> None:
+    air = parameters(air={"jitter": 0.0, "lattice_offset": "centred", "spacing_units": 8.0}).air
+    site = Rectangle(0.0, 0.0, 100.0, 60.0)
+    one, other = (
+        air_lattice(air, site, [], (0.0, 0.0), 0.0, np.random.default_rng(seed)).position
+        for seed in (0, 1)
+    )
+    assert (one == other).all()
+    assert np.diff(np.unique(one[:, 0])) == pytest.approx(8.0)
+    assert one.mean(axis=0) == pytest.approx([50.0, 30.0])
+
+
+@given(st.integers(0, 2**31), st.floats(2.0, 20.0), st.floats(30.0, 200.0))
+@settings(max_examples=50, deadline=None, derandomize=True)
+def test_no_scene_has_more_air_than_its_capacity(seed: int, spacing: float, width: float) -> None:
+    air, site = parameters(air={"spacing_units": spacing}).air, Rectangle(0.0, 0.0, width, 50.0)
+    rng = np.random.default_rng(seed)
+    lattice = air_lattice(air, site, [], (-99.0, -99.0), 1.0, rng)
+    assert len(lattice) <= lattice_capacity(air, site)
+    assert len(lattice) > 0.4 * lattice_capacity(air, site)
 
 
 @given(

@@ -123,7 +123,7 @@ def test_hash_changes_with_what_affects_a_result(path: KeyPath, value: object) -
         (("build_zone", "keep_outs", 0, "reason"), "other"),
         (("site", "width_m"), 30.0),  # written as 30
         (("structures", 1, "protected"), False),  # the default
-        (("simulation", "overrides", "air", "mass"), 0.3),  # the preset's value
+        (("simulation", "overrides", "air", "mass"), 0.79),  # the preset's value
     ],
 )
 def test_hash_ignores_words_and_ways_of_writing(path: KeyPath, value: object) -> None:
@@ -215,7 +215,7 @@ def test_other_parameters_are_added_to_the_scenario_s_own() -> None:
     changed = scenario.with_simulation(overrides={"air": {"mass": 0.2}})
     again = changed.with_simulation(overrides={"air": {"spacing_units": 6.0}})
     assert (again.parameters.air.mass, again.parameters.air.spacing_units) == (0.2, 6.0)
-    assert scenario.parameters.air.mass == 0.3
+    assert scenario.parameters.air.mass == 0.79
     with pytest.raises(ScenarioError, match="did you mean 'mass'"):
         scenario.with_simulation(overrides={"air": {"mas": 0.2}})
     with pytest.raises(ScenarioError, match="did you mean 'ballistic'"):
