@@ -69,6 +69,9 @@ class Candidate:
                 "elasticity": self.elasticity,
             },
             "explosive": {"elasticity": self.elasticity},
+            # What the preset had when the choice was made. At 120 m it cuts off the last arrivals,
+            # so the preset now has 2 s; the stored calibrations were made with those.
+            "stepping": {"time_limit_s": 1.0},
         }
         return Scenario.from_document(document, "candidate")
 

@@ -29,8 +29,12 @@ def test_a_wheel_in_a_clean_environment_loads_the_scenarios_by_name(tmp_path: Pa
     (site / "dependencies.pth").write_text(sysconfig.get_path("purelib"))
     code = (
         "import blast_env; print(blast_env.__file__);"
-        "print([blast_env.load_scenario(n).name for n in blast_env.bundled_scenarios()])"
+        "print([blast_env.load_scenario(n).name for n in blast_env.bundled_scenarios()]);"
+        "from blast_env.calibration import *;"
+        "print([load_calibration(n).name for n in stored_calibrations()], len(paper_table()),"
+        " round(kingery_bulmash('reflected_impulse', 10.0, 100.0)))"
     )
-    where, names = call(clean / "bin" / "python", "-c", code, cwd=tmp_path).splitlines()
+    where, names, data = call(clean / "bin" / "python", "-c", code, cwd=tmp_path).splitlines()
     assert Path(where).is_relative_to(clean)
     assert names == "['courtyard', 'free_field', 'perimeter_gate', 'street_junction']"
+    assert data == "['ballistic_kb_100kg', 'ballistic_ufc'] 8 1543"

@@ -119,7 +119,7 @@ class SteppingParameters(Parameters):
     step_radii: Annotated[float, Field(ge=0.01, le=0.5)] = 0.5
     longest_step_s: Annotated[float, Field(ge=1e-7, le=1.0)] = 0.002
     solver_iterations: Annotated[int, Field(ge=1, le=100)] = 10
-    time_limit_s: Annotated[float, Field(gt=0.0, le=60.0)] = 1.0
+    time_limit_s: Annotated[float, Field(gt=0.0, le=60.0)] = 2.0
 
 
 class SimulationParameters(Parameters):
