@@ -107,6 +107,15 @@ def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
     return tuple(np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3))
 
 
+def draw_charge(scenario: Scenario, seed: int) -> Charge:
+    """Return the charge that a seed draws from a scenario.
+
+    Raises:
+        ValueError: If the seed is negative.
+    """
+    return scenario.sample_charge(random_streams(seed)[0])
+
+
 def build_scene(
     scenario: Scenario,
     layout: Sequence[Cell] = (),
@@ -130,9 +139,8 @@ def build_scene(
     cells = check_layout(scenario, layout)
     if charge is not None:
         check_layout(scenario.with_charge(charge), cells)
-    charge_rng, fan_rng, air_rng = random_streams(seed)
-    drawn = scenario.sample_charge(charge_rng)
-    charge = drawn if charge is None else charge
+    _, fan_rng, air_rng = random_streams(seed)
+    charge = draw_charge(scenario, seed) if charge is None else charge
     parameters = scenario.parameters
     site = scenario.site.rectangle_m.scaled(UNITS_PER_M)
     structures = tuple(_outline(section) for section in scenario.structures)

@@ -24,7 +24,7 @@ from blast_env.physics.structure import ModularObstacle
 from blast_env.recording.run_record import RunRecord, run_record
 from blast_env.recording.tables import collision_table, module_table, structure_table
 from blast_env.scenario import Cell, Charge, Scenario
-from blast_env.scene import Scene, build_scene
+from blast_env.scene import Scene, build_scene, draw_charge
 from blast_env.units import UNITS_PER_M
 
 _PROGRESS_CALLS = 200
@@ -65,7 +65,8 @@ class Blast:
             raise BlastEnvError(
                 f"charge_position_m is {position_m!r}, must be a pair of numbers (x, y)"
             ) from None
-        return replace(self, charge=Charge((x_m, y_m), self.scene.charge.tnt_kg))
+        drawn = draw_charge(self.scenario, self.seed) if self.charge is None else self.charge
+        return replace(self, charge=Charge((x_m, y_m), drawn.tnt_kg))
 
     def start(self) -> BlastRun:
         """Return a run at time 0."""

@@ -18,10 +18,11 @@ import typer
 from scipy.stats import qmc
 
 from blast_env.atomic import write_atomically
-from blast_env.calibration import fit_metrics, fit_power_law, paper_table
+from blast_env.calibration import fit_metrics, fit_power_law, paper_table, shape_rms_percent
 from blast_env.calibration.study import FreeFieldStudy, impulse_by_seed
 from blast_env.cli.output import print_line, user_errors
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario import Scenario
+from scripts.facade_width import free_field_with_facade
 
 MOST_MAPE_PERCENT, MOST_INTEGRAL_PERCENT, MOST_RMS_PERCENT = 8.0, 1.5, 20.0
 FACADES_MODULES = (10, 20)
@@ -56,24 +57,19 @@ class Candidate:
 
     def scenario(self) -> Scenario:
         """Return the free field with these parameters."""
-        document = load_scenario("free_field").model_dump()
-        structure = document["structures"][0]
-        middle_m = document["site"]["height_m"] / 2
-        structure["side_modules"] = self.facade_modules
-        structure["corner_m"] = (structure["corner_m"][0], middle_m - self.facade_modules / 4)
-        document["site"]["width_m"] += (self.facade_modules - 10) / 2
-        document["simulation"]["overrides"] = {
-            "air": {
-                "spacing_units": self.spacing_units,
-                "mass": self.air_mass,
-                "elasticity": self.elasticity,
-            },
-            "explosive": {"elasticity": self.elasticity},
-            # What the preset had when the choice was made. At 120 m it cuts off the last arrivals,
-            # so the preset now has 2 s; the stored calibrations were made with those.
-            "stepping": {"time_limit_s": 1.0},
-        }
-        return Scenario.from_document(document, "candidate")
+        return free_field_with_facade(self.facade_modules).with_simulation(
+            overrides={
+                "air": {
+                    "spacing_units": self.spacing_units,
+                    "mass": self.air_mass,
+                    "elasticity": self.elasticity,
+                },
+                "explosive": {"elasticity": self.elasticity},
+                # What the preset had when the choice was made. At 120 m it cuts off the last
+                # arrivals, so the preset now has 2 s; the stored calibrations were made with those.
+                "stepping": {"time_limit_s": 1.0},
+            }
+        )
 
 
 @dataclass(frozen=True)
@@ -106,16 +102,9 @@ def score(i_sim: np.ndarray) -> Score:
     return Score(
         metrics.mape_percent,
         metrics.integral_error_percent,
-        100.0 * rms_after_one_factor(i_sim, table.i_sim.to_numpy()),
+        shape_rms_percent(i_sim, table.i_sim.to_numpy()),
         law.B,
     )
-
-
-def rms_after_one_factor(i_sim: np.ndarray, paper: np.ndarray) -> float:
-    """Return the rms of c i_sim / paper - 1 for the best common factor c."""
-    share = i_sim / paper
-    factor = share.sum() / (share @ share)
-    return float(np.sqrt(np.mean((factor * share - 1.0) ** 2)))
 
 
 def measure(candidate: Candidate, seeds: int, processes: int) -> Score:

@@ -239,8 +239,9 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
 
     def _make_observation_space(self, scene: Scene) -> spaces.Dict:
         modules = sum(section.rows * section.columns for section in self.scenario.structures)
+        stepping = scene.parameters.stepping
         # A step of the engine can begin just before the time limit.
-        limit_s = 2.0 * scene.parameters.stepping.time_limit_s
+        latest_s = stepping.time_limit_s + stepping.longest_step_s
         most_impulse = scene.largest_exact_impulse
         air_balls = lattice_capacity(scene.parameters.air, scene.site)
         counts = np.array([scene.parameters.explosive.ball_count, air_balls])
@@ -248,7 +249,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
             {
                 "module_impulses": spaces.Box(0.0, most_impulse, (modules,), np.float64),
                 "particle_counts": spaces.Box(0, counts, dtype=np.int64),
-                "time_s": spaces.Box(0.0, limit_s, (1,), np.float64),
+                "time_s": spaces.Box(0.0, latest_s, (1,), np.float64),
             }
         )
 
