@@ -9,7 +9,7 @@ class BlastEnvError(ValueError):
 
 
 class LayoutError(BlastEnvError):
-    """A layout names a cell that does not exist, is kept out, is repeated or exceeds the stock."""
+    """A cell cannot take a module: because of site, modules, stock, budget or access way."""
 
 
 class UnknownNameError(BlastEnvError):

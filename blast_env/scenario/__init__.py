@@ -1,5 +1,6 @@
 """Scenario files: models, validation, loading and saving."""
 
+from blast_env.scenario.build_zone import AccessWay, BuildZone, CostArea, KeepOut
 from blast_env.scenario.files import (
     bundled_scenarios,
     find_problems,
@@ -8,16 +9,14 @@ from blast_env.scenario.files import (
     save_scenario,
     scenario_hash,
 )
-from blast_env.scenario.layout import blocked_reason, check_layout, load_layout, usable_cells
+from blast_env.scenario.layout import check_layout, load_layout, usable_cells
 from blast_env.scenario.models import (
     SCHEMA_VERSION,
     AnySource,
     AnyStructure,
-    BuildZone,
     Cell,
     Charge,
     ConcreteSquareSection,
-    KeepOut,
     ModularObstacleSection,
     PointSource,
     RectangleSource,
@@ -26,18 +25,22 @@ from blast_env.scenario.models import (
     SimulationSection,
     Site,
 )
+from blast_env.scenario.placement import Placement
 from blast_env.scenario.problems import Problem, ScenarioError
 
 __all__ = [
     "SCHEMA_VERSION",
+    "AccessWay",
     "AnySource",
     "AnyStructure",
     "BuildZone",
     "Cell",
     "Charge",
     "ConcreteSquareSection",
+    "CostArea",
     "KeepOut",
     "ModularObstacleSection",
+    "Placement",
     "PointSource",
     "Problem",
     "RectangleSource",
@@ -46,7 +49,6 @@ __all__ = [
     "SegmentSource",
     "SimulationSection",
     "Site",
-    "blocked_reason",
     "bundled_scenarios",
     "check_layout",
     "find_problems",

@@ -12,11 +12,14 @@ from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import AirParameters, SimulationParameters
 from blast_env.physics.particles import lattice_capacity
 from blast_env.physics.structure import BARRIER_NAME
+from blast_env.scenario.build_zone import BuildZone
 from blast_env.scenario.clearance import distance_m, source_bounds_m
 from blast_env.scenario.problems import Problem
-from blast_env.scenario.sections import AnySource, AnyStructure, BuildZone, Site
+from blast_env.scenario.sections import AnySource, AnyStructure, Site
 from blast_env.scenario.simulation import SimulationSection
-from blast_env.scenario.usability import TOLERANCE_M, usable_mask
+from blast_env.scenario.usability import TOLERANCE_M, Surroundings
+from blast_env.scenario.wording import extent
+from blast_env.scenario.zone_checks import build_zone_problems
 from blast_env.units import UNITS_PER_M
 
 Item = TypeVar("Item")
@@ -157,23 +160,15 @@ def _charge_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def _build_zone_problems(parts: Parts) -> Iterator[Problem]:
-    """Check where the build zone and its keep-outs lie, and that the stock can be used."""
+    """Check where the build zone lies, and that something can be built in it."""
     zone = parts.build_zone
     if zone is None:
         return
     yield from _outside_site(
         parts, "build_zone", f"the zone ({extent(zone.rectangle_m)})", zone.rectangle_m
     )
-    for index, keep_out in enumerate(zone.keep_outs):
-        if not keep_out.rectangle_m.overlaps(zone.rectangle_m):
-            where, bound = extent(keep_out.rectangle_m), extent(zone.rectangle_m)
-            message = f"covers {where}, must overlap the build zone ({bound})"
-            yield Problem(f"build_zone.keep_outs[{index}]", message)
-    structures, sources = parts.structures.values(), parts.sources.values()
-    usable = int(usable_mask(zone, structures, sources, parts.charge_radius_m).sum())
-    if zone.stock > usable:
-        message = f"is {zone.stock}, must be at most {usable}, the number of usable cells"
-        yield Problem("build_zone.stock", message)
+    structures, sources = tuple(parts.structures.values()), tuple(parts.sources.values())
+    yield from build_zone_problems(Surroundings(zone, structures, sources, parts.charge_radius_m))
 
 
 def _simulation_problems(parts: Parts) -> Iterator[Problem]:
@@ -226,9 +221,3 @@ def _outside_site(
 def _described(structure: AnyStructure) -> str:
     """Return the name and the extent of a structure."""
     return f"{structure.name!r} ({extent(structure.rectangle_m)})"
-
-
-def extent(rectangle: Rectangle) -> str:
-    """Return the extent of a rectangle in words."""
-    left, bottom, right, top = rectangle
-    return f"x {left:g} to {right:g} m, y {bottom:g} to {top:g} m"

@@ -1,4 +1,4 @@
-"""How far rectangles are from the places where a charge may be."""
+"""How far rectangles are from each other and from the places where a charge may be."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ def source_bounds_m(source: AnySource) -> Rectangle:
 def distances_m(source: AnySource, boxes: Boxes) -> Array:
     """Return how near the centre of a charge from this source can come to each rectangle."""
     if isinstance(source, RectangleSource):
-        return _box_distances(source.rectangle_m, boxes)
+        return box_distances_m(source.rectangle_m, boxes)
     return _segment_distances(*source.segment_m, boxes)
 
 
@@ -40,7 +40,7 @@ def _gaps(box: Rectangle, boxes: Boxes) -> tuple[Array, Array]:
     return along_x, along_y
 
 
-def _box_distances(box: Rectangle, boxes: Boxes) -> Array:
+def box_distances_m(box: Rectangle, boxes: Boxes) -> Array:
     """Return the distances between one rectangle and others."""
     return np.hypot(*_gaps(box, boxes))
 
@@ -54,8 +54,8 @@ def _segment_distances(start: PointM, end: PointM, boxes: Boxes) -> Array:
     step_x, step_y = x1 - x0, y1 - y0
     square = step_x**2 + step_y**2
     nearest = np.minimum(
-        _box_distances(Rectangle(x0, y0, x0, y0), boxes),
-        _box_distances(Rectangle(x1, y1, x1, y1), boxes),
+        box_distances_m(Rectangle(x0, y0, x0, y0), boxes),
+        box_distances_m(Rectangle(x1, y1, x1, y1), boxes),
     )
     left, bottom, right, top = boxes
     sides = []
@@ -66,5 +66,5 @@ def _segment_distances(start: PointM, end: PointM, boxes: Boxes) -> Array:
         sides.append((x - x0) * step_y - (y - y0) * step_x)
     both_sides = (np.minimum.reduce(sides) <= 0.0) & (np.maximum.reduce(sides) >= 0.0)
     bounds = Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
-    meets = both_sides & (_box_distances(bounds, boxes) == 0.0)
+    meets = both_sides & (box_distances_m(bounds, boxes) == 0.0)
     return np.where(meets, 0.0, nearest)

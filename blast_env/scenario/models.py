@@ -13,17 +13,16 @@ from pydantic import AfterValidator, Field, StrictInt, ValidationError, model_va
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.parameters import SimulationParameters
+from blast_env.scenario.build_zone import BuildZone, KeepOut
 from blast_env.scenario.checks import Parts, charge_radius_m, check_parts, sound_parts
 from blast_env.scenario.problems import ScenarioError, problems_from
 from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
-    BuildZone,
     Cell,
     Charge,
     ChargeSource,
     ConcreteSquareSection,
-    KeepOut,
     ModularObstacleSection,
     Name,
     PointM,
@@ -63,6 +62,9 @@ __all__ = [
 
 SCHEMA_VERSION: Final = 1
 """The version of the file format that this release reads and writes."""
+
+_LATER_KEYS: Final = ("clearance_m", "module_cost", "cost_areas", "budget", "access_way")
+"""Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
 
 def _check_version(version: int) -> int:
@@ -111,12 +113,12 @@ class Scenario(Section):
     def content_hash(self) -> str:
         """SHA-256 of everything that affects a result: not of the words for people.
 
-        Two scenarios that differ only in name, description, the reasons of keep-outs, the order
-        of keys or in how they arrive at the same simulation parameters have the same hash.
+        Two scenarios that differ only in name, description, the reasons of areas, the order of
+        keys or in how they arrive at the same simulation parameters have the same hash.
         """
         content = self.model_dump(mode="json", exclude={"name", "description", "simulation"})
-        for keep_out in (content["build_zone"] or {}).get("keep_outs", ()):
-            del keep_out["reason"]
+        if self.build_zone is not None:
+            content["build_zone"] = _without_words(self.build_zone)
         content["parameters"] = self.parameters.model_dump(mode="json")
         text = json.dumps(_without_negative_zero(content), sort_keys=True, allow_nan=False)
         return sha256(text.encode()).hexdigest()
@@ -224,6 +226,17 @@ class Scenario(Section):
         if problems:
             raise ScenarioError(self.name, problems)
         return self
+
+
+def _without_words(zone: BuildZone) -> dict[str, Any]:
+    """Return what a build zone says, without words for people and unused later keys."""
+    content = zone.model_dump(mode="json")
+    for area in (*content["keep_outs"], *content["cost_areas"]):
+        del area["reason"]
+    for key in _LATER_KEYS:
+        if getattr(zone, key) == BuildZone.model_fields[key].default:
+            del content[key]
+    return content
 
 
 def _without_negative_zero(value: Any) -> Any:

@@ -1,10 +1,9 @@
-"""The sections of a scenario: site, charge, structures, build zone; see `simulation` for the rest.
+"""The sections of a scenario: site, charge, structures; `build_zone` and `simulation` are others.
 
 All lengths are in metres, x to the right and y upwards from the lower left corner of the site.
 """
 
 import re
-from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -195,55 +194,3 @@ class ConcreteSquareSection(StructureSection):
 AnyStructure = Annotated[
     ModularObstacleSection | ConcreteSquareSection, Field(discriminator="kind")
 ]
-
-
-class KeepOut(Section):
-    """A part of the build zone that must stay empty, and why."""
-
-    corner_m: PointM
-    size_m: SizeM
-    reason: Annotated[str, Field(min_length=1, max_length=200)]
-
-    @property
-    def rectangle_m(self) -> Rectangle:
-        """The area."""
-        return Rectangle.from_corner(self.corner_m, self.size_m)
-
-
-class BuildZone(Section):
-    """Where barrier modules may stand: a grid of cells of one module each.
-
-    Attributes:
-        corner_m: Lower left corner of the cell (0, 0).
-        rows: Number of rows, counted upwards.
-        columns: Number of columns, counted to the right.
-        stock: How many modules there are to place.
-        keep_outs: Areas in which no cell may be used.
-        module_capacity: As for structures, for the modules of the barrier.
-    """
-
-    corner_m: PointM
-    rows: Count
-    columns: Count
-    stock: Annotated[StrictInt, Field(ge=1, le=10_000)]
-    keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=100)] = ()
-    module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
-
-    @property
-    def rectangle_m(self) -> Rectangle:
-        """The whole zone."""
-        size = (self.columns * MODULE_SIDE_M, self.rows * MODULE_SIDE_M)
-        return Rectangle.from_corner(self.corner_m, size)
-
-    def cells(self) -> Iterator[Cell]:
-        """Yield every cell, row by row."""
-        return ((row, column) for row in range(self.rows) for column in range(self.columns))
-
-    def cell_rectangle_m(self, cell: Cell) -> Rectangle:
-        """Return the square that a cell covers."""
-        row, column = cell
-        corner = (
-            self.corner_m[0] + column * MODULE_SIDE_M,
-            self.corner_m[1] + row * MODULE_SIDE_M,
-        )
-        return Rectangle.from_corner(corner, (MODULE_SIDE_M, MODULE_SIDE_M))

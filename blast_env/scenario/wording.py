@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import date, datetime, time
 from typing import Final
 
+from blast_env.geometry import Rectangle
+
 MAX_TEXT: Final = 60
 """Characters after which a value or a key is cut."""
 
@@ -70,6 +72,12 @@ def alternatives(values: Iterable[object]) -> str:
     """Return `'a', 'b' or 'c'`."""
     texts = [value_text(value) for value in values]
     return " or ".join(filter(None, (", ".join(texts[:-1]), texts[-1])))
+
+
+def extent(rectangle: Rectangle) -> str:
+    """Return the extent of a rectangle in words."""
+    left, bottom, right, top = rectangle
+    return f"x {left:g} to {right:g} m, y {bottom:g} to {top:g} m"
 
 
 def _quoted(text: str) -> str:

@@ -48,6 +48,13 @@ _FULL: Document = {
         "stock": 12,
         "module_capacity": 100.0,
         "keep_outs": [{"corner_m": [8.0, 9.0], "size_m": [5.0, 1.0], "reason": "path"}],
+        "clearance_m": 0.5,
+        "module_cost": 2.0,
+        "cost_areas": [
+            {"corner_m": [8.0, 5.0], "size_m": [1, 10], "module_cost": 5.0, "reason": "duct"}
+        ],
+        "budget": 40.0,
+        "access_way": {"width_m": 1.5, "between": "left_right"},
     },
     "simulation": {
         "preset": "ballistic",

@@ -27,6 +27,7 @@ OPTIONAL = {
     *("description", "calibration", "build_zone", "simulation", "weight", "protected"),
     *("module_capacity", "keep_outs", "preset", "overrides", "air", "explosive", "spacing_units"),
     *("jitter", "ball_count", "collide_within_charge"),
+    *("clearance_m", "module_cost", "cost_areas", "budget", "access_way"),
 }
 CASES = [(document, path) for document in all_documents() for path in key_paths(document)]
 KEYS = [(document, path) for document, path in CASES if isinstance(path[-1], str)]

@@ -20,6 +20,7 @@ from tests.scenario.documents import (
 
 HOUSE = ("structures", 0)
 BUNKER = ("structures", 1)
+AREAS = ("build_zone.keep_outs[0]", "build_zone.cost_areas[0]")
 OVERRIDES = ("simulation", "overrides")
 
 
@@ -144,10 +145,10 @@ def _broken(section: str) -> Document:
 @pytest.mark.parametrize(
     ("section", "expected"),
     [
-        ("site", ["structures[1]", "charge[0]", "build_zone.keep_outs[0]"]),
-        ("simulation", ["structures[1]", "charge[0]", "build_zone", "build_zone.keep_outs[0]"]),
-        ("charge", ["structures[1]", "build_zone", "build_zone.keep_outs[0]"]),
-        ("structures", ["build_zone", "build_zone.keep_outs[0]"]),
+        ("site", ["structures[1]", "charge[0]", *AREAS]),
+        ("simulation", ["structures[1]", "charge[0]", "build_zone", *AREAS]),
+        ("charge", ["structures[1]", "build_zone", *AREAS]),
+        ("structures", ["build_zone", *AREAS]),
         ("build_zone", ["structures[1]", "charge[0]"]),
     ],
 )

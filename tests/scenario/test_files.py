@@ -85,6 +85,7 @@ def test_bundled_scenario_survives_saving(tmp_path: Path, name: str) -> None:
             "tnt_kg": st.floats(0.01, 100_000.0),
             "reason": st.text(min_size=1, max_size=40),
             "stock": st.integers(1, 180),
+            "budget": st.floats(2.0, 1e12),
             "spacing_units": st.one_of(st.just(0), st.floats(2.0, 1e6)),
         }
     )
@@ -99,6 +100,7 @@ def test_any_scenario_survives_saving(
     document["charge"][0]["tnt_kg"] = values["tnt_kg"]
     document["build_zone"]["keep_outs"][0]["reason"] = values["reason"]
     document["build_zone"]["stock"] = values["stock"]
+    document["build_zone"]["budget"] = values["budget"]
     document["simulation"]["overrides"]["air"]["spacing_units"] = values["spacing_units"]
     scenario = Scenario.from_document(document, "drawn")
     path = tmp_path_factory.getbasetemp() / "drawn.toml"
@@ -277,6 +279,8 @@ def test_format_description_names_every_key() -> None:
         *document["site"],
         "reason",
         *document["build_zone"],
+        *document["build_zone"]["cost_areas"][0],
+        *document["build_zone"]["access_way"],
         *document["simulation"],
     }
     for item in (*document["charge"], *document["structures"]):

@@ -10,7 +10,6 @@ from blast_env.errors import LayoutError
 from blast_env.scenario import (
     Cell,
     Scenario,
-    blocked_reason,
     bundled_scenarios,
     check_layout,
     load_layout,
@@ -25,67 +24,18 @@ def scenario() -> Scenario:
     document = full_document()
     document["build_zone"]["corner_m"] = [17.0, 5.0]
     document["build_zone"]["keep_outs"][0].update(corner_m=[17.0, 5.0], size_m=[5.0, 1.0])
+    for key in ("clearance_m", "cost_areas", "budget", "access_way"):
+        del document["build_zone"][key]
     document["charge"][0]["position_m"] = [18.25, 12.25]
     return Scenario.from_document(document, "test")
-
-
-@pytest.mark.parametrize(
-    ("cell", "reason"),
-    [
-        ((-1, 0), "is outside the build zone of 20 rows and 10 columns"),
-        ((0, 10), "is outside the build zone of 20 rows and 10 columns"),
-        ((20, 0), "is outside the build zone of 20 rows and 10 columns"),
-        ((1, 0), "must stay empty: path"),
-        ((6, 6), "overlaps the structure 'house'"),
-        # Its square starts 0.25 m from the charge's centre.
-        (
-            (14, 3),
-            "is closer than the charge's radius of 0.5 m to where the charge may be (charge[",
-        ),
-    ],
-)
-def test_blocked_cell_has_its_reason(cell: Cell, reason: str) -> None:
-    assert (blocked_reason(scenario(), cell) or "").startswith(reason)
-
-
-@pytest.mark.parametrize("cell", [(2, 0), (6, 5), (14, 9), (14, 4), (19, 9)])
-def test_cell_beside_an_obstacle_is_free(cell: Cell) -> None:
-    assert blocked_reason(scenario(), cell) is None
 
 
 def test_no_cell_is_usable_without_a_build_zone() -> None:
     without_zone = Scenario.from_document(minimal_document(), "test")
     assert usable_cells(without_zone).shape == (0, 0)
-    assert blocked_reason(without_zone, (0, 0)) == "is not usable: the scenario has no build zone"
     assert check_layout(without_zone, []) == ()
     with pytest.raises(LayoutError, match="no build zone"):
         check_layout(without_zone, [(0, 0)])
-
-
-@given(
-    st.tuples(st.floats(8.0, 17.0), st.floats(1.0, 9.0)),
-    st.tuples(st.floats(0.1, 4.0), st.floats(0.1, 4.0)),
-    st.tuples(st.floats(8.0, 13.0), st.floats(1.0, 19.0)),
-    st.tuples(st.floats(8.0, 13.0), st.floats(1.0, 19.0)),
-)
-@settings(max_examples=40, deadline=None, derandomize=True)
-def test_mask_and_reason_agree_on_every_cell(
-    zone_corner: tuple[float, float],
-    keep_out_size: tuple[float, float],
-    start: tuple[float, float],
-    end: tuple[float, float],
-) -> None:
-    document = full_document()
-    document["build_zone"].update(corner_m=list(zone_corner), stock=1)
-    document["build_zone"]["keep_outs"][0].update(
-        corner_m=list(zone_corner), size_m=list(keep_out_size)
-    )
-    document["charge"][1].update(start_m=list(start), end_m=list(end))
-    drawn = Scenario.from_document(document, "test")
-    assert drawn.build_zone is not None
-    usable = usable_cells(drawn)
-    for cell in drawn.build_zone.cells():
-        assert usable[cell] == (blocked_reason(drawn, cell) is None), cell
 
 
 @pytest.mark.parametrize("name", bundled_scenarios())

@@ -1,5 +1,7 @@
+import json
 import math
 import pickle
+from hashlib import sha256
 
 import numpy as np
 import pytest
@@ -106,6 +108,11 @@ def test_scenario_survives_pickling() -> None:
         (("structures", 1, "module_capacity"), 501.0),
         (("build_zone", "stock"), 13),
         (("build_zone", "keep_outs", 0, "size_m"), [4.0, 1.0]),
+        (("build_zone", "clearance_m"), 1.0),
+        (("build_zone", "module_cost"), 2.5),
+        (("build_zone", "cost_areas", 0, "module_cost"), 6.0),
+        (("build_zone", "budget"), 41.0),
+        (("build_zone", "access_way", "between"), "bottom_top"),
         (("simulation", "overrides", "air", "jitter"), 0.3),
         (("calibration",), "another"),
     ],
@@ -121,6 +128,7 @@ def test_hash_changes_with_what_affects_a_result(path: KeyPath, value: object) -
         (("name",), "other"),
         (("description",), "Other words."),
         (("build_zone", "keep_outs", 0, "reason"), "other"),
+        (("build_zone", "cost_areas", 0, "reason"), "other"),
         (("site", "width_m"), 30.0),  # written as 30
         (("structures", 1, "protected"), False),  # the default
         (("simulation", "overrides", "air", "mass"), 0.79),  # the preset's value
@@ -129,6 +137,24 @@ def test_hash_changes_with_what_affects_a_result(path: KeyPath, value: object) -
 def test_hash_ignores_words_and_ways_of_writing(path: KeyPath, value: object) -> None:
     other = changed(full_document(), path, value)
     assert scenario_from(other).content_hash == scenario_from(full_document()).content_hash
+
+
+def test_conditions_that_a_file_does_not_make_leave_its_hash_as_it_was_before_they_existed() -> (
+    None
+):
+    """Results and calibrations name scenarios by their hash: the format may only grow."""
+    document = full_document()
+    for key in ("clearance_m", "module_cost", "cost_areas", "budget", "access_way"):
+        del document["build_zone"][key]
+    scenario = scenario_from(document)
+    words = {"name", "description", "simulation"}
+    content: Document = scenario.model_dump(mode="json", exclude=words)
+    known = ("corner_m", "rows", "columns", "stock", "module_capacity", "keep_outs")
+    content["build_zone"] = {key: content["build_zone"][key] for key in known}
+    del content["build_zone"]["keep_outs"][0]["reason"]
+    content["parameters"] = scenario.parameters.model_dump(mode="json")
+    text = json.dumps(content, sort_keys=True)
+    assert scenario.content_hash == sha256(text.encode()).hexdigest()
 
 
 def test_hash_ignores_the_sign_of_zero() -> None:

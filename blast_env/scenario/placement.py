@@ -1,0 +1,256 @@
+"""The modules placed so far, and where the next may stand."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import fsum
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.errors import LayoutError
+from blast_env.scenario.access_way import closing_cells, is_open
+from blast_env.scenario.build_zone import BuildZone
+from blast_env.scenario.cells import cell_from, cell_text, cells_from
+from blast_env.scenario.models import Scenario
+from blast_env.scenario.sections import Cell
+from blast_env.scenario.usability import EmptyZone, Surroundings, empty_zone, reason_against
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A layout in the making: immutable, every module placed gives another placement.
+
+    Made with `Placement.empty`, `Placement.of` and `place`, which keep every condition of the
+    build zone; the constructor itself checks nothing. What may stand depends on which cells are
+    taken, not on their order, and whatever may stand may also stand with fewer modules around it.
+
+    Attributes:
+        scenario: The scenario.
+        cells: (row, column) of each module, in the order in which they were placed.
+    """
+
+    scenario: Scenario
+    cells: tuple[Cell, ...]
+
+    @classmethod
+    def empty(cls, scenario: Scenario) -> "Placement":
+        """Return the placement without modules."""
+        return cls(scenario, ())
+
+    @classmethod
+    def of(cls, scenario: Scenario, cells: Sequence[Cell]) -> "Placement":
+        """Return the placement of a whole layout.
+
+        Args:
+            scenario: The scenario.
+            cells: (row, column) of each module. NumPy integers and arrays are welcome.
+
+        Raises:
+            LayoutError: If a cell is not a pair of integers, lies outside the build zone, is
+                repeated or not available once the cells before it are taken.
+        """
+        layout = cells_from(cells)
+        whole = cls(scenario, layout)
+        return whole if whole._is_sound else _placed_one_by_one(scenario, layout)
+
+    def place(self, cell: Cell) -> "Placement":
+        """Return the placement with one more module.
+
+        Args:
+            cell: (row, column).
+
+        Raises:
+            LayoutError: If the cell is not available; the message is that of `explain`.
+        """
+        cell = cell_from(cell, "cell")
+        reason = self.explain(cell)
+        if reason is not None:
+            raise LayoutError(reason)
+        return Placement(self.scenario, (*self.cells, cell))
+
+    def explain(self, cell: Cell) -> str | None:
+        """Return a sentence that says why a cell is not available, or `None` if it is.
+
+        Args:
+            cell: (row, column), also of a cell that does not exist.
+
+        Raises:
+            LayoutError: If it is not a pair of integers.
+        """
+        cell = cell_from(cell, "cell")
+        reason = self._reason_against_site(cell)
+        if reason is None and cell in self.cells:
+            reason = "is taken by a module"
+        if reason is not None:
+            return f"{cell_text(cell)} {reason}"
+        if self.stock_left == 0:
+            return f"the stock of {_counted_modules(len(self.cells))} is used up"
+        reason = self._reason_against_cost(cell) or self._reason_against_closing(cell)
+        return None if reason is None else f"{cell_text(cell)} {reason}"
+
+    @cached_property
+    def free(self) -> BoolArray:
+        """Which cells may take a module now, shape (rows, columns), read-only.
+
+        (0, 0) without a build zone.
+        """
+        free = np.zeros(self._empty_zone.usable.shape, dtype=bool)
+        if self.stock_left > 0:
+            affordable = self._empty_zone.module_costs <= self._spendable
+            free = self._empty_zone.usable & affordable & ~self._taken & ~self._closing
+        free.flags.writeable = False
+        return free
+
+    @property
+    def usable(self) -> BoolArray:
+        """Which cells may ever take a module, as far as the site is concerned, read-only.
+
+        Shape (rows, columns). Neither the modules nor stock, budget and access way count here.
+        """
+        return self._empty_zone.usable
+
+    @property
+    def module_costs(self) -> NDArray[np.float64]:
+        """What a module on each cell costs, shape (rows, columns), read-only."""
+        return self._empty_zone.module_costs
+
+    @property
+    def is_full(self) -> bool:
+        """Whether no cell may take another module."""
+        return not self.free.any()
+
+    @property
+    def stock_left(self) -> int:
+        """How many modules of the stock are left."""
+        zone = self.scenario.build_zone
+        return 0 if zone is None else zone.stock - len(self.cells)
+
+    @cached_property
+    def cost(self) -> float:
+        """What the modules cost together."""
+        # Summed exactly, so that the order of the cells does not matter.
+        return fsum(self._empty_zone.module_costs[cell] for cell in self.cells)
+
+    @property
+    def budget_left(self) -> float | None:
+        """What is left of the budget; `None` without one."""
+        zone = self.scenario.build_zone
+        if zone is None or zone.budget is None:
+            return None
+        return max(0.0, zone.budget - self.cost)
+
+    @property
+    def _spendable(self) -> float:
+        """What the next module may cost."""
+        zone = self.scenario.build_zone
+        return 0.0 if zone is None else zone.cost_limit - self.cost
+
+    @cached_property
+    def _empty_zone(self) -> EmptyZone:
+        """What holds for the cells without the modules."""
+        zone = self.scenario.build_zone
+        return _NO_ZONE if zone is None else empty_zone(_surroundings(self.scenario, zone))
+
+    @cached_property
+    def _taken(self) -> BoolArray:
+        """Which cells hold a module, shape (rows, columns)."""
+        taken = np.zeros(self._empty_zone.usable.shape, dtype=bool)
+        if self.cells:
+            taken[tuple(zip(*self.cells, strict=True))] = True
+        return taken
+
+    @cached_property
+    def _closing(self) -> BoolArray:
+        """On which cells a module would close the access way, shape (rows, columns)."""
+        zone = self.scenario.build_zone
+        if zone is None or zone.access_way is None:
+            return np.zeros(self._empty_zone.usable.shape, dtype=bool)
+        return closing_cells(zone.access_way, self._empty_zone.passable & ~self._taken)
+
+    @property
+    def _is_sound(self) -> bool:
+        """Whether all cells together keep every condition."""
+        zone = self.scenario.build_zone
+        if zone is None or not self.cells:
+            return not self.cells
+        if self.stock_left < 0 or len(set(self.cells)) < len(self.cells):
+            return False
+        if not all(_is_on_grid(zone, cell) for cell in self.cells):
+            return False
+        if self._spendable < 0.0 or not self._empty_zone.usable[self._taken].all():
+            return False
+        passable = self._empty_zone.passable & ~self._taken
+        return zone.access_way is None or is_open(zone.access_way, passable)
+
+    def _reason_against_site(self, cell: Cell) -> str | None:
+        """Return why a cell may not be used even without modules, or `None` if it may."""
+        zone = self.scenario.build_zone
+        if zone is None:
+            return "is not usable: the scenario has no build zone"
+        if not _is_on_grid(zone, cell):
+            return f"is outside the build zone of {zone.rows} rows and {zone.columns} columns"
+        if self._empty_zone.usable[cell]:
+            return None
+        return reason_against(_surroundings(self.scenario, zone), cell)
+
+    def _reason_against_cost(self, cell: Cell) -> str | None:
+        """Return why a module on a cell cannot be paid for, or `None` if it can."""
+        cost = self._empty_zone.module_costs[cell]
+        zone = self.scenario.build_zone
+        if zone is None or zone.budget is None or cost <= self._spendable:
+            return None
+        return (
+            f"costs {cost:.10g}, but only {self.budget_left:.10g} of the budget of"
+            f" {zone.budget:.10g} is left"
+        )
+
+    def _reason_against_closing(self, cell: Cell) -> str | None:
+        """Return why a module on a cell would be in the way, or `None` if it would not."""
+        zone = self.scenario.build_zone
+        if zone is None or zone.access_way is None or not self._closing[cell]:
+            return None
+        return f"would close the {zone.access_way.description}"
+
+    def __reduce__(self) -> tuple[Callable[..., "Placement"], tuple[Any, ...]]:
+        """Pickle only what cannot be worked out again: arrays would come back writeable."""
+        return Placement, (self.scenario, self.cells)
+
+
+_NO_ZONE: Final = EmptyZone(
+    usable=np.zeros((0, 0), dtype=bool),
+    passable=np.zeros((0, 0), dtype=bool),
+    module_costs=np.zeros((0, 0)),
+)
+
+
+def _surroundings(scenario: Scenario, zone: BuildZone) -> Surroundings:
+    return Surroundings(zone, scenario.structures, scenario.charge, scenario.charge_radius_m)
+
+
+def _placed_one_by_one(scenario: Scenario, layout: tuple[Cell, ...]) -> Placement:
+    """Place the cells of a layout in their order, or raise the error for the first that fails."""
+    placement = Placement.empty(scenario)
+    for cell in layout:
+        if cell in placement.cells:
+            raise LayoutError(f"{cell_text(cell)} is repeated")
+        reason = placement._reason_against_site(cell)
+        if reason is None and placement.stock_left == 0:
+            raise LayoutError(
+                f"{cell_text(cell)} is beyond the stock:"
+                f" the layout has {len(layout)} modules, must have at most {len(placement.cells)}"
+            )
+        placement = placement.place(cell)
+    return placement
+
+
+def _is_on_grid(zone: BuildZone, cell: Cell) -> bool:
+    """Whether the grid has the cell."""
+    return 0 <= cell[0] < zone.rows and 0 <= cell[1] < zone.columns
+
+
+def _counted_modules(count: int) -> str:
+    return "1 module" if count == 1 else f"{count} modules"

@@ -1,0 +1,164 @@
+"""Scenarios with a small build zone, and the rules of building in it written out the slow way."""
+
+from collections import deque
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from hypothesis import assume
+from hypothesis import strategies as st
+
+from blast_env.geometry import Rectangle
+from blast_env.scenario import BuildZone, Cell, Placement, Scenario, ScenarioError
+from tests.scenario.documents import Document
+
+CORNER_M = (10.0, 10.0)
+"""Lower left corner of the zone."""
+
+SHAPES = ((1, 1), (3, 1), (1, 4), (2, 2))
+"""Rows and columns of structures inside drawn zones."""
+
+
+def structure(name: str, x_m: float, y_m: float, rows: int, columns: int) -> Document:
+    """An unprotected structure, its corner so far from the zone's corner."""
+    corner_m = [CORNER_M[0] + x_m, CORNER_M[1] + y_m]
+    shape = {"corner_m": corner_m, "rows": rows, "columns": columns}
+    return {"kind": "ModularObstacle", "name": name, **shape}
+
+
+def area(x_m: float, y_m: float, width_m: float, height_m: float, **keys: Any) -> Document:
+    """A keep-out or cost area, its corner so far from the zone's corner."""
+    corner_m = [CORNER_M[0] + x_m, CORNER_M[1] + y_m]
+    return {"corner_m": corner_m, "size_m": [width_m, height_m], **keys}
+
+
+def zone_document(*structures: Document, **zone: Any) -> Document:
+    """A zone of 8 x 8 cells and 10 modules, unless said otherwise; all else is far away."""
+    protected = {**structure("protected", 20.0, 20.0, 2, 2), "protected": True}
+    return {
+        "schema_version": 1,
+        "name": "zone",
+        "site": {"width_m": 40.0, "height_m": 40.0},
+        "charge": [{"kind": "point", "position_m": [2.0, 2.0], "tnt_kg": 100.0}],
+        "structures": [protected, *structures],
+        "build_zone": {"corner_m": list(CORNER_M), "rows": 8, "columns": 8, "stock": 10, **zone},
+    }
+
+
+def zone_scenario(*structures: Document, **zone: Any) -> Scenario:
+    """The scenario of `zone_document`."""
+    return Scenario.from_document(zone_document(*structures, **zone), "zone")
+
+
+def available(placement: Placement) -> list[Cell]:
+    """The cells that may take a module, as plain integers."""
+    return [(int(row), int(column)) for row, column in np.argwhere(placement.free)]
+
+
+def filled(scenario: Scenario, rng: np.random.Generator) -> Placement:
+    """Modules on free cells drawn at random, until there are none."""
+    placement = Placement.empty(scenario)
+    while not placement.is_full:
+        cells = available(placement)
+        placement = placement.place(cells[rng.integers(len(cells))])
+    return placement
+
+
+@st.composite
+def zone_documents(draw: st.DrawFn) -> Document:
+    """Zones of up to 8 x 8 cells with any of the conditions; not all of them can be built in."""
+    rows, columns = draw(st.integers(3, 8)), draw(st.integers(3, 8))
+    x_m = st.integers(0, 2 * columns - 1).map(lambda n: n / 4)
+    y_m = st.integers(0, 2 * rows - 1).map(lambda n: n / 4)
+    sizes = st.integers(1, 4).map(lambda n: n / 4)
+    costs = st.sampled_from([0.1, 0.3, 1.0, 2.5, 4.0])
+    areas = st.builds(area, x_m, y_m, sizes, sizes, reason=st.just("a reason"))
+    document = zone_document(
+        rows=rows,
+        columns=columns,
+        stock=draw(st.sampled_from([1, 4, rows * columns // 3])),
+        module_cost=draw(costs),
+        clearance_m=draw(st.sampled_from([0.0, 0.0, 0.25, 0.5, 1.0])),
+        keep_outs=draw(st.lists(areas, max_size=2)),
+        cost_areas=[{**each, "module_cost": draw(costs)} for each in draw(st.lists(areas))],
+    )
+    zone = document["build_zone"]
+    if draw(st.booleans()):
+        zone["budget"] = draw(st.sampled_from([1.0, 3.0, 5.5, 8.0]))
+    if draw(st.integers(0, 3)) > 0:
+        between = draw(st.sampled_from(["left_right", "bottom_top"]))
+        zone["access_way"] = {"width_m": draw(st.sampled_from([0.5, 1.0, 1.5])), "between": between}
+    if draw(st.booleans()):
+        shape = draw(st.sampled_from(SHAPES))
+        document["structures"].append(structure("inside", draw(x_m), draw(y_m), *shape))
+    return document
+
+
+def buildable(document: Document) -> Scenario:
+    """The scenario of a drawn document; the draw does not count if it is none."""
+    try:
+        return Scenario.from_document(document, "drawn")
+    except ScenarioError:
+        assume(False)
+        raise
+
+
+def may_stand(scenario: Scenario, cells: Collection[Cell]) -> bool:
+    """Whether modules may stand on all these cells, as the format's description says it."""
+    zone = scenario.build_zone
+    if zone is None or len(cells) > zone.stock:
+        return False
+    squares = [zone.cell_rectangle_m(cell) for cell in cells]
+    limit = np.inf if zone.budget is None else zone.budget * (1.0 + 1e-9)
+    if sum(_cost(zone, square) for square in squares) > limit:
+        return False
+    if any(square.overlaps(each.rectangle_m) for square in squares for each in zone.keep_outs):
+        return False
+    solids = [each.rectangle_m for each in scenario.structures]
+    for square in squares:
+        if any(square.overlaps(solid) for solid in solids):
+            return False
+        if any(_distance_m(square, solid) < zone.clearance_m - 1e-9 for solid in solids):
+            return False
+    if zone.access_way is None:
+        return True
+    passable = np.array(
+        [
+            cell not in cells
+            and not any(zone.cell_rectangle_m(cell).overlaps(solid) for solid in solids)
+            for cell in zone.cells()
+        ]
+    ).reshape(zone.rows, zone.columns)
+    turned = passable if zone.access_way.between == "left_right" else passable.T
+    return can_cross(turned, round(zone.access_way.width_m / 0.5))
+
+
+def can_cross(passable: np.ndarray, width: int) -> bool:
+    """Whether a square of width x width cells can go from the left to the right, step by step."""
+    rows, columns = (length - width + 1 for length in passable.shape)
+    places = {
+        (row, column)
+        for row in range(rows)
+        for column in range(columns)
+        if passable[row : row + width, column : column + width].all()
+    }
+    reached = {place for place in places if place[1] == 0}
+    queue = deque(reached)
+    while queue:
+        row, column = queue.popleft()
+        for place in ((row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)):
+            if place in places and place not in reached:
+                reached.add(place)
+                queue.append(place)
+    return any(column == columns - 1 for _, column in reached)
+
+
+def _cost(zone: BuildZone, square: Rectangle) -> float:
+    inside = [each.module_cost for each in zone.cost_areas if square.overlaps(each.rectangle_m)]
+    return max(inside, default=zone.module_cost)
+
+
+def _distance_m(one: Rectangle, other: Rectangle) -> float:
+    gap_x = max(0.0, one.left - other.right, other.left - one.right)
+    gap_y = max(0.0, one.bottom - other.top, other.bottom - one.top)
+    return float((gap_x**2 + gap_y**2) ** 0.5)
