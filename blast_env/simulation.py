@@ -10,16 +10,14 @@ import numpy as np
 import pandas as pd
 
 from blast_env.calibration.stored import (
+    Calibration,
     CalibrationError,
     ScaledImpulse,
-    load_calibration,
-    seen_width_m,
-    stored_calibrations,
+    scenario_calibration,
 )
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.physics.collisions import CollisionArray
 from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, find_engine
-from blast_env.physics.particles import distance_to_rectangle
 from blast_env.physics.structure import ModularObstacle
 from blast_env.recording.run_record import RunRecord, run_record
 from blast_env.recording.tables import collision_table, module_table, structure_table
@@ -149,6 +147,17 @@ class BlastResult:
         """One row a structure; the columns are `recording.tables.STRUCTURE_COLUMNS`."""
         return structure_table(self.obstacles)
 
+    @cached_property
+    def calibration(self) -> Calibration:
+        """The scenario's calibration.
+
+        Raises:
+            UnknownNameError: If there is no calibration of that name.
+            CalibrationError: If the scenario names no calibration, or one that was made with
+                other parameters or another engine.
+        """
+        return scenario_calibration(self.blast.scenario, self.engine_name)
+
     def obstacle(self, name: str) -> ModularObstacle:
         """Return a structure, or the barrier, by its name.
 
@@ -186,25 +195,11 @@ class BlastResult:
             CalibrationError: If the scenario names no calibration, or one that was made with
                 other parameters or another engine.
         """
-        scenario, charge = self.blast.scenario, self.blast.scene.charge
-        if scenario.calibration is None:
-            raise CalibrationError(
-                f"scenario {scenario.name!r} names no calibration: set calibration to one of "
-                f"{', '.join(stored_calibrations())}"
-            )
-        calibration = load_calibration(scenario.calibration)
-        calibration.check(scenario.parameters, self.engine_name)
-        obstacle = self.obstacle(structure)
+        obstacle, calibration = self.obstacle(structure), self.calibration
         if obstacle.cells is not None:
             raise CalibrationError(f"{structure!r} is no structure: it has no facade of one width")
-        rectangle_m = obstacle.rectangle.scaled(1.0 / UNITS_PER_M)
-        position = np.array([charge.position_m])
-        return calibration.convert(
-            obstacle.impulse,
-            seen_width_m(rectangle_m, charge.position_m),
-            float(distance_to_rectangle(position, rectangle_m)[0]),
-            charge.tnt_kg,
-        )
+        footprint_m = obstacle.rectangle.scaled(1.0 / UNITS_PER_M)
+        return calibration.convert_load(obstacle.impulse, footprint_m, self.blast.scene.charge)
 
     @cached_property
     def digest(self) -> str:

@@ -131,7 +131,7 @@ class CalibrationReport:
             coefficient_intervals={key: (i.low, i.high) for key, i in intervals.items()},
             reference=self.reference.section,
             preset=study.scenario.simulation.preset,
-            parameters_digest=parameters_digest(study.scenario.parameters),
+            parameters_digest=parameters_digest(study.scenario.parameters, study.engine),
             engine=study.engine,
             engine_version=find_engine(study.engine).version,
             blast_env_version=version("blast-env"),

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from blast_env.atomic import write_atomically
@@ -16,6 +17,8 @@ from blast_env.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, Sca
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import SimulationParameters, parameters_digest
+from blast_env.physics.particles import distance_to_rectangle
+from blast_env.scenario import Charge, Scenario
 from blast_env.units import PA_PER_PSI
 
 SUFFIX: Final = ".json"
@@ -141,7 +144,7 @@ class Calibration(Section):
                 f"calibration {self.name!r} was made with engine {self.engine!r}, "
                 f"the simulation ran on {engine!r}"
             )
-        digest = parameters_digest(parameters)
+        digest = parameters_digest(parameters, engine)
         if digest != self.parameters_digest:
             raise CalibrationError(
                 f"calibration {self.name!r} was made with the parameters of preset "
@@ -175,6 +178,20 @@ class Calibration(Section):
             notes.append(f"charge {tnt_kg:g} kg TNT is not {self.tnt_kg:g} kg")
         return ScaledImpulse(self.scaling_law(share * impulse_sim), not notes, tuple(notes))
 
+    def convert_load(
+        self, impulse_sim: float, structure_m: Rectangle, charge: Charge
+    ) -> ScaledImpulse:
+        """Convert the impulse on a structure from a charge; see `convert`.
+
+        Args:
+            impulse_sim: Sum of m |v| on the structure, simulation units.
+            structure_m: Its footprint.
+            charge: The charge.
+        """
+        distance_m = float(distance_to_rectangle(np.array([charge.position_m]), structure_m)[0])
+        width_m = seen_width_m(structure_m, charge.position_m)
+        return self.convert(impulse_sim, width_m, distance_m, charge.tnt_kg)
+
 
 def seen_width_m(structure_m: Rectangle, charge_m: tuple[float, float]) -> float:
     """Return the width of a structure across the line from the charge to its centre, m."""
@@ -187,29 +204,65 @@ def seen_width_m(structure_m: Rectangle, charge_m: tuple[float, float]) -> float
 
 def stored_calibrations() -> tuple[str, ...]:
     """Return the names of the calibrations that come with the package."""
-    folder = files("blast_env.calibration") / "stored"
-    names = (entry.name for entry in folder.iterdir())
-    return tuple(sorted(name.removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX)))
+    return tuple(sorted({name for name, _ in _stored_files()}))
 
 
-def load_calibration(name_or_path: str | Path) -> Calibration:
+def calibration_file(name: str, engine: str) -> str:
+    """Return the name of the file of a calibration: each engine has its own."""
+    return f"{name}.{engine}{SUFFIX}"
+
+
+def load_calibration(name_or_path: str | Path, engine: str = "pymunk") -> Calibration:
     """Return a calibration by its name in the package, or from a `.json` file.
+
+    Args:
+        name_or_path: The name, or the file.
+        engine: With a name: the engine whose calibration it is.
 
     Raises:
         UnknownNameError: If there is none of that name.
-        CalibrationError: If the file cannot be read, was cut short or was edited.
+        CalibrationError: If there is none for that engine, or the file cannot be read, was cut
+            short or was edited.
     """
     path = Path(name_or_path)
     if path.suffix != SUFFIX:
-        known = stored_calibrations()
-        if str(name_or_path) not in known:
-            raise UnknownNameError("calibration", str(name_or_path), known)
-        entry = files("blast_env.calibration") / "stored" / f"{name_or_path}{SUFFIX}"
-        return _parse(entry.read_text(encoding="utf-8"), str(name_or_path))
+        name, known = str(name_or_path), stored_calibrations()
+        if name not in known:
+            raise UnknownNameError("calibration", name, known)
+        engines = sorted(its for stored, its in _stored_files() if stored == name)
+        if engine not in engines:
+            raise CalibrationError(
+                f"calibration {name!r} was not made for engine {engine!r}, only for "
+                f"{', '.join(engines)}"
+            )
+        entry = files("blast_env.calibration") / "stored" / calibration_file(name, engine)
+        return _parse(entry.read_text(encoding="utf-8"), f"{name} for {engine}")
     try:
         return _parse(path.read_text(encoding="utf-8"), str(path))
     except (OSError, UnicodeDecodeError) as error:
         raise CalibrationError(f"{path}: cannot be read: {error}") from error
+
+
+def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:
+    """Return the calibration that a scenario names, checked against its parameters.
+
+    Args:
+        scenario: The scenario.
+        engine: Name of the engine that runs its blasts.
+
+    Raises:
+        CalibrationError: If the scenario names no calibration, or one that was made with other
+            parameters or another engine.
+        UnknownNameError: If there is no calibration of that name.
+    """
+    if scenario.calibration is None:
+        raise CalibrationError(
+            f"scenario {scenario.name!r} names no calibration: set calibration to one of "
+            f"{', '.join(stored_calibrations())}"
+        )
+    calibration = load_calibration(scenario.calibration, engine)
+    calibration.check(scenario.parameters, engine)
+    return calibration
 
 
 def save_calibration(calibration: Calibration, path: Path) -> None:
@@ -222,6 +275,14 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
     document = {**content, "checksum": _checksum(content)}
     with write_atomically(path) as temporary:
         temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+
+
+def _stored_files() -> tuple[tuple[str, str], ...]:
+    """Return name and engine of the calibrations that come with the package."""
+    folder = files("blast_env.calibration") / "stored"
+    stems = (entry.name.removesuffix(SUFFIX) for entry in folder.iterdir())
+    pairs = (stem.rpartition(".") for stem in stems)
+    return tuple((name, engine) for name, _, engine in pairs if name)
 
 
 def _parse(text: str, source: str) -> Calibration:

@@ -22,6 +22,7 @@ from blast_env.calibration.stored import Calibration, save_calibration
 from blast_env.calibration.study import FreeFieldStudy
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
+from blast_env.physics.engine import find_engine
 from blast_env.scenario import load_scenario
 
 PAPER_DISTANCES = "15,30,45,60,75,90,105,120"
@@ -40,6 +41,7 @@ def calibrate(
         str, typer.Option(help="A scenario with one point charge and one structure.")
     ] = "free_field",
     preset: Annotated[str | None, typer.Option(help="Parameters of this name.")] = None,
+    engine: Annotated[str, typer.Option(help="pymunk or event.")] = "pymunk",
     law: Annotated[LawName, typer.Option(help="The law to store.")] = "power",
     burst: Annotated[
         Literal["hemispherical", "spherical"], typer.Option(help="For Kingery-Bulmash.")
@@ -49,7 +51,7 @@ def calibrate(
 ) -> None:
     """Run blasts at many distances, fit the three laws, and store one as a calibration.
 
-    Finished blasts are kept in NAME.runs.jsonl: after an interruption, the same command goes on
+    Finished blasts are kept in NAME.ENGINE.runs.jsonl: after an interruption, the same command goes on
     from there.
     """
     with user_errors():
@@ -58,16 +60,17 @@ def calibrate(
         if preset is not None:
             chosen = chosen.with_simulation(preset)
         distances_m = _parse_distances(distances)
-        study = FreeFieldStudy(chosen, distances_m, tuple(range(first_seed, first_seed + seeds)))
+        numbers = tuple(range(first_seed, first_seed + seeds))
+        study = FreeFieldStudy(chosen, distances_m, numbers, find_engine(engine).name)
         to_match = _reference(reference, study, burst)
         with progress_bar(f"{seeds * len(distances_m)} blasts") as progress:
-            runs = study.run(processes, out / f"{name}.runs.jsonl", progress)
+            runs = study.run(processes, out / f"{name}.{engine}.runs.jsonl", progress)
         report = fit_laws(study, runs, to_match)
         stored = report.calibration(name, law)
         _write(report, stored, out)
         _print(report, stored)
         for suffix in (".json", ".csv", ".png", ".runs.jsonl"):
-            print_line(f"wrote {out / name}{suffix}")
+            print_line(f"wrote {out / name}.{engine}{suffix}")
 
 
 def _parse_distances(text: str) -> tuple[float, ...]:
@@ -92,10 +95,11 @@ def _write(report: CalibrationReport, stored: Calibration, out: Path) -> None:
     from blast_env.rendering.calibration_figure import calibration_figure
     from blast_env.rendering.figures import save_figure
 
-    save_calibration(stored, out / f"{stored.name}.json")
-    with write_atomically(out / f"{stored.name}.csv") as temporary:
+    stem = f"{stored.name}.{stored.engine}"
+    save_calibration(stored, out / f"{stem}.json")
+    with write_atomically(out / f"{stem}.csv") as temporary:
         report.table().to_csv(temporary, index=False)
-    save_figure(calibration_figure(report, stored.name), out / f"{stored.name}.png")
+    save_figure(calibration_figure(report, stored.name), out / f"{stem}.png")
 
 
 def _print(report: CalibrationReport, stored: Calibration) -> None:

@@ -1,7 +1,5 @@
 """The record of collisions with modules that an engine writes (section 2.8)."""
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,17 +23,21 @@ COLLISION_DTYPE = np.dtype(
 
 CollisionArray = NDArray[np.void]
 
-_FIELDS: Final = COLLISION_DTYPE.names or ()
-
 
 class CollisionLog:
     """Collisions in the order in which they happened."""
 
     def __init__(self) -> None:
-        self._rows: list[tuple[float, ...]] = []
+        self._arrays: list[CollisionArray] = []
+        self._rows: list[tuple[float, ...]] = []  # after those of the arrays
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return sum(map(len, self._arrays)) + len(self._rows)
+
+    def extend(self, collisions: CollisionArray) -> None:
+        """Add an array of `COLLISION_DTYPE`."""
+        self._gather_rows()
+        self._arrays.append(collisions)
 
     def append(
         self,
@@ -59,7 +61,16 @@ class CollisionLog:
 
     def to_array(self, start: int = 0) -> CollisionArray:
         """Return the collisions from `start` on as an array of `COLLISION_DTYPE`."""
-        return np.array(self._rows[start:], dtype=COLLISION_DTYPE)
+        self._gather_rows()
+        if len(self._arrays) != 1:
+            empty = np.empty(0, dtype=COLLISION_DTYPE)
+            self._arrays = [np.concatenate([empty, *self._arrays])]
+        return self._arrays[0][start:].copy()
+
+    def _gather_rows(self) -> None:
+        if self._rows:
+            self._arrays.append(np.array(self._rows, dtype=COLLISION_DTYPE))
+            self._rows = []
 
 
 def incidence_angle_rad(collisions: CollisionArray) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,16 @@ from blast_env.physics.particles import distance_to_rectangle
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scene import Scene
 
+ENGINE_NAMES: Final = ("pymunk", "event")
+"""The engines that come with the package; the first one is the reference."""
+
 
 class EndReason(StrEnum):
     """Why a run ended."""
 
     OUT_OF_REACH = "no moving ball can reach a structure before the time limit"
     TIME_LIMIT = "the time limit was reached"
+    EVENT_LIMIT = "the limit of collisions was reached before the end"
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +129,14 @@ def find_engine(engine: str | Engine) -> Engine:
     Raises:
         UnknownNameError: If there is no engine of that name.
     """
-    from blast_env.physics.pymunk_engine import PymunkEngine
-
     if not isinstance(engine, str):
         return engine
-    engines: dict[str, Engine] = {built_in.name: built_in for built_in in (PymunkEngine(),)}
-    if engine not in engines:
-        raise UnknownNameError("engine", engine, engines)
-    return engines[engine]
+    if engine not in ENGINE_NAMES:
+        raise UnknownNameError("engine", engine, ENGINE_NAMES)
+    if engine == "event":
+        from blast_env.physics.event_engine import EventEngine
+
+        return EventEngine()
+    from blast_env.physics.pymunk_engine import PymunkEngine
+
+    return PymunkEngine()

@@ -83,24 +83,28 @@ def explosion_fan(
 ) -> Balls:
     """Return the charge: N `ExplosionBall`s at the angles 2 pi i / N (section 2.3).
 
+    With a thermal share their velocities have a normally distributed part beside the radial one;
+    the kinetic energy is the same on average.
+
     Args:
         parameters: The explosive's parameters.
         centre: The charge's centre, units.
         tnt_kg: TNT-equivalent mass; scales the mass of the balls.
-        rng: Draws the phase of the fan; drawn from in any case, so that a fixed phase does not
-            shift the stream of the air.
+        rng: Draws the phase of the fan and the random part of the velocities.
     """
     drawn = rng.random()
     phase = drawn if parameters.fan_phase == "random" else 0.0
     index = np.arange(1, parameters.ball_count + 1)
     angle = 2.0 * np.pi * (index + phase) / parameters.ball_count
     direction = np.column_stack((np.cos(angle), np.sin(angle)))
+    share = parameters.thermal_share
+    random_part = np.sqrt(share / 2.0) * rng.normal(size=direction.shape)
     return Balls.of_one_kind(
         CollisionType.ExplosionBall,
         parameters,
         position=np.asarray(centre) + parameters.offset_units * direction,
-        velocity=parameters.speed_units_per_s * direction,
-        mass_factor=tnt_kg / parameters.reference_tnt_kg,
+        velocity=parameters.speed_units_per_s * (np.sqrt(1.0 - share) * direction + random_part),
+        mass_factor=(tnt_kg / parameters.reference_tnt_kg) ** parameters.mass_exponent,
     )
 
 

@@ -26,13 +26,19 @@ class WallSurface:
     """What of a set of modules can be reached.
 
     Attributes:
-        exposed: Whether any face of the module is free (m,).
+        free_faces: Whether nothing stands flush on the face (m, 4); the faces are left, right,
+            lower, upper.
         covered_corners: Whether the wall goes on past the corner (m, 4); the corners are lower
             left, lower right, upper left, upper right.
     """
 
-    exposed: BoolArray
+    free_faces: BoolArray
     covered_corners: BoolArray
+
+    @property
+    def exposed(self) -> BoolArray:
+        """Whether any face of the module is free (m,)."""
+        return np.asarray(self.free_faces.any(axis=1))
 
 
 def wall_surface(centres: FloatArray) -> WallSurface:
@@ -42,22 +48,19 @@ def wall_surface(centres: FloatArray) -> WallSurface:
         centres: Centres of the modules that stand, units (m, 2).
     """
     lattices = tuple(_lattices(centres))
-    inner = np.zeros(len(centres), dtype=np.bool_)
+    free = np.ones((len(centres), 4), dtype=np.bool_)
     for lattice in lattices:
         own = centres[lattice.members]
-        inner[lattice.members] = np.logical_and.reduce(
-            [
-                lattice.is_solid(own + np.array(step) * MODULE_SIDE_UNITS)
-                for step in ((-1, 0), (1, 0), (0, -1), (0, 1))
-            ]
-        )
+        for face, step in enumerate(((-1, 0), (1, 0), (0, -1), (0, 1))):
+            beside = own + np.array(step) * MODULE_SIDE_UNITS
+            free[lattice.members, face] = ~lattice.is_solid(beside)
     covered = np.zeros((len(centres), 4), dtype=np.bool_)
     for corner, (x_sign, y_sign) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
         past_in_x = centres + (x_sign * (_HALF + _BEYOND), y_sign * (_HALF - _BEYOND))
         past_in_y = centres + (x_sign * (_HALF - _BEYOND), y_sign * (_HALF + _BEYOND))
         for lattice in lattices:
             covered[:, corner] |= lattice.is_solid(past_in_x) | lattice.is_solid(past_in_y)
-    return WallSurface(exposed=~inner, covered_corners=covered)
+    return WallSurface(free_faces=free, covered_corners=covered)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,10 +20,14 @@ from blast_env.calibration.stored import (
 from blast_env.calibration.study import FreeFieldStudy
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
+from blast_env.physics.engine import ENGINE_NAMES
+from blast_env.physics.presets import preset, with_overrides
 from blast_env.scenario import Scenario
 from scripts.facade_width import free_field_with_facade
 
 CALIBRATION = load_calibration("ballistic_kb_100kg")
+of_every_engine = pytest.mark.parametrize("engine", ENGINE_NAMES)
+of_every_name = pytest.mark.parametrize("name", stored_calibrations())
 
 
 def test_the_ballistic_preset_meets_its_bounds_on_held_out_seeds() -> None:
@@ -36,9 +40,10 @@ def test_the_ballistic_preset_meets_its_bounds_on_held_out_seeds() -> None:
     assert ufc.distances_m == tuple(15.0 * n for n in range(1, 9))
 
 
-@pytest.mark.parametrize("name", stored_calibrations())
-def test_stored_metrics_follow_from_the_stored_columns(name: str) -> None:
-    stored = load_calibration(name)
+@of_every_name
+@of_every_engine
+def test_stored_metrics_follow_from_the_stored_columns(name: str, engine: str) -> None:
+    stored = load_calibration(name, engine)
     i_sim, reference = np.array(stored.i_sim), np.array(stored.i_reference_psi_s)
     exponent, intercept = np.polyfit(np.log(i_sim), np.log(reference), 1)
     law = stored.scaling_law
@@ -50,10 +55,32 @@ def test_stored_metrics_follow_from_the_stored_columns(name: str) -> None:
         assert low < stored.coefficients[key] < high
 
 
-@pytest.mark.parametrize("name", stored_calibrations())
-def test_bundled_scenarios_may_use_the_stored_calibrations(name: str) -> None:
-    scenario = load_scenario("courtyard")
-    load_calibration(name).check(scenario.parameters, "pymunk")
+@of_every_name
+@of_every_engine
+def test_every_engine_has_its_own_calibration(name: str, engine: str) -> None:
+    stored = load_calibration(name, engine)
+    assert (stored.name, stored.engine) == (name, engine)
+    stored.check(preset(stored.preset), engine)
+
+
+def test_an_engine_without_a_calibration_is_named() -> None:
+    with pytest.raises(CalibrationError, match="not made for engine 'mine', only for event, pymu"):
+        load_calibration("ballistic_ufc", "mine")
+
+
+def test_settings_of_the_other_engine_do_not_matter() -> None:
+    coarse = with_overrides(preset("ballistic"), {"stepping": {"contact_time_s": 1e-5}})
+    CALIBRATION.check(coarse, "pymunk")
+    with pytest.raises(CalibrationError, match="preset 'ballistic'"):
+        load_calibration("ballistic_kb_100kg", "event").check(coarse, "event")
+
+
+@of_every_engine
+def test_a_blast_is_converted_by_the_calibration_of_its_engine(engine: str) -> None:
+    result = simulate(load_scenario("free_field"), seed=1, engine=engine)
+    law = load_calibration("ballistic_ufc", engine).scaling_law
+    expected = law(result.impulse_sim("building"))
+    assert result.impulse("building").psi_s == pytest.approx(expected, rel=1e-12)
 
 
 def test_other_parameters_and_other_engines_are_refused() -> None:
@@ -178,14 +205,18 @@ def test_calibrating_gives_a_calibration_that_converts_its_own_runs() -> None:
     assert converted.in_range
 
 
-@pytest.mark.parametrize("name", stored_calibrations())
-def test_the_simulator_still_gives_what_the_calibration_was_made_from(name: str) -> None:
+@of_every_name
+@of_every_engine
+def test_the_simulator_still_gives_what_the_calibration_was_made_from(
+    name: str, engine: str
+) -> None:
     """A digest of parameters does not see a change of the code; the blasts do.
 
     Twice the half-width is about three standard errors of a difference of two such means, for a
     machine on which the blasts are not the same to the last bit.
     """
-    stored = load_calibration(name)
-    study = FreeFieldStudy(load_scenario("free_field"), stored.distances_m[:1], stored.seeds)
+    stored = load_calibration(name, engine)
+    scenario = load_scenario("free_field").with_simulation(stored.preset)
+    study = FreeFieldStudy(scenario, stored.distances_m[:1], stored.seeds, engine)
     mean = study.run().impulse_sim.mean()
     assert mean == pytest.approx(stored.i_sim[0], abs=2.0 * stored.i_sim_ci95[0])

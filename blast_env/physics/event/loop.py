@@ -1,0 +1,178 @@
+"""The main loop: one event after the other, in the order of time."""
+
+from math import inf, sqrt
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from blast_env.physics.event.arrays import (
+    BORDER,
+    CHANGED,
+    FIRST_SURFACE,
+    NEW,
+    RUNNING,
+    Record,
+    RecordArray,
+)
+from blast_env.physics.event.collisions import collide_balls, collide_with_module
+from blast_env.physics.event.heap import unschedule
+from blast_env.physics.event.lookahead import (
+    cell_at,
+    cross,
+    enter_cell,
+    leave_cell,
+    look_ahead,
+)
+
+# Why the loop came back.
+UNTIL: Final = 0
+RECORD_FULL: Final = 1
+OUT_OF_REACH: Final = 2
+EVENT_LIMIT: Final = 3
+MODULE_DESTROYED: Final = 4
+
+_COLLISIONS_BETWEEN_CHECKS: Final = 512
+
+
+@njit(error_model="numpy")
+def run_until(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    modules: NDArray[np.int32],
+    loads: RecordArray,
+    targets: NDArray[np.float64],
+    rules: Record,
+    progress: Record,
+    record: NDArray[np.float64],
+    until_s: float,
+) -> int:
+    """Go on until a time, or until something is to be done outside.
+
+    Returns:
+        One of the constants above.
+    """
+    if progress.stage == NEW:
+        _begin(balls, cells, heap, surfaces, rules)
+    elif progress.stage == CHANGED:
+        _look_again(balls, cells, heap, surfaces, rules)
+    progress.stage = RUNNING
+    while True:
+        if progress.collisions >= progress.next_check:
+            progress.next_check = progress.collisions + _COLLISIONS_BETWEEN_CHECKS
+            if not _can_reach(balls, targets, rules.time_limit_s, progress.time_s):
+                return OUT_OF_REACH
+        if progress.collisions >= rules.most_collisions:
+            return EVENT_LIMIT
+        if progress.records == len(record):
+            return RECORD_FULL
+        if heap[0].ball == 0 or heap[1].time_s == inf:
+            return OUT_OF_REACH  # nothing will ever happen again
+        if heap[1].time_s > until_s:
+            return UNTIL
+        ball, time_s = heap[1].ball, heap[1].time_s
+        if balls[ball].contact_s > time_s:
+            progress.crossings += 1
+            cross(balls, cells, heap, surfaces, rules, ball)
+            continue
+        partner = balls[ball].partner
+        if partner >= 0 and balls[partner].collisions != balls[ball].partner_collisions:
+            progress.outdated += 1
+            look_ahead(balls, cells, heap, surfaces, rules, ball)
+            continue
+        progress.collisions += 1
+        progress.time_s = time_s
+        if partner >= 0:
+            collide_balls(balls[ball], balls[partner], time_s, rules)
+            _go_on(balls, cells, heap, surfaces, rules, ball)
+            _go_on(balls, cells, heap, surfaces, rules, partner)
+        elif partner == BORDER:
+            _remove(balls, cells, heap, ball)
+        else:
+            row = record[progress.records]
+            progress.records += 1
+            row[1] = ball
+            surface = surfaces[FIRST_SURFACE - partner]
+            module = collide_with_module(balls[ball], surface, modules, loads, time_s, rules, row)
+            _go_on(balls, cells, heap, surfaces, rules, ball)
+            if loads[module].impulse > loads[module].capacity:
+                progress.stage = CHANGED
+                return MODULE_DESTROYED
+
+
+@njit(error_model="numpy")
+def _begin(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+) -> None:
+    """Put every ball into its cell, and look ahead for those that move."""
+    for ball in range(len(balls)):
+        enter_cell(balls, cells, ball, cell_at(rules, balls[ball].x, balls[ball].y))
+    for ball in range(len(balls)):
+        if balls[ball].vx != 0.0 or balls[ball].vy != 0.0:
+            look_ahead(balls, cells, heap, surfaces, rules, ball)
+
+
+@njit(error_model="numpy")
+def _look_again(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+) -> None:
+    """Look ahead again for every ball that moves."""
+    for ball in range(len(balls)):
+        if balls[ball].place > 0:
+            look_ahead(balls, cells, heap, surfaces, rules, ball)
+
+
+@njit(error_model="numpy")
+def _go_on(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+    ball: int,
+) -> None:
+    """Look ahead for a ball that has collided, or remove it if it has got too small."""
+    if balls[ball].explosive and balls[ball].radius < rules.minimum_radius:
+        _remove(balls, cells, heap, ball)
+    else:
+        look_ahead(balls, cells, heap, surfaces, rules, ball)
+
+
+@njit(error_model="numpy")
+def _remove(balls: RecordArray, cells: RecordArray, heap: RecordArray, ball: int) -> None:
+    leave_cell(balls, cells, ball)
+    unschedule(heap, balls, ball)
+    balls[ball].alive = 0
+    balls[ball].collisions += 1  # so that nobody waits for it
+
+
+@njit(error_model="numpy")
+def _can_reach(
+    balls: RecordArray, targets: NDArray[np.float64], time_limit_s: float, time_s: float
+) -> bool:
+    """Whether a moving ball can still act on a structure; see `engine.can_reach`."""
+    for index in range(len(balls)):
+        ball = balls[index]
+        if not ball.alive or (ball.vx == 0.0 and ball.vy == 0.0):
+            continue
+        passed = time_s - ball.since_s
+        x, y = ball.x + ball.vx * passed, ball.y + ball.vy * passed
+        speed = sqrt(ball.vx * ball.vx + ball.vy * ball.vy)
+        reach = 2.0 * speed * (time_limit_s - time_s) + ball.radius
+        for target in range(len(targets)):
+            dx = max(targets[target, 0] - x, x - targets[target, 2], 0.0)
+            dy = max(targets[target, 1] - y, y - targets[target, 3], 0.0)
+            if dx * dx + dy * dy <= reach * reach:
+                return True
+    return False
