@@ -4,6 +4,7 @@ import typer
 
 from blast_env.cli.bench import bench
 from blast_env.cli.calibrate import calibrate
+from blast_env.cli.evaluate import evaluate
 from blast_env.cli.simulate import simulate
 from blast_env.cli.validate import validate
 
@@ -17,4 +18,5 @@ app = typer.Typer(
 app.command()(simulate)
 app.command()(validate)
 app.command()(calibrate)
+app.command()(evaluate)
 app.command()(bench)

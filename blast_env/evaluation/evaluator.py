@@ -1,0 +1,125 @@
+"""The loads of layouts under threats, each blast simulated once."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+import joblib
+
+from blast_env.calibration.stored import Calibration, scenario_calibration
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.cache import BlastKey, LoadsCache
+from blast_env.evaluation.loads import BlastLoads, blast_loads
+from blast_env.evaluation.threats import Threat
+from blast_env.physics.engine import Engine, find_engine
+from blast_env.scenario import Cell, Scenario, check_layout
+from blast_env.simulation import Blast
+
+
+class BlastEvaluator:
+    """Runs blasts of one scenario and remembers their loads.
+
+    What the reward, the search methods and `evaluate_layout` have in common. Loads are a pure
+    function of scenario, layout, threat and engine. The order in which a layout names its cells
+    does not matter, to the last bit: they are sorted before the blast.
+
+    It can be pickled, with what it remembers.
+
+    Args:
+        scenario: The scenario; it must name a calibration.
+        engine: Name of an engine, or an engine.
+        cache_size: Most loads that are remembered; see `LoadsCache`.
+
+    Attributes:
+        scenario: As given.
+        engine: The engine.
+        calibration: The scenario's calibration, checked against its parameters and the engine.
+        blasts: Number of blasts that were really simulated.
+        cache_hits: Number of loads that were asked for and needed no blast.
+
+    Raises:
+        CalibrationError: If the scenario names no calibration, or one that was made with other
+            parameters or another engine.
+        UnknownNameError: If there is no such engine or calibration.
+        BlastEnvError: If the cache size is negative.
+    """
+
+    def __init__(
+        self, scenario: Scenario, engine: str | Engine = "pymunk", cache_size: int = 4096
+    ) -> None:
+        self.scenario = scenario
+        self.engine = find_engine(engine)
+        self.calibration = scenario_calibration(scenario, self.engine.name)
+        self.blasts = 0
+        self.cache_hits = 0
+        self._scenario_hash = scenario.content_hash
+        self._cache = LoadsCache(cache_size)
+
+    def loads(self, layout: Sequence[Cell], threat: Threat) -> BlastLoads:
+        """Return the loads of one blast.
+
+        Args:
+            layout: (row, column) of the build-zone cells that hold a barrier module, in any order.
+            threat: The charge and the seed.
+
+        Raises:
+            LayoutError: If the layout does not fit the build zone.
+            ScenarioError: If the charge is not clear of a structure or the border.
+        """
+        return self.loads_of_many([(layout, threat)])[0]
+
+    def loads_of_many(
+        self,
+        pairs: Iterable[tuple[Sequence[Cell], Threat]],
+        processes: int = 1,
+        progress: Callable[[float], None] | None = None,
+    ) -> list[BlastLoads]:
+        """Return the loads of many blasts, in the order of the pairs.
+
+        Pairs that are equal or were simulated before cost nothing. The number of processes
+        changes nothing but the time. Blasts that ended before an interruption are remembered.
+
+        Args:
+            pairs: Layouts with threats.
+            processes: Worker processes.
+            progress: Called with the share of the pairs that is done.
+
+        Raises:
+            BlastEnvError: If `processes` is below 1.
+            LayoutError: If a layout does not fit the build zone; nothing is simulated then.
+            ScenarioError: If a charge is not clear of a structure or the border.
+        """
+        if processes < 1:
+            raise BlastEnvError(f"processes is {processes}, must be at least 1")
+        keys = [self._key(layout, threat) for layout, threat in pairs]
+        found = {key: loads for key in keys if (loads := self._cache.get(key)) is not None}
+        missing = [key for key in dict.fromkeys(keys) if key not in found]
+        simulated = _run(map(self._blast, missing), self.calibration, min(processes, len(missing)))
+        for done, (key, loads) in enumerate(zip(missing, simulated, strict=True), start=1):
+            loads.module_impulse_sim.flags.writeable = False  # it is given out more than once
+            found[key] = loads
+            self._cache.add(key, loads)
+            self.blasts += 1
+            if progress is not None:
+                progress(1.0 - (len(missing) - done) / len(keys))
+        self.cache_hits += len(keys) - len(missing)
+        return [found[key] for key in keys]
+
+    def _key(self, layout: Sequence[Cell], threat: Threat) -> BlastKey:
+        cells = tuple(sorted(check_layout(self.scenario, layout)))
+        return BlastKey(self._scenario_hash, cells, threat.charge, threat.seed, self.engine.name)
+
+    def _blast(self, key: BlastKey) -> Blast:
+        return Blast(self.scenario, key.layout, key.seed, self.engine, key.charge)
+
+
+def _run(blasts: Iterable[Blast], calibration: Calibration, processes: int) -> Iterator[BlastLoads]:
+    """Run blasts; their loads come in the order of the blasts, each as soon as it is there."""
+    if processes <= 1:
+        return (_run_one(blast, calibration) for blast in blasts)
+    jobs = (joblib.delayed(_run_one)(blast, calibration) for blast in blasts)
+    results: Iterator[BlastLoads] = joblib.Parallel(n_jobs=processes, return_as="generator")(jobs)
+    return results
+
+
+def _run_one(blast: Blast, calibration: Calibration) -> BlastLoads:
+    """Run one blast, perhaps in a worker process."""
+    return blast_loads(blast.run(), calibration)

@@ -1,0 +1,115 @@
+"""The loads that one blast puts on the structures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.calibration.stored import Calibration
+from blast_env.physics.structure import ModularObstacle
+from blast_env.scenario import Charge
+from blast_env.simulation import BlastResult
+from blast_env.units import PA_PER_PSI, UNITS_PER_M
+
+
+@dataclass(frozen=True)
+class StructureLoad:
+    """The load on one structure.
+
+    Attributes:
+        name: Name of the structure.
+        protected: Whether its load counts.
+        weight: How much it counts among the protected structures.
+        impulse_sim: Sum of m |v| over the collisions, simulation units.
+        transferred_impulse_sim: Momentum really transferred, simulation units.
+        impulse_psi_s: Calibrated impulse per area, psi*s.
+        in_range: Whether the calibration was made for this distance and charge.
+        notes: Why not, a sentence each.
+    """
+
+    name: str
+    protected: bool
+    weight: float
+    impulse_sim: float
+    transferred_impulse_sim: float
+    impulse_psi_s: float
+    in_range: bool
+    notes: tuple[str, ...]
+
+    @property
+    def impulse_pa_s(self) -> float:
+        """Calibrated impulse per area, Pa*s."""
+        return self.impulse_psi_s * PA_PER_PSI
+
+
+@dataclass(frozen=True, eq=False)
+class BlastLoads:
+    """The loads of one blast on all structures; the barrier is none.
+
+    Attributes:
+        structures: One load a structure, in the order of the scene.
+        module_impulse_sim: Sum of m |v| on each module of the structures, in the order of the
+            scene, simulation units (modules,).
+    """
+
+    structures: tuple[StructureLoad, ...]
+    module_impulse_sim: NDArray[np.float64]
+
+    @property
+    def protected(self) -> tuple[StructureLoad, ...]:
+        """The loads on the protected structures."""
+        return tuple(load for load in self.structures if load.protected)
+
+    @property
+    def protected_impulse_psi_s(self) -> float:
+        """Calibrated impulses of the protected structures, by weight, added up, psi*s."""
+        return sum(load.weight * load.impulse_psi_s for load in self.protected)
+
+    @property
+    def protected_impulse_pa_s(self) -> float:
+        """Calibrated impulses of the protected structures, by weight, added up, Pa*s."""
+        return self.protected_impulse_psi_s * PA_PER_PSI
+
+    @property
+    def protected_impulse_sim(self) -> float:
+        """Impulses of the protected structures, by weight, added up, simulation units."""
+        return sum(load.weight * load.impulse_sim for load in self.protected)
+
+    @property
+    def in_range(self) -> bool:
+        """Whether the calibration was made for this distance to every protected structure."""
+        return all(load.in_range for load in self.protected)
+
+
+def blast_loads(result: BlastResult, calibration: Calibration) -> BlastLoads:
+    """Return the loads of a blast.
+
+    Args:
+        result: The blast.
+        calibration: The calibration of its scenario, checked against parameters and engine.
+    """
+    structures = [obstacle for obstacle in result.obstacles if obstacle.cells is None]
+    charge = result.blast.scene.charge
+    impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
+    return BlastLoads(
+        structures=tuple(_structure_load(each, calibration, charge) for each in structures),
+        module_impulse_sim=np.array(impulse, dtype=np.float64),
+    )
+
+
+def _structure_load(
+    obstacle: ModularObstacle, calibration: Calibration, charge: Charge
+) -> StructureLoad:
+    impulse_sim = obstacle.impulse
+    footprint_m = obstacle.rectangle.scaled(1.0 / UNITS_PER_M)
+    scaled = calibration.convert_load(impulse_sim, footprint_m, charge)
+    return StructureLoad(
+        name=obstacle.name,
+        protected=obstacle.protected,
+        weight=obstacle.weight,
+        impulse_sim=impulse_sim,
+        transferred_impulse_sim=obstacle.transferred_impulse,
+        impulse_psi_s=scaled.psi_s,
+        in_range=scaled.in_range,
+        notes=scaled.notes,
+    )

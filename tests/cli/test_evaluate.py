@@ -1,0 +1,116 @@
+"""`blast-env evaluate`, run in this process."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner, Result
+
+from blast_env import load_scenario
+from blast_env.cli import app
+from blast_env.evaluation import evaluate_layout
+from blast_env.physics.pymunk_engine import PymunkRun
+
+CELLS = [(9, 0), (10, 0), (11, 0)]
+
+
+@pytest.fixture
+def layout(tmp_path: Path) -> Path:
+    path = tmp_path / "layout.json"
+    path.write_text(json.dumps(CELLS))
+    return path
+
+
+def evaluate(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, ["evaluate", *(str(argument) for argument in arguments)])
+
+
+def test_it_has_help_and_is_listed() -> None:
+    help_text = CliRunner().invoke(app, ["--help"]).stdout
+    assert "evaluate" in help_text
+    result = evaluate("--help")
+    assert result.exit_code == 0
+    assert "row, column" in result.stdout
+
+
+def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: Path) -> None:
+    out = tmp_path / "a" / "b"
+    options = ("--seeds", "3", "--first-seed", "7", "--processes", "2", "--out", out)
+    result = evaluate("--layout", layout, *options)
+    assert result.exit_code == 0, result.output
+    expected = evaluate_layout(load_scenario("courtyard"), CELLS, (7, 8, 9))
+    content = json.loads((out / "evaluation.json").read_text())
+    assert content == expected.to_dict()
+    low, high = (100.0 * end for end in expected.ci95)
+    interval = f"(95 % interval {low:.1f} % to {high:.1f} %)"
+    assert f"mean reduction {100.0 * expected.mean_reduction:.1f} % {interval}" in result.stdout
+    assert f"mean of the worst 20 % {expected.cvar:,.0f} Pa s" in result.stdout
+    assert f"seed {expected.worst.threat.seed}: {expected.worst.impulse_pa_s:,.0f}" in result.stdout
+    assert "means over 3 threats (seeds 7 to 9)" in result.stdout
+    for name in ("evaluation.json", "structures.csv", "modules.csv", "threats.csv"):
+        assert f"wrote {out / name}" in result.stdout
+    for name, table in (("structures", expected.table), ("threats", expected.threat_table)):
+        written = pd.read_csv(out / f"{name}.csv")
+        pd.testing.assert_frame_equal(written, table, check_dtype=False, rtol=1e-9)
+    assert (out / "evaluation.png").stat().st_size > 10_000
+
+
+def test_it_prints_json_and_says_when_one_threat_has_no_interval(layout: Path) -> None:
+    result = evaluate("--layout", layout, "--seeds", "1", "--json")
+    assert result.exit_code == 0, result.output
+    content = json.loads(result.stdout)
+    assert content["layout"] == [list(cell) for cell in CELLS]
+    assert content["result"]["reduction"]["ci95_low"] is None
+    assert content["files"] == []
+    table = evaluate("--layout", layout, "--seeds", "1")
+    assert "(95 % interval -)" in table.stdout
+
+
+def test_it_says_what_is_outside_the_calibration(tmp_path: Path) -> None:
+    """The first threat of the perimeter gate that seed 0 draws is a 500 kg vehicle."""
+    layout = tmp_path / "empty.json"
+    layout.write_text("[]")
+    result = evaluate("--layout", layout, "--scenario", "perimeter_gate", "--seeds", "1")
+    assert result.exit_code == 0, result.output
+    assert "note: building: 1 of 1 threats are outside the range of calibration" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--layout", "nowhere.json"), "nowhere.json"),
+        (("--scenario", "cortyard"), "did you mean 'courtyard'"),
+        (("--engine", "pymonk"), "did you mean 'pymunk'"),
+        (("--cvar-level", "1"), "cvar_level is 1, must be at least 0 and below 1"),
+        (("--seeds", "0"), "greater than or equal to 1"),
+        (("--scenario", "free_field"), "(9, 0) is not usable"),
+        (("--out", "layout.json"), "layout.json: cannot be a folder"),
+    ],
+)
+def test_bad_input_is_one_clear_message(
+    arguments: tuple[str, ...],
+    words: str,
+    layout: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = evaluate("--layout", layout, "--out", "folder", *arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert "Traceback" not in result.output
+    assert list(tmp_path.iterdir()) == [layout]
+
+
+def test_an_interruption_leaves_nothing_half_written(
+    layout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(self: PymunkRun, until_s: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(PymunkRun, "advance", interrupted)
+    result = evaluate("--layout", layout, "--seeds", "2", "--out", tmp_path / "out")
+    assert result.exit_code == 130
+    assert "interrupted" in result.stderr
+    assert list((tmp_path / "out").iterdir()) == []

@@ -1,0 +1,192 @@
+"""Evaluations of layouts: what they say, that it adds up, and that it can be repeated."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blast_env import Charge, simulate
+from blast_env.errors import BlastEnvError, LayoutError
+from blast_env.evaluation import (
+    BlastEvaluator,
+    LayoutEvaluation,
+    Threat,
+    draw_threats,
+    evaluate_against,
+    evaluate_layout,
+)
+from blast_env.scenario import Scenario
+from tests.evaluation.cases import (
+    BEHIND_SHADOW,
+    COURTYARD,
+    FEW,
+    SEEDS,
+    SHADOW,
+    THREATS,
+    WALL,
+)
+
+
+def test_no_barrier_reduces_by_exactly_nothing(evaluator: BlastEvaluator) -> None:
+    evaluation = evaluate_against(evaluator, (), THREATS)
+    assert evaluation.mean_reduction == 0.0
+    assert evaluation.ci95 == (0.0, 0.0)
+    assert evaluation.impulse_pa_s == evaluation.unprotected_impulse_pa_s
+    assert evaluation.cvar == evaluation.unprotected_cvar
+    assert (evaluation.threat_table.reduction == 0.0).all()
+    assert (evaluation.module_table.reduction.dropna() == 0.0).all()
+
+
+def test_a_wall_across_the_line_of_sight_reduces(evaluator: BlastEvaluator) -> None:
+    """In sparse air nearly all of the impulse comes straight from the charge."""
+    evaluation = evaluate_against(evaluator, SHADOW, BEHIND_SHADOW)
+    assert evaluation.mean_reduction > 0.7
+    low, high = evaluation.ci95
+    assert 0.0 < low < evaluation.mean_reduction < high <= 1.0
+    assert evaluation.impulse_pa_s.high < evaluation.unprotected_impulse_pa_s.low
+
+
+def test_the_numbers_are_those_of_the_blasts(evaluation: LayoutEvaluation) -> None:
+    """Worked out again from `simulate`, without anything of this package."""
+    with_wall, without = (
+        np.array([simulate(COURTYARD, cells, seed=seed).impulse("building").pa_s for seed in SEEDS])
+        for cells in (WALL, ())
+    )
+    assert evaluation.impulse_pa_s.value == pytest.approx(with_wall.mean())
+    assert evaluation.unprotected_impulse_pa_s.value == pytest.approx(without.mean())
+    assert evaluation.mean_reduction == pytest.approx(1.0 - with_wall.sum() / without.sum())
+    assert evaluation.cvar == pytest.approx(with_wall.max())  # 20 % of four threats: the worst
+    worst = int(with_wall.argmax())
+    assert evaluation.worst.threat == THREATS[worst]
+    assert evaluation.worst.impulse_pa_s == pytest.approx(with_wall[worst])
+    assert evaluation.worst.reduction == pytest.approx(1.0 - with_wall[worst] / without[worst])
+    assert evaluation.threat_table.impulse_pa_s.to_numpy() == pytest.approx(with_wall)
+    assert evaluation.threat_table.charge_y_m.tolist() == [
+        threat.charge.position_m[1] for threat in THREATS
+    ]
+
+
+def test_the_tables_agree_with_each_other(evaluation: LayoutEvaluation) -> None:
+    (building,) = evaluation.table.itertuples()
+    assert building.structure == "building"
+    assert building.impulse_pa_s == pytest.approx(evaluation.impulse_pa_s.value)
+    assert building.reduction == pytest.approx(evaluation.mean_reduction)
+    ends = (building.reduction_low, building.reduction_high)
+    assert ends == pytest.approx(evaluation.ci95)
+    assert building.threats_in_range == len(THREATS)
+    modules = evaluation.module_table
+    assert len(modules) == 20 * 8
+    assert modules.impulse_sim.sum() == pytest.approx(building.impulse_sim)
+    assert modules.unprotected_impulse_sim.sum() == pytest.approx(building.unprotected_impulse_sim)
+    facade = modules[modules.x_m == modules.x_m.min()]
+    assert (facade.reduction > 0.0).mean() > 0.8  # the side that looks at the wall
+    assert modules[modules.unprotected_impulse_sim == 0.0].reduction.isna().all()
+
+
+def test_modules_are_named_as_in_a_blast(evaluation: LayoutEvaluation) -> None:
+    modules = simulate(COURTYARD, seed=0).modules
+    columns = ["module_id", "structure", "x_m", "y_m"]
+    assert evaluation.module_table[columns].equals(modules[columns])
+
+
+def test_evaluate_layout_draws_the_threats_of_its_seeds(evaluation: LayoutEvaluation) -> None:
+    """In two processes and with the cells in another order: the same to the last digit."""
+    again = evaluate_layout(COURTYARD, WALL[::-1], SEEDS, processes=2)
+    assert again.to_dict() == evaluation.to_dict()
+
+
+def test_threats_may_be_given_instead_of_seeds(evaluator: BlastEvaluator) -> None:
+    light = [Threat(Charge((5.0, 15.0), 50.0), seed) for seed in (0, 1)]
+    evaluation = evaluate_layout(COURTYARD, FEW, threats=[*light, THREATS[0]])
+    assert evaluation.threats == (*light, THREATS[0])
+    assert not evaluation.in_range
+    assert evaluation.threat_table.in_range.tolist() == [False, False, True]
+    assert evaluation.table.threats_in_range.tolist() == [1]
+    (note,) = evaluation.notes
+    assert note == (
+        "building: 2 of 3 threats are outside the range of calibration 'ballistic_kb_100kg', "
+        "e.g. charge 50 kg TNT is not 100 kg"
+    )
+
+
+def test_the_empty_site_is_simulated_once_for_all_layouts() -> None:
+    evaluator = BlastEvaluator(COURTYARD)
+    for layout in (FEW, FEW[:1], FEW[:2]):
+        evaluate_against(evaluator, layout, THREATS[:1])
+    assert evaluator.blasts == 4
+
+
+def test_a_file_repeats_its_evaluation(evaluation: LayoutEvaluation, tmp_path: Path) -> None:
+    path = evaluation.to_json(tmp_path / "evaluation.json")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    assert content == evaluation.to_dict()
+    scenario = Scenario.from_document(content["scenario"], "evaluation.json")
+    assert scenario.content_hash == content["scenario_hash"]
+    threats = [
+        Threat(Charge((row["charge_x_m"], row["charge_y_m"]), row["tnt_kg"]), row["seed"])
+        for row in content["threats"]
+    ]
+    layout = [tuple(cell) for cell in content["layout"]]
+    again = evaluate_layout(scenario, layout, engine=content["engine"], threats=threats)
+    assert again.to_dict() == content
+
+
+def test_a_file_has_versions_units_and_no_numbers_that_json_does_not_know(
+    evaluator: BlastEvaluator, tmp_path: Path
+) -> None:
+    """A single threat has no interval, and most modules are never hit."""
+    evaluation = evaluate_against(evaluator, FEW, THREATS[:1])
+    text = evaluation.to_json(tmp_path / "one.json").read_text(encoding="utf-8")
+    content = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} in the file"))
+    assert content["result"]["reduction"]["ci95_low"] is None
+    assert content["modules"][12]["reduction"] is None
+    assert content["versions"]["engine"].startswith("pymunk 7")
+    assert content["calibration"] == "ballistic_kb_100kg"
+    result = content["result"]
+    assert result["cvar_pa_s"] == pytest.approx(6894.757293168 * result["cvar_psi_s"])
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing(
+    evaluation: LayoutEvaluation, tmp_path: Path
+) -> None:
+    with pytest.raises(BlastEnvError, match="there is no folder"):
+        evaluation.to_json(tmp_path / "nowhere" / "evaluation.json")
+    with pytest.raises(BlastEnvError, match=r"suffix '\.bmp'"):
+        evaluation.figure(tmp_path / "evaluation.bmp")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unusable_arguments_are_named(evaluator: BlastEvaluator) -> None:
+    with pytest.raises(LayoutError, match=r"cell \(20, 0\) must stay empty"):
+        evaluate_layout(COURTYARD, [(20, 0)], SEEDS)
+    with pytest.raises(BlastEnvError, match="seeds: there are none"):
+        evaluate_layout(COURTYARD, FEW, [])
+    with pytest.raises(BlastEnvError, match=r"seeds\[1\] is -1, must be at least 0"):
+        evaluate_layout(COURTYARD, FEW, [0, -1])
+    with pytest.raises(BlastEnvError, match="processes is -2, must be at least 1"):
+        evaluate_layout(COURTYARD, FEW, SEEDS, processes=-2)
+    with pytest.raises(BlastEnvError, match="cvar_level is 1, must be at least 0 and below 1"):
+        evaluate_layout(COURTYARD, FEW, SEEDS, cvar_level=1.0)
+    with pytest.raises(BlastEnvError, match="threats: there are none"):
+        evaluate_layout(COURTYARD, FEW, threats=[])
+    with pytest.raises(BlastEnvError, match=r"threats\[1\] .* is there already"):
+        evaluate_layout(COURTYARD, FEW, threats=[THREATS[0], THREATS[0]])
+
+
+def test_a_structure_that_nothing_reaches_has_nothing_to_reduce() -> None:
+    """The protected block stands in a closed yard of other blocks."""
+    document = COURTYARD.model_dump()
+    sizes = {"left": ((26.0, 9.0), 24, 2), "right": ((31.0, 9.0), 24, 2)}
+    sizes |= {"bottom": ((27.0, 9.0), 2, 8), "top": ((27.0, 20.0), 2, 8)}
+    document["structures"] = [
+        *document["structures"],
+        *(
+            {"kind": "ModularObstacle", "name": name, "corner_m": corner, "rows": r, "columns": c}
+            for name, (corner, r, c) in sizes.items()
+        ),
+    ]
+    yard = Scenario.from_document(document, "yard")
+    threats = draw_threats(yard, [0])
+    with pytest.raises(BlastEnvError, match="nothing arrives at the protected structures"):
+        evaluate_layout(yard, (), threats=threats)

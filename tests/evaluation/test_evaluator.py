@@ -1,0 +1,198 @@
+"""Loads are those of `simulate`, however and however often they are asked for."""
+
+import multiprocessing
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blast_env import Charge, load_scenario, simulate
+from blast_env.calibration import Calibration, CalibrationError
+from blast_env.calibration import stored as stored_module
+from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
+from blast_env.evaluation import BlastEvaluator, BlastLoads, StructureLoad, Threat
+from blast_env.physics.engine import BlastRun
+from blast_env.physics.pymunk_engine import PymunkEngine
+from blast_env.scenario import Cell, Scenario, ScenarioError
+from blast_env.scene import Scene
+from tests.evaluation.cases import COURTYARD, FEW, THREATS, WALL
+
+
+def same(one: BlastLoads, other: BlastLoads) -> bool:
+    """Whether two loads are equal to the last bit."""
+    modules = np.array_equal(one.module_impulse_sim, other.module_impulse_sim)
+    return modules and one.structures == other.structures
+
+
+def test_loads_are_those_of_simulate(evaluator: BlastEvaluator) -> None:
+    loads = evaluator.loads(WALL, THREATS[0])
+    result = simulate(COURTYARD, WALL, seed=THREATS[0].seed)
+    (building,) = loads.structures
+    assert building.impulse_sim == result.impulse_sim("building")
+    assert building.transferred_impulse_sim == result.obstacle("building").transferred_impulse
+    scaled = result.impulse("building")
+    assert (building.impulse_psi_s, building.impulse_pa_s) == (scaled.psi_s, scaled.pa_s)
+    assert (building.in_range, building.notes) == (True, ())
+    modules = result.modules[result.modules.structure == "building"]
+    assert loads.module_impulse_sim.tolist() == modules.impulse_sim.tolist()
+
+
+def test_notes_say_what_the_calibration_was_not_made_for(evaluator: BlastEvaluator) -> None:
+    light = evaluator.loads((), Threat(Charge((5.0, 15.0), 50.0), 0))
+    assert not light.in_range
+    assert light.structures[0].notes == ("charge 50 kg TNT is not 100 kg",)
+
+
+def test_protected_structures_count_by_their_weights_and_others_not_at_all() -> None:
+    load = StructureLoad("a", True, 2.0, 10.0, 5.0, 0.1, True, ())
+    other = replace(load, name="b", weight=3.0, impulse_sim=1.0, impulse_psi_s=0.01)
+    bystander = replace(load, name="c", protected=False, in_range=False)
+    loads = BlastLoads((load, bystander, other), np.zeros(3))
+    assert loads.protected_impulse_sim == 23.0
+    assert loads.protected_impulse_psi_s == pytest.approx(0.23)
+    assert loads.protected_impulse_pa_s == pytest.approx(0.23 * 6894.757293168)
+    assert loads.in_range
+    assert not replace(loads, structures=(replace(load, in_range=False),)).in_range
+
+
+class WatchedEngine:
+    """Runs blasts on pymunk and remembers the barriers' cells in their order."""
+
+    name = "pymunk"
+    version = PymunkEngine().version
+
+    def __init__(self) -> None:
+        self.layouts: list[tuple[Cell, ...]] = []
+
+    def start(self, scene: Scene) -> BlastRun:
+        self.layouts += [each.cells for each in scene.structures if each.cells is not None]
+        return PymunkEngine().start(scene)
+
+
+def test_the_order_of_the_cells_changes_nothing() -> None:
+    """Without a cache each order is really simulated.
+
+    Few layouts are loaded differently in another order, so the engine's own input is looked at.
+    """
+    engine = WatchedEngine()
+    evaluator = BlastEvaluator(COURTYARD, engine, cache_size=0)
+    shuffled = [WALL[index] for index in np.random.default_rng(0).permutation(len(WALL))]
+    first = evaluator.loads(WALL, THREATS[1])
+    for layout in (shuffled, WALL[::-1]):
+        assert same(evaluator.loads(layout, THREATS[1]), first)
+    assert engine.layouts == [WALL] * 3
+
+
+def test_parallel_and_serial_are_the_same(evaluator: BlastEvaluator) -> None:
+    pairs = [(layout, threat) for layout in (FEW, (), WALL) for threat in THREATS[:2]]
+    parallel = BlastEvaluator(COURTYARD)
+    for one, other in zip(
+        parallel.loads_of_many(pairs, processes=2), evaluator.loads_of_many(pairs), strict=True
+    ):
+        assert same(one, other)
+    assert parallel.blasts == len(pairs)
+    parallel.loads_of_many(pairs)
+    assert (parallel.blasts, parallel.cache_hits) == (len(pairs), len(pairs))
+
+
+def test_equal_blasts_are_simulated_once() -> None:
+    evaluator = BlastEvaluator(COURTYARD)
+    threat = THREATS[0]
+    pairs = [(FEW, threat), ((), threat), (FEW[::-1], threat)]
+    first, bare, again = evaluator.loads_of_many(pairs)
+    assert (evaluator.blasts, evaluator.cache_hits) == (2, 1)
+    assert first is again
+    assert not same(first, bare)
+    assert evaluator.loads((), threat) is bare
+    assert (evaluator.blasts, evaluator.cache_hits) == (2, 2)
+
+
+def test_evicted_loads_are_simulated_again_with_the_same_result() -> None:
+    evaluator = BlastEvaluator(COURTYARD, cache_size=1)
+    first = evaluator.loads(FEW, THREATS[0])
+    evaluator.loads(FEW, THREATS[1])
+    assert same(evaluator.loads(FEW, THREATS[0]), first)
+    assert (evaluator.blasts, evaluator.cache_hits) == (3, 0)
+
+
+def test_an_engine_may_be_given_as_an_object(evaluator: BlastEvaluator) -> None:
+    by_object = BlastEvaluator(COURTYARD, engine=PymunkEngine())
+    assert same(by_object.loads(FEW, THREATS[0]), evaluator.loads(FEW, THREATS[0]))
+
+
+def test_loads_that_are_given_out_twice_cannot_be_changed(evaluator: BlastEvaluator) -> None:
+    for loads in evaluator.loads_of_many([(FEW, threat) for threat in THREATS], processes=2):
+        with pytest.raises(ValueError, match="read-only"):
+            loads.module_impulse_sim[0] = 0.0
+
+
+def protected_impulse(evaluator: BlastEvaluator) -> tuple[float, int]:
+    return evaluator.loads(FEW, THREATS[0]).protected_impulse_psi_s, evaluator.blasts
+
+
+def test_an_evaluator_works_in_a_spawned_process_and_keeps_what_it_remembers() -> None:
+    evaluator = BlastEvaluator(COURTYARD)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        there, _ = pool.apply(protected_impulse, (evaluator,))
+    assert (there, 1) == protected_impulse(evaluator)
+    copy = pickle.loads(pickle.dumps(evaluator))
+    assert protected_impulse(copy) == (there, 1)
+
+
+def test_progress_ends_at_one(evaluator: BlastEvaluator) -> None:
+    shares: list[float] = []
+    BlastEvaluator(COURTYARD).loads_of_many([((), THREATS[0]), (FEW, THREATS[0])], 1, shares.append)
+    assert shares == [0.5, 1.0]
+
+
+def test_the_calibration_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reading and checking the file costs more than converting a load."""
+    calls = []
+    load = stored_module.load_calibration
+
+    def counted(name: str, engine: str) -> Calibration:
+        calls.append((name, engine))
+        return load(name, engine)
+
+    monkeypatch.setattr(stored_module, "load_calibration", counted)
+    evaluator = BlastEvaluator(COURTYARD)
+    evaluator.loads_of_many([((), threat) for threat in THREATS[:2]])
+    assert calls == [("ballistic_kb_100kg", "pymunk")]
+
+
+def test_scenarios_that_no_calibration_fits_are_refused_at_once() -> None:
+    document = COURTYARD.model_dump() | {"calibration": None, "name": "bare"}
+    with pytest.raises(CalibrationError, match="'bare' names no calibration: set calibration to"):
+        BlastEvaluator(Scenario.from_document(document, "bare"))
+    other = COURTYARD.with_simulation(overrides={"air": {"mass": 0.5}})
+    with pytest.raises(CalibrationError, match="the simulation has others"):
+        BlastEvaluator(other)
+    with pytest.raises(UnknownNameError, match="did you mean 'pymunk'"):
+        BlastEvaluator(COURTYARD, engine="pymonk")
+
+
+def test_layouts_and_process_counts_are_checked_before_any_blast() -> None:
+    evaluator = BlastEvaluator(COURTYARD)
+    with pytest.raises(LayoutError, match=r"\(0, 99\)"):
+        evaluator.loads_of_many([((), THREATS[0]), ([(0, 99)], THREATS[0])])
+    with pytest.raises(BlastEnvError, match="processes is 0, must be at least 1"):
+        evaluator.loads_of_many([((), THREATS[0])], processes=0)
+    assert evaluator.blasts == 0
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_charge_in_a_building_is_refused_in_any_process(processes: int) -> None:
+    inside = [Threat(Charge((29.0, 15.0), 100.0), seed) for seed in range(2)]
+    with pytest.raises(ScenarioError, match="building"):
+        BlastEvaluator(COURTYARD).loads_of_many([((), each) for each in inside], processes)
+
+
+def test_weights_and_all_structures_of_a_street_are_there() -> None:
+    """The protected block of the street junction counts twice; the others do not count."""
+    evaluator = BlastEvaluator(load_scenario("street_junction"))
+    loads = evaluator.loads((), Threat(Charge((10.0, 20.0), 100.0), 0))
+    assert [load.protected for load in loads.structures] == [False, False, False, True]
+    assert loads.protected_impulse_psi_s == 2.0 * loads.structures[3].impulse_psi_s > 0.0
+    assert loads.module_impulse_sim.shape == (4 * 20 * 20,)
+    assert loads.module_impulse_sim[-400:].sum() == loads.structures[3].impulse_sim
