@@ -5,8 +5,7 @@ Importing the package registers its environments with Gymnasium.
 
 from importlib.metadata import version
 
-import gymnasium as _gymnasium
-
+from blast_env.envs.registration import register_environments as _register_environments
 from blast_env.scenario import (
     Charge,
     Scenario,
@@ -30,7 +29,4 @@ __all__ = [
     "simulate",
 ]
 
-_gymnasium.register(
-    id="BlastSimulator-v0",
-    entry_point="blast_env.envs.simulator_env:BlastSimulatorEnv",
-)
+_register_environments()

@@ -9,7 +9,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.envs.arguments import check_names, checked_keywords
+from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import BlastRun, Engine
 from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.structure import BARRIER_NAME, ModularPart
@@ -105,6 +106,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
         "render_fps": 25,
     }
 
+    @checked_keywords
     def __init__(
         self,
         scenario: str | Path | Scenario = "courtyard",
@@ -115,8 +117,8 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
     ) -> None:
         if not 1e-6 <= step_s <= 10.0:
             raise BlastEnvError(f"step_s is {step_s} s, must be between 1e-06 and 10 s")
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise UnknownNameError("render mode", render_mode, self.metadata["render_modes"])
+        if render_mode is not None:
+            check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
         self.layout: Sequence[Cell] = layout
         self.engine = engine
@@ -219,9 +221,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
             self._window = None
 
     def _lay_out(self, seed: int, options: Mapping[str, Any]) -> Blast:
-        for name in options:
-            if name not in _OPTIONS:
-                raise UnknownNameError("option of reset", name, _OPTIONS)
+        check_names("option of reset", options, _OPTIONS)
         blast = Blast(self.scenario, options.get("layout", self.layout), seed, self.engine)
         position_m = options.get("charge_position_m")
         if position_m is None:

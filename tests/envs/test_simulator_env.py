@@ -166,6 +166,8 @@ def test_bad_arguments_are_named() -> None:
         make(step_s=0)
     with pytest.raises(BlastEnvError, match="did you mean 'courtyard'"):
         make(scenario="cortyard")
+    with pytest.raises(BlastEnvError, match="'layuot', did you mean 'layout'"):
+        make(layuot=())
     with pytest.raises(BlastEnvError, match="render mode 'rgb'"):
         BlastSimulatorEnv(render_mode="rgb")
 

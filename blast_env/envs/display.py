@@ -1,0 +1,146 @@
+"""What a person sees of an episode of placing: frames, a window, text."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.envs.episode import Episode
+from blast_env.simulation import Blast
+
+if TYPE_CHECKING:  # drawing is an optional extra
+    from blast_env.rendering.placing import PlacingPainter
+    from blast_env.rendering.placing_film import BlastScreening
+    from blast_env.rendering.window import Window
+
+Frame = NDArray[np.uint8]
+
+_FRAMES_PER_PLACEMENT: Final = 5  # in the window: 0.2 s, so that a person can follow
+
+
+class Display:
+    """Shows an episode of placing, and the blast at its end.
+
+    Drawing objects are made when they are needed and left out when this is pickled.
+
+    Args:
+        render_mode: `"human"`, `"rgb_array"`, `"ansi"`, or `None` for nothing.
+        frames_per_s: Frames a second of the window and of films.
+    """
+
+    def __init__(self, render_mode: str | None, frames_per_s: float) -> None:
+        self._render_mode = render_mode
+        self._frames_per_s = frames_per_s
+        self._episode: Episode | None = None
+        self._painter: PlacingPainter | None = None
+        self._last_frame: Frame | None = None
+        self._window: Window | None = None
+
+    def show(self, episode: Episode) -> None:
+        """Show the present state in the window; the film of the blast when it goes off."""
+        if not episode.ended:
+            for _ in range(_FRAMES_PER_PLACEMENT):
+                self._show(self._placing_frame(episode))
+            return
+        for frame in self.blast_frames(episode):
+            self._show(frame)
+        self._show(self._final_frame(episode))
+
+    def render(self, episode: Episode) -> Frame | str | None:
+        """Return what `render` of an environment returns in the render mode."""
+        if self._render_mode == "rgb_array":
+            return self._final_frame(episode) if episode.ended else self._placing_frame(episode)
+        if self._render_mode == "ansi":
+            from blast_env.rendering.placing_text import placing_text
+
+            lines = [*_state_lines(episode), *([_outcome(episode)] if episode.ended else [])]
+            return placing_text(episode.placement, episode.sight.sources, lines)
+        if self._render_mode == "human":
+            self._show(
+                self._final_frame(episode) if episode.ended else self._placing_frame(episode)
+            )
+        return None
+
+    def blast_frames(self, episode: Episode) -> Iterator[Frame]:
+        """Yield the frames of the film of the blast that ended the episode."""
+        painter = self._placing_painter(episode)
+        return map(painter.padded, _screening(episode).frames(self._frames_per_s))
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state without drawing objects, which do not pickle."""
+        return {**self.__dict__, "_painter": None, "_window": None}
+
+    def _placing_frame(self, episode: Episode) -> Frame:
+        return self._placing_painter(episode).paint(episode.placement, _state_lines(episode))
+
+    def _final_frame(self, episode: Episode) -> Frame:
+        painter = self._placing_painter(episode)
+        if self._last_frame is None:
+            self._last_frame = painter.padded(_screening(episode).last_frame())
+        return self._last_frame.copy()
+
+    def _placing_painter(self, episode: Episode) -> "PlacingPainter":
+        """Return the painter of the episode; a new one with a new episode."""
+        from blast_env.rendering.placing import PlacingPainter
+
+        if self._painter is None or self._episode is not episode:
+            if self._episode is not episode:
+                self._last_frame = None
+            sight = episode.sight
+            self._painter = PlacingPainter(sight.scenario, sight.sources)
+            self._episode = episode
+        return self._painter
+
+    def _show(self, frame: Frame) -> None:
+        from blast_env.rendering.window import Window
+
+        if self._window is None:
+            self._window = Window("blast-env", self._frames_per_s)
+        self._window.show(frame)
+
+
+def _screening(episode: Episode) -> "BlastScreening":
+    """Return the blast that is shown: of the worst threat, with its first realisation."""
+    from blast_env.rendering.placing_film import BlastScreening
+
+    protected, _ = episode.assess()
+    threats = episode.objective.threats
+    threat = threats[int(np.argmax(protected.threat_impulses_psi_s))][0]
+    evaluator = episode.objective.evaluator
+    # Sorted, as for the assessment: the order of the cells may change the last bits.
+    cells = tuple(sorted(episode.placement.cells))
+    blast = Blast(evaluator.scenario, cells, threat.seed, evaluator.engine, threat.charge)
+    remark = f": the worst of {len(threats)} charges" if len(threats) > 1 else ""
+    return BlastScreening(blast, _outcome(episode), remark)
+
+
+def _outcome(episode: Episode) -> str:
+    """Return what came of the blast, in words."""
+    protected, unprotected = episode.assess()
+    reduction_percent = 100.0 * protected.reduction_from(unprotected)
+    of_all = "all charges: " if len(episode.objective.threats) > 1 else ""
+    return (
+        f"{of_all}{protected.impulse_psi_s:.3g} psi s ({protected.impulse_pa_s:.3g} Pa s),"
+        f" reduction {reduction_percent:.0f} %"
+    )
+
+
+def _state_lines(episode: Episode) -> list[str]:
+    """Return what is left to build with, and how many illegal actions there were."""
+    placement, zone = episode.placement, episode.placement.scenario.build_zone
+    stock = 0 if zone is None else zone.stock
+    lines = [f"{placement.stock_left} of {stock} modules left"]
+    extras = []
+    if zone is not None and zone.budget is not None:
+        extras.append(f"budget: {placement.budget_left:g} of {zone.budget:g} left")
+    if episode.illegal_actions:
+        plural = "" if episode.illegal_actions == 1 else "s"
+        extras.append(f"{episode.illegal_actions} illegal action{plural}")
+    return [*lines, ", ".join(extras)] if extras else lines

@@ -1,0 +1,144 @@
+"""Small scenarios and thin blasts, which take little time, to test the barrier environment."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils.env_checker import data_equivalence
+
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.scenario_source import ScenarioSource
+from blast_env.physics.engine import BlastRun
+from blast_env.physics.particles import Balls, CollisionType
+from blast_env.physics.pymunk_engine import PymunkEngine
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.scene import Scene
+
+# Whatever the bundled scenarios use: other parameters would have no calibration.
+_MODEL = load_scenario("courtyard")
+
+
+@dataclass(frozen=True)
+class ThinEngine:
+    """Runs scenes without air and with every tenth ball of the charge: a blast in some 20 ms."""
+
+    name: str = PymunkEngine().name
+    version: str = PymunkEngine().version
+
+    def start(self, scene: Scene) -> BlastRun:
+        """Return a run of what is left of the scene."""
+        balls = scene.balls
+        kept = (balls.kind == CollisionType.ExplosionBall).nonzero()[0][::10]
+        thin = Balls(
+            kind=balls.kind[kept],
+            position=balls.position[kept],
+            velocity=balls.velocity[kept],
+            mass=balls.mass[kept],
+            radius=balls.radius[kept],
+        )
+        return PymunkEngine().start(replace(scene, balls=thin))
+
+
+def small_document(**zone: Any) -> dict[str, Any]:
+    """Return a document with two protected structures and another one, and a zone of 8 x 5."""
+    return {
+        "schema_version": 1,
+        "name": "small",
+        "calibration": _MODEL.calibration,
+        "simulation": _MODEL.simulation.model_dump(),
+        "site": {"width_m": 19.0, "height_m": 18.0},
+        "charge": [
+            {
+                "kind": "segment",
+                "start_m": (3.0, 6.0),
+                "end_m": (3.0, 12.0),
+                "tnt_kg": 100.0,
+                "weight": 2.0,
+            },
+            {"kind": "point", "position_m": (8.5, 16.0), "tnt_kg": 20.0},
+        ],
+        "structures": [
+            {
+                "kind": "ModularObstacle",
+                "name": "shed",
+                "corner_m": (11.0, 14.0),
+                "rows": 2,
+                "columns": 4,
+            },
+            {
+                "kind": "ModularObstacle",
+                "name": "house",
+                "corner_m": (14.0, 5.0),
+                "rows": 12,
+                "columns": 4,
+                "protected": True,
+                "weight": 2.0,
+            },
+            {
+                "kind": "ConcreteSquare",
+                "name": "store",
+                "corner_m": (12.0, 1.0),
+                "side_modules": 3,
+                "protected": True,
+            },
+        ],
+        "build_zone": {
+            "corner_m": (7.0, 7.0),
+            "rows": 8,
+            "columns": 5,
+            "stock": 3,
+            "keep_outs": [{"corner_m": (7.0, 9.0), "size_m": (1.0, 0.5), "reason": "hydrant"}],
+            **zone,
+        },
+    }
+
+
+def small_scenario(**zone: Any) -> Scenario:
+    """Return the small scenario, with changes to its build zone."""
+    return Scenario.model_validate(small_document(**zone))
+
+
+def restricted_scenario() -> Scenario:
+    """Return a small scenario with every condition that a build zone can have."""
+    return small_scenario(
+        corner_m=(7.0, 6.0),
+        rows=14,
+        columns=10,
+        stock=12,
+        clearance_m=1.0,
+        cost_areas=[
+            {"corner_m": (7.0, 6.0), "size_m": (2.5, 4.0), "reason": "rock", "module_cost": 2.5}
+        ],
+        budget=14.0,
+        access_way={"width_m": 1.0, "between": "left_right"},
+    )
+
+
+def make(scenario: Scenario | ScenarioSource | None = None, **arguments: Any) -> BlastBarrierEnv:
+    """Return an environment with one thin blast a charge, of the small scenario unless given."""
+    defaults: dict[str, Any] = {
+        "scenario": scenario or small_scenario(),
+        "realisations": 1,
+        "engine": ThinEngine(),
+    }
+    arguments = defaults | arguments
+    env = gym.make("BlastBarrier-v0", **arguments).unwrapped
+    assert isinstance(env, BlastBarrierEnv)
+    return env
+
+
+def play(env: gym.Env, seed: int, policy_seed: int = 0, **options: Any) -> list[tuple]:
+    """Return what every step of an episode of random legal actions returned, `reset` first."""
+    rng = np.random.default_rng(policy_seed)
+    observation, info = env.reset(seed=seed, options=options)
+    steps: list[tuple] = [(observation, 0.0, False, False, info)]
+    while not steps[-1][2]:
+        mask = steps[-1][4]["action_mask"]
+        steps.append(env.step(rng.choice(np.flatnonzero(mask))))
+    return steps
+
+
+def same(first: Any, second: Any) -> bool:
+    """Whether two things that an environment gave are equal to the last bit."""
+    return data_equivalence(first, second, exact=True)

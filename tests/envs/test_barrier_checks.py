@@ -1,0 +1,55 @@
+"""Both libraries' checkers, on every id and every variant; warnings are errors."""
+
+import doctest
+
+import gymnasium as gym
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3.common.env_checker import check_env as check_env_for_agents
+
+from blast_env.envs import barrier_env
+from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
+from blast_env.scenario import bundled_scenarios, load_scenario
+from tests.envs.small import ThinEngine, make
+
+IDS = sorted(name for name in gym.registry if name.startswith("BlastBarrier"))
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_both_checkers_pass_on_every_id(env_id: str) -> None:
+    env = gym.make(env_id, engine=ThinEngine(), render_mode="rgb_array")
+    check_env(env.unwrapped)
+    check_env_for_agents(env.unwrapped)
+
+
+@pytest.mark.parametrize("observation", ["grid", "grid_with_load", "features"])
+@pytest.mark.parametrize("reward", ["terminal", "incremental"])
+@pytest.mark.parametrize("threat", ["visible", "hidden"])
+def test_both_checkers_pass_on_every_variant(observation: str, reward: str, threat: str) -> None:
+    threats = None if threat == "visible" else 2
+    env = make(observation=observation, reward=reward, threat=threat, threats=threats)
+    check_env(env, skip_render_check=True)
+    check_env_for_agents(env, skip_render_check=True)
+
+
+def test_every_bundled_scenario_with_a_build_zone_has_an_id() -> None:
+    zones = {name: load_scenario(name).build_zone is not None for name in bundled_scenarios()}
+    assert {name for name, has_zone in zones.items() if not has_zone} == WITHOUT_BUILD_ZONE
+    for name, has_zone in zones.items():
+        assert (barrier_id(name) in gym.registry) == has_zone
+        if has_zone:
+            assert gym.spec(barrier_id(name)).kwargs["scenario"] == name
+
+
+def test_examples_in_the_environment_s_docstring() -> None:
+    failures, tried = doctest.testmod(barrier_env)
+    assert tried > 5
+    assert failures == 0
+
+
+def test_names_of_scenarios_become_ids() -> None:
+    assert barrier_id("perimeter_gate") == "BlastBarrier/PerimeterGate-v0"
+
+
+def test_the_incremental_id_pays_piece_by_piece() -> None:
+    assert gym.spec("BlastBarrierIncremental-v0").kwargs["reward"] == "incremental"

@@ -1,0 +1,257 @@
+"""Episodes of the barrier environment: actions, rewards, information, options."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import blast_env
+from blast_env.envs.reward import Transition
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.evaluation.threats import Threat
+from blast_env.units import PA_PER_PSI
+from tests.envs.small import ThinEngine, make, play, same, small_scenario
+
+COLUMNS = 5
+FINISH = 8 * COLUMNS
+HYDRANT = 4 * COLUMNS  # a cell that is kept out
+
+
+def test_placing_the_stock_sets_off_the_charge() -> None:
+    env = make()
+    env.reset(seed=1)
+    ended = [env.step(cell)[2] for cell in (7, 8, 9)]
+    assert ended == [False, False, True]
+    assert env.placement.cells == ((1, 2), (1, 3), (1, 4))
+
+
+def test_finishing_sets_off_the_charge_with_what_stands() -> None:
+    env = make()
+    env.reset(seed=1)
+    env.step(7)
+    _, reward, ended, truncated, info = env.step(FINISH)
+    assert ended
+    assert not truncated
+    assert info["layout"] == ((1, 2),)
+    assert reward == -info["impulse_psi_s"] < 0.0
+
+
+def test_the_final_information_is_that_of_the_same_blasts_run_by_hand() -> None:
+    scenario = small_scenario()
+    env = make(scenario, realisations=2)
+    info = play(env, seed=4)[-1][4]
+    (charge,), (seeds,) = info["charges"], info["blast_seeds"]
+    evaluator = BlastEvaluator(scenario, ThinEngine())
+    by_hand = [
+        [evaluator.loads(layout, Threat(charge, seed)) for seed in seeds]
+        for layout in (info["layout"], ())
+    ]
+    impulse, unprotected = (
+        np.mean([loads.protected_impulse_psi_s for loads in each]) for each in by_hand
+    )
+    assert info["impulse_psi_s"] == impulse
+    assert info["impulse_pa_s"] == pytest.approx(impulse * PA_PER_PSI)
+    assert info["impulse_sim"] == np.mean([loads.protected_impulse_sim for loads in by_hand[0]])
+    assert info["unprotected_impulse_pa_s"] == pytest.approx(unprotected * PA_PER_PSI)
+    assert info["reduction"] == pytest.approx(1.0 - impulse / unprotected)
+    assert info["scenario_hash"] == scenario.content_hash
+    assert info["calibration"] == scenario.calibration
+    assert info["calibration_in_range"] == all(loads.in_range for loads in by_hand[0])
+    assert info["blasts"] == 4
+
+
+def test_the_weights_of_structures_count() -> None:
+    info = play(make(), seed=4)[-1][4]
+    result = blast_env.simulate(
+        small_scenario(),
+        sorted(info["layout"]),
+        info["blast_seeds"][0][0],
+        ThinEngine(),
+        info["charges"][0],
+    )
+    house, store = result.impulse_sim("house"), result.impulse_sim("store")
+    assert house > 0.0
+    assert info["impulse_sim"] == 2.0 * house + store
+
+
+def test_an_illegal_action_changes_nothing_but_the_count_and_the_reward() -> None:
+    env = make(illegal_action_cost=0.25)
+    observation, info = env.reset(seed=1)
+    assert not info["action_mask"][HYDRANT]
+    after, reward, ended, _, info = env.step(HYDRANT)
+    assert same(observation, after)
+    assert not ended
+    assert reward == -0.25
+    assert info["reward_terms"] == {"impulse": 0.0, "illegal_actions": -0.25}
+    assert info["illegal_actions"] == 1
+    env.step(0)
+    again = env.step(0)  # the cell is taken now
+    assert again[1] == -0.25
+    assert again[4]["illegal_actions"] == 2
+
+
+def test_the_limit_of_illegal_actions_ends_the_episode_as_finishing_does() -> None:
+    env = make(illegal_action_limit=3, illegal_action_cost=0.5)
+    env.reset(seed=1)
+    env.step(7)
+    rewards, ended = zip(*[env.step(HYDRANT)[1:3] for _ in range(3)], strict=True)
+    assert ended == (False, False, True)
+    env.reset(seed=1)
+    env.step(7)
+    assert rewards[2] == env.step(FINISH)[1] - 0.5
+
+
+@pytest.mark.parametrize("action", [-1, FINISH + 1, 1.5, "3"])
+def test_an_action_outside_the_space_is_an_error(action: int) -> None:
+    env = make()
+    env.reset(seed=1)
+    with pytest.raises(gym.error.InvalidAction, match="must be in Discrete"):
+        env.step(action)
+
+
+def test_stepping_before_reset_and_after_the_end_is_refused() -> None:
+    env = make()
+    for call in (lambda: env.step(0), env.action_masks, lambda: env.explain((0, 0))):
+        with pytest.raises(gym.error.ResetNeeded, match="call reset"):
+            call()
+    env.reset(seed=1)
+    with pytest.raises(gym.error.ResetNeeded, match="has not gone off"):
+        env.blast_frames()
+    env.step(FINISH)
+    with pytest.raises(gym.error.ResetNeeded, match="has ended"):
+        env.step(FINISH)
+
+
+@pytest.mark.parametrize("threat", ["visible", "hidden"])
+@pytest.mark.parametrize("layout", [(), ((0, 1),)])
+def test_incremental_rewards_add_up_to_the_terminal_one(threat: str, layout: tuple) -> None:
+    rewards = {}
+    for reward in ("terminal", "incremental"):
+        env = make(reward=reward, threat=threat, threats=None if threat == "visible" else 2)
+        steps = play(env, seed=5, layout=layout)
+        rewards[reward] = [step[1] for step in steps[1:]]
+    assert sum(rewards["incremental"]) == pytest.approx(sum(rewards["terminal"]), abs=1e-12)
+    assert not any(rewards["terminal"][:-1])
+    assert sum(rewards["terminal"]) < 0.0
+
+
+def test_a_module_earns_what_it_takes_off_the_impulse() -> None:
+    env = make(reward="incremental")
+    _, info = env.reset(seed=1, options={"charge_position_m": (3.0, 9.0)})
+    earned = env.step(3 * COLUMNS)[1]
+    _, last, _, _, info = env.step(FINISH)
+    unprotected_psi_s = info["unprotected_impulse_pa_s"] / PA_PER_PSI
+    assert earned == pytest.approx(unprotected_psi_s - info["impulse_psi_s"], abs=1e-12)
+    assert last == pytest.approx(-unprotected_psi_s)
+
+
+class PayPerModule:
+    """A reward of a user's."""
+
+    def __call__(self, transition: Transition) -> dict[str, float]:
+        return {"modules": float(len(transition.after)), "end": -7.0 * transition.ended}
+
+
+def test_a_reward_of_ones_own_names_its_terms() -> None:
+    env = make(reward=PayPerModule())
+    steps = play(env, seed=1)
+    assert [step[1] for step in steps[1:]] == [1.0, 2.0, 3.0 - 7.0]
+    terms = {"modules": 3.0, "end": -7.0, "illegal_actions": 0.0}
+    assert steps[-1][4]["reward_terms"] == terms
+
+
+def test_a_reward_must_not_name_the_term_of_the_environment() -> None:
+    env = make(reward=lambda _: {"illegal_actions": 1.0})
+    env.reset(seed=1)
+    with pytest.raises(BlastEnvError, match="'illegal_actions', which the environment adds"):
+        env.step(0)
+
+
+def test_hidden_threats_count_as_their_mean_or_their_worst() -> None:
+    impulses = {}
+    measures: dict[str, dict] = {
+        "mean": {},
+        "half": {"risk": "cvar", "cvar_level": 0.5},
+        "worst": {"risk": "cvar", "cvar_level": 0.99},
+        "own": {"risk": lambda impulses: 3.0 * impulses[0]},
+    }
+    for name, arguments in measures.items():
+        env = make(threat="hidden", threats=4, **arguments)
+        info = play(env, seed=2, blast_seed=10)[-1][4]
+        impulses[name] = info["impulse_psi_s"]
+        assert info["blast_seeds"] == ((10,), (11,), (12,), (13,))
+        assert len(set(info["charges"])) > 1
+    evaluator = BlastEvaluator(small_scenario(), ThinEngine())
+    each = [
+        evaluator.loads(info["layout"], Threat(charge, seed)).protected_impulse_psi_s
+        for charge, (seed,) in zip(info["charges"], info["blast_seeds"], strict=True)
+    ]
+    assert impulses["mean"] == pytest.approx(np.mean(each))
+    assert impulses["half"] == pytest.approx(np.mean(sorted(each)[2:]))
+    assert impulses["worst"] == pytest.approx(max(each))
+    assert impulses["own"] == pytest.approx(3.0 * each[0])
+
+
+def test_one_seed_repeats_exactly_in_two_environments_and_after_a_reset() -> None:
+    env, twin = make(observation="features"), make(observation="features")
+    first, second, again = play(env, 3), play(twin, 3), play(env, 3)
+    assert same(first, second)
+    for each in (first, again):
+        for count in ("blasts", "cache_hits"):  # these go on from episode to episode
+            del each[-1][4][count]
+    assert same(first, again)
+    assert not same(first[-1][4]["charges"], play(env, 4)[-1][4]["charges"])
+
+
+def test_the_layout_does_not_change_the_blasts() -> None:
+    env = make(threat="hidden", threats=2, realisations=2)
+    ends = [play(env, seed=3, policy_seed=policy)[-1][4] for policy in (0, 1)]
+    assert ends[0]["layout"] != ends[1]["layout"]
+    assert ends[0]["charges"] == ends[1]["charges"]
+    assert ends[0]["blast_seeds"] == ends[1]["blast_seeds"]
+    assert ends[0]["unprotected_impulse_pa_s"] == ends[1]["unprotected_impulse_pa_s"]
+
+
+def test_episodes_without_a_seed_follow_from_the_first_seed() -> None:
+    drawn = []
+    for env in (make(), make()):
+        env.reset(seed=9)
+        ends = []
+        for _ in range(3):
+            env.reset()
+            ends.append(env.step(FINISH)[4]["blast_seeds"])
+        drawn.append(ends)
+    assert drawn[0] == drawn[1]
+    assert len(set(drawn[0])) == 3
+
+
+def test_options_fix_charge_layout_and_seeds() -> None:
+    env = make()
+    options = {
+        "charge_position_m": np.array([2.0, 8.0]),
+        "tnt_kg": 50,
+        "layout": [(0, 0), np.array([1, 1])],
+        "blast_seed": 77,
+    }
+    _, info = env.reset(seed=1, options=options)
+    assert not info["action_mask"][[0, COLUMNS + 1]].any()
+    _, _, _, _, info = env.step(FINISH)
+    assert info["charges"] == (((2.0, 8.0), 50.0),)
+    assert info["blast_seeds"] == ((77,),)
+    assert info["layout"] == ((0, 0), (1, 1))
+
+
+def test_modules_keep_clear_of_a_charge_that_an_option_puts_into_the_zone() -> None:
+    env = make()
+    _, info = env.reset(seed=1, options={"charge_position_m": (8.0, 10.0)})
+    assert not info["action_mask"][5 * COLUMNS + 2]
+    assert "closer than the charge's radius" in str(env.explain((5, 2)))
+    assert info["action_mask"].sum() > 20
+    assert play(env, seed=1, charge_position_m=(8.0, 10.0))[-1][4]["impulse_psi_s"] > 0.0
+
+
+def test_a_full_layout_leaves_only_finishing() -> None:
+    env = make()
+    _, info = env.reset(seed=1, options={"layout": [(0, 0), (1, 1), (2, 2)]})
+    assert np.flatnonzero(info["action_mask"]).tolist() == [FINISH]
+    assert env.step(FINISH)[2]

@@ -1,0 +1,104 @@
+"""A cell is offered exactly if a module may be placed on it."""
+
+import numpy as np
+import pytest
+
+from blast_env.errors import LayoutError
+from blast_env.scenario import (
+    BuildZone,
+    Placement,
+    Scenario,
+    bundled_scenarios,
+    check_layout,
+    load_scenario,
+)
+from tests.envs.small import make, restricted_scenario, small_scenario
+
+SCENARIOS = {
+    "small": small_scenario(),
+    "restricted": restricted_scenario(),
+    **{
+        name: scenario
+        for name in bundled_scenarios()
+        if (scenario := load_scenario(name)).build_zone is not None
+    },
+}
+EPISODES = 60
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_an_action_is_legal_exactly_if_the_layout_with_it_is_accepted(name: str) -> None:
+    """Thousands of states; in each, some cells are tried that are legal and some that are not.
+
+    Whether a layout is accepted is for `check_layout` to say, which looks at it as a whole.
+    """
+    scenario = SCENARIOS[name]
+    env = make(scenario, illegal_action_limit=1000)
+    rng = np.random.default_rng(0)
+    states = 0
+    for episode in range(EPISODES):
+        _, info = env.reset(seed=episode)
+        ended = False
+        while not ended:
+            mask = info["action_mask"]
+            assert (mask == env.action_masks()).all()
+            assert mask[-1]
+            layout = env.placement.cells
+            for action in _some_of_each(mask[:-1], rng):
+                cell = divmod(action, _zone(scenario).columns)
+                _check(env.explain(cell), mask[action])
+                assert _is_accepted(scenario, (*layout, cell)) == mask[action]
+            if not mask.all():
+                _, _, ended, _, info = env.step(rng.choice(np.flatnonzero(~mask)))
+                assert not ended
+                assert env.placement.cells == layout
+            states += 1
+            if len(layout) + 1 == _zone(scenario).stock:
+                break  # the next module would set off the charge, which costs time
+            action = rng.choice(np.flatnonzero(mask[:-1]))
+            _, _, ended, _, info = env.step(action)
+            assert env.placement.cells == (*layout, divmod(action, _zone(scenario).columns))
+    assert states >= EPISODES * min(3, _zone(scenario).stock)
+
+
+def _check(reason: str | None, is_legal: bool) -> None:
+    assert (reason is None) == is_legal
+    if reason is not None:
+        assert len(reason) > 20
+
+
+def _some_of_each(mask: np.ndarray, rng: np.random.Generator) -> list[int]:
+    """Return an action that is legal and one that is not, where there are such."""
+    kinds = (np.flatnonzero(mask), np.flatnonzero(~mask))
+    return [int(rng.choice(kind)) for kind in kinds if len(kind)]
+
+
+def _zone(scenario: Scenario) -> BuildZone:
+    assert scenario.build_zone is not None
+    return scenario.build_zone
+
+
+def _is_accepted(scenario: Scenario, layout: tuple) -> bool:
+    try:
+        check_layout(scenario, layout)
+    except LayoutError:
+        return False
+    return True
+
+
+def test_finishing_stays_legal_when_the_stock_is_not_used_up_but_no_cell_is_left() -> None:
+    # A budget for two modules, though there are three: the second one ends the episode.
+    env = make(small_scenario(budget=2.0))
+    env.reset(seed=0)
+    _, _, ended, _, _ = env.step(0)
+    assert not ended
+    assert env.step(1)[2]
+    assert env.placement.stock_left == 1
+    assert env.placement.is_full
+
+
+def test_an_empty_zone_offers_what_the_placement_offers() -> None:
+    scenario = restricted_scenario()
+    env = make(scenario)
+    _, info = env.reset(seed=0)
+    assert (info["action_mask"][:-1] == Placement.empty(scenario).free.ravel()).all()

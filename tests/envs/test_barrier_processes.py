@@ -1,0 +1,92 @@
+"""The barrier environment in vectors, other processes, and pickles."""
+
+import copy
+import multiprocessing
+import pickle
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+from tests.envs.small import ThinEngine, make, play, same, small_scenario
+
+FINISH = 40
+
+
+def arguments() -> dict[str, Any]:
+    return {"scenario": small_scenario(), "engine": ThinEngine(), "observation": "features"}
+
+
+def _play_in_process(queue: "multiprocessing.Queue[list]") -> None:
+    env = gym.make("blast_env:BlastBarrier-v0", **arguments())
+    queue.put(play(env, 3))
+
+
+def test_works_by_module_name_in_a_spawned_process_with_the_same_rollout() -> None:
+    context = multiprocessing.get_context("spawn")
+    queue: multiprocessing.Queue[list] = context.Queue()
+    process = context.Process(target=_play_in_process, args=(queue,))
+    process.start()
+    steps = queue.get(timeout=120)
+    process.join()
+    assert same(steps, play(gym.make("BlastBarrier-v0", **arguments()), 3))
+
+
+@pytest.mark.parametrize(
+    ("mode", "vector_kwargs"), [("sync", {}), ("async", {}), ("async", {"context": "spawn"})]
+)
+def test_vectors_of_environments_stack_the_information(mode: str, vector_kwargs: dict) -> None:
+    envs = gym.make_vec(
+        "BlastBarrier-v0",
+        num_envs=2,
+        vectorization_mode=mode,
+        vector_kwargs=vector_kwargs,
+        **arguments(),
+    )
+    _, info = envs.reset(seed=3)
+    assert info["action_mask"].shape == (2, FINISH + 1)
+    _, _, _, _, info = envs.step(np.array([0, 4 * 5]))
+    assert info["illegal_actions"].tolist() == [0, 1]
+    _, rewards, ended, _, info = envs.step(np.array([1, FINISH]))
+    assert ended.tolist() == [False, True]
+    assert info["_reduction"].tolist() == [False, True]
+    assert info["layout"][1] == ()
+    assert info["reward_terms"]["impulse"][1] == -info["impulse_psi_s"][1] == rewards[1]
+    envs.close()
+
+
+def test_monitor_logs_the_final_information() -> None:
+    env = Monitor(make(), info_keywords=("reduction", "impulse_pa_s", "blasts"))
+    vector = DummyVecEnv([lambda: env])
+    vector.seed(3)
+    vector.reset()
+    _, _, ended, infos = vector.step(np.array([FINISH]))
+    assert ended[0]
+    assert infos[0]["episode"]["reduction"] == 0.0
+    assert infos[0]["episode"]["blasts"] == 1
+
+
+@pytest.mark.parametrize("again", [lambda env: pickle.loads(pickle.dumps(env)), copy.deepcopy])
+@pytest.mark.parametrize("observation", ["grid_with_load", "features"])
+def test_a_copy_in_mid_episode_goes_on_identically(again: Any, observation: str) -> None:
+    env = make(reward="incremental", observation=observation, render_mode="rgb_array")
+    env.reset(seed=2)
+    env.step(11)
+    env.render()  # so that there is something that does not pickle
+    twin = again(env)
+    assert same(env.render(), twin.render())
+    for action in (20, 12, 13):
+        assert same(env.step(action), twin.step(action))
+    assert same(env.reset(), twin.reset())
+    assert same(env.step(FINISH), twin.step(FINISH))
+
+
+def test_a_copy_is_independent() -> None:
+    env = make()
+    env.reset(seed=2)
+    twin = copy.deepcopy(env)
+    twin.step(3)
+    assert env.placement.cells == ()
