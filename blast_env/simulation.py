@@ -9,12 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from blast_env.calibration.stored import (
-    Calibration,
-    CalibrationError,
-    ScaledImpulse,
-    scenario_calibration,
-)
+from blast_env.calibration.model import Calibration, CalibrationError, ScaledImpulse
+from blast_env.calibration.stored import scenario_calibration
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.physics.collisions import CollisionArray
 from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, find_engine
@@ -23,7 +19,6 @@ from blast_env.recording.run_record import RunRecord, run_record
 from blast_env.recording.tables import collision_table, module_table, structure_table
 from blast_env.scenario import Cell, Charge, Scenario
 from blast_env.scene import Scene, build_scene, draw_charge
-from blast_env.units import UNITS_PER_M
 
 _PROGRESS_CALLS = 200
 
@@ -180,26 +175,30 @@ class BlastResult:
         """
         return self.obstacle(structure).impulse
 
-    def impulse(self, structure: str) -> ScaledImpulse:
-        """Return the impulse per area on a structure, through the scenario's calibration.
+    def impulse(self, structure: str, calibration: Calibration | None = None) -> ScaledImpulse:
+        """Return the impulse per area on a structure, through a calibration.
 
         Args:
             structure: Name of the structure.
+            calibration: By default the scenario's.
 
         Returns:
             `.psi_s`, `.pa_s`, and `.in_range` with `.notes`: whether the calibration was made
-            for this distance and charge.
+            for this distance and charge, and the blast ran to its end.
 
         Raises:
             UnknownNameError: If there is no structure or no calibration of that name.
             CalibrationError: If the scenario names no calibration, or one that was made with
                 other parameters or another engine.
         """
-        obstacle, calibration = self.obstacle(structure), self.calibration
+        obstacle = self.obstacle(structure)
         if obstacle.cells is not None:
             raise CalibrationError(f"{structure!r} is no structure: it has no facade of one width")
-        footprint_m = obstacle.rectangle.scaled(1.0 / UNITS_PER_M)
-        return calibration.convert_load(obstacle.impulse, footprint_m, self.blast.scene.charge)
+        scaled = (calibration or self.calibration).convert_load(obstacle, self.blast.scene.charge)
+        if self.end_reason is not EndReason.EVENT_LIMIT:
+            return scaled
+        notes = (*scaled.notes, f"the blast was cut off: {self.end_reason}")
+        return ScaledImpulse(scaled.psi_s, False, notes)
 
     @cached_property
     def digest(self) -> str:

@@ -20,6 +20,7 @@ from blast_env.calibration.metrics import (
     leave_one_out,
     shape_rms_percent,
 )
+from blast_env.calibration.model import Calibration, CalibrationError, ScaledImpulse
 from blast_env.calibration.pressure import PressureHistory, facade_history
 from blast_env.calibration.references import (
     PAPER_COLUMNS,
@@ -29,14 +30,7 @@ from blast_env.calibration.references import (
     paper_ufc_column,
     scaled_distance,
 )
-from blast_env.calibration.stored import (
-    Calibration,
-    CalibrationError,
-    ScaledImpulse,
-    load_calibration,
-    save_calibration,
-    stored_calibrations,
-)
+from blast_env.calibration.stored import load_calibration, save_calibration, stored_calibrations
 
 __all__ = [
     "PAPER_COLUMNS",

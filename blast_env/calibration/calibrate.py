@@ -16,8 +16,13 @@ from blast_env.calibration.metrics import (
     fit_metrics,
     leave_one_out,
 )
+from blast_env.calibration.model import (
+    Calibration,
+    MetricsSection,
+    ReferenceSection,
+    SimulatedQuantity,
+)
 from blast_env.calibration.references import kingery_bulmash, paper_ufc_column
-from blast_env.calibration.stored import Calibration, MetricsSection, ReferenceSection
 from blast_env.calibration.study import FreeFieldStudy, impulse_by_seed, summarise
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import find_engine
@@ -90,6 +95,7 @@ class CalibrationReport:
         reference: What it was fitted to.
         laws: The three laws by name.
         metrics: How well each agrees.
+        simulated: Which sum over the collisions they convert.
     """
 
     study: FreeFieldStudy
@@ -98,6 +104,7 @@ class CalibrationReport:
     reference: Reference
     laws: Mapping[str, ScalingLaw]
     metrics: Mapping[str, FitMetrics]
+    simulated: SimulatedQuantity = "impulse"
 
     def table(self) -> pd.DataFrame:
         """Return the summary with the reference and the three laws beside it, psi*s."""
@@ -115,7 +122,7 @@ class CalibrationReport:
             name: Its name.
             law: Which of the laws.
         """
-        study, by_seed = self.study, impulse_by_seed(self.runs)
+        study, by_seed = self.study, impulse_by_seed(self.runs, self.simulated)
         reference = self.reference.impulse_psi_s
         left_out = leave_one_out(
             study.distances_m, self.summary.i_sim.to_numpy(), reference, FITS[law]
@@ -137,6 +144,7 @@ class CalibrationReport:
             blast_env_version=version("blast-env"),
             facade_width_m=structure.rectangle_m.top - structure.rectangle_m.bottom,
             ball_radius_m=study.scenario.parameters.air.radius_units / UNITS_PER_M,
+            simulated=self.simulated,
             tnt_kg=source.tnt_kg,
             distances_m=study.distances_m,
             seeds=study.seeds,
@@ -152,17 +160,28 @@ class CalibrationReport:
         )
 
 
-def calibrate(study: FreeFieldStudy, runs: pd.DataFrame, reference: Reference) -> CalibrationReport:
+def calibrate(
+    study: FreeFieldStudy,
+    runs: pd.DataFrame,
+    reference: Reference,
+    simulated: SimulatedQuantity = "impulse",
+) -> CalibrationReport:
     """Fit the three laws to the runs of a study.
+
+    Args:
+        study: The study.
+        runs: Its runs.
+        reference: What to fit to.
+        simulated: Which sum over the collisions to convert.
 
     Raises:
         BlastEnvError: If the runs cannot be fitted, e.g. because nothing arrived at a distance.
     """
-    summary = summarise(runs)
+    summary = summarise(runs, simulated)
     i_sim = summary.i_sim.to_numpy(dtype=np.float64)
     laws = {name: fit(i_sim, reference.impulse_psi_s) for name, fit in FITS.items()}
     metrics = {
         name: fit_metrics(study.distances_m, law(i_sim), reference.impulse_psi_s)
         for name, law in laws.items()
     }
-    return CalibrationReport(study, runs, summary, reference, laws, metrics)
+    return CalibrationReport(study, runs, summary, reference, laws, metrics, simulated)

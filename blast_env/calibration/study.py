@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from blast_env.calibration.model import SimulatedQuantity
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import find_engine
 from blast_env.scenario import Scenario
@@ -120,17 +121,20 @@ class FreeFieldStudy:
         return f"{scenario.content_hash} {seed} {self.engine} {version}"
 
 
-def impulse_by_seed(runs: pd.DataFrame) -> NDArray[np.float64]:
+def impulse_by_seed(
+    runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse"
+) -> NDArray[np.float64]:
     """Return the impulses, simulation units (seeds, distances), from the table of a study."""
-    pivot = runs.pivot_table(index="seed", columns="distance_m", values="impulse_sim")
+    pivot = runs.pivot_table(index="seed", columns="distance_m", values=f"{simulated}_sim")
     return pivot.to_numpy(dtype=np.float64)
 
 
-def summarise(runs: pd.DataFrame) -> pd.DataFrame:
+def summarise(runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse") -> pd.DataFrame:
     """Return mean and 95 % confidence interval at each distance.
 
     Args:
         runs: The table of a study.
+        simulated: Which sum over the collisions `i_sim` is.
 
     Returns:
         One row a distance: `distance_m`, `seeds`, `i_sim`, its half-width `ci95` (Student's t),
@@ -140,8 +144,8 @@ def summarise(runs: pd.DataFrame) -> pd.DataFrame:
     table = pd.DataFrame(
         {
             "seeds": groups.size(),
-            "i_sim": groups.impulse_sim.mean(),
-            "sd": groups.impulse_sim.std(ddof=1),
+            "i_sim": groups[f"{simulated}_sim"].mean(),
+            "sd": groups[f"{simulated}_sim"].std(ddof=1),
             "transferred_sim": groups.transferred_impulse_sim.mean(),
             "arrival_s": groups.first_hit_s.mean(),
         }

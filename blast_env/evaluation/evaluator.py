@@ -4,7 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import joblib
 
-from blast_env.calibration.stored import Calibration, scenario_calibration
+from blast_env.calibration.model import Calibration
+from blast_env.calibration.stored import scenario_calibration
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cache import BlastKey, LoadsCache
 from blast_env.evaluation.loads import BlastLoads, blast_loads

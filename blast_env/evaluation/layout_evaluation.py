@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from blast_env.atomic import write_atomically
-from blast_env.calibration.stored import Calibration
+from blast_env.calibration.model import Calibration
 from blast_env.evaluation.loads import BlastLoads
 from blast_env.evaluation.record import evaluation_record
 from blast_env.evaluation.statistics import (

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.calibration.stored import Calibration
+from blast_env.calibration.model import Calibration
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scenario import Charge
 from blast_env.simulation import BlastResult
-from blast_env.units import PA_PER_PSI, UNITS_PER_M
+from blast_env.units import PA_PER_PSI
 
 
 @dataclass(frozen=True)
@@ -89,25 +88,22 @@ def blast_loads(result: BlastResult, calibration: Calibration) -> BlastLoads:
         calibration: The calibration of its scenario, checked against parameters and engine.
     """
     structures = [obstacle for obstacle in result.obstacles if obstacle.cells is None]
-    charge = result.blast.scene.charge
     impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
     return BlastLoads(
-        structures=tuple(_structure_load(each, calibration, charge) for each in structures),
+        structures=tuple(_structure_load(result, each, calibration) for each in structures),
         module_impulse_sim=np.array(impulse, dtype=np.float64),
     )
 
 
 def _structure_load(
-    obstacle: ModularObstacle, calibration: Calibration, charge: Charge
+    result: BlastResult, obstacle: ModularObstacle, calibration: Calibration
 ) -> StructureLoad:
-    impulse_sim = obstacle.impulse
-    footprint_m = obstacle.rectangle.scaled(1.0 / UNITS_PER_M)
-    scaled = calibration.convert_load(impulse_sim, footprint_m, charge)
+    scaled = result.impulse(obstacle.name, calibration)
     return StructureLoad(
         name=obstacle.name,
         protected=obstacle.protected,
         weight=obstacle.weight,
-        impulse_sim=impulse_sim,
+        impulse_sim=obstacle.impulse,
         transferred_impulse_sim=obstacle.transferred_impulse,
         impulse_psi_s=scaled.psi_s,
         in_range=scaled.in_range,

@@ -9,14 +9,8 @@ import pytest
 from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import PowerLaw, paper_table, shape_rms_percent
 from blast_env.calibration.calibrate import calibrate, kingery_bulmash_reference, paper_reference
-from blast_env.calibration.stored import (
-    Calibration,
-    CalibrationError,
-    load_calibration,
-    save_calibration,
-    seen_width_m,
-    stored_calibrations,
-)
+from blast_env.calibration.model import Calibration, CalibrationError, seen_width_m
+from blast_env.calibration.stored import load_calibration, save_calibration, stored_calibrations
 from blast_env.calibration.study import FreeFieldStudy
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle

@@ -1,0 +1,213 @@
+"""A calibration: a law, what it was made from, and where it holds."""
+
+from collections.abc import Mapping
+from math import hypot
+from types import MappingProxyType
+from typing import Annotated, Final, Literal, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from blast_env.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Rectangle
+from blast_env.physics.parameters import SimulationParameters, parameters_digest
+from blast_env.physics.particles import distance_to_rectangle
+from blast_env.physics.structure import ModularObstacle
+from blast_env.scenario import Charge
+from blast_env.units import PA_PER_PSI, UNITS_PER_M
+
+SimulatedQuantity = Literal["impulse", "transferred_impulse"]
+"""The paper's sum of m |v|, or the momentum really transferred along the normals."""
+
+LAWS: Final[Mapping[str, type[ScalingLaw]]] = MappingProxyType(
+    {"proportional": ProportionalLaw, "linear": LinearLaw, "power": PowerLaw}
+)
+
+
+class CalibrationError(BlastEnvError):
+    """A calibration that cannot be read, or does not belong to a simulation."""
+
+
+class ScaledImpulse(NamedTuple):
+    """A simulated impulse in the units of the reference.
+
+    Attributes:
+        psi_s: Impulse per area, psi*s.
+        in_range: Whether the calibration was made for a case like this one.
+        notes: Why not, a sentence each.
+    """
+
+    psi_s: float
+    in_range: bool
+    notes: tuple[str, ...]
+
+    @property
+    def pa_s(self) -> float:
+        """Impulse per area, Pa*s."""
+        return self.psi_s * PA_PER_PSI
+
+
+class Section(BaseModel):
+    """Base of the parts of a calibration file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class ReferenceSection(Section):
+    """What the law was fitted to.
+
+    Attributes:
+        source: The paper's UFC column, or Kingery-Bulmash.
+        quantity: What is compared, e.g. `reflected_impulse`.
+        burst: `hemispherical` or `spherical`; None where the source does not say.
+        charge_kg: TNT-equivalent mass; None where the source does not say.
+    """
+
+    source: Literal["paper UFC column", "Kingery-Bulmash"]
+    quantity: str
+    burst: str | None = None
+    charge_kg: float | None = None
+
+
+class MetricsSection(Section):
+    """How well the law agrees with the reference (`FitMetrics`), rmse in psi*s."""
+
+    mape_percent: float
+    rmse: float
+    integral_error_percent: float
+    leave_one_out_mape_percent: float
+
+
+class Calibration(Section):
+    """A law from simulated impulse to psi*s, and everything that it depends on.
+
+    Attributes:
+        schema_version: Version of the file format.
+        name: Name, as in `load_calibration("ballistic_ufc")`.
+        law: Kind of the law.
+        coefficients: Its coefficients, by the paper's names.
+        coefficient_intervals: Their 95 % intervals (low, high) from the scatter between seeds.
+        reference: What it was fitted to.
+        preset: Preset of the simulations.
+        parameters_digest: Digest of all their parameters.
+        engine: Engine that ran them.
+        engine_version: Its version then.
+        blast_env_version: The package's version then.
+        facade_width_m: Width of the reference structure's facade.
+        ball_radius_m: Radius of an air ball, by which a facade collects on either side.
+        simulated: Which sum over the collisions the law converts.
+        tnt_kg: TNT-equivalent mass of the simulated charge.
+        tnt_range_kg: Masses between which the law was found to hold by Hopkinson-Cranz scaling
+            (`scripts/hopkinson_cranz.py`); None: it holds for `tnt_kg` alone.
+        distances_m: Distances, ascending; the first and last are the range of validity.
+        seeds: Seeds at every distance.
+        i_sim: Mean simulated impulse at each distance.
+        i_sim_ci95: Half-width of its 95 % confidence interval.
+        i_reference_psi_s: Reference impulse at each distance.
+        metrics: How well the law agrees.
+    """
+
+    schema_version: Literal[1] = 1
+    name: str
+    law: Literal["proportional", "linear", "power"]
+    coefficients: dict[str, float]
+    coefficient_intervals: dict[str, tuple[float, float]]
+    reference: ReferenceSection
+    preset: str
+    parameters_digest: str
+    engine: str
+    engine_version: str
+    blast_env_version: str
+    facade_width_m: Annotated[float, Field(gt=0.0)]
+    ball_radius_m: Annotated[float, Field(gt=0.0)]
+    simulated: SimulatedQuantity = "impulse"
+    tnt_kg: Annotated[float, Field(gt=0.0)]
+    tnt_range_kg: tuple[float, float] | None = None
+    distances_m: Annotated[tuple[float, ...], Field(min_length=2)]
+    seeds: Annotated[tuple[int, ...], Field(min_length=1)]
+    i_sim: tuple[float, ...]
+    i_sim_ci95: tuple[float, ...]
+    i_reference_psi_s: tuple[float, ...]
+    metrics: MetricsSection
+
+    @property
+    def scaling_law(self) -> ScalingLaw:
+        """The law; it takes i_sim on the reference facade and gives psi*s."""
+        return LAWS[self.law](**self.coefficients)
+
+    def check(self, parameters: SimulationParameters, engine: str) -> None:
+        """Refuse a simulation that the calibration was not made with.
+
+        Raises:
+            CalibrationError: If the engine or any parameter of the blast model differs.
+        """
+        if engine != self.engine:
+            raise CalibrationError(
+                f"calibration {self.name!r} was made with engine {self.engine!r}, "
+                f"the simulation ran on {engine!r}"
+            )
+        digest = parameters_digest(parameters, engine)
+        if digest != self.parameters_digest:
+            raise CalibrationError(
+                f"calibration {self.name!r} was made with the parameters of preset "
+                f"{self.preset!r} ({self.parameters_digest[:12]}), the simulation has others "
+                f"({digest[:12]}): use that preset without overrides, or calibrate anew"
+            )
+
+    def convert(
+        self, impulse_sim: float, seen_width_m: float, distance_m: float, tnt_kg: float
+    ) -> ScaledImpulse:
+        """Convert the impulse on a structure.
+
+        The law holds for the impulse on the reference facade. Another structure's impulse is
+        first taken per metre of the width that collects balls, times that width of the reference:
+        a wider building is hit by more balls without being loaded more. The width is the one that
+        the charge sees, and a ball radius on either side, from where balls touch it as well.
+
+        With `tnt_range_kg`, distance and impulse are divided by the cube root of the charge's mass
+        over `tnt_kg` before the law, and the result is multiplied by it (Hopkinson-Cranz).
+
+        Args:
+            impulse_sim: The sum that `simulated` names, on the structure, simulation units.
+            seen_width_m: Its width as seen from the charge; see `seen_width_m`.
+            distance_m: From the charge's centre to the structure.
+            tnt_kg: TNT-equivalent mass of the charge.
+        """
+        margin_m = 2.0 * self.ball_radius_m
+        share = (self.facade_width_m + margin_m) / (seen_width_m + margin_m)
+        low_kg, high_kg = self.tnt_range_kg or (self.tnt_kg, self.tnt_kg)
+        scale = 1.0 if self.tnt_range_kg is None else (tnt_kg / self.tnt_kg) ** (1.0 / 3.0)
+        psi_s = scale * self.scaling_law(share * impulse_sim / scale)
+        notes = []
+        first_m, last_m = scale * self.distances_m[0], scale * self.distances_m[-1]
+        if not first_m <= distance_m <= last_m:
+            notes.append(f"distance {distance_m:.2f} m is outside {first_m:.4g} to {last_m:.4g} m")
+        if not low_kg <= tnt_kg <= high_kg:
+            bounds = (
+                f"{low_kg:g} kg" if low_kg == high_kg else f"between {low_kg:g} and {high_kg:g} kg"
+            )
+            notes.append(f"charge {tnt_kg:g} kg TNT is not {bounds}")
+        return ScaledImpulse(psi_s, not notes, tuple(notes))
+
+    def convert_load(self, obstacle: ModularObstacle, charge: Charge) -> ScaledImpulse:
+        """Convert the load on a structure; see `convert`.
+
+        Args:
+            obstacle: The structure, after a blast.
+            charge: The charge.
+        """
+        footprint_m = obstacle.rectangle.scaled(1.0 / UNITS_PER_M)
+        distance_m = float(distance_to_rectangle(np.array([charge.position_m]), footprint_m)[0])
+        width_m = seen_width_m(footprint_m, charge.position_m)
+        impulse_sim: float = getattr(obstacle, self.simulated)
+        return self.convert(impulse_sim, width_m, distance_m, charge.tnt_kg)
+
+
+def seen_width_m(structure_m: Rectangle, charge_m: tuple[float, float]) -> float:
+    """Return the width of a structure across the line from the charge to its centre, m."""
+    (x0, y0), (x1, y1) = charge_m, structure_m.centre
+    along_x, along_y = x1 - x0, y1 - y0
+    length = hypot(along_x, along_y)
+    width, height = structure_m.right - structure_m.left, structure_m.top - structure_m.bottom
+    return (abs(along_y) * width + abs(along_x) * height) / length
