@@ -21,6 +21,11 @@ def stored_calibrations() -> tuple[str, ...]:
     return tuple(sorted({name for name, _ in _stored_files()}))
 
 
+def calibrated_engines(name: str) -> tuple[str, ...]:
+    """Return the engines for which a calibration of that name comes with the package."""
+    return tuple(sorted(engine for stored, engine in _stored_files() if stored == name))
+
+
 def calibration_file(name: str, engine: str) -> str:
     """Return the name of the file of a calibration: each engine has its own."""
     return f"{name}.{engine}{SUFFIX}"
@@ -43,7 +48,7 @@ def load_calibration(name_or_path: str | Path, engine: str = "pymunk") -> Calibr
         name, known = str(name_or_path), stored_calibrations()
         if name not in known:
             raise UnknownNameError("calibration", name, known)
-        engines = sorted(its for stored, its in _stored_files() if stored == name)
+        engines = calibrated_engines(name)
         if engine not in engines:
             raise CalibrationError(
                 f"calibration {name!r} was not made for engine {engine!r}, only for "

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from hashlib import sha256
 from types import MappingProxyType
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -165,3 +165,24 @@ def parameters_digest(parameters: SimulationParameters, engine: str) -> str:
             for setting in settings:
                 del content["stepping"][setting]
     return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def with_overrides(
+    parameters: SimulationParameters, overrides: Mapping[str, Any]
+) -> SimulationParameters:
+    """Return `parameters` with some values replaced.
+
+    Args:
+        parameters: The parameters to start from.
+        overrides: Nested like `SimulationParameters`: `{"air": {"spacing_units": 3.0}}`.
+
+    Raises:
+        pydantic.ValidationError: If a key is unknown or a value is out of bounds.
+    """
+    merged = parameters.model_dump()
+    for group, values in overrides.items():
+        if isinstance(values, Mapping) and isinstance(merged.get(group), dict):
+            merged[group] = {**merged[group], **values}
+        else:
+            merged[group] = values
+    return SimulationParameters.model_validate(merged)

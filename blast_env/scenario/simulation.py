@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 
-from blast_env.physics.parameters import SimulationParameters
-from blast_env.physics.presets import PRESETS, preset, with_overrides
+from blast_env.physics.parameters import SimulationParameters, with_overrides
+from blast_env.physics.presets import PRESETS, preset
 from blast_env.scenario.problems import (
     Problem,
     ScenarioError,

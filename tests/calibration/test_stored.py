@@ -10,18 +10,27 @@ from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import PowerLaw, paper_table, shape_rms_percent
 from blast_env.calibration.calibrate import calibrate, kingery_bulmash_reference, paper_reference
 from blast_env.calibration.model import Calibration, CalibrationError, seen_width_m
-from blast_env.calibration.stored import load_calibration, save_calibration, stored_calibrations
+from blast_env.calibration.stored import (
+    calibrated_engines,
+    load_calibration,
+    save_calibration,
+    stored_calibrations,
+)
 from blast_env.calibration.study import FreeFieldStudy
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.engine import ENGINE_NAMES
-from blast_env.physics.presets import preset, with_overrides
+from blast_env.physics.parameters import with_overrides
+from blast_env.physics.presets import preset
 from blast_env.scenario import Scenario
 from scripts.facade_width import free_field_with_facade
 
 CALIBRATION = load_calibration("ballistic_kb_100kg")
 of_every_engine = pytest.mark.parametrize("engine", ENGINE_NAMES)
-of_every_name = pytest.mark.parametrize("name", stored_calibrations())
+of_every_calibration = pytest.mark.parametrize(
+    ("name", "engine"),
+    [(name, engine) for name in stored_calibrations() for engine in calibrated_engines(name)],
+)
 
 
 def test_the_ballistic_preset_meets_its_bounds_on_held_out_seeds() -> None:
@@ -34,8 +43,7 @@ def test_the_ballistic_preset_meets_its_bounds_on_held_out_seeds() -> None:
     assert ufc.distances_m == tuple(15.0 * n for n in range(1, 9))
 
 
-@of_every_name
-@of_every_engine
+@of_every_calibration
 def test_stored_metrics_follow_from_the_stored_columns(name: str, engine: str) -> None:
     stored = load_calibration(name, engine)
     i_sim, reference = np.array(stored.i_sim), np.array(stored.i_reference_psi_s)
@@ -49,12 +57,16 @@ def test_stored_metrics_follow_from_the_stored_columns(name: str, engine: str) -
         assert low < stored.coefficients[key] < high
 
 
-@of_every_name
-@of_every_engine
+@of_every_calibration
 def test_every_engine_has_its_own_calibration(name: str, engine: str) -> None:
     stored = load_calibration(name, engine)
     assert (stored.name, stored.engine) == (name, engine)
     stored.check(preset(stored.preset), engine)
+
+
+def test_the_calibrations_of_the_ballistic_preset_are_there_for_both_engines() -> None:
+    for name in ("ballistic_ufc", "ballistic_kb_100kg"):
+        assert calibrated_engines(name) == tuple(sorted(ENGINE_NAMES))
 
 
 def test_an_engine_without_a_calibration_is_named() -> None:
@@ -138,6 +150,40 @@ def test_outside_its_cases_it_converts_and_says_so() -> None:
     )
 
 
+def test_charges_are_related_by_hopkinson_cranz_scaling_where_that_was_checked() -> None:
+    """Eight times the mass, twice the distance and twice the impulse: twice the result."""
+    law = CALIBRATION.model_copy(update={"tnt_range_kg": (20.0, 1000.0)})
+    small = law.convert(1e5, 10.0, 20.0, 100.0)
+    large = law.convert(2e5, 10.0, 40.0, 800.0)
+    assert large.psi_s == pytest.approx(2.0 * small.psi_s)
+    assert large.in_range
+    assert law.convert(1e5, 10.0, 20.0, 100.0) == CALIBRATION.convert(1e5, 10.0, 20.0, 100.0)
+    assert law.convert(1e5, 10.0, 90.0, 800.0).notes == ("distance 90.00 m is outside 16 to 80 m",)
+    assert law.convert(1e5, 10.0, 50.0, 2000.0).notes == (
+        "charge 2000 kg TNT is not between 20 and 1000 kg",
+    )
+
+
+def test_a_calibration_says_which_impulse_it_converts() -> None:
+    scenario = load_scenario("courtyard")
+    result = simulate(scenario, seed=1)
+    other = CALIBRATION.model_copy(update={"simulated": "transferred_impulse"})
+    building = result.obstacle("building")
+    ratio = building.transferred_impulse / building.impulse
+    expected = result.impulse("building").psi_s * ratio ** CALIBRATION.coefficients["B"]
+    assert result.impulse("building", other).psi_s == pytest.approx(expected)
+
+
+def test_a_blast_that_was_cut_off_says_so() -> None:
+    limited = load_scenario("courtyard").with_simulation(
+        overrides={"stepping": {"most_collisions": 500}}
+    )
+    result = simulate(limited, engine="event")
+    scaled = result.impulse("building", load_calibration("ballistic_kb_100kg", "event"))
+    assert not scaled.in_range
+    assert any("limit of collisions" in note for note in scaled.notes)
+
+
 def test_the_width_is_the_one_that_the_charge_sees() -> None:
     building = Rectangle(20.0, 10.0, 24.0, 20.0)
     assert seen_width_m(building, (0.0, 15.0)) == pytest.approx(10.0)
@@ -199,8 +245,7 @@ def test_calibrating_gives_a_calibration_that_converts_its_own_runs() -> None:
     assert converted.in_range
 
 
-@of_every_name
-@of_every_engine
+@of_every_calibration
 def test_the_simulator_still_gives_what_the_calibration_was_made_from(
     name: str, engine: str
 ) -> None:
@@ -212,5 +257,5 @@ def test_the_simulator_still_gives_what_the_calibration_was_made_from(
     stored = load_calibration(name, engine)
     scenario = load_scenario("free_field").with_simulation(stored.preset)
     study = FreeFieldStudy(scenario, stored.distances_m[:1], stored.seeds, engine)
-    mean = study.run().impulse_sim.mean()
+    mean = study.run()[f"{stored.simulated}_sim"].mean()
     assert mean == pytest.approx(stored.i_sim[0], abs=2.0 * stored.i_sim_ci95[0])
