@@ -139,8 +139,8 @@ def build_scene(
     cells = check_layout(scenario, layout)
     if charge is not None:
         check_layout(scenario.with_charge(charge), cells)
-    _, fan_rng, air_rng = random_streams(seed)
-    charge = draw_charge(scenario, seed) if charge is None else charge
+    charge_rng, fan_rng, air_rng = random_streams(seed)
+    charge = scenario.sample_charge(charge_rng) if charge is None else charge
     parameters = scenario.parameters
     site = scenario.site.rectangle_m.scaled(UNITS_PER_M)
     structures = tuple(_outline(section) for section in scenario.structures)

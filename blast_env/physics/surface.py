@@ -50,16 +50,15 @@ def wall_surface(centres: FloatArray) -> WallSurface:
     lattices = tuple(_lattices(centres))
     free = np.ones((len(centres), 4), dtype=np.bool_)
     for lattice in lattices:
-        own = centres[lattice.members]
-        for face, step in enumerate(((-1, 0), (1, 0), (0, -1), (0, 1))):
-            beside = own + np.array(step) * MODULE_SIDE_UNITS
-            free[lattice.members, face] = ~lattice.is_solid(beside)
-    covered = np.zeros((len(centres), 4), dtype=np.bool_)
-    for corner, (x_sign, y_sign) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
-        past_in_x = centres + (x_sign * (_HALF + _BEYOND), y_sign * (_HALF - _BEYOND))
-        past_in_y = centres + (x_sign * (_HALF - _BEYOND), y_sign * (_HALF + _BEYOND))
-        for lattice in lattices:
-            covered[:, corner] |= lattice.is_solid(past_in_x) | lattice.is_solid(past_in_y)
+        free[lattice.members] = lattice.free_faces()
+    left, right, lower, upper = ~free.T
+    covered = np.stack((left | lower, right | lower, left | upper, right | upper), axis=1)
+    if len(lattices) > 1:
+        for corner, (x_sign, y_sign) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
+            past_in_x = centres + (x_sign * (_HALF + _BEYOND), y_sign * (_HALF - _BEYOND))
+            past_in_y = centres + (x_sign * (_HALF - _BEYOND), y_sign * (_HALF + _BEYOND))
+            for lattice in lattices:
+                covered[:, corner] |= lattice.is_solid(past_in_x) | lattice.is_solid(past_in_y)
     return WallSurface(free_faces=free, covered_corners=covered)
 
 
@@ -70,12 +69,21 @@ class _Lattice:
     Attributes:
         members: Indices of the modules (k,).
         origin: Lower left corner of the occupancy's first cell, units (2,).
-        occupied: Occupancy (columns, rows).
+        cells: Column and row of each of them in the occupancy (2, k).
+        occupied: Occupancy (columns, rows), with empty cells all around.
     """
 
     members: NDArray[np.int64]
     origin: FloatArray
+    cells: NDArray[np.int64]
     occupied: BoolArray
+
+    def free_faces(self) -> BoolArray:
+        """Return whether no module of this lattice stands flush on the faces (k, 4)."""
+        column, row = self.cells
+        solid = self.occupied
+        beside = solid[column - 1, row], solid[column + 1, row]
+        return ~np.stack((*beside, solid[column, row - 1], solid[column, row + 1]), axis=1)
 
     def is_solid(self, points: FloatArray) -> BoolArray:
         """Return whether a module of this lattice covers each point (n, 2)."""
@@ -92,12 +100,11 @@ def _lattices(centres: FloatArray) -> Iterator[_Lattice]:
         return
     # The digits below a billionth of a unit are rounding of the metres in a scenario file.
     offsets = np.round(np.mod(centres, MODULE_SIDE_UNITS), 9) % MODULE_SIDE_UNITS
-    _, group = np.unique(offsets, axis=0, return_inverse=True)
-    for index in range(int(group.max()) + 1):
-        members = np.flatnonzero(group.ravel() == index)
+    for offset in np.unique(offsets @ (1.0, 1.0j)):  # much faster than unique rows
+        members = np.flatnonzero((offsets == (offset.real, offset.imag)).all(axis=1))
         own = centres[members]
-        origin = own.min(axis=0) - _HALF
-        cell = np.floor((own - origin) / MODULE_SIDE_UNITS).astype(np.int64)
-        occupied = np.zeros(cell.max(axis=0) + 1, dtype=np.bool_)
-        occupied[cell[:, 0], cell[:, 1]] = True
-        yield _Lattice(members=members, origin=origin, occupied=occupied)
+        origin = own.min(axis=0) - (_HALF + MODULE_SIDE_UNITS)
+        cells = np.floor((own - origin) / MODULE_SIDE_UNITS).astype(np.int64).T
+        occupied = np.zeros(cells.max(axis=1) + 2, dtype=np.bool_)
+        occupied[*cells] = True
+        yield _Lattice(members, origin, cells, occupied)

@@ -1,35 +1,39 @@
-"""Scenes made by hand: balls and modules exactly where a test wants them."""
+"""Scenes made by hand: balls and modules exactly where a test wants them, and how to run them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from blast_env.geometry import Rectangle
-from blast_env.physics.parameters import SimulationParameters
+from blast_env.physics.engine import BallStates, BlastRun, Engine
+from blast_env.physics.event_engine import EventEngine
+from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, CollisionType
-from blast_env.physics.presets import with_overrides
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Charge
 from blast_env.scene import Scene, StructureOutline
 
 EXPLOSIVE, AIR = CollisionType.ExplosionBall, CollisionType.AirBall
+KEEP_MASS: dict[str, object] = {"air_shrink": 1.0, "module_shrink": 1.0}
+EVENT = EventEngine()
 
 
-def parameters(**overrides: dict[str, object]) -> SimulationParameters:
+def parameters(**overrides: Mapping[str, object]) -> SimulationParameters:
     """Return the default parameters with some replaced, group by group.
 
     The time limit is long, so that balls far from any structure are not out of reach.
     """
-    stepping = {"time_limit_s": 5.0} | overrides.pop("stepping", {})
+    stepping = {"time_limit_s": 5.0, **overrides.pop("stepping", {})}
     return with_overrides(SimulationParameters(), overrides | {"stepping": stepping})
 
 
 def balls(
-    kinds: Sequence[CollisionType],
-    positions: Sequence[tuple[float, float]],
-    velocities: Sequence[tuple[float, float]],
-    mass: float | Sequence[float] = 1.0,
-    radius: float | Sequence[float] = 1.0,
+    kinds: Sequence[int],
+    positions: ArrayLike,
+    velocities: ArrayLike,
+    mass: ArrayLike = 1.0,
+    radius: ArrayLike = 1.0,
 ) -> Balls:
     """Return balls with the given states."""
     count = len(kinds)
@@ -78,4 +82,68 @@ def scene(
         balls=of_balls,
         structures=tuple(structures),
         parameters=of_parameters,
+    )
+
+
+def closed_box(
+    corner: tuple[float, float], modules: tuple[int, int], name: str = "box"
+) -> list[StructureOutline]:
+    """Return four walls, one module thick, around a space of (columns, rows) modules.
+
+    Args:
+        corner: Lower left corner of the space inside, units.
+        modules: Columns and rows of modules that would fit inside.
+        name: Prefix of the walls' names.
+    """
+    (x, y), (columns, rows) = corner, modules
+    return [
+        wall((x - 2.0, y - 2.0), rows + 2, 1, f"{name} left"),
+        wall((x + 2.0 * columns, y - 2.0), rows + 2, 1, f"{name} right"),
+        wall((x, y - 2.0), 1, columns, f"{name} lower"),
+        wall((x, y + 2.0 * rows), 1, columns, f"{name} upper"),
+    ]
+
+
+def finished(of_scene: Scene, engine: Engine = EVENT) -> BlastRun:
+    """Return the run of a scene at its end."""
+    run = engine.start(of_scene)
+    run.advance(np.inf)
+    return run
+
+
+def states_at(of_scene: Scene, time_s: float, engine: Engine = EVENT) -> BallStates:
+    """Return the balls of a scene at a time."""
+    run = engine.start(of_scene)
+    run.advance(time_s)
+    return run.balls()
+
+
+def momentum(states: Balls | BallStates) -> np.ndarray:
+    """Return the momentum (2,)."""
+    total: np.ndarray = (states.mass[:, None] * states.velocity).sum(axis=0)
+    return total
+
+
+def energy(states: Balls | BallStates) -> float:
+    """Return the kinetic energy without that of the spins."""
+    return float(0.5 * (states.mass * (states.velocity**2).sum(axis=1)).sum())
+
+
+def hot_cloud(
+    settings: SimulationParameters, structures: Sequence[StructureOutline], seed: int = 3
+) -> Scene:
+    """Return a dense, hot square of air, ten times as light as the explosive ball shot into it."""
+    rng = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid(np.arange(12), np.arange(12)), axis=-1).reshape(-1, 2)
+    position = 70.0 + 2.2 * grid + rng.uniform(-0.1, 0.1, grid.shape)
+    velocity = rng.normal(0.0, 200.0, grid.shape)
+    return scene(
+        balls(
+            [AIR] * len(grid) + [EXPLOSIVE],
+            [*map(tuple, position), (60.0, 81.0)],
+            [*map(tuple, velocity), (1000.0, 37.0)],
+            mass=[0.1] * len(grid) + [1.0],
+        ),
+        structures,
+        settings,
     )

@@ -52,8 +52,9 @@ BALL: Final = np.dtype(
         ("crossing", np.int32),  # step to the number of the next cell
         ("previous", np.int32),  # ball before in that list, -1 for none
         ("place", np.int32),  # in the heap, 0 if it is not in it
-        ("explosive", np.int32),  # 1 for a ball of the charge, 0 for air
-        ("alive", np.int32),  # 1 while it is on the site
+        ("rattles", np.int32),  # collisions with modules alone so far within one contact
+        ("explosive", np.int16),  # 1 for a ball of the charge, 0 for air
+        ("alive", np.int16),  # 1 while it is on the site
     ],
     align=True,
 )

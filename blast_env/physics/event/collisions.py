@@ -1,6 +1,7 @@
 """What a collision does (paper, section 2.4): two balls, or a ball on a module."""
 
 from math import sqrt
+from typing import Final
 
 import numpy as np
 from numba import njit
@@ -8,6 +9,13 @@ from numpy.typing import NDArray
 
 from blast_env.physics.event.arrays import CORNER, FACE_X, Record, RecordArray
 from blast_env.units import MODULE_SIDE_UNITS
+
+_WEDGED: Final = 16
+"""Collisions with modules alone within one contact after which a ball sticks between them.
+
+Balls of the size of a gap between modules are caught in its mouth, where collisions without loss
+would go on for up to millions of times.
+"""
 
 
 @njit(error_model="numpy")
@@ -58,6 +66,7 @@ def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> N
     other.vy += py / other.mass
     one.collisions += 1
     other.collisions += 1
+    one.rattles = other.rattles = 0
     if explosive == 1:
         shrink(one if one.explosive else other, rules.air_shrink)
 
@@ -129,9 +138,7 @@ def collide_with_module(
     Returns:
         The module.
     """
-    restitution = rules.module_restitution
-    if follows_at_once(ball, time_s, rules):
-        restitution = 1.0
+    restitution = _module_restitution(ball, time_s, rules)
     is_new = time_s - ball.module_s >= rules.contact_time_s
     move_to(ball, time_s)
     module = touched_module(ball, surface, modules)
@@ -155,11 +162,23 @@ def collide_with_module(
     push = _module_friction(ball, transferred, along, rules)
     ball.vx += (transferred * nx - push * ny) / ball.mass
     ball.vy += (transferred * ny + push * nx) / ball.mass
+    if ball.rattles > _WEDGED and rules.module_restitution < 1.0:
+        ball.vx, ball.vy = 0.0, 0.0
     ball.collisions += 1
     ball.module_s = time_s
     if is_new and ball.explosive:
         shrink(ball, rules.module_shrink)
     return module
+
+
+@njit(error_model="numpy")
+def _module_restitution(ball: Record, time_s: float, rules: Record) -> float:
+    """Return the restitution of a ball at a module, and count how often it rattles."""
+    if not follows_at_once(ball, time_s, rules):
+        ball.rattles = 0
+        return rules.module_restitution
+    ball.rattles += 1
+    return 1.0
 
 
 @njit(error_model="numpy")

@@ -82,7 +82,7 @@ def _until_distance(x: float, y: float, vx: float, vy: float, distance: float) -
         share = _GRAZING * distance
         return inf if falling * falling < share * share * speed2 else 0.0
     discriminant = falling * falling - speed2 * excess
-    if discriminant < 0.0:
+    if discriminant <= 0.0:  # 0: it touches in passing, and nothing happens
         return inf
     # This form of the root does not cancel when the balls almost touch.
     return excess / (sqrt(discriminant) - falling)

@@ -1,8 +1,16 @@
-"""A binary heap of balls by the time of what happens to them next."""
+"""A binary heap of balls by the time of what happens to them next.
+
+What happens at exactly the same time has an order too, by the numbers of the balls, so that a run
+on a bare lattice, which is full of such ties, does not depend on the cells either.
+"""
+
+from typing import Final
 
 from numba import njit
 
-from blast_env.physics.event.arrays import RecordArray
+from blast_env.physics.event.arrays import Record, RecordArray
+
+_MOST_BALLS: Final = 2**31
 
 
 @njit(error_model="numpy", inline="always")
@@ -12,7 +20,7 @@ def schedule(heap: RecordArray, balls: RecordArray, ball: int, time_s: float) ->
     if place == 0:
         heap[0].ball += 1
         _rise(heap, balls, heap[0].ball, ball, time_s)
-    elif time_s < heap[place].time_s:
+    elif place > 1 and _is_before(balls, ball, time_s, heap[place >> 1]):
         _rise(heap, balls, place, ball, time_s)
     else:
         _sink(heap, balls, place, ball, time_s)
@@ -30,10 +38,29 @@ def unschedule(heap: RecordArray, balls: RecordArray, ball: int) -> None:
     if place == last:
         return
     moved, time_s = heap[last].ball, heap[last].time_s
-    if time_s < heap[place].time_s:
+    if place > 1 and _is_before(balls, moved, time_s, heap[place >> 1]):
         _rise(heap, balls, place, moved, time_s)
     else:
         _sink(heap, balls, place, moved, time_s)
+
+
+@njit(error_model="numpy", inline="always")
+def _is_before(balls: RecordArray, ball: int, time_s: float, entry: Record) -> bool:
+    """Whether what happens to a ball comes before an entry of the heap."""
+    if time_s != entry.time_s:
+        return time_s < entry.time_s
+    return _rank(balls, ball) < _rank(balls, entry.ball)
+
+
+@njit(error_model="numpy")
+def _rank(balls: RecordArray, ball: int) -> int:
+    """Return the rank among what happens at the same time: moves, walls, pairs of balls."""
+    partner = balls[ball].partner
+    if balls[ball].contact_s > balls[ball].crossing_s:
+        return ball - 2 * _MOST_BALLS
+    if partner < 0:
+        return ball - _MOST_BALLS
+    return min(ball, partner) * _MOST_BALLS + max(ball, partner)
 
 
 @njit(error_model="numpy", inline="always")
@@ -41,7 +68,7 @@ def _rise(heap: RecordArray, balls: RecordArray, place: int, ball: int, time_s: 
     """Find the place at or above `place` for a ball, and put it there."""
     while place > 1:
         above = place >> 1
-        if heap[above].time_s <= time_s:
+        if not _is_before(balls, ball, time_s, heap[above]):
             break
         _put(heap, balls, place, heap[above].ball, heap[above].time_s)
         place = above
@@ -56,9 +83,11 @@ def _sink(heap: RecordArray, balls: RecordArray, place: int, ball: int, time_s: 
         below = 2 * place
         if below > size:
             break
-        if below < size and heap[below + 1].time_s < heap[below].time_s:
+        if below < size and _is_before(
+            balls, heap[below + 1].ball, heap[below + 1].time_s, heap[below]
+        ):
             below += 1
-        if heap[below].time_s >= time_s:
+        if _is_before(balls, ball, time_s, heap[below]):
             break
         _put(heap, balls, place, heap[below].ball, heap[below].time_s)
         place = below

@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.physics.event.arrays import (
     BALL,
@@ -26,6 +27,8 @@ from blast_env.scene import Scene
 
 _CELL_SPACINGS: Final = 1.2
 """Side of a cell in spacings of the air; measured to be about the fastest."""
+
+_CELL_MARGIN: Final = 1e-6
 
 
 class World(NamedTuple):
@@ -62,8 +65,14 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
         parts: Its modules.
         cell_units: Side of a cell, which changes the speed and nothing else; at least the
             diameter of the largest ball. By default what suits the scene.
+
+    Raises:
+        BlastEnvError: If the cells are too small to hold a ball, or a ball is off the site.
     """
-    rules = _rules(scene, cell_units or _cell_units(scene))
+    _check(scene, cell_units)
+    # A little more, so that balls in touch are in neighbouring cells whatever the rounding.
+    smallest = (1.0 + _CELL_MARGIN) * _largest_diameter(scene)
+    rules = _rules(scene, max(smallest, cell_units or _cell_units(scene)))
     balls = _balls(scene.balls)
     heap = np.zeros(len(balls) + 1, dtype=HEAP_ENTRY)
     loads = np.zeros(len(parts), dtype=LOAD)
@@ -76,6 +85,22 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
     surfaces, modules = np.empty(0, dtype=SURFACE), np.empty(0, dtype=np.int32)
     world = World(balls, cells, heap, surfaces, modules, loads, targets, rules, progress)
     return with_walls(world, scene, parts)
+
+
+def _check(scene: Scene, cell_units: float | None) -> None:
+    """Refuse what would make the compiled code miss collisions or leave its arrays."""
+    diameter = _largest_diameter(scene)
+    if cell_units is not None and not diameter <= cell_units < np.inf:
+        raise BlastEnvError(
+            f"cell_units is {cell_units:g}, must be at least {diameter:g}, "
+            "the diameter of the largest ball, and finite"
+        )
+    position, site = scene.balls.position, scene.site
+    on_site = (position >= site[:2]) & (position <= site[2:])
+    for ball in np.flatnonzero(~on_site.all(axis=1))[:1].tolist():
+        raise BlastEnvError(
+            f"ball {ball} is at {tuple(position[ball].tolist())}, must be on the site {site}"
+        )
 
 
 def with_walls(world: World, scene: Scene, parts: list[ModularPart]) -> World:
@@ -143,10 +168,13 @@ def _rules(scene: Scene, cell_units: float) -> Record:
 
 def _cell_units(scene: Scene) -> float:
     """Return a good side of a cell: the spacing of the air, and not many more cells than balls."""
-    largest = 2.0 * float(scene.balls.radius.max(initial=0.01))
     width, height = scene.site.right - scene.site.left, scene.site.top - scene.site.bottom
     sparse = sqrt(width * height / (4.0 * len(scene.balls) + 1024.0))
-    return max(largest, sparse, _CELL_SPACINGS * scene.parameters.air.spacing_units)
+    return max(sparse, _CELL_SPACINGS * scene.parameters.air.spacing_units)
+
+
+def _largest_diameter(scene: Scene) -> float:
+    return 2.0 * float(scene.balls.radius.max(initial=0.01))
 
 
 def _grid_shape(site: Rectangle, rules: Record) -> tuple[int, int]:

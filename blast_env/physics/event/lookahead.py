@@ -108,9 +108,23 @@ def _look_at_surfaces(
     cell = cells[balls[ball].cell]
     for surface in range(cell.surfaces_from, cell.surfaces_to):
         time_s = surface_touch_s(balls[ball], surfaces[surface])
-        if time_s < balls[ball].contact_s:
+        if time_s < balls[ball].contact_s or (
+            time_s == balls[ball].contact_s and _wins_tie(surfaces, surface, balls[ball].partner)
+        ):
             balls[ball].contact_s = time_s
             balls[ball].partner = FIRST_SURFACE - surface
+
+
+@njit(error_model="numpy")
+def _wins_tie(surfaces: RecordArray, surface: int, partner: int) -> bool:
+    """Whether a surface goes before the partner that is touched at the same time.
+
+    Neither the order in which they were found nor the numbers of the surfaces, which both depend
+    on the cells, may decide.
+    """
+    if partner > FIRST_SURFACE:
+        return partner >= 0
+    return surfaces[surface].modules_from < surfaces[FIRST_SURFACE - partner].modules_from
 
 
 @njit(error_model="numpy", inline="always")
@@ -127,7 +141,9 @@ def _look_along_list(balls: RecordArray, ball: int, other: int) -> None:
     while other >= 0:
         if other != ball:
             time_s = balls_touch_s(balls[ball], balls[other])
-            if time_s < balls[ball].contact_s:
+            if time_s < balls[ball].contact_s or (
+                time_s == balls[ball].contact_s and other < balls[ball].partner
+            ):
                 balls[ball].contact_s = time_s
                 balls[ball].partner = other
                 balls[ball].partner_collisions = balls[other].collisions

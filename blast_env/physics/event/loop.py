@@ -86,7 +86,8 @@ def run_until(
         progress.collisions += 1
         progress.time_s = time_s
         if partner >= 0:
-            collide_balls(balls[ball], balls[partner], time_s, rules)
+            one, other = min(ball, partner), max(ball, partner)  # whichever foresaw it
+            collide_balls(balls[one], balls[other], time_s, rules)
             _go_on(balls, cells, heap, surfaces, rules, ball)
             _go_on(balls, cells, heap, surfaces, rules, partner)
         elif partner == BORDER:

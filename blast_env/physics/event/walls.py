@@ -3,7 +3,6 @@
 A wall without seams cannot give a ball a ghost hit at one.
 """
 
-from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,6 +14,8 @@ from blast_env.units import MODULE_SIDE_UNITS
 
 _HALF: Final = MODULE_SIDE_UNITS / 2.0
 _TOLERANCE: Final = 1e-9  # units; faces overlap by it, so that rounding opens no gap
+_CORNERS: Final = _HALF * np.array([(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)])
+"""From the centre of a module, in the order of `WallSurface.covered_corners`."""
 
 
 class Walls(NamedTuple):
@@ -38,31 +39,12 @@ def walls_of(centres: NDArray[np.float64], standing: NDArray[np.int64]) -> Walls
     """
     own = centres[standing]
     surface = wall_surface(own)
-    parts: list[RecordArray] = []
-    modules: list[NDArray[np.int64]] = []
-    used = 0
-    faces = ((FACE_X, -1.0), (FACE_X, 1.0), (FACE_Y, -1.0), (FACE_Y, 1.0))
-    for face, (kind, sign) in enumerate(faces):
-        free = np.flatnonzero(surface.free_faces[:, face])
-        order, starts = _runs(own[free], kind)
-        members = free[order]
-        joined = _faces(own[members], starts, kind, sign)
-        joined["modules_from"] += used
-        joined["modules_to"] += used
-        used += len(members)
-        parts.append(joined)
-        modules.append(standing[members])
-    for corner, at in enumerate(_corner_offsets()):
-        free = np.flatnonzero(~surface.covered_corners[:, corner])
-        points = np.zeros(len(free), dtype=SURFACE)
-        points["kind"] = CORNER
-        points["a"], points["b"] = (own[free] + at).T
-        points["modules_from"] = used + np.arange(len(free))
-        points["modules_to"] = points["modules_from"] + 1
-        used += len(free)
-        parts.append(points)
-        modules.append(standing[free])
-    return Walls(np.concatenate(parts), np.concatenate(modules).astype(np.int32))
+    faces, along_faces = _joined_faces(own, surface.free_faces)
+    corners, at_corners = _free_corners(own, surface.covered_corners)
+    corners["modules_from"] += len(along_faces)
+    corners["modules_to"] += len(along_faces)
+    modules = standing[np.concatenate((along_faces, at_corners))]
+    return Walls(np.concatenate((faces, corners)), modules.astype(np.int32))
 
 
 def spread_over_cells(
@@ -102,34 +84,47 @@ def spread_over_cells(
     return surfaces[which[order]], start
 
 
-def _runs(centres: NDArray[np.float64], kind: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the order of modules along their faces, and where a new wall begins in it."""
-    across, along = np.round(centres.T if kind == FACE_X else centres.T[::-1], 9)
-    order = np.lexsort((along, across))
-    across, along = across[order], along[order]
-    gap = np.abs(np.diff(along) - MODULE_SIDE_UNITS) > _TOLERANCE
-    begins = np.concatenate(([True], (np.diff(across) != 0.0) | gap))
-    return order, np.flatnonzero(begins[: len(order)])
+def _joined_faces(
+    centres: NDArray[np.float64], free_faces: NDArray[np.bool_]
+) -> tuple[RecordArray, NDArray[np.int64]]:
+    """Join the free faces of modules (m, 4) that go on in each other.
 
-
-def _faces(
-    centres: NDArray[np.float64], starts: NDArray[np.int64], kind: int, sign: float
-) -> RecordArray:
-    """Return the joined faces of modules that are in the order of `_runs`."""
-    ends = np.append(starts[1:], len(centres))
-    across, along = centres.T if kind == FACE_X else centres.T[::-1]
+    Returns:
+        The faces, whose modules are numbered from 0, and the modules, face by face, along it.
+    """
+    face, member = np.nonzero(free_faces.T)
+    is_x = face < 2
+    across, along = np.where(is_x, centres[member].T, centres[member, ::-1].T)
+    # Rounding of the metres in a scenario file must not decide which faces lie in one line.
+    line, place = np.round((across, along), 9)
+    order = np.lexsort((place, line, face))
+    face, line, place = face[order], line[order], place[order]
+    begins = np.ones(len(order), dtype=np.bool_)
+    begins[1:] = np.abs(np.diff(place) - MODULE_SIDE_UNITS) > _TOLERANCE
+    begins[1:] |= (np.diff(line) != 0.0) | (np.diff(face) != 0)
+    starts = np.flatnonzero(begins)
+    ends = np.flatnonzero(np.roll(begins, -1)) + 1
     faces = np.zeros(len(starts), dtype=SURFACE)
-    faces["kind"], faces["a"] = kind, sign
-    faces["b"] = across[starts] + sign * _HALF
-    faces["low"] = along[starts] - _HALF - _TOLERANCE
-    faces["high"] = along[ends - 1] + _HALF + _TOLERANCE
+    faces["kind"] = np.where(face[starts] < 2, FACE_X, FACE_Y)
+    sign = faces["a"] = np.where(face[starts] % 2 == 0, -1.0, 1.0)
+    faces["b"] = across[order[starts]] + sign * _HALF
+    faces["low"] = along[order[starts]] - _HALF - _TOLERANCE
+    faces["high"] = along[order[ends - 1]] + _HALF + _TOLERANCE
     faces["modules_from"], faces["modules_to"] = starts, ends
-    return faces
+    return faces, member[order]
 
 
-def _corner_offsets() -> Iterator[tuple[float, float]]:
-    """Yield the corners from the centre, in the order of `WallSurface.covered_corners`."""
-    return ((x * _HALF, y * _HALF) for y in (-1, 1) for x in (-1, 1))
+def _free_corners(
+    centres: NDArray[np.float64], covered_corners: NDArray[np.bool_]
+) -> tuple[RecordArray, NDArray[np.int64]]:
+    """Return the corners of modules where no wall goes on, and the modules that they belong to."""
+    corner, member = np.nonzero(~covered_corners.T)
+    corners = np.zeros(len(member), dtype=SURFACE)
+    corners["kind"] = CORNER
+    corners["a"], corners["b"] = (centres[member] + _CORNERS[corner]).T
+    corners["modules_from"] = np.arange(len(member))
+    corners["modules_to"] = corners["modules_from"] + 1
+    return corners, member
 
 
 def _boxes(surfaces: RecordArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,0 +1,11 @@
+"""What the tests of the physics share."""
+
+import pytest
+
+from blast_env.physics.engine import ENGINE_NAMES, Engine, find_engine
+
+
+@pytest.fixture(params=ENGINE_NAMES)
+def engine(request: pytest.FixtureRequest) -> Engine:
+    """Every engine that comes with the package, one after the other."""
+    return find_engine(str(request.param))

@@ -1,0 +1,61 @@
+"""Compiling: once per installation, with a notice, and again when any of the sources changed."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import blast_env
+
+NOTICE = "compiling the event engine"
+CODE = """
+import logging
+logging.basicConfig(format="%(name)s: %(message)s")
+import blast_env
+print(blast_env.__file__)
+scenario = blast_env.load_scenario("courtyard")
+for seed in range(2):
+    print(blast_env.simulate(scenario, seed=seed, engine="event").digest)
+"""
+
+
+def run_in(folder: Path) -> tuple[list[str], str]:
+    """Run two blasts with the package in `folder`; return what was printed and what was logged."""
+    done = subprocess.run(
+        [sys.executable, "-c", CODE],
+        cwd=folder,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.split(), done.stderr
+
+
+def test_the_first_run_compiles_and_says_so_and_only_the_first(tmp_path: Path) -> None:
+    """In a copy of the package, of which one file is then changed."""
+    package = Path(blast_env.__file__).parent
+    without = shutil.ignore_patterns("__pycache__", "*.png")
+    shutil.copytree(package, tmp_path / "blast_env", ignore=without)
+    shutil.copytree(package.parent / "scenarios", tmp_path / "scenarios")
+
+    (path, *digests), logged = run_in(tmp_path)
+    assert Path(path).is_relative_to(tmp_path)
+    assert logged.count(NOTICE) == 1
+    assert logged.startswith("blast_env: ")
+
+    again = run_in(tmp_path)
+    assert again == ([path, *digests], "")
+
+    # Not the file of the function that is kept on disk: a change of that one Numba would notice.
+    source = tmp_path / "blast_env" / "physics" / "event" / "collisions.py"
+    text = source.read_text(encoding="utf-8")
+    changed = text.replace(
+        "-(1.0 + restitution) * reduced_mass", "-(1.5 + restitution) * reduced_mass"
+    )
+    assert changed != text
+    source.write_text(changed, encoding="utf-8")
+    (_, *other_digests), logged = run_in(tmp_path)
+    assert logged.count(NOTICE) == 1
+    assert set(other_digests).isdisjoint(digests)
