@@ -1,39 +1,45 @@
-"""How fast a blast is, next to pymunk alone on the same scene."""
+"""How fast a blast is: on each engine, and next to pymunk alone on the same scene."""
 
 import multiprocessing
 import os
 import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 import pymunk
 
 from blast_env.physics.pymunk_engine import PymunkEngine
 from blast_env.physics.pymunk_space import build_space
-from blast_env.scenario import Scenario
+from blast_env.scenario import Scenario, load_scenario
 from blast_env.scene import Scene, build_scene
 from blast_env.simulation import Blast
 
 Departures = Mapping[int, list[int]]
 """Balls that leave the space after a step, by the number of the step."""
 
+_DENSE_AIR = {
+    "air": {"spacing_units": 3.0, "mass": 0.1, "elasticity": 1.0},
+    "explosive": {"elasticity": 1.0},
+}
+
 _BYTES_PER_MAXRSS_UNIT = 1 if platform.system() == "Darwin" else 1024
 
 
 @dataclass(frozen=True)
 class SpeedFigures:
-    """Speed of the blasts of one scenario; medians over repeats.
+    """Speed of the blasts of one scenario on pymunk; medians over repeats.
 
     Attributes:
         name: What was run.
         balls: Balls at the start.
         steps: Steps of the engine.
-        blast_s: Wall time of a blast, from scenario to result.
-        per_particle_step_ns: Wall time per ball and step, counting the balls present.
+        blast_s: Processor time of a blast, from scenario to result.
+        per_particle_step_ns: Processor time per ball and step, counting the balls present.
         ratio_all_balls: Our time over that of pymunk alone: the same scene and steps without
             handler, recording and shrinking. Nothing leaves there, so it steps more balls.
         ratio_same_balls: Our time over that of pymunk alone when the balls that leave our run
@@ -107,9 +113,101 @@ def _watch_departures(scene: Scene) -> tuple[Departures, int, int]:
 
 
 def _timed(call: Callable[[], object]) -> float:
-    start = perf_counter()
+    """Return the processor time that a call takes: whatever else runs here counts little."""
+    start = process_time()
     call()
-    return perf_counter() - start
+    return process_time() - start
+
+
+@dataclass(frozen=True)
+class BenchmarkScene:
+    """A scenario on which the engines are timed.
+
+    Attributes:
+        name: Name for the table.
+        scenario: The scenario.
+        close_step_radii: Longest step at which the loads of pymunk are within 5 % of those of the
+            event engine, as `python -m scripts.compare_engines` finds; None if not known.
+    """
+
+    name: str
+    scenario: Scenario
+    close_step_radii: float | None = None
+
+    def at_close_step(self) -> Scenario | None:
+        """Return the scenario at that step; None if it is not known."""
+        step_radii = self.close_step_radii
+        if step_radii is None:
+            return None
+        if step_radii == self.scenario.parameters.stepping.step_radii:
+            return self.scenario
+        return self.scenario.with_simulation(overrides={"stepping": {"step_radii": step_radii}})
+
+
+def benchmark_scenes() -> tuple[BenchmarkScene, ...]:
+    """Return the scenes that `blast-env bench` times."""
+    return (
+        BenchmarkScene("courtyard", load_scenario("courtyard"), 0.25),
+        BenchmarkScene("free_field at 60 m", load_scenario("free_field").at_stand_off(60.0), 0.5),
+        BenchmarkScene("dense courtyard", dense_courtyard(), 0.05),
+    )
+
+
+def dense_courtyard() -> Scenario:
+    """Return the courtyard full of light, elastic air, three radii apart."""
+    return load_scenario("courtyard").with_simulation("ballistic", _DENSE_AIR)
+
+
+@dataclass(frozen=True)
+class EngineFigures:
+    """Processor time of one blast on each engine; medians over seeds.
+
+    Attributes:
+        balls: Balls at the start.
+        pymunk_s: On pymunk at the scenario's step.
+        close_pymunk_s: On pymunk at a step where it is within 5 %; None if that is not known.
+        event_s: On the event engine.
+        ratio: How many times faster the event engine is than pymunk at the scenario's step.
+        close_ratio: Likewise at the step where it is within 5 %.
+    """
+
+    balls: int
+    pymunk_s: float
+    close_pymunk_s: float | None
+    event_s: float
+    ratio: float
+    close_ratio: float | None
+
+
+def measure_engines(scene: BenchmarkScene, repeats: int) -> EngineFigures:
+    """Time blasts on both engines, in turn, from scenario to result.
+
+    Args:
+        scene: The scene.
+        repeats: Number of blasts on each; their seeds are 0 and up.
+    """
+    Blast(scene.scenario, engine="event").run()  # compiles, where nothing is on disk yet
+    close = scene.at_close_step()
+    event, pymunk, close_pymunk = [], [], []
+    for seed in range(repeats):
+        event.append(_timed(Blast(scene.scenario, seed=seed, engine="event").run))
+        pymunk.append(_timed(Blast(scene.scenario, seed=seed).run))
+        if close == scene.scenario:
+            close_pymunk.append(pymunk[-1])
+        elif close is not None:
+            close_pymunk.append(_timed(Blast(close, seed=seed).run))
+    return EngineFigures(
+        balls=len(build_scene(scene.scenario).balls),
+        pymunk_s=median(pymunk),
+        close_pymunk_s=median(close_pymunk) if close_pymunk else None,
+        event_s=median(event),
+        ratio=_median_ratio(pymunk, event),
+        close_ratio=_median_ratio(close_pymunk, event) if close_pymunk else None,
+    )
+
+
+def _median_ratio(ones: list[float], others: list[float]) -> float:
+    return median(one / other for one, other in zip(ones, others, strict=True))
 
 
 def measure_memory_mb(scenario: Scenario) -> float:
@@ -135,7 +233,7 @@ def hardware() -> str:
     """Return the processor, the number of cores and the versions that decide the speed."""
     return (
         f"{_processor()}, {os.cpu_count()} cores, Python {platform.python_version()}, "
-        f"pymunk {pymunk.version} (Chipmunk {pymunk.chipmunk_version})"
+        f"pymunk {pymunk.version} (Chipmunk {pymunk.chipmunk_version}), numba {version('numba')}"
     )
 
 

@@ -4,7 +4,14 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from blast_env import Blast, load_scenario
-from blast_env.benchmark import measure_memory_mb, measure_speed
+from blast_env.benchmark import (
+    BenchmarkScene,
+    benchmark_scenes,
+    dense_courtyard,
+    measure_engines,
+    measure_memory_mb,
+    measure_speed,
+)
 from blast_env.physics.pymunk_engine import PymunkEngine
 from blast_env.physics.pymunk_space import build_space
 from blast_env.scene import build_scene
@@ -19,6 +26,37 @@ def test_our_rules_and_records_cost_less_than_the_balls_they_take_out_save() -> 
     assert speed.ratio_same_balls > speed.ratio_all_balls
     assert speed.balls == len(build_scene(COURTYARD).balls)
     assert speed.steps == Blast(COURTYARD).run().steps
+
+
+@pytest.mark.parametrize(
+    ("name", "times"), [("courtyard", 10.0), ("free_field at 60 m", 10.0), ("dense courtyard", 5.0)]
+)
+def test_event_engine_is_many_times_faster(name: str, times: float) -> None:
+    """The issue's bounds, here against pymunk's longest step, at which it is fastest."""
+    scene = next(scene for scene in benchmark_scenes() if scene.name == name)
+    figures = measure_engines(BenchmarkScene(name, scene.scenario), repeats=1)
+    assert figures.ratio > times
+    assert figures.balls == len(build_scene(scene.scenario).balls)
+    assert figures.close_ratio is None
+
+
+def test_a_shorter_step_makes_pymunk_slower() -> None:
+    figures = measure_engines(BenchmarkScene("courtyard", COURTYARD, 0.125), repeats=1)
+    assert figures.close_pymunk_s is not None
+    assert figures.close_ratio is not None
+    assert figures.close_pymunk_s > 2.0 * figures.pymunk_s
+    assert figures.close_ratio == pytest.approx(figures.close_pymunk_s / figures.event_s)
+
+
+def test_a_step_that_is_the_scenario_s_is_not_timed_twice() -> None:
+    figures = measure_engines(BenchmarkScene("courtyard", COURTYARD, 0.5), repeats=1)
+    assert figures.close_pymunk_s == figures.pymunk_s
+
+
+def test_dense_air_is_dense_and_elastic() -> None:
+    parameters = dense_courtyard().parameters
+    assert parameters.air.spacing_units == 3.0 * parameters.air.radius_units
+    assert parameters.air.elasticity == parameters.explosive.elasticity == 1.0
 
 
 def test_a_blast_of_60_000_balls_fits_into_500_mb() -> None:
