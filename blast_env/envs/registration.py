@@ -5,6 +5,7 @@ from typing import Final
 import gymnasium as gym
 
 from blast_env.scenario import bundled_scenarios
+from blast_env.sites import SiteSource
 
 BARRIER_ENTRY_POINT: Final = "blast_env.envs.barrier_env:BlastBarrierEnv"
 
@@ -31,6 +32,11 @@ def register_environments() -> None:
         id="BlastBarrierIncremental-v0",
         entry_point=BARRIER_ENTRY_POINT,
         kwargs={"scenario": "courtyard", "reward": "incremental"},
+    )
+    gym.register(
+        id="BlastBarrierSites-v0",
+        entry_point=BARRIER_ENTRY_POINT,
+        kwargs={"scenario": SiteSource.training()},
     )
     for name in bundled_scenarios():
         if name not in WITHOUT_BUILD_ZONE:

@@ -1,0 +1,24 @@
+"""Generated sites: varied, valid, worth solving, and all of one size."""
+
+from blast_env.sites.criterion import Objection, SightLineCriterion, SiteCriterion
+from blast_env.sites.generate import draw_site, generate_site
+from blast_env.sites.measures import SiteMeasures, sight_line_layout
+from blast_env.sites.ranges import SiteRanges
+from blast_env.sites.sight_lines import SightLines
+from blast_env.sites.source import HELD_OUT_SITES, SiteSource
+from blast_env.sites.turning import turned
+
+__all__ = [
+    "HELD_OUT_SITES",
+    "Objection",
+    "SightLineCriterion",
+    "SightLines",
+    "SiteCriterion",
+    "SiteMeasures",
+    "SiteRanges",
+    "SiteSource",
+    "draw_site",
+    "generate_site",
+    "sight_line_layout",
+    "turned",
+]

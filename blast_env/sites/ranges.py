@@ -1,0 +1,144 @@
+"""What generated sites may be: the ranges that everything about them is drawn from."""
+
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+from blast_env.errors import BlastEnvError
+from blast_env.physics.presets import preset
+from blast_env.sites.range_checks import (
+    Bounds,
+    CountsBounds,
+    LengthBounds,
+    LengthsBounds,
+    PairBounds,
+    Span,
+    WholeSpan,
+    check_bounds,
+)
+from blast_env.units import MODULE_SIDE_M
+
+Probability = Annotated[float, Bounds(0.0, 1.0)]
+
+MARGIN_M: Final = 1.0
+"""What stays free along the border of a site."""
+
+
+@dataclass(frozen=True)
+class SiteRanges:
+    """What a generated site may be.
+
+    A pair is the lowest and the highest value, both possible, and all values between are as
+    likely; lengths are drawn on the 0.5 m grid of the modules. The words are those for a site
+    with the threat on its left; `generate_site` turns it by right angles.
+
+    All sites of the same ranges have one size, and so have their build zones.
+
+    Attributes:
+        side_m: Width and height of the site, m.
+        zone_side_m: Width and height of the build zone, m.
+        tnt_kg: TNT-equivalent mass of the charge, whole kg where the range has any.
+        road_from_border_m: From the left border to where the charge may be, m.
+        road_length_m: Length of the stretch of road that the charge may be on, m.
+        parking_probability: How likely a parking area takes the place of the road.
+        parking_length_m: Length of a parking area along the road, m.
+        parking_depth_m: Its depth, m.
+        threat_shift_m: From the middle of the site to that of road or parking area, m.
+        stand_off_m: From road or parking area to the facade of the protected building, m; not
+            more than the site has room for.
+        facade_m: Length of that facade, m.
+        depth_m: Depth of the protected building, m; not more than the site has room for.
+        building_shift_m: From the middle of the site to that of the facade, m.
+        neighbour_probability: How likely there is an unprotected building, where it has room.
+        neighbour_side_m: Its width, and its height, m.
+        zone_from_threat_m: From road or parking area to the build zone, m.
+        zone_shift_m: From midway between threat and facade to the zone's middle, along the
+            road, m.
+        path_probability: How likely a path from the road to the door is kept out.
+        path_width_m: Its width, m.
+        hydrant_probability: How likely a hydrant, 1.5 m square, is kept out.
+        trees: Number of trees that are kept out.
+        tree_side_m: Side of the square that a tree takes, m.
+        clearance_m: Least distance between a module and a building, m.
+        access_way_probability: How likely an access way must stay open.
+        access_way_width_m: Its width, m.
+        stock: Number of modules.
+        duct_probability: How likely there is a budget, and a duct with dearer modules above it.
+        duct_width_m: Width of the strip above the duct, m.
+        duct_module_cost: Cost of a module in it; elsewhere it is 1.
+        budget_share: Budget divided by stock.
+        preset: Preset of the blast model.
+        calibration: Calibration that the sites name.
+
+    Raises:
+        BlastEnvError: If a value is out of bounds, or the site has no room for what may be drawn.
+        UnknownNameError: If there is no such preset.
+    """
+
+    side_m: Annotated[float, LengthBounds(2.0, 2000.0)] = 36.0
+    zone_side_m: Annotated[float, LengthBounds(0.5, 500.0)] = 14.0
+    tnt_kg: Annotated[Span, PairBounds(0.1, 100_000.0)] = (50.0, 300.0)
+    road_from_border_m: Annotated[Span, LengthsBounds(MARGIN_M, 2000.0)] = (2.0, 5.0)
+    road_length_m: Annotated[Span, LengthsBounds(0.5, 2000.0)] = (8.0, 20.0)
+    parking_probability: Probability = 0.35
+    parking_length_m: Annotated[Span, LengthsBounds(0.5, 2000.0)] = (6.0, 14.0)
+    parking_depth_m: Annotated[Span, LengthsBounds(0.5, 2000.0)] = (2.5, 4.0)
+    threat_shift_m: Annotated[Span, LengthsBounds(-2000.0, 2000.0)] = (-4.0, 4.0)
+    stand_off_m: Annotated[Span, LengthsBounds(1.0, 2000.0)] = (12.0, 20.0)
+    facade_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (8.0, 14.0)
+    depth_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (4.0, 10.0)
+    building_shift_m: Annotated[Span, LengthsBounds(-2000.0, 2000.0)] = (-5.0, 5.0)
+    neighbour_probability: Probability = 0.5
+    neighbour_side_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (3.0, 6.0)
+    zone_from_threat_m: Annotated[Span, LengthsBounds(0.5, 2000.0)] = (3.0, 6.0)
+    zone_shift_m: Annotated[Span, LengthsBounds(-2000.0, 2000.0)] = (-1.5, 1.5)
+    path_probability: Probability = 0.75
+    path_width_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (1.5, 2.5)
+    hydrant_probability: Probability = 0.5
+    trees: Annotated[WholeSpan, CountsBounds(0, 90)] = (0, 3)
+    tree_side_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (1.0, 2.5)
+    clearance_m: Annotated[Span, LengthsBounds(0.0, 2000.0)] = (0.0, 2.0)
+    access_way_probability: Probability = 0.35
+    access_way_width_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (2.5, 4.0)
+    stock: Annotated[WholeSpan, CountsBounds(1, 10_000)] = (8, 20)
+    duct_probability: Probability = 0.35
+    duct_width_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (1.5, 4.0)
+    duct_module_cost: Annotated[Span, PairBounds(0.1, 1e9)] = (1.5, 4.0)
+    budget_share: Annotated[Span, PairBounds(0.1, 1e6)] = (0.75, 1.5)
+    preset: str = "ballistic"
+    calibration: str = "ballistic_kb_100kg"
+
+    def __post_init__(self) -> None:
+        """Check the values; see the class for the errors."""
+        check_bounds(self)
+        preset(self.preset)
+        self._check_room()
+
+    @property
+    def zone_cells(self) -> int:
+        """Number of rows of the build zone, and of columns."""
+        return round(self.zone_side_m / MODULE_SIDE_M)
+
+    def _check_room(self) -> None:
+        """Refuse a site that is too small for what may be drawn."""
+        parking_m = self.parking_depth_m[1] if self.parking_probability > 0.0 else 0.0
+        before_m = self.road_from_border_m[1] + parking_m
+        behind_m = self.stand_off_m[0] + self.depth_m[0] + MARGIN_M
+        needs_m = {
+            "threat, the least stand-off and the least depth": before_m + behind_m,
+            "threat and build zone": before_m + self.zone_from_threat_m[1] + self.zone_side_m,
+            "the longest road": self.road_length_m[1] + 2.0 * MARGIN_M,
+            "the longest parking area": self.parking_length_m[1] + 2.0 * MARGIN_M,
+            "the longest facade": self.facade_m[1] + 2.0 * MARGIN_M,
+        }
+        for what, need_m in needs_m.items():
+            if need_m > self.side_m:
+                raise BlastEnvError(
+                    f"SiteRanges: side_m is {self.side_m:g}, must be at least {need_m:g},"
+                    f" to have room for {what}"
+                )
+        if self.zone_from_threat_m[1] >= self.stand_off_m[0]:
+            raise BlastEnvError(
+                f"SiteRanges: zone_from_threat_m is {self.zone_from_threat_m}, must be less than"
+                f" {self.stand_off_m[0]:g}, the least stand_off_m: the zone begins before the"
+                " building"
+            )

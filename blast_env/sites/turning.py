@@ -1,0 +1,91 @@
+"""The same site turned by right angles."""
+
+from typing import Any
+
+from blast_env.geometry import Rectangle
+from blast_env.scenario import (
+    AccessWay,
+    AnySource,
+    AnyStructure,
+    BuildZone,
+    ConcreteSquareSection,
+    PointSource,
+    Scenario,
+    SegmentSource,
+)
+from blast_env.scenario.build_zone import Area
+from blast_env.scenario.sections import PointM
+
+
+def turned(scenario: Scenario, quarter_turns: int) -> Scenario:
+    """Return a scenario turned to the left: what was on its right is now at its top.
+
+    It is the same problem, seen from another side; the cells of the build zone turn too.
+
+    Args:
+        scenario: The scenario.
+        quarter_turns: By how many right angles.
+    """
+    for _ in range(quarter_turns % 4):
+        scenario = _turned_once(scenario)
+    return Scenario.from_document(scenario.model_dump(), scenario.name)
+
+
+def _turned_once(scenario: Scenario) -> Scenario:
+    """Return a scenario turned by one right angle; its sections are not checked again."""
+    site, zone = scenario.site, scenario.build_zone
+    changes: dict[str, Any] = {
+        "site": site.model_copy(update={"width_m": site.height_m, "height_m": site.width_m}),
+        "charge": tuple(_source(each, site.height_m) for each in scenario.charge),
+        "structures": tuple(_structure(each, site.height_m) for each in scenario.structures),
+        "build_zone": None if zone is None else _zone(zone, site.height_m),
+    }
+    return scenario.model_copy(update=changes)
+
+
+def _point(point_m: PointM, height_m: float) -> PointM:
+    return height_m - point_m[1], point_m[0]
+
+
+def _corner(rectangle_m: Rectangle, height_m: float) -> PointM:
+    """Return the lower left corner after the turn: the upper left one before it."""
+    return _point((rectangle_m.left, rectangle_m.top), height_m)
+
+
+def _source(source: AnySource, height_m: float) -> AnySource:
+    if isinstance(source, PointSource):
+        return source.model_copy(update={"position_m": _point(source.position_m, height_m)})
+    if isinstance(source, SegmentSource):
+        start_m, end_m = (_point(each, height_m) for each in source.segment_m)
+        return source.model_copy(update={"start_m": start_m, "end_m": end_m})
+    corner_m = _corner(source.rectangle_m, height_m)
+    return source.model_copy(update={"corner_m": corner_m, "size_m": source.size_m[::-1]})
+
+
+def _structure(structure: AnyStructure, height_m: float) -> AnyStructure:
+    changes: dict[str, Any] = {"corner_m": _corner(structure.rectangle_m, height_m)}
+    if not isinstance(structure, ConcreteSquareSection):
+        changes |= {"rows": structure.columns, "columns": structure.rows}
+    return structure.model_copy(update=changes)
+
+
+def _zone(zone: BuildZone, height_m: float) -> BuildZone:
+    changes: dict[str, Any] = {
+        "corner_m": _corner(zone.rectangle_m, height_m),
+        "rows": zone.columns,
+        "columns": zone.rows,
+        "keep_outs": tuple(_area(each, height_m) for each in zone.keep_outs),
+        "cost_areas": tuple(_area(each, height_m) for each in zone.cost_areas),
+        "access_way": None if zone.access_way is None else _way(zone.access_way),
+    }
+    return zone.model_copy(update=changes)
+
+
+def _area(area: Area, height_m: float) -> Area:
+    corner_m = _corner(area.rectangle_m, height_m)
+    return area.model_copy(update={"corner_m": corner_m, "size_m": area.size_m[::-1]})
+
+
+def _way(way: AccessWay) -> AccessWay:
+    across = "bottom_top" if way.between == "left_right" else "left_right"
+    return way.model_copy(update={"between": across})

@@ -1,0 +1,267 @@
+"""What generated sites are like, and whether the criterion that they are chosen by means anything.
+
+The criterion is told from sight lines; here every site is measured with blasts. All sites that a
+seed draws are, the rejected ones too: a criterion that rejects the wrong ones would show.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import process_time
+from typing import Annotated, Final
+
+import joblib
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from blast_env.cli.output import print_line, progress_bar
+from blast_env.evaluation import BlastEvaluator, draw_threats
+from blast_env.rendering.figures import save_figure
+from blast_env.scenario import BuildZone, Cell, Placement, Scenario, SegmentSource, usable_cells
+from blast_env.scenario.clearance import distance_m, source_bounds_m
+from blast_env.sites import (
+    SightLineCriterion,
+    SightLines,
+    SiteMeasures,
+    SiteRanges,
+    draw_site,
+    generate_site,
+    sight_line_layout,
+)
+from blast_env.sites.contact_sheet import contact_sheet
+
+Array = NDArray[np.float64]
+Layout = tuple[Cell, ...]
+
+LEAST_REDUCTION: Final = 0.4
+MOST_REDUCTION: Final = 0.95
+LEAST_ADVANTAGE: Final = 0.2
+"""A site is worth solving if blasts say so: the sight-line layout takes so much off the impulse,
+no layout takes more than that, and random layouts take so much less on average."""
+
+CRITERION: Final = SightLineCriterion()
+QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What blasts say about a site.
+
+    Attributes:
+        accepted: Whether the criterion accepts it.
+        shares: What its sight lines say.
+        unprotected_pa_s: Impulse on the building without a barrier, Pa*s.
+        cut: Share of the sight lines that each layout cuts: the sight-line layout, then the
+            random ones (1 + random,).
+        reduction: Share of the impulse that each of them takes off (1 + random,).
+    """
+
+    accepted: bool
+    shares: SiteMeasures
+    unprotected_pa_s: float
+    cut: Array
+    reduction: Array
+
+    @property
+    def advantage(self) -> float:
+        """Reduction of the sight-line layout above that of random layouts, on average."""
+        return float(self.reduction[0] - self.reduction[1:].mean())
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with the site by the blasts; empty if it is worth solving."""
+        if self.reduction[0] < LEAST_REDUCTION:
+            return "too little to gain"
+        if self.reduction.max() > MOST_REDUCTION:
+            return "everything can be gained"
+        return "the place does not matter" if self.advantage < LEAST_ADVANTAGE else ""
+
+
+def measured(site: Scenario, random_layouts: int, threats: int, engine: str) -> Measured:
+    """Measure a site with blasts of charges drawn from where they may be."""
+    rng = np.random.default_rng(0)
+    lines = SightLines.of(site)
+    layouts = [sight_line_layout(site, lines)]
+    layouts += [random_layout(site, rng) for _ in range(random_layouts)]
+    evaluator = BlastEvaluator(site, engine, cache_size=0)
+    drawn = draw_threats(site, range(threats))
+    pairs = [(layout, threat) for layout in ((), *layouts) for threat in drawn]
+    loads = evaluator.loads_of_many(pairs)
+    impulses = np.array([each.protected_impulse_pa_s for each in loads])
+    unprotected, *with_layout = impulses.reshape(-1, threats).mean(axis=1)
+    return Measured(
+        accepted=CRITERION.objection(site) is None,
+        shares=SiteMeasures.of(site),
+        unprotected_pa_s=float(unprotected),
+        cut=np.array([lines.cut_share(layout) for layout in layouts]),
+        reduction=1.0 - np.array(with_layout) / unprotected,
+    )
+
+
+def random_layout(site: Scenario, rng: np.random.Generator) -> Layout:
+    """Return a layout with its modules anywhere, as many as can be placed."""
+    placement = Placement.empty(site)
+    while not placement.is_full:
+        row, column = rng.choice(np.argwhere(placement.free)).tolist()
+        placement = placement.place((row, column))
+    return placement.cells
+
+
+def drawn_sites(seed: int, ranges: SiteRanges) -> Iterator[Scenario]:
+    """Yield the sites that `generate_site` draws for a seed; the last one is what it returns."""
+    rng = np.random.default_rng(seed)
+    while True:
+        site = draw_site(rng, ranges, f"site_{seed}")
+        yield site
+        if CRITERION.objection(site) is None:
+            return
+
+
+def main(
+    sites: Annotated[int, typer.Option(min=2, help="Seeds, from 0 on.")] = 100,
+    random_layouts: Annotated[int, typer.Option(min=2)] = 50,
+    threats: Annotated[int, typer.Option(min=1, help="Charges and seeds a layout.")] = 8,
+    processes: int = 2,
+    engine: str = "event",
+    preset: str = SiteRanges.preset,
+    calibration: str = SiteRanges.calibration,
+    picture: Annotated[Path | None, typer.Option(help="Where to draw the first twelve.")] = None,
+) -> None:
+    """Print tables about generated sites, and draw some."""
+    ranges = SiteRanges(preset=preset, calibration=calibration)
+    seconds = [cpu_time_s(seed, ranges) for seed in range(sites)]
+    generated = [generate_site(seed, ranges) for seed in range(sites)]
+    drawn = [site for seed in range(sites) for site in drawn_sites(seed, ranges)]
+    print_properties(generated)
+    print_time(seconds, len(drawn))
+    if picture is not None:
+        print_line(f"wrote {save_figure(contact_sheet(generated[:12]), picture)}")
+    jobs = (joblib.delayed(measured)(site, random_layouts, threats, engine) for site in drawn)
+    results: list[Measured] = []
+    with progress_bar("blasts") as progress:
+        for result in joblib.Parallel(n_jobs=processes, return_as="generator")(jobs):
+            results.append(result)
+            progress(len(results) / len(drawn))
+    print_measured([each for each in results if each.accepted])
+    print_agreement(results)
+
+
+def cpu_time_s(seed: int, ranges: SiteRanges) -> float:
+    """Return the processor time that the site of a seed takes."""
+    start_s = process_time()
+    generate_site(seed, ranges)
+    return process_time() - start_s
+
+
+def print_properties(sites: Sequence[Scenario]) -> None:
+    """Print how the properties of sites are distributed."""
+    print_row("property", "least", "10 %", "median", "90 %", "largest")
+    print_line("|---" * 6 + "|")
+    for name, value_of in PROPERTIES.items():
+        values = np.array([value_of(site) for site in sites])
+        print_row(name, *(f"{value:.4g}" for value in np.quantile(values, QUANTILES)))
+    for name, holds_for in CONDITIONS.items():
+        print_line(f"{name}: {sum(map(holds_for, sites))} of {len(sites)} sites")
+
+
+def print_time(seconds: Sequence[float], drawn: int) -> None:
+    """Print how long it takes to generate a site."""
+    ms = 1e3 * np.array(seconds)
+    print_line(
+        f"processor time a site: mean {ms.mean():.1f} ms, median {np.median(ms):.1f} ms,"
+        f" at most {ms.max():.1f} ms; {drawn} sites drawn for {len(ms)} accepted"
+    )
+
+
+def print_measured(results: Sequence[Measured]) -> None:
+    """Print what blasts say about the sites that the criterion accepts."""
+    reduction = np.array([each.reduction for each in results])
+    columns = {
+        "unprotected impulse (Pa s)": np.array([each.unprotected_pa_s for each in results]),
+        "reduction by random layouts, mean (%)": 100.0 * reduction[:, 1:].mean(axis=1),
+        f"by the best of {reduction.shape[1] - 1} (%)": 100.0 * reduction[:, 1:].max(axis=1),
+        "by the sight-line layout (%)": 100.0 * reduction[:, 0],
+        "its advantage over random layouts (%)": np.array([100.0 * x.advantage for x in results]),
+    }
+    print_row("measured with blasts", "least", "10 %", "median", "90 %", "largest")
+    print_line("|---" * 6 + "|")
+    for name, values in columns.items():
+        print_row(name, *(f"{value:.0f}" for value in np.quantile(values, QUANTILES)))
+
+
+def print_agreement(results: Sequence[Measured]) -> None:
+    """Print how far sight lines and blasts agree."""
+    cut = np.array([each.cut for each in results])
+    reduction = np.array([each.reduction for each in results])
+    within = [np.corrcoef(*pair)[0, 1] for pair in zip(cut[:, 1:], reduction[:, 1:], strict=True)]
+    random_share = np.array([each.shares.random_share for each in results])
+    measured_random = reduction[:, 1:].mean(axis=1)
+    print_line(
+        "correlation of the share of sight lines cut with the reduction:"
+        f" {np.corrcoef(cut.ravel(), reduction.ravel())[0, 1]:.2f} over all layouts,"
+        f" {np.median(within):.2f} among a site's random layouts (median);"
+        f" {np.corrcoef(cut[:, 0], reduction[:, 0])[0, 1]:.2f} over sight-line layouts,"
+        f" {np.corrcoef(random_share, measured_random)[0, 1]:.2f} over the means of random ones"
+    )
+    faults = ("", *dict.fromkeys(each.fault for each in results if each.fault))
+    print_row("by sight lines", *(fault or "worth solving by blasts" for fault in faults))
+    print_line("|---" * (1 + len(faults)) + "|")
+    for label, accepted in (("accepted", True), ("rejected", False)):
+        found = [each.fault for each in results if each.accepted is accepted]
+        print_row(label, *(str(found.count(fault)) for fault in faults))
+
+
+def print_row(*cells: str) -> None:
+    """Print a row of a Markdown table."""
+    print_line(f"| {' | '.join(cells)} |")
+
+
+def zone_of(site: Scenario) -> BuildZone:
+    """Return the build zone of a generated site, which has one."""
+    assert site.build_zone is not None
+    return site.build_zone
+
+
+def stand_off_m(site: Scenario) -> float:
+    """Return the least distance from the charge to the protected building."""
+    return distance_m(site.charge[0], site.structures[0].rectangle_m)
+
+
+def is_threatened_along_x(site: Scenario) -> bool:
+    """Return whether road or parking area is on the left or right of the building."""
+    threat, building = source_bounds_m(site.charge[0]), site.structures[0].rectangle_m
+    return threat.right < building.left or threat.left > building.right
+
+
+def facade_and_depth_m(site: Scenario) -> tuple[float, float]:
+    """Return the sides of the protected building: the one that faces the threat, the other."""
+    left, bottom, right, top = site.structures[0].rectangle_m
+    sides = (top - bottom, right - left)
+    return sides if is_threatened_along_x(site) else (sides[1], sides[0])
+
+
+PROPERTIES: Final[Mapping[str, Callable[[Scenario], float]]] = {
+    "charge (kg TNT)": lambda site: site.charge[0].tnt_kg,
+    "least distance of the charge (m)": stand_off_m,
+    "facade (m)": lambda site: facade_and_depth_m(site)[0],
+    "depth of the building (m)": lambda site: facade_and_depth_m(site)[1],
+    "usable cells": lambda site: int(usable_cells(site).sum()),
+    "modules in stock": lambda site: zone_of(site).stock,
+    "keep-outs": lambda site: len(zone_of(site).keep_outs),
+    "clearance (m)": lambda site: zone_of(site).clearance_m,
+}
+
+CONDITIONS: Final[Mapping[str, Callable[[Scenario], bool]]] = {
+    "threat on the left or right": is_threatened_along_x,
+    "road, not parking area": lambda site: isinstance(site.charge[0], SegmentSource),
+    "neighbouring building": lambda site: len(site.structures) > 1,
+    "building looks at the threat with its longer side": lambda site: (
+        facade_and_depth_m(site)[0] > facade_and_depth_m(site)[1]
+    ),
+    "access way": lambda site: zone_of(site).access_way is not None,
+    "duct and budget": lambda site: zone_of(site).budget is not None,
+}
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,57 @@
+"""The script that measures sites with blasts."""
+
+import numpy as np
+import pytest
+
+from blast_env.scenario import Placement, Scenario
+from blast_env.sites import SiteMeasures, SiteRanges
+from scripts.check_sites import (
+    Measured,
+    drawn_sites,
+    facade_and_depth_m,
+    measured,
+    random_layout,
+)
+from tests.sites.cases import yard
+
+
+def result(reduction: list[float]) -> Measured:
+    shares = SiteMeasures(1.0, 0.8, 0.7, 0.4)
+    return Measured(True, shares, 1000.0, np.array(reduction), np.array(reduction))
+
+
+@pytest.mark.parametrize(
+    ("reduction", "fault"),
+    [
+        ([0.8, 0.4, 0.5], ""),
+        ([0.3, 0.0, 0.1], "too little to gain"),
+        ([0.8, 0.4, 0.99], "everything can be gained"),
+        ([0.6, 0.5, 0.5], "the place does not matter"),
+    ],
+)
+def test_a_site_is_worth_solving_or_has_a_fault(reduction: list[float], fault: str) -> None:
+    assert result(reduction).fault == fault
+
+
+def test_the_last_site_drawn_for_a_seed_is_the_one_generated(sites: tuple[Scenario, ...]) -> None:
+    drawn = [list(drawn_sites(seed, SiteRanges())) for seed in range(20)]
+    assert [each[-1] for each in drawn] == list(sites[:20])
+    assert max(map(len, drawn)) > 1
+
+
+def test_random_layouts_use_all_that_can_be_placed(sites: tuple[Scenario, ...]) -> None:
+    rng = np.random.default_rng(0)
+    for site in sites[:10]:
+        assert Placement.of(site, random_layout(site, rng)).is_full
+
+
+def test_the_facade_is_the_side_that_the_charge_looks_at() -> None:
+    assert facade_and_depth_m(yard()) == (4.0, 2.0)
+
+
+def test_measuring_puts_the_sight_line_layout_first() -> None:
+    found = measured(yard(stock=5), random_layouts=2, threats=1, engine="pymunk")
+    assert found.cut.shape == found.reduction.shape == (3,)
+    assert found.cut[0] == pytest.approx(found.shares.layout_share)
+    assert found.reduction[0] > found.reduction[1:].max()
+    assert found.unprotected_pa_s > 0.0

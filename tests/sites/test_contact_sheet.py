@@ -1,0 +1,58 @@
+"""The picture of many sites."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.patches import Rectangle as RectanglePatch
+
+from blast_env.errors import BlastEnvError
+from blast_env.rendering.figures import save_figure
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.sites.contact_sheet import contact_sheet
+
+
+def test_every_site_has_a_panel_with_its_name(sites: tuple[Scenario, ...]) -> None:
+    figure = contact_sheet(sites[:6])
+    panels = [axes for axes in figure.axes if axes.get_visible()]
+    assert [axes.get_title().split(":")[0] for axes in panels] == [f"site_{n}" for n in range(6)]
+
+
+def test_everything_on_a_site_is_drawn_where_it_is(sites: tuple[Scenario, ...]) -> None:
+    for site in sites[:20]:
+        (axes,) = (axes for axes in contact_sheet([site]).axes if axes.get_visible())
+        zone = site.build_zone
+        assert zone is not None
+        areas = [zone, *zone.keep_outs, *zone.cost_areas, *site.structures]
+        rectangles = [patch for patch in axes.patches if isinstance(patch, RectanglePatch)]
+        drawn = [(*patch.get_xy(), patch.get_width(), patch.get_height()) for patch in rectangles]
+        for area in areas:
+            left, bottom, right, top = area.rectangle_m
+            assert (left, bottom, right - left, top - bottom) in drawn
+        assert len(drawn) == len(areas) + 2  # the ground, and where the charge may be
+        ways = [patch for patch in axes.patches if isinstance(patch, FancyArrowPatch)]
+        assert len(ways) == (zone.access_way is not None)
+
+
+def test_the_access_way_is_drawn_where_no_structure_stands(sites: tuple[Scenario, ...]) -> None:
+    with_way = [site for site in sites if site.build_zone and site.build_zone.access_way]
+    assert len(with_way) > 20
+    for site in with_way[:10]:
+        (axes,) = (axes for axes in contact_sheet([site]).axes if axes.get_visible())
+        (way,) = (patch for patch in axes.patches if isinstance(patch, FancyArrowPatch))
+        ends = np.asarray(way.get_path().vertices)[[0, 2]].tolist()
+        start, end = ((x, y) for x, y in ends)
+        for structure in site.structures:
+            assert not structure.rectangle_m.meets_segment(start, end)
+
+
+def test_bundled_scenarios_can_be_drawn_too(tmp_path: Path) -> None:
+    scenarios = [load_scenario(name) for name in ("perimeter_gate", "free_field")]
+    picture = save_figure(contact_sheet(scenarios), tmp_path / "sheet.png")
+    assert picture.stat().st_size > 10_000
+
+
+def test_no_sites_are_an_error() -> None:
+    with pytest.raises(BlastEnvError, match="sites: there are none, must be at least one"):
+        contact_sheet([])

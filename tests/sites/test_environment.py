@@ -1,0 +1,77 @@
+"""`BlastBarrierSites-v0`: another site at every reset."""
+
+import pickle
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.sites import HELD_OUT_SITES, SiteSource
+from tests.envs.small import ThinEngine, play, same
+
+ID = "BlastBarrierSites-v0"
+FINISH = 28 * 28
+
+
+def make(**arguments: Any) -> BlastBarrierEnv:
+    defaults: dict[str, Any] = {"engine": ThinEngine(), "realisations": 1}
+    env = gym.make(ID, **(defaults | arguments)).unwrapped
+    assert isinstance(env, BlastBarrierEnv)
+    return env
+
+
+def test_every_reset_gives_another_site_to_train_on() -> None:
+    env = make()
+    env.reset(seed=0)
+    names = []
+    for _ in range(10):
+        observation, info = env.reset()
+        assert env.observation_space.contains(observation)
+        assert info["action_mask"].shape == (FINISH + 1,)
+        names.append(env.sight.scenario.name)
+    assert len(set(names)) == 10
+    assert all(int(name.removeprefix("site_")) >= HELD_OUT_SITES for name in names)
+
+
+@pytest.mark.parametrize("observation", ["grid", "features"])
+def test_a_seed_gives_the_same_episode_again(observation: str) -> None:
+    env, twin = make(observation=observation), make(observation=observation)
+    for seed in range(2):
+        steps = play(env, seed)
+        assert same(steps, play(twin, seed))
+        assert steps[-1][4]["layout"]
+
+
+def test_it_can_be_given_the_sites_held_out() -> None:
+    env = make(scenario=SiteSource.held_out(1))
+    env.reset(seed=4)
+    assert env.sight.scenario.name == "site_0"
+
+
+def test_it_survives_a_pickle_in_mid_episode() -> None:
+    env = make()
+    _, info = env.reset(seed=3)
+    action = int(np.flatnonzero(info["action_mask"])[0])
+    env.step(action)
+    twin = pickle.loads(pickle.dumps(env))
+    assert same(env.step(FINISH), twin.step(FINISH))
+    assert same(env.reset(), twin.reset())
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_vectors_have_a_site_each(mode: str) -> None:
+    arguments: dict[str, Any] = {"engine": ThinEngine(), "realisations": 1}
+    envs = gym.make_vec(ID, num_envs=2, vectorization_mode=mode, **arguments)
+    observation, info = envs.reset(seed=3)
+    assert not np.array_equal(observation[0], observation[1])
+    assert not np.array_equal(info["action_mask"][0], info["action_mask"][1])
+    _, _, ended, _, info = envs.step(np.array([FINISH, FINISH]))
+    assert ended.all()
+    assert info["scenario_hash"][0] != info["scenario_hash"][1]
+    envs.close()
+
+
+def test_its_specification_can_be_written_down() -> None:
+    assert '"first_seed": 10000' in gym.spec(ID).to_json()

@@ -1,0 +1,59 @@
+"""Ranges of sites: every wrong value is an error with its bound."""
+
+from typing import Any
+
+import pytest
+
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.sites import SiteRanges
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"side_m": 36.2}, r"side_m is 36.2, must be a multiple of 0.5 m from 2 to 2000"),
+        ({"zone_side_m": 0.0}, r"zone_side_m is 0.0, must be a multiple of 0.5 m from 0.5 to 500"),
+        ({"tnt_kg": (0.0, 10.0)}, r"tnt_kg is \(0.0, 10.0\), must be a pair .* from 0.1 to 100000"),
+        ({"tnt_kg": (20.0, 10.0)}, r"tnt_kg is \(20.0, 10.0\), must be a pair \(lowest, highest\)"),
+        ({"tnt_kg": 10.0}, r"tnt_kg is 10.0, must be a pair"),
+        ({"tnt_kg": (float("nan"), 10.0)}, r"tnt_kg is \(nan, 10.0\), must be a pair"),
+        ({"stand_off_m": (12.1, 12.4)}, r"\(12.1, 12.4\), must be .* multiple of 0.5 m between"),
+        ({"parking_probability": 1.5}, r"parking_probability is 1.5, must be a number from 0 to 1"),
+        ({"path_probability": True}, r"path_probability is True, must be a number"),
+        ({"stock": (8.0, 9.0)}, r"stock is \(8.0, 9.0\), must be a pair .* of whole numbers"),
+        ({"stock": (0, 9)}, r"stock is \(0, 9\), must be .* from 1 to 10000"),
+        ({"trees": (0, 1, 2)}, r"trees is \(0, 1, 2\), must be a pair"),
+    ],
+)
+def test_a_value_out_of_bounds_is_named_with_its_bound(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(BlastEnvError, match=rf"SiteRanges: .*{words}"):
+        SiteRanges(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"side_m": 20.0}, r"side_m is 20, must be at least 26, .* least stand-off"),
+        ({"zone_side_m": 25.0}, r"side_m is 36, must be at least 40, .* build zone"),
+        ({"road_length_m": (8.0, 40.0)}, r"side_m is 36, must be at least 42, .* longest road"),
+        ({"facade_m": (8.0, 35.0)}, r"side_m is 36, must be at least 37, .* longest facade"),
+        (
+            {"zone_from_threat_m": (3.0, 12.0)},
+            r"zone_from_threat_m is \(3.0, 12.0\), must be less than 12, the least stand_off_m",
+        ),
+    ],
+)
+def test_what_has_no_room_is_named(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(BlastEnvError, match=words):
+        SiteRanges(**changes)
+
+
+def test_a_parking_area_that_never_is_needs_no_room() -> None:
+    assert SiteRanges(side_m=25.0, parking_probability=0.0).side_m == 25.0
+    with pytest.raises(BlastEnvError, match="must be at least"):
+        SiteRanges(side_m=25.0, parking_probability=0.1)
+
+
+def test_an_unknown_preset_is_an_error_at_once() -> None:
+    with pytest.raises(UnknownNameError, match=r"balistic.*did you mean 'ballistic'"):
+        SiteRanges(preset="balistic")
