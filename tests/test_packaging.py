@@ -37,4 +37,4 @@ def test_a_wheel_in_a_clean_environment_loads_the_scenarios_by_name(tmp_path: Pa
     where, names, data = call(clean / "bin" / "python", "-c", code, cwd=tmp_path).splitlines()
     assert Path(where).is_relative_to(clean)
     assert names == "['courtyard', 'free_field', 'perimeter_gate', 'street_junction']"
-    assert data == "['ballistic_kb_100kg', 'ballistic_ufc'] 8 1543"
+    assert data == "['ballistic_kb_100kg', 'ballistic_ufc', 'collisional_kb'] 8 1543"

@@ -31,12 +31,13 @@ def calibration_file(name: str, engine: str) -> str:
     return f"{name}.{engine}{SUFFIX}"
 
 
-def load_calibration(name_or_path: str | Path, engine: str = "pymunk") -> Calibration:
+def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Calibration:
     """Return a calibration by its name in the package, or from a `.json` file.
 
     Args:
         name_or_path: The name, or the file.
-        engine: With a name: the engine whose calibration it is.
+        engine: With a name: the engine whose calibration it is. By default the reference
+            engine, pymunk, where there is one for it.
 
     Raises:
         UnknownNameError: If there is none of that name.
@@ -49,6 +50,7 @@ def load_calibration(name_or_path: str | Path, engine: str = "pymunk") -> Calibr
         if name not in known:
             raise UnknownNameError("calibration", name, known)
         engines = calibrated_engines(name)
+        engine = engine or ("pymunk" if "pymunk" in engines else engines[0])
         if engine not in engines:
             raise CalibrationError(
                 f"calibration {name!r} was not made for engine {engine!r}, only for "
