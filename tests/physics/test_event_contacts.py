@@ -213,6 +213,16 @@ def test_a_ball_caught_in_the_mouth_of_such_a_gap_ends_there(
     assert steps < 100
 
 
+@pytest.mark.parametrize("seed", [118, 144, 210])
+def test_balls_that_press_on_each_other_in_gaps_come_to_rest(seed: int) -> None:
+    """Default balls are exactly as wide as a gap of one module: here several are caught in one."""
+    scattered = np.random.default_rng(seed).random((6, 6)) < 0.42
+    layout = [(22 + row, 4 + column) for row, column in np.argwhere(scattered)[:16].tolist()]
+    scenario = load_scenario("courtyard").with_simulation("ballistic")
+    result = simulate(scenario, layout, seed=seed, engine="event")
+    assert result.steps < 10_000
+
+
 def test_an_elastic_ball_in_such_a_gap_meets_the_limit_of_collisions() -> None:
     """Nothing can stop it: that is what the limit is for. The record is kept up to there."""
     settings = rules(1.0, 1.0, stepping={"most_collisions": 12_345})
@@ -229,7 +239,10 @@ def test_gaps_of_one_module_in_a_barrier_do_not_stop_a_blast() -> None:
     rows = (6, 8, 10, 12, 14, 26, 28, 30, 32)
     for seed in range(3):
         result = simulate(
-            load_scenario("courtyard"), [(row, 0) for row in rows], seed=seed, engine="event"
+            load_scenario("courtyard").with_simulation("ballistic"),
+            [(row, 0) for row in rows],
+            seed=seed,
+            engine="event",
         )
         assert result.end_reason is not EndReason.EVENT_LIMIT
         assert result.steps < 10_000

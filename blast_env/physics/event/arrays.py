@@ -53,6 +53,7 @@ BALL: Final = np.dtype(
         ("previous", np.int32),  # ball before in that list, -1 for none
         ("place", np.int32),  # in the heap, 0 if it is not in it
         ("rattles", np.int32),  # collisions with modules alone so far within one contact
+        ("presses", np.int32),  # collisions of any kind so far within one contact
         ("explosive", np.int16),  # 1 for a ball of the charge, 0 for air
         ("alive", np.int16),  # 1 while it is on the site
     ],
@@ -117,6 +118,7 @@ RULES: Final = np.dtype(
         ("base_impulse", np.float64),
         ("charge_collides", np.int64),  # 1 if balls of the charge collide with each other
         ("contact_time_s", np.float64),  # hits within this time belong to one contact
+        ("rest_speed", np.float64),  # a ball slower than this within one contact is at rest
         ("quantum", np.float64),  # recorded impulses are multiples of this
         ("time_limit_s", np.float64),
         ("most_collisions", np.int64),

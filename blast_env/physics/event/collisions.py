@@ -16,6 +16,12 @@ _WEDGED: Final = 16
 Balls of the size of a gap between modules are caught in its mouth, where collisions without loss
 would go on for up to millions of times.
 """
+_PRESSED: Final = 128
+"""Collisions of any kind within one contact after which balls stick, to each other and to modules.
+
+A light ball between a heavy one and a wall needs about pi times the root of their mass ratio until
+it has turned the heavy one back. Balls that are caught by others that are caught never get away.
+"""
 
 
 @njit(error_model="numpy")
@@ -29,12 +35,35 @@ def move_to(ball: Record, time_s: float) -> None:
 
 @njit(error_model="numpy")
 def follows_at_once(ball: Record, time_s: float, rules: Record) -> bool:
-    """Whether a ball's last collision is so short ago that both are one contact.
+    """Whether a ball's last collision is so short ago that both are one contact, and count them.
 
     Then it loses no energy: otherwise balls that are pressed together would collide infinitely
     often in a finite time (inelastic collapse; the rule is Luding and McNamara's TC model).
     """
-    return ball.collisions > 0 and time_s - ball.since_s < rules.contact_time_s
+    at_once = ball.collisions > 0 and time_s - ball.since_s < rules.contact_time_s
+    ball.presses = ball.presses + 1 if at_once else 0
+    return at_once
+
+
+@njit(error_model="numpy")
+def _rest_if_slow(ball: Record, rules: Record) -> None:
+    """Bring a ball to rest that is all but at rest.
+
+    What is left of a motion that fades between balls and modules in touch would go on until the
+    smallest numbers there are, and beyond them without end.
+    """
+    if ball.vx * ball.vx + ball.vy * ball.vy < rules.rest_speed * rules.rest_speed:
+        ball.vx, ball.vy = 0.0, 0.0
+
+
+@njit(error_model="numpy")
+def _stay_together(one: Record, other: Record) -> None:
+    """Give two balls the velocity of their centre of mass."""
+    share = one.mass / (one.mass + other.mass)
+    vx = share * one.vx + (1.0 - share) * other.vx
+    vy = share * one.vy + (1.0 - share) * other.vy
+    one.vx = other.vx = vx
+    one.vy = other.vy = vy
 
 
 @njit(error_model="numpy")
@@ -42,7 +71,10 @@ def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> N
     """Let two balls collide: restitution, friction, the base impulse, and shrinking."""
     explosive = one.explosive + other.explosive
     restitution = rules.restitution[explosive]
-    if follows_at_once(one, time_s, rules) or follows_at_once(other, time_s, rules):
+    one_at_once = follows_at_once(one, time_s, rules)
+    at_once = follows_at_once(other, time_s, rules) or one_at_once
+    is_caught = at_once and max(one.presses, other.presses) > _PRESSED and restitution < 1.0
+    if at_once:
         restitution = 1.0
     move_to(one, time_s)
     move_to(other, time_s)
@@ -67,6 +99,11 @@ def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> N
     one.collisions += 1
     other.collisions += 1
     one.rattles = other.rattles = 0
+    if is_caught:
+        _stay_together(one, other)
+    if at_once:
+        _rest_if_slow(one, rules)
+        _rest_if_slow(other, rules)
     if explosive == 1:
         shrink(one if one.explosive else other, rules.air_shrink)
 
@@ -162,8 +199,11 @@ def collide_with_module(
     push = _module_friction(ball, transferred, along, rules)
     ball.vx += (transferred * nx - push * ny) / ball.mass
     ball.vy += (transferred * ny + push * nx) / ball.mass
-    if ball.rattles > _WEDGED and rules.module_restitution < 1.0:
+    is_caught = ball.rattles > _WEDGED or ball.presses > _PRESSED
+    if is_caught and rules.module_restitution < 1.0:
         ball.vx, ball.vy = 0.0, 0.0
+    elif ball.presses > 0:
+        _rest_if_slow(ball, rules)
     ball.collisions += 1
     ball.module_s = time_s
     if is_new and ball.explosive:

@@ -30,6 +30,9 @@ _CELL_SPACINGS: Final = 1.2
 
 _CELL_MARGIN: Final = 1e-6
 
+_REST_SHARE: Final = 1e-12
+"""Of the fastest ball's first speed: slower than that, within one contact, is at rest."""
+
 
 class World(NamedTuple):
     """One blast as arrays, in the order in which the compiled loop takes them.
@@ -160,6 +163,9 @@ def _rules(scene: Scene, cell_units: float) -> Record:
     rules["minimum_radius"] = contact.minimum_radius_units
     rules["charge_collides"] = explosive.collide_within_charge
     rules["contact_time_s"] = stepping.contact_time_s
+    rules["rest_speed"] = _REST_SHARE * float(
+        np.linalg.norm(scene.balls.velocity, axis=1).max(initial=0.0)
+    )
     rules["quantum"] = scene.impulse_quantum
     rules["time_limit_s"] = stepping.time_limit_s
     rules["most_collisions"] = stepping.most_collisions

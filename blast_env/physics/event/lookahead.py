@@ -70,7 +70,7 @@ def look_ahead(
     balls[ball].contact_s = border_touch_s(balls[ball], rules)
     balls[ball].partner = BORDER if balls[ball].contact_s < inf else NOBODY
     cell = balls[ball].cell
-    _look_at_surfaces(balls, cells, surfaces, ball)
+    _look_at_surfaces(balls, cells, surfaces, rules, ball)
     for row in range(-1, 2):
         middle = cell + row * rules.columns
         for place in range(middle - 1, middle + 2):
@@ -93,7 +93,7 @@ def cross(
     leave_cell(balls, cells, ball)
     cell = balls[ball].cell + step
     enter_cell(balls, cells, ball, cell)
-    _look_at_surfaces(balls, cells, surfaces, ball)
+    _look_at_surfaces(balls, cells, surfaces, rules, ball)
     aside = rules.columns if abs(step) == 1 else 1
     for place in range(-1, 2):
         _look_at_balls(balls, cells, rules, ball, cell + step + place * aside)
@@ -103,11 +103,11 @@ def cross(
 
 @njit(error_model="numpy", inline="always")
 def _look_at_surfaces(
-    balls: RecordArray, cells: RecordArray, surfaces: RecordArray, ball: int
+    balls: RecordArray, cells: RecordArray, surfaces: RecordArray, rules: Record, ball: int
 ) -> None:
     cell = cells[balls[ball].cell]
     for surface in range(cell.surfaces_from, cell.surfaces_to):
-        time_s = surface_touch_s(balls[ball], surfaces[surface])
+        time_s = surface_touch_s(balls[ball], surfaces[surface], rules)
         if time_s < balls[ball].contact_s or (
             time_s == balls[ball].contact_s and _wins_tie(surfaces, surface, balls[ball].partner)
         ):
@@ -131,16 +131,16 @@ def _wins_tie(surfaces: RecordArray, surface: int, partner: int) -> bool:
 def _look_at_balls(
     balls: RecordArray, cells: RecordArray, rules: Record, ball: int, cell: int
 ) -> None:
-    _look_along_list(balls, ball, cells[cell].first_air)
+    _look_along_list(balls, rules, ball, cells[cell].first_air)
     if rules.charge_collides or not balls[ball].explosive:
-        _look_along_list(balls, ball, cells[cell].first_explosive)
+        _look_along_list(balls, rules, ball, cells[cell].first_explosive)
 
 
 @njit(error_model="numpy", inline="always")
-def _look_along_list(balls: RecordArray, ball: int, other: int) -> None:
+def _look_along_list(balls: RecordArray, rules: Record, ball: int, other: int) -> None:
     while other >= 0:
         if other != ball:
-            time_s = balls_touch_s(balls[ball], balls[other])
+            time_s = balls_touch_s(balls[ball], balls[other], rules)
             if time_s < balls[ball].contact_s or (
                 time_s == balls[ball].contact_s and other < balls[ball].partner
             ):
