@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from blast_env.geometry import Rectangle
+from blast_env.physics.charge_scaling import for_charge
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
@@ -25,7 +26,7 @@ class Scene:
         charge: The charge in metres and kilograms.
         balls: All balls; air first, then the charge.
         structures: The structures and, when there is one, the barrier; see `obstacles`.
-        parameters: Parameters of the blast model.
+        parameters: Parameters of the blast model for this charge.
     """
 
     site: Rectangle
@@ -134,6 +135,7 @@ def build_scene(
     Raises:
         LayoutError: If the layout does not fit the build zone, or the charge.
         ScenarioError: If the charge is not clear of a structure or the border.
+        BlastEnvError: If the parameters do not reach to the mass of the charge.
         ValueError: If the seed is negative.
     """
     cells = check_layout(scenario, layout)
@@ -141,7 +143,7 @@ def build_scene(
         check_layout(scenario.with_charge(charge), cells)
     charge_rng, fan_rng, air_rng = random_streams(seed)
     charge = scenario.sample_charge(charge_rng) if charge is None else charge
-    parameters = scenario.parameters
+    parameters = for_charge(scenario.parameters, charge.tnt_kg)
     site = scenario.site.rectangle_m.scaled(UNITS_PER_M)
     structures = tuple(_outline(section) for section in scenario.structures)
     if cells:
@@ -155,7 +157,7 @@ def build_scene(
         parameters.explosive.offset_units + parameters.explosive.radius_units,
         air_rng,
     )
-    fan = explosion_fan(parameters.explosive, centre, charge.tnt_kg, fan_rng)
+    fan = explosion_fan(parameters.explosive, centre, fan_rng)
     return Scene(
         site=site,
         charge_centre=centre,

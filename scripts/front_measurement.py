@@ -90,7 +90,7 @@ class FrontCase:
         site, centre = Rectangle(0.0, 0.0, side, side), (side / 2.0, side / 2.0)
         rng = np.random.default_rng(seed)
         air = air_lattice(parameters.air, site, [], centre, SPACING_UNITS + radius, rng)
-        fan = explosion_fan(parameters.explosive, centre, 100.0, rng)
+        fan = explosion_fan(parameters.explosive, centre, rng)
         # A run ends when no structure can be reached: this one is in a corner.
         far = StructureOutline(ModularObstacle, "far", (2.0, 2.0), 1, 1, True, 1.0, None, None)
         balls = Balls.concatenate((air, fan))

@@ -3,7 +3,7 @@
 Searches packing fraction, ball radius, elasticity, masses, number of balls, shrinking, C_e, thermal
 share and facade width with NSGA-II for three things at once: agreement with Kingery-Bulmash's
 reflected impulse over distance, agreement with measured shielding behind a box, and few events a
-blast. Writes every candidate, the front as a table, and a figure.
+blast. Writes every candidate and the front as a table; `scripts.collisional_front` draws it.
 
 The base impulse I_b stays 0: at every contact it feeds in energy that the charge does not have.
 
@@ -110,7 +110,7 @@ class Candidate:
                     "mass": CHARGE_MASS / self.ball_count,
                     "elasticity": elasticity,
                     "thermal_share": self.thermal_share,
-                    "mass_exponent": 2.0 / 3.0,
+                    "charge_scaling": "hopkinson_cranz",
                 },
                 "contact": {
                     "module_restitution": self.module_restitution,
@@ -159,10 +159,15 @@ class Score:
         )
 
 
-def score(candidate: Candidate, seeds: tuple[int, ...]) -> Score:
-    """Run a candidate's blasts."""
-    parameters = candidate.parameters()
-    field = _with(free_field_with_facade(candidate.facade_modules), parameters)
+def score(parameters: SimulationParameters, facade_modules: int, seeds: tuple[int, ...]) -> Score:
+    """Run the blasts that parameters are judged by.
+
+    Args:
+        parameters: The parameters.
+        facade_modules: Width of the calibration's facade.
+        seeds: Seeds of every scene.
+    """
+    field = _with(free_field_with_facade(facade_modules), parameters)
     study = FreeFieldStudy(field, DISTANCES_M, seeds, "event")
     i_sim = impulse_by_seed(study.run(), "transferred_impulse").mean(axis=0)
     reference = kingery_bulmash("reflected_impulse", np.array(DISTANCES_M), 100.0)
@@ -206,7 +211,10 @@ class Store:
         """Return the scores of candidates, running those that are new."""
         wanted = list(candidates)
         new = [each for each in dict.fromkeys(wanted) if each not in self.scores]
-        jobs = (joblib.delayed(score)(each, self._seeds) for each in new)
+        jobs = (
+            joblib.delayed(score)(each.parameters(), each.facade_modules, self._seeds)
+            for each in new
+        )
         found = joblib.Parallel(n_jobs=self._processes, return_as="generator")(jobs)
         for candidate, its_score in zip(new, found, strict=True):
             self.scores[candidate] = its_score
@@ -228,20 +236,24 @@ class Search(Problem):
         out["F"] = np.array([(s.distance_error, s.shielding_error, s.events) for s in scores])
 
 
-def front(scores: dict[Candidate, Score]) -> pd.DataFrame:
-    """Return the candidates that no other one beats in all three objectives, cheapest first."""
+def candidate_table(scores: dict[Candidate, Score]) -> pd.DataFrame:
+    """Return one row a candidate: its values, its scores, and its two errors."""
     rows = [
         asdict(candidate)
         | asdict(its)
         | {"distance_error": its.distance_error, "shielding_error": its.shielding_error}
         for candidate, its in scores.items()
     ]
-    table = pd.DataFrame(rows)
+    return pd.DataFrame(rows)
+
+
+def front(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows that no other one beats in all three objectives, cheapest first."""
     objectives = table[["distance_error", "shielding_error", "events"]].to_numpy()
     no_worse = (objectives[:, None] <= objectives[None]).all(axis=2)
     better = (objectives[:, None] < objectives[None]).any(axis=2)
     unbeaten = np.flatnonzero(~(no_worse & better).any(axis=0))
-    return table.iloc[unbeaten].sort_values(by="events").reset_index(drop=True)
+    return table.iloc[unbeaten].sort_values(by="events")
 
 
 def main(
@@ -263,7 +275,7 @@ def main(
                 seed=0,
                 callback=lambda algorithm: progress(algorithm.n_gen / generations),
             )
-        table = front(store.scores)
+        table = front(candidate_table(store.scores))
         with write_atomically(out / "front.csv") as temporary:
             table.to_csv(temporary, index=False)
         met = table[(table.distance_error <= 1.0) & (table.shielding_error <= 1.0)]

@@ -15,8 +15,7 @@ from blast_env.physics.engine import BlastRun, Engine
 from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.structure import BARRIER_NAME, ModularPart
 from blast_env.recording.tables import collision_table
-from blast_env.scenario import Cell, Scenario, load_scenario
-from blast_env.scene import Scene
+from blast_env.scenario import Cell, Charge, Scenario, load_scenario
 from blast_env.simulation import Blast, BlastResult
 
 if TYPE_CHECKING:  # drawing is an optional extra
@@ -125,7 +124,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
         self.step_s = step_s
         self.render_mode = render_mode
         self.action_space = spaces.Discrete(1)
-        self.observation_space = self._make_observation_space(Blast(self.scenario).scene)
+        self.observation_space = self._make_observation_space()
         self._blast: Blast | None = None
         self._run: BlastRun | None = None
         self._target_s = 0.0
@@ -237,7 +236,11 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
             "time_s": np.array([run.time_s]),
         }
 
-    def _make_observation_space(self, scene: Scene) -> spaces.Dict:
+    def _make_observation_space(self) -> spaces.Dict:
+        # With the heaviest charge every bound is the highest.
+        source = max(self.scenario.charge, key=lambda source: source.tnt_kg)
+        position_m = source.sample_position_m(np.random.default_rng(0))
+        scene = Blast(self.scenario, charge=Charge(position_m, source.tnt_kg)).scene
         modules = sum(section.rows * section.columns for section in self.scenario.structures)
         stepping = scene.parameters.stepping
         # A step of the engine can begin just before the time limit.

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]
+ChargeScaling = Literal["mass", "hopkinson_cranz"]
 
 
 class Parameters(BaseModel):
@@ -53,12 +54,12 @@ class ExplosiveParameters(BallParameters):
         thermal_share: Share of the kinetic energy that is random in direction at the start,
             beside the radial part; 0 in the paper's model. Particle blast methods give their
             detonation products such a part, for their pressure.
-        reference_tnt_kg: The TNT-equivalent mass that `mass` stands for. The specific energy of
-            TNT is a constant, so another charge mass keeps v0 and scales the mass of the balls.
-        mass_exponent: The mass of the balls grows with this power of the charge's. 1 says that
-            all of the charge lies in the plane. 2/3 keeps the energy per area of the air that a
-            length scaled with the cube root of the charge holds: then distances and impulses of
-            two charges are related by Hopkinson-Cranz scaling.
+        reference_tnt_kg: The TNT-equivalent mass that all parameters stand for.
+        charge_scaling: What follows for another charge (`charge_scaling.for_charge`). The
+            specific energy of TNT is a constant, so v0 stays. `"mass"`: the mass of the balls is
+            proportional to the charge's. `"hopkinson_cranz"`: the blast is the reference blast
+            enlarged by the cube root of the charge's mass, with balls of the same size; charge
+            mass in the plane, number of balls, losses in collisions and the time limit follow.
     """
 
     mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
@@ -71,7 +72,7 @@ class ExplosiveParameters(BallParameters):
     collide_within_charge: bool = False
     thermal_share: Fraction = 0.0
     reference_tnt_kg: Positive = 100.0
-    mass_exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    charge_scaling: ChargeScaling = "mass"
 
 
 class AirParameters(BallParameters):
@@ -124,7 +125,8 @@ class SteppingParameters(Parameters):
             smallest ball (or half modules, if those are smaller).
         longest_step_s: Bound of the time step, however slow the balls are.
         solver_iterations: Iterations of Chipmunk's contact solver.
-        time_limit_s: Simulated time after which the run ends in any case.
+        time_limit_s: Simulated time after which the run ends in any case; that of the reference
+            charge, where `explosive.charge_scaling` is `"hopkinson_cranz"`.
         contact_time_s: Event engine: collisions of a ball that follow each other within this time
             are one contact, which loses energy only once. It stands for the time that a real
             contact lasts, and keeps pressed balls from colliding infinitely often.

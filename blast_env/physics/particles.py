@@ -51,7 +51,6 @@ class Balls:
         parameters: BallParameters,
         position: FloatArray,
         velocity: FloatArray,
-        mass_factor: float = 1.0,
     ) -> "Balls":
         """Return balls of one kind, all with the mass and radius of `parameters`."""
         count = len(position)
@@ -59,7 +58,7 @@ class Balls:
             kind=np.full(count, kind, dtype=np.uint8),
             position=position,
             velocity=velocity,
-            mass=np.full(count, parameters.mass * mass_factor),
+            mass=np.full(count, parameters.mass),
             radius=np.full(count, parameters.radius_units),
         )
 
@@ -78,7 +77,6 @@ class Balls:
 def explosion_fan(
     parameters: ExplosiveParameters,
     centre: tuple[float, float],
-    tnt_kg: float,
     rng: np.random.Generator,
 ) -> Balls:
     """Return the charge: N `ExplosionBall`s at the angles 2 pi i / N (section 2.3).
@@ -87,9 +85,8 @@ def explosion_fan(
     the kinetic energy is the same on average.
 
     Args:
-        parameters: The explosive's parameters.
+        parameters: The explosive's parameters, for this charge.
         centre: The charge's centre, units.
-        tnt_kg: TNT-equivalent mass; scales the mass of the balls.
         rng: Draws the phase of the fan and the random part of the velocities.
     """
     drawn = rng.random()
@@ -104,7 +101,6 @@ def explosion_fan(
         parameters,
         position=np.asarray(centre) + parameters.offset_units * direction,
         velocity=parameters.speed_units_per_s * (np.sqrt(1.0 - share) * direction + random_part),
-        mass_factor=(tnt_kg / parameters.reference_tnt_kg) ** parameters.mass_exponent,
     )
 
 

@@ -18,7 +18,7 @@ _COLLISIONAL_AIR: Final = with_overrides(
             "ball_count": 900,
             "elasticity": 0.98894,
             "thermal_share": 0.75,
-            "mass_exponent": 2.0 / 3.0,
+            "charge_scaling": "hopkinson_cranz",
         },
         "air": {"mass": 0.0614, "spacing_units": 3.82, "elasticity": 0.98894},
         "contact": {"module_restitution": 0.9, "air_shrink": 0.91},

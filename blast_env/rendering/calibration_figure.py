@@ -1,8 +1,13 @@
 """A calibration as a figure: impulse over distance with the reference, the laws, the residuals."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
 import numpy as np
 
 from blast_env.calibration.calibrate import CalibrationReport
+from blast_env.calibration.model import SimulatedQuantity
 from blast_env.rendering.captions import write_heading
 from blast_env.rendering.extra import render_extra
 from blast_env.rendering.style import number_on_axis
@@ -19,6 +24,12 @@ _LAWS = {
     "linear": ("#56B4E9", "-.", "^"),
     "power": ("#009E73", "-", "o"),
 }
+_SIMULATED_LABELS: Final[Mapping[SimulatedQuantity, str]] = MappingProxyType(
+    {
+        "impulse": "impulse on the facade, sum of m|v|",
+        "transferred_impulse": "impulse really transferred to the facade",
+    }
+)
 _LEAST_TICK_RATIO = 1.18
 _SIMULATED, _REFERENCE = "#0072B2", "#000000"
 
@@ -62,7 +73,7 @@ def _draw_simulated(axes: Axes, report: CalibrationReport) -> None:
     )
     slope, _ = np.polyfit(np.log(summary.distance_m), np.log(summary.i_sim), 1)
     axes.set_title(f"Simulated impulse: falls as R$^{{{slope:.2f}}}$ on average")
-    axes.set_ylabel("impulse on the facade, sum of m|v| (simulation units)")
+    axes.set_ylabel(f"{_SIMULATED_LABELS[report.simulated]} (simulation units)")
     _set_axes(axes, report)
     axes.legend()
 

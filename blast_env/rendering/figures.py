@@ -74,7 +74,6 @@ def initial_velocities(parameters: SimulationParameters, count: int = 12) -> Fig
     fan = explosion_fan(
         explosive.model_copy(update={"ball_count": count, "fan_phase": "fixed"}),
         (0.0, 0.0),
-        explosive.reference_tnt_kg,
         np.random.default_rng(0),
     )
     speed_m_per_s = explosive.speed_units_per_s / UNITS_PER_M

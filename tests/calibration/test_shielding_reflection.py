@@ -15,7 +15,7 @@ from blast_env.calibration.shielding_reflection import (
 from blast_env.calibration.shielding_scenes import facade_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.simulation import simulate
-from tests.calibration.test_shielding import DENSE
+from tests.calibration.shielding_cases import DENSE
 
 GEOMETRY = BlockGeometry(margin_m=8.0)
 

@@ -49,7 +49,7 @@ def blast(kind: str) -> Scene:
     rng = np.random.default_rng(11)
     facade, site = wall((46.0, 10.0), 20, 2, capacity=2000.0), Rectangle(0.0, 0.0, 64.0, 60.0)
     air = air_lattice(settings.air, site, [facade.rectangle], (30.0, 30.0), 2.0, rng)
-    fan = explosion_fan(settings.explosive, (30.0, 30.0), 100.0, rng)
+    fan = explosion_fan(settings.explosive, (30.0, 30.0), rng)
     return replace(scene(Balls.concatenate((air, fan)), [facade], settings), site=site)
 
 

@@ -51,7 +51,7 @@ def blast(turn: Turn | None, air: dict[str, object], contact: dict[str, object])
     cells = tuple((r, c) for r in range(rows) for c in range(columns) if (r, c) != (3, 0))
     rectangle = wall(corner, rows, columns).rectangle
     lattice = air_lattice(of_parameters.air, SITE, [rectangle], (-7.3, 1.7), 2.0, rng)
-    fan = explosion_fan(of_parameters.explosive, (-7.3, 1.7), 100.0, rng)
+    fan = explosion_fan(of_parameters.explosive, (-7.3, 1.7), rng)
     of_balls = Balls.concatenate((lattice, fan))
     if turn is not None:
         of_balls = replace(

@@ -11,7 +11,7 @@ from blast_env.calibration.shielding import BlockGeometry, ShieldingReport, Shie
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.shielding_figure import shielding_figure
 from blast_env.rendering.shielding_plan import gauge_rectangles
-from tests.calibration.test_shielding import DENSE
+from tests.calibration.shielding_cases import DENSE
 
 GEOMETRY = BlockGeometry(side_modules=9, stand_off_m=3.0, margin_m=8.0)
 PLAN, _COLOUR_BAR, LOADS, RATIOS = range(4)

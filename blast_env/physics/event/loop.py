@@ -63,7 +63,7 @@ def run_until(
     while True:
         if progress.collisions >= progress.next_check:
             progress.next_check = progress.collisions + _COLLISIONS_BETWEEN_CHECKS
-            if not _can_reach(balls, targets, rules.time_limit_s, progress.time_s):
+            if not _can_reach(balls, heap, targets, rules.time_limit_s, progress.time_s):
                 return OUT_OF_REACH
         if progress.collisions >= rules.most_collisions:
             return EVENT_LIMIT
@@ -160,12 +160,19 @@ def _remove(balls: RecordArray, cells: RecordArray, heap: RecordArray, ball: int
 
 @njit(error_model="numpy")
 def _can_reach(
-    balls: RecordArray, targets: NDArray[np.float64], time_limit_s: float, time_s: float
+    balls: RecordArray,
+    heap: RecordArray,
+    targets: NDArray[np.float64],
+    time_limit_s: float,
+    time_s: float,
 ) -> bool:
-    """Whether a moving ball can still act on a structure; see `engine.can_reach`."""
-    for index in range(len(balls)):
-        ball = balls[index]
-        if not ball.alive or (ball.vx == 0.0 and ball.vy == 0.0):
+    """Whether a moving ball can still act on a structure; see `engine.can_reach`.
+
+    All that move are in the heap: air that nothing has touched yet takes no time here either.
+    """
+    for place in range(1, heap[0].ball + 1):
+        ball = balls[heap[place].ball]
+        if ball.vx == 0.0 and ball.vy == 0.0:
             continue
         passed = time_s - ball.since_s
         x, y = ball.x + ball.vx * passed, ball.y + ball.vy * passed
