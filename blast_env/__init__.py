@@ -13,6 +13,7 @@ from blast_env.scenario import (
     load_layout,
     load_scenario,
     save_scenario,
+    write_layout,
 )
 from blast_env.simulation import Blast, BlastResult, simulate
 
@@ -27,6 +28,7 @@ __all__ = [
     "load_scenario",
     "save_scenario",
     "simulate",
+    "write_layout",
 ]
 
 _register_environments()

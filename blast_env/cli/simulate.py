@@ -54,8 +54,10 @@ def simulate(
 ) -> None:
     """Run one blast and print what each structure took."""
     with user_errors():
-        chosen = _choose(scenario, preset, stand_off)
-        cells: Sequence[Cell] = () if layout is None else load_layout(layout)
+        named = load_scenario(scenario)
+        chosen = _changed(named, preset, stand_off)
+        # A layout is for the site of the file; preset and stand-off are this command's.
+        cells: Sequence[Cell] = () if layout is None else load_layout(layout, named)
         blast = Blast(chosen, cells, seed, engine)
         if charge is not None:
             blast = blast.with_charge_at(charge)
@@ -69,8 +71,7 @@ def simulate(
         print_summary(result, written)
 
 
-def _choose(name: str, preset: str | None, stand_off: float | None) -> Scenario:
-    scenario = load_scenario(name)
+def _changed(scenario: Scenario, preset: str | None, stand_off: float | None) -> Scenario:
     if stand_off is not None:
         scenario = scenario.at_stand_off(stand_off)
     return scenario.with_simulation(preset)

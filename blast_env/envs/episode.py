@@ -117,6 +117,7 @@ class Episode:
             "blast_seeds": tuple(tuple(threat.seed for threat in each) for each in threats),
             "blasts": evaluators.blasts,
             "cache_hits": evaluators.cache_hits,
+            "cache_hit_rate": evaluators.cache_hit_rate,
         }
 
 

@@ -3,11 +3,14 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from blast_env.envs.risk import Risk
+from blast_env.evaluation.cache import BlastCache
+from blast_env.evaluation.disk_cache import find_cache
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.threats import Threat
 from blast_env.physics.engine import Engine
@@ -103,10 +106,15 @@ class Evaluators:
 
     Args:
         engine: Name of an engine, or an engine.
+        cache: Folder or cache that all of them share; see `BlastEvaluator`.
+
+    Raises:
+        BlastEnvError: If the cache is of no use.
     """
 
-    def __init__(self, engine: str | Engine) -> None:
+    def __init__(self, engine: str | Engine, cache: str | Path | BlastCache | None = None) -> None:
         self._engine = engine
+        self._cache = find_cache(cache)
         self._kept: OrderedDict[str, BlastEvaluator] = OrderedDict()
         self._gone_blasts = 0
         self._gone_cache_hits = 0
@@ -121,6 +129,12 @@ class Evaluators:
         """Number of loads that were asked for so far and needed no blast."""
         return self._gone_cache_hits + sum(each.cache_hits for each in self._kept.values())
 
+    @property
+    def cache_hit_rate(self) -> float:
+        """Share of the loads asked for so far that needed no blast; 0 if none were."""
+        asked = self.blasts + self.cache_hits
+        return self.cache_hits / asked if asked else 0.0
+
     def of(self, scenario: Scenario) -> BlastEvaluator:
         """Return the evaluator of a scenario.
 
@@ -134,7 +148,9 @@ class Evaluators:
             return newest  # the usual case, without the time that a content hash takes
         key = scenario.content_hash
         if key not in self._kept:
-            self._kept[key] = BlastEvaluator(scenario, self._engine, _LOADS_PER_EVALUATOR)
+            self._kept[key] = BlastEvaluator(
+                scenario, self._engine, _LOADS_PER_EVALUATOR, self._cache
+            )
         self._kept.move_to_end(key)
         if len(self._kept) > _MOST_EVALUATORS:
             _, gone = self._kept.popitem(last=False)

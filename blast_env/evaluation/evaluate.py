@@ -1,9 +1,11 @@
 """A layout against no barrier, on the same threats."""
 
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Final
 
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.cache import BlastCache
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.layout_evaluation import LayoutEvaluation
 from blast_env.evaluation.statistics import check_cvar_level
@@ -20,10 +22,11 @@ def evaluate_layout(
     layout: Sequence[Cell],
     seeds: Iterable[int] = range(16),
     processes: int = 1,
-    engine: str | Engine = "pymunk",
+    engine: str | Engine = "event",
     *,
     threats: Iterable[Threat] | None = None,
     cvar_level: float = CVAR_LEVEL,
+    cache: str | Path | BlastCache | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> LayoutEvaluation:
     """Return how much a layout takes off the protected structures, and how sure that is.
@@ -39,6 +42,7 @@ def evaluate_layout(
         engine: Name of an engine, or an engine.
         threats: Used instead of threats drawn with `seeds`.
         cvar_level: The worst share 1 - `cvar_level` of the threats makes the CVaR.
+        cache: Folder or cache of blasts that were run before; see `BlastEvaluator`.
         progress: Called with the share of the blasts that is done.
 
     Raises:
@@ -51,7 +55,7 @@ def evaluate_layout(
             `processes` or `cvar_level` is out of bounds, or if nothing arrives at the protected
             structures even without a barrier.
     """
-    evaluator = BlastEvaluator(scenario, engine)
+    evaluator = BlastEvaluator(scenario, engine, cache=cache)
     drawn = draw_threats(scenario, seeds) if threats is None else tuple(threats)
     return evaluate_against(
         evaluator, layout, drawn, processes, cvar_level=cvar_level, progress=progress

@@ -1,17 +1,26 @@
 """The loads of layouts under threats, each blast simulated once."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 
 import joblib
 
 from blast_env.calibration.model import Calibration
 from blast_env.calibration.stored import scenario_calibration
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cache import BlastKey, LoadsCache
+from blast_env.evaluation.cache import (
+    BlastCache,
+    BlastKey,
+    LoadsCache,
+    calibration_digest,
+    code_version,
+    engine_text,
+)
+from blast_env.evaluation.disk_cache import find_cache
 from blast_env.evaluation.loads import BlastLoads, blast_loads
 from blast_env.evaluation.threats import Threat
 from blast_env.physics.engine import Engine, find_engine
-from blast_env.scenario import Cell, Scenario, check_layout
+from blast_env.scenario import Cell, Charge, Scenario, check_layout
 from blast_env.simulation import Blast
 
 
@@ -27,7 +36,9 @@ class BlastEvaluator:
     Args:
         scenario: The scenario; it must name a calibration.
         engine: Name of an engine, or an engine.
-        cache_size: Most loads that are remembered; see `LoadsCache`.
+        cache_size: Most loads that the evaluator itself remembers; see `LoadsCache`.
+        cache: Asked for what it does not remember, and told all: a folder (`DiskCache`), for other
+            processes and later runs, or a cache that several evaluators share.
 
     Attributes:
         scenario: As given.
@@ -40,19 +51,38 @@ class BlastEvaluator:
         CalibrationError: If the scenario names no calibration, or one that was made with other
             parameters or another engine.
         UnknownNameError: If there is no such engine or calibration.
-        BlastEnvError: If the cache size is negative.
+        BlastEnvError: If the cache size is negative, or `cache` is of no use.
     """
 
     def __init__(
-        self, scenario: Scenario, engine: str | Engine = "pymunk", cache_size: int = 4096
+        self,
+        scenario: Scenario,
+        engine: str | Engine = "event",
+        cache_size: int = 4096,
+        cache: str | Path | BlastCache | None = None,
     ) -> None:
         self.scenario = scenario
         self.engine = find_engine(engine)
         self.calibration = scenario_calibration(scenario, self.engine.name)
         self.blasts = 0
         self.cache_hits = 0
-        self._scenario_hash = scenario.content_hash
-        self._cache = LoadsCache(cache_size)
+        self._remembered = LoadsCache(cache_size)
+        self._cache = find_cache(cache)
+        self._key_of_nothing = BlastKey(
+            scenario_hash=scenario.content_hash,
+            layout=(),
+            charge=Charge((0.0, 0.0), 0.0),
+            seed=0,
+            engine=engine_text(self.engine),
+            calibration=calibration_digest(self.calibration),
+            code=code_version(),
+        )
+
+    @property
+    def cache_hit_rate(self) -> float:
+        """Share of the loads asked for so far that needed no blast; 0 if none were."""
+        asked = self.blasts + self.cache_hits
+        return self.cache_hits / asked if asked else 0.0
 
     def loads(self, layout: Sequence[Cell], threat: Threat) -> BlastLoads:
         """Return the loads of one blast.
@@ -91,13 +121,15 @@ class BlastEvaluator:
         if processes < 1:
             raise BlastEnvError(f"processes is {processes}, must be at least 1")
         keys = [self._key(layout, threat) for layout, threat in pairs]
-        found = {key: loads for key in keys if (loads := self._cache.get(key)) is not None}
-        missing = [key for key in dict.fromkeys(keys) if key not in found]
+        asked = dict.fromkeys(keys)
+        found = {key: loads for key in asked if (loads := self._known(key)) is not None}
+        missing = [key for key in asked if key not in found]
         simulated = _run(map(self._blast, missing), self.calibration, min(processes, len(missing)))
         for done, (key, loads) in enumerate(zip(missing, simulated, strict=True), start=1):
-            loads.module_impulse_sim.flags.writeable = False  # it is given out more than once
             found[key] = loads
-            self._cache.add(key, loads)
+            self._remember(key, loads)
+            if self._cache is not None:
+                self._cache.add(key, loads)
             self.blasts += 1
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(keys))
@@ -106,7 +138,20 @@ class BlastEvaluator:
 
     def _key(self, layout: Sequence[Cell], threat: Threat) -> BlastKey:
         cells = tuple(sorted(check_layout(self.scenario, layout)))
-        return BlastKey(self._scenario_hash, cells, threat.charge, threat.seed, self.engine.name)
+        return self._key_of_nothing._replace(layout=cells, charge=threat.charge, seed=threat.seed)
+
+    def _known(self, key: BlastKey) -> BlastLoads | None:
+        """Return loads that are remembered here or there."""
+        loads = self._remembered.get(key)
+        if loads is None and self._cache is not None:
+            loads = self._cache.get(key)
+            if loads is not None:
+                self._remember(key, loads)
+        return loads
+
+    def _remember(self, key: BlastKey, loads: BlastLoads) -> None:
+        loads.module_impulse_sim.flags.writeable = False  # it is given out more than once
+        self._remembered.add(key, loads)
 
     def _blast(self, key: BlastKey) -> Blast:
         return Blast(self.scenario, key.layout, key.seed, self.engine, key.charge)

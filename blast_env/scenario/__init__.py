@@ -9,7 +9,8 @@ from blast_env.scenario.files import (
     save_scenario,
     scenario_hash,
 )
-from blast_env.scenario.layout import check_layout, load_layout, usable_cells
+from blast_env.scenario.layout import check_layout, usable_cells
+from blast_env.scenario.layout_file import LayoutFile, load_layout, write_layout
 from blast_env.scenario.models import (
     SCHEMA_VERSION,
     AnySource,
@@ -39,6 +40,7 @@ __all__ = [
     "ConcreteSquareSection",
     "CostArea",
     "KeepOut",
+    "LayoutFile",
     "ModularObstacleSection",
     "Placement",
     "PointSource",
@@ -58,4 +60,5 @@ __all__ = [
     "save_scenario",
     "scenario_hash",
     "usable_cells",
+    "write_layout",
 ]

@@ -70,7 +70,10 @@ class Placement:
         reason = self.explain(cell)
         if reason is not None:
             raise LayoutError(reason)
-        return Placement(self.scenario, (*self.cells, cell))
+        placed = Placement(self.scenario, (*self.cells, cell))
+        # To look it up takes as long as all the rest of a step of the environment.
+        vars(placed)["_empty_zone"] = self._empty_zone
+        return placed
 
     def explain(self, cell: Cell) -> str | None:
         """Return a sentence that says why a cell is not available, or `None` if it is.

@@ -10,14 +10,14 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_agen
 from blast_env.envs import barrier_env
 from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.scenario import bundled_scenarios, load_scenario
-from tests.envs.small import ThinEngine, make
+from tests.envs.small import make
 
 IDS = sorted(name for name in gym.registry if name.startswith("BlastBarrier"))
 
 
 @pytest.mark.parametrize("env_id", IDS)
 def test_both_checkers_pass_on_every_id(env_id: str) -> None:
-    env = gym.make(env_id, engine=ThinEngine(), render_mode="rgb_array")
+    env = gym.make(env_id, render_mode="rgb_array")
     check_env(env.unwrapped)
     check_env_for_agents(env.unwrapped)
 

@@ -15,12 +15,15 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_agen
 import blast_env
 from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.scenario import ScenarioError
+from blast_env.scenario import Scenario, ScenarioError
+from tests.scenarios import BALLISTIC_COURTYARD
 
 LAYOUT = ((4, 0), (5, 0), (6, 0))
 
 
 def make(**arguments: Any) -> BlastSimulatorEnv:
+    """Return an environment on the courtyard in sparse air, unless other arguments are given."""
+    arguments = {"scenario": BALLISTIC_COURTYARD} | arguments
     env = gym.make("BlastSimulator-v0", **arguments).unwrapped
     assert isinstance(env, BlastSimulatorEnv)
     return env
@@ -38,18 +41,38 @@ def play(env: gym.Env, seed: int, **options: object) -> tuple[list, list[float],
     return observations, rewards, info
 
 
-@pytest.mark.parametrize("scenario", blast_env.bundled_scenarios())
-def test_both_checkers_pass_without_a_warning(scenario: str) -> None:
-    env = gym.make("BlastSimulator-v0", scenario=scenario, step_s=0.05, render_mode="rgb_array")
-    check_env(env.unwrapped)
-    check_env_for_agents(env.unwrapped)
+@pytest.mark.parametrize(
+    ("scenario", "engine"),
+    [(BALLISTIC_COURTYARD, "pymunk"), *((name, "event") for name in blast_env.bundled_scenarios())],
+)
+def test_both_checkers_pass_without_a_warning(scenario: str | Scenario, engine: str) -> None:
+    env = make(scenario=scenario, engine=engine, step_s=0.05, render_mode="rgb_array")
+    check_env(env)
+    check_env_for_agents(env)
 
 
-@pytest.mark.parametrize("step_s", [0.0007, 0.01, 10.0])
-def test_an_episode_adds_up_to_the_blast_exactly(step_s: float) -> None:
-    scenario = blast_env.load_scenario("courtyard")
-    result = blast_env.simulate(scenario, LAYOUT, seed=5)
-    env = make(scenario="courtyard", step_s=step_s)
+def test_it_is_made_for_the_courtyard_and_pymunk_unless_told_otherwise() -> None:
+    env = gym.make("BlastSimulator-v0").unwrapped
+    assert isinstance(env, BlastSimulatorEnv)
+    assert (env.scenario, env.engine) == (blast_env.load_scenario("courtyard"), "pymunk")
+    env.reset(seed=0)
+    assert env.observation_space.contains(env.step(0)[0])
+
+
+@pytest.mark.parametrize(
+    ("scenario", "engine", "step_s"),
+    [
+        (BALLISTIC_COURTYARD, "pymunk", 0.0007),
+        (BALLISTIC_COURTYARD, "pymunk", 0.01),
+        (BALLISTIC_COURTYARD, "pymunk", 10.0),
+        ("courtyard", "event", 0.01),
+    ],
+)
+def test_an_episode_adds_up_to_the_blast_exactly(
+    scenario: str | Scenario, engine: str, step_s: float
+) -> None:
+    env = make(scenario=scenario, engine=engine, step_s=step_s)
+    result = blast_env.simulate(env.scenario, LAYOUT, 5, engine)
     observation, info = env.reset(seed=5, options={"layout": LAYOUT})
     total, records, ended = 0.0, [], False
     while not ended:
@@ -108,7 +131,7 @@ def test_without_a_seed_blasts_follow_from_the_first_seed() -> None:
 
 
 def _digest_in_process(queue: "multiprocessing.Queue[str]") -> None:
-    env = gym.make("blast_env:BlastSimulator-v0", scenario="courtyard", step_s=0.1)
+    env = gym.make("blast_env:BlastSimulator-v0", scenario=BALLISTIC_COURTYARD, step_s=0.1)
     queue.put(play(env, 3)[2]["digest"])
 
 
@@ -127,6 +150,7 @@ def test_vector_environments_run_it() -> None:
         "BlastSimulator-v0",
         num_envs=2,
         vectorization_mode="async",
+        scenario=BALLISTIC_COURTYARD,
         step_s=0.05,
         vector_kwargs={"context": "spawn"},
     )
@@ -184,15 +208,33 @@ def test_stepping_before_reset_and_after_the_end_is_refused() -> None:
 
 
 def test_an_environment_that_is_not_running_pickles() -> None:
-    copy = pickle.loads(pickle.dumps(BlastSimulatorEnv(step_s=0.1)))
+    copy = pickle.loads(pickle.dumps(make(step_s=0.1)))
     assert play(copy, 3)[2]["digest"] == play(make(step_s=0.1), 3)[2]["digest"]
 
 
 def test_weights_count_in_the_reward() -> None:
-    env = make(scenario="street_junction", step_s=10.0)
+    env = make(scenario="street_junction", engine="event", step_s=10.0)
     _, rewards, _ = play(env, 2)
     result = env.result()
     assert fsum(rewards) == -2.0 * result.impulse_sim("block_north_east")
+
+
+@pytest.mark.parametrize("position_m", [(3.0, 15.0), (5.0, 15.0)])
+def test_observations_are_in_bounds_for_every_charge(position_m: tuple[float, float]) -> None:
+    """The number of balls of a charge and its time limit may depend on its mass."""
+    document = blast_env.load_scenario("courtyard").model_dump()
+    document["charge"] = [
+        {"kind": "point", "position_m": (3.0, 15.0), "tnt_kg": 20.0},
+        {"kind": "point", "position_m": (5.0, 15.0), "tnt_kg": 1000.0},
+    ]
+    document["simulation"] = {"preset": "collisional"}
+    scenario = blast_env.Scenario.from_document(document, "two charges")
+    env = make(scenario=scenario, step_s=0.01, engine="event")
+    seeds = (s for s in range(99) if env.reset(seed=s)[1]["charge_position_m"] == position_m)
+    observation, info = env.reset(seed=next(seeds))
+    assert env.observation_space.contains(observation)
+    balls = int(observation["particle_counts"][0])
+    assert balls == {20.0: 658, 1000.0: 2424}[info["charge_tnt_kg"]]
 
 
 def test_frames_are_pictures() -> None:

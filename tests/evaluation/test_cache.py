@@ -1,16 +1,30 @@
-"""The cache keeps what was asked for last, and no more than it may."""
+"""The cache keeps what was asked for last, and no more than it may; what its keys tell apart."""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from blast_env import Charge
+from blast_env.calibration.stored import scenario_calibration
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastLoads
-from blast_env.evaluation.cache import BlastKey, LoadsCache
+from blast_env.evaluation import BlastEvaluator, BlastLoads
+from blast_env.evaluation.cache import (
+    BlastKey,
+    LoadsCache,
+    calibration_digest,
+    code_version,
+    engine_text,
+)
+from blast_env.physics.engine import BlastRun
+from blast_env.physics.event_engine import EventEngine
+from blast_env.physics.pymunk_engine import PymunkEngine
+from blast_env.scene import Scene
+from tests.evaluation.cases import COURTYARD, FEW, THREATS
 
 
 def key(seed: int) -> BlastKey:
-    return BlastKey("hash", (), Charge((0.0, 0.0), 1.0), seed, "pymunk")
+    return BlastKey("hash", (), Charge((0.0, 0.0), 1.0), seed, "pymunk", "calibration", "code")
 
 
 def filled(size: int, count: int) -> LoadsCache:
@@ -45,6 +59,8 @@ def test_what_was_asked_for_stays() -> None:
         key(0)._replace(charge=Charge((0.0, 0.0), 2.0)),
         key(0)._replace(seed=1),
         key(0)._replace(engine="other"),
+        key(0)._replace(calibration="other"),
+        key(0)._replace(code="other"),
     ],
 )
 def test_every_part_of_the_key_counts(other: BlastKey) -> None:
@@ -60,3 +76,67 @@ def test_a_cache_of_size_zero_keeps_nothing() -> None:
 def test_a_negative_size_is_refused() -> None:
     with pytest.raises(BlastEnvError, match="cache_size is -1, must be at least 0"):
         LoadsCache(-1)
+
+
+@dataclass(frozen=True)
+class HalfEngine:
+    """Calls itself pymunk, as engines of tests and of users may."""
+
+    share: float = 0.5
+    name: str = PymunkEngine().name
+    version: str = PymunkEngine().version
+
+    def start(self, scene: Scene) -> BlastRun:
+        return PymunkEngine().start(scene)
+
+
+def test_engines_are_told_apart_by_class_version_and_fields() -> None:
+    """A library may change what it computes from one version to the next."""
+    engines = (
+        PymunkEngine(),
+        PymunkEngine(version="pymunk 6.0.0"),
+        EventEngine(),
+        HalfEngine(),
+        HalfEngine(share=0.4),
+    )
+    assert len({engine_text(engine) for engine in engines}) == len(engines)
+    assert engine_text(PymunkEngine()) == engine_text(PymunkEngine())
+
+
+def test_calibrations_of_one_name_are_told_apart() -> None:
+    """A calibration that was made anew gives other loads in psi*s."""
+    made = scenario_calibration(COURTYARD, "event")
+    again = made.model_copy(update={"coefficients": {"A": 1.0, "B": 1.0}})
+    assert calibration_digest(made) != calibration_digest(again)
+
+
+def test_the_version_of_the_code_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What an older package computed must not pass for what this one would."""
+    shared = LoadsCache(10)
+    BlastEvaluator(COURTYARD, "event", cache=shared).loads(FEW, THREATS[0])
+    same = BlastEvaluator(COURTYARD, "event", cache=shared)
+    same.loads(FEW, THREATS[0])
+    assert same.blasts == 0
+    monkeypatch.setattr("blast_env.evaluation.evaluator.code_version", lambda: "0.0.1+00")
+    newer = BlastEvaluator(COURTYARD, "event", cache=shared)
+    newer.loads(FEW, THREATS[0])
+    assert newer.blasts == 1
+    assert code_version().startswith("0.")
+
+
+def test_the_version_of_the_engine_counts() -> None:
+    shared = LoadsCache(10)
+    evaluators = [
+        BlastEvaluator(COURTYARD, replace(EventEngine(), version=version), cache=shared)
+        for version in ("event 1", "event 2", "event 1")
+    ]
+    for evaluator in evaluators:
+        evaluator.loads(FEW, THREATS[0])
+    assert [evaluator.blasts for evaluator in evaluators] == [1, 1, 0]
+
+
+def test_the_hit_rate_is_the_share_that_needed_no_blast() -> None:
+    evaluator = BlastEvaluator(COURTYARD, "event")
+    assert evaluator.cache_hit_rate == 0.0
+    evaluator.loads_of_many([(FEW, THREATS[0])] * 4)
+    assert evaluator.cache_hit_rate == 0.75

@@ -13,10 +13,11 @@ from blast_env.calibration import stored as stored_module
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, StructureLoad, Threat
 from blast_env.physics.engine import BlastRun
-from blast_env.physics.pymunk_engine import PymunkEngine
+from blast_env.physics.event_engine import EventEngine
 from blast_env.scenario import Cell, Scenario, ScenarioError
 from blast_env.scene import Scene
 from tests.evaluation.cases import COURTYARD, FEW, THREATS, WALL
+from tests.scenarios import BALLISTIC_COURTYARD
 
 
 def same(one: BlastLoads, other: BlastLoads) -> bool:
@@ -25,9 +26,12 @@ def same(one: BlastLoads, other: BlastLoads) -> bool:
     return modules and one.structures == other.structures
 
 
-def test_loads_are_those_of_simulate(evaluator: BlastEvaluator) -> None:
-    loads = evaluator.loads(WALL, THREATS[0])
-    result = simulate(COURTYARD, WALL, seed=THREATS[0].seed)
+@pytest.mark.parametrize(
+    ("scenario", "engine"), [(COURTYARD, "event"), (BALLISTIC_COURTYARD, "pymunk")]
+)
+def test_loads_are_those_of_simulate(scenario: Scenario, engine: str) -> None:
+    loads = BlastEvaluator(scenario, engine).loads(WALL, THREATS[0])
+    result = simulate(scenario, WALL, THREATS[0].seed, engine)
     (building,) = loads.structures
     assert building.impulse_sim == result.impulse_sim("building")
     assert building.transferred_impulse_sim == result.obstacle("building").transferred_impulse
@@ -39,9 +43,9 @@ def test_loads_are_those_of_simulate(evaluator: BlastEvaluator) -> None:
 
 
 def test_notes_say_what_the_calibration_was_not_made_for(evaluator: BlastEvaluator) -> None:
-    light = evaluator.loads((), Threat(Charge((5.0, 15.0), 50.0), 0))
+    light = evaluator.loads((), Threat(Charge((10.0, 15.0), 15.0), 0))
     assert not light.in_range
-    assert light.structures[0].notes == ("charge 50 kg TNT is not 100 kg",)
+    assert light.structures[0].notes == ("charge 15 kg TNT is not between 20 and 1000 kg",)
 
 
 def test_protected_structures_count_by_their_weights_and_others_not_at_all() -> None:
@@ -57,17 +61,17 @@ def test_protected_structures_count_by_their_weights_and_others_not_at_all() -> 
 
 
 class WatchedEngine:
-    """Runs blasts on pymunk and remembers the barriers' cells in their order."""
+    """Runs blasts and remembers the barriers' cells in their order."""
 
-    name = "pymunk"
-    version = PymunkEngine().version
+    name = EventEngine().name
+    version = EventEngine().version
 
     def __init__(self) -> None:
         self.layouts: list[tuple[Cell, ...]] = []
 
     def start(self, scene: Scene) -> BlastRun:
         self.layouts += [each.cells for each in scene.structures if each.cells is not None]
-        return PymunkEngine().start(scene)
+        return EventEngine().start(scene)
 
 
 def test_the_order_of_the_cells_changes_nothing() -> None:
@@ -117,7 +121,7 @@ def test_evicted_loads_are_simulated_again_with_the_same_result() -> None:
 
 
 def test_an_engine_may_be_given_as_an_object(evaluator: BlastEvaluator) -> None:
-    by_object = BlastEvaluator(COURTYARD, engine=PymunkEngine())
+    by_object = BlastEvaluator(COURTYARD, engine=EventEngine())
     assert same(by_object.loads(FEW, THREATS[0]), evaluator.loads(FEW, THREATS[0]))
 
 
@@ -158,7 +162,7 @@ def test_the_calibration_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stored_module, "load_calibration", counted)
     evaluator = BlastEvaluator(COURTYARD)
     evaluator.loads_of_many([((), threat) for threat in THREATS[:2]])
-    assert calls == [("ballistic_kb_100kg", "pymunk")]
+    assert calls == [("collisional_kb", "event")]
 
 
 def test_scenarios_that_no_calibration_fits_are_refused_at_once() -> None:

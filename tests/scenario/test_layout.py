@@ -1,10 +1,5 @@
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from blast_env.errors import LayoutError
 from blast_env.scenario import (
@@ -12,7 +7,6 @@ from blast_env.scenario import (
     Scenario,
     bundled_scenarios,
     check_layout,
-    load_layout,
     load_scenario,
     usable_cells,
 )
@@ -104,74 +98,3 @@ def test_numpy_layouts_become_plain_integers(layout: list[Cell]) -> None:
 def test_bad_layout_is_refused_by_its_cell(layout: list[Cell], words: str) -> None:
     with pytest.raises(LayoutError, match=words):
         check_layout(scenario(), layout)
-
-
-@pytest.mark.parametrize("content", ["[[3, 1], [2, 0]]", '\ufeff{"cells": [[3, 1], [2, 0]]}'])
-def test_layout_file_gives_its_cells(tmp_path: Path, content: str) -> None:
-    path = tmp_path / "layout.json"
-    path.write_text(content, encoding="utf-8")
-    assert load_layout(path) == ((3, 1), (2, 0))
-    assert load_layout(str(path)) == ((3, 1), (2, 0))
-
-
-@pytest.mark.parametrize(
-    ("content", "place"),
-    [
-        (b"", "line 1, column 1"),
-        (b"[[1, 2],\n[3, 4", "line 2, column 6"),
-        (b"[[1, 2], [3, 4.0]]", r"\[1\]: is \(3, 4.0\)"),
-        (b'{"cells": [[1, 2], [3]]}', r"cells\[1\]: has 1 values"),
-        (b'{"cells": [[1, true]]}', r"cells\[0\]: is \(1, true"),
-        (b'{"cells": 3}', "cells: is 3, must be a list"),
-        (b'{"cell": []}', "must have the key 'cells' and no other"),
-        (b'{"cells": [], "seed": 1}', "must have the key 'cells' and no other"),
-        (b'{"cells": [], "cells": [[1, 2]]}', "a key occurs twice"),
-        (b"{}", "must have the key 'cells' and no other"),
-        (b"null", "is nothing, must be a list"),
-        (b'"text"', "is 'text' .a string., must be a list"),
-        (b"[[1, NaN]]", r"\[0\]: is \(1, nan\)"),
-        (b"[[1, " + b"9" * 5000 + b"]]", "9{57}... has 5000 digits"),
-        (b"[" * 100_000, "nested too deeply"),
-        (b"[[1, 2],\n\xff]", "line 2: is not UTF-8"),
-        (b" " * 1_000_001, "has 1000001 bytes, must have at most 1000000"),
-    ],
-)
-def test_bad_layout_file_is_named_with_the_place(
-    tmp_path: Path, content: bytes, place: str
-) -> None:
-    path = tmp_path / "layout.json"
-    path.write_bytes(content)
-    with pytest.raises(LayoutError, match=place) as caught:
-        load_layout(path)
-    assert str(caught.value).startswith(f"{path}: ")
-
-
-def test_layout_file_must_be_a_file(tmp_path: Path) -> None:
-    with pytest.raises(LayoutError, match="is a folder"):
-        load_layout(tmp_path)
-    with pytest.raises(LayoutError, match="no such file"):
-        load_layout(tmp_path / "missing.json")
-
-
-JSON = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=3),
-    max_leaves=12,
-)
-
-
-@given(st.one_of(JSON.map(json.dumps).map(str.encode), st.binary(max_size=40)))
-@settings(max_examples=300, deadline=None, derandomize=True)
-def test_any_layout_file_gives_cells_or_the_layout_error(
-    tmp_path_factory: pytest.TempPathFactory, content: bytes
-) -> None:
-    path = tmp_path_factory.getbasetemp() / "any_layout.json"
-    path.write_bytes(content)
-    try:
-        cells = load_layout(path)
-    except LayoutError as error:
-        message = str(error)
-    else:
-        assert all(len(cell) == 2 for cell in cells)
-        return
-    assert message.startswith(f"{path}: ")

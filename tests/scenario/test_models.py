@@ -8,6 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from blast_env.errors import BlastEnvError
+from blast_env.physics.presets import preset
 from blast_env.scenario import (
     Charge,
     PointSource,
@@ -241,7 +242,7 @@ def test_other_parameters_are_added_to_the_scenario_s_own() -> None:
     changed = scenario.with_simulation(overrides={"air": {"mass": 0.2}})
     again = changed.with_simulation(overrides={"air": {"spacing_units": 6.0}})
     assert (again.parameters.air.mass, again.parameters.air.spacing_units) == (0.2, 6.0)
-    assert scenario.parameters.air.mass == 0.79
+    assert scenario.parameters.air.mass == preset("collisional").air.mass
     with pytest.raises(ScenarioError, match="did you mean 'mass'"):
         scenario.with_simulation(overrides={"air": {"mas": 0.2}})
     with pytest.raises(ScenarioError, match="did you mean 'ballistic'"):

@@ -1,0 +1,94 @@
+"""What environments, evaluations and searches remember of each other's blasts."""
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, DiskCache, LoadsCache, Threat
+from tests.envs.small import ThinEngine, make, play, same, small_scenario
+from tests.envs.test_scenario_source import Sites
+
+FINISH = 40
+COUNTS = ("blasts", "cache_hits", "cache_hit_rate")
+
+
+def without_counts(steps: list[tuple]) -> tuple[list[tuple], dict[str, Any]]:
+    """Return the steps of an episode without the counts of blasts, and these."""
+    return steps, {name: steps[-1][4].pop(name) for name in COUNTS}
+
+
+def test_the_hit_rate_is_told() -> None:
+    env = make()
+    env.reset(seed=3)
+    first = env.step(FINISH)[4]  # the layout is the empty one: one blast, asked for once
+    assert {name: first[name] for name in COUNTS} == dict(zip(COUNTS, (1, 0, 0.0), strict=True))
+    env.reset(seed=3)
+    second = env.step(FINISH)[4]
+    assert {name: second[name] for name in COUNTS} == dict(zip(COUNTS, (1, 1, 0.5), strict=True))
+
+
+@pytest.mark.parametrize("kind", ["folder", "memory"])
+def test_a_second_environment_needs_no_blast_and_says_the_same(kind: str, tmp_path: Path) -> None:
+    cache = tmp_path / "blasts" if kind == "folder" else LoadsCache(100)
+    bare, _ = without_counts(play(make(), seed=5))
+    first, first_counts = without_counts(play(make(cache=cache), seed=5))
+    second, second_counts = without_counts(play(make(cache=cache), seed=5))
+    assert same(bare, first)
+    assert same(first, second)
+    assert first_counts["cache_hit_rate"] == 0.0
+    assert (second_counts["blasts"], second_counts["cache_hit_rate"]) == (0, 1.0)
+
+
+def test_an_evaluator_finds_the_blasts_of_an_environment(tmp_path: Path) -> None:
+    env = make(cache=str(tmp_path))
+    info = play(env, seed=5)[-1][4]
+    evaluator = BlastEvaluator(small_scenario(), ThinEngine(), cache=DiskCache(tmp_path))
+    threat = Threat(info["charges"][0], info["blast_seeds"][0][0])
+    loads = evaluator.loads(info["layout"], threat)
+    assert evaluator.blasts == 0
+    assert loads.protected_impulse_psi_s == info["impulse_psi_s"]
+
+
+def test_sites_that_the_memory_has_let_go_are_still_in_the_cache(tmp_path: Path) -> None:
+    env = make(Sites(), cache=tmp_path)
+    for seed in (*range(8), *range(8)):
+        env.reset(seed=seed)
+        info = env.step(FINISH)[4]
+    assert info["cache_hit_rate"] >= 0.5
+
+
+def test_a_pickled_environment_keeps_its_folder(tmp_path: Path) -> None:
+    env = make(cache=tmp_path / "blasts")
+    env.reset(seed=3)
+    twin = pickle.loads(pickle.dumps(env))
+    assert env.step(FINISH)[4]["blasts"] == 1
+    assert twin.step(FINISH)[4]["blasts"] == 0
+
+
+def test_environments_in_processes_share_a_folder(tmp_path: Path) -> None:
+    arguments: dict[str, Any] = {"engine": ThinEngine(), "cache": str(tmp_path)}
+    for blasts in (1, 0):
+        envs = gym.make_vec(
+            "BlastBarrier-v0",
+            num_envs=2,
+            vectorization_mode="async",
+            scenario=small_scenario(),
+            realisations=1,
+            **arguments,
+        )
+        envs.reset(seed=3)
+        info = envs.step(np.array([FINISH, FINISH]))[4]
+        assert info["blasts"].tolist() == [blasts, blasts]
+        envs.close()
+
+
+def test_what_is_no_cache_is_named() -> None:
+    with pytest.raises(BlastEnvError, match="cache is 3, must be a folder or have the methods"):
+        make(cache=3)
+    with pytest.raises(BlastEnvError, match="no argument 'cahce', did you mean 'cache'"):
+        make(cahce="folder")
