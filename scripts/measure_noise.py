@@ -14,6 +14,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from agents.random_layouts import random_layout
 from blast_env import load_scenario
 from blast_env.cli.output import print_line, progress_bar
 from blast_env.evaluation.evaluator import BlastEvaluator
@@ -85,7 +86,7 @@ def main(
     charges: Annotated[int, typer.Option(min=2, help="Charges drawn from the scenario.")] = 16,
     seeds: Annotated[int, typer.Option(min=2, help="Seeds of fan and air a charge.")] = 4,
     processes: int = 2,
-    engine: str = "pymunk",
+    engine: str = "event",
 ) -> None:
     """Print a table: signal, noise, and their ratio (in brackets for comparisons)."""
     columns = ["scenario, layouts, draws", "signal", "noise", "of reduction", "in comparisons"]
@@ -124,14 +125,6 @@ def measured_impulses(
     return impulses.reshape(len(layouts), *draws)
 
 
-def scattered_layout(scenario: Scenario, rng: np.random.Generator) -> Layout:
-    """Return a layout that has its modules anywhere, as many as can be placed."""
-    placement = Placement.empty(scenario)
-    while not placement.is_full:
-        placement = placement.place(_any_free(placement, rng))
-    return placement.cells
-
-
 def walled_layout(scenario: Scenario, rng: np.random.Generator) -> Layout:
     """Return a layout of straight walls, each as long as space and stock allow."""
     placement = Placement.empty(scenario)
@@ -150,7 +143,7 @@ def _any_free(placement: Placement, rng: np.random.Generator) -> Cell:
 
 
 LAYOUTS: Final[Mapping[str, Callable[[Scenario, np.random.Generator], Layout]]] = {
-    "scattered": scattered_layout,
+    "scattered": random_layout,
     "walls": walled_layout,
 }
 

@@ -18,6 +18,7 @@ import typer
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from agents.random_layouts import random_layout
 from blast_env import load_scenario, simulate
 from blast_env.atomic import write_atomically
 from blast_env.cli.output import print_line, progress_bar, user_errors
@@ -25,7 +26,7 @@ from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.presets import preset
 from blast_env.physics.resolution import with_resolution
 from blast_env.scenario import Cell, Scenario
-from scripts.measure_noise import scattered_layout, walled_layout
+from scripts.measure_noise import walled_layout
 
 FINER: Final = 1.5
 """How much finer the finest balls are than those of `collisional_fine`."""
@@ -61,7 +62,7 @@ def resolutions() -> dict[str, SimulationParameters]:
 def random_layouts(scenario: Scenario, count: int) -> list[Layout]:
     """Return walls and scattered modules in turn, the same in every call."""
     rng = np.random.default_rng(0)
-    kinds = (walled_layout, scattered_layout)
+    kinds = (walled_layout, random_layout)
     return [kinds[index % 2](scenario, rng) for index in range(count)]
 
 

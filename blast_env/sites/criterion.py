@@ -42,7 +42,7 @@ class SightLineCriterion:
 
     least_open_share: float = 0.6
     least_layout_share: float = 0.5
-    most_layout_share: float = 0.95
+    most_layout_share: float = 0.9
     least_advantage: float = 0.3
 
     def objection(self, scenario: Scenario) -> Objection | None:

@@ -84,8 +84,8 @@ class SiteRanges:
     parking_depth_m: Annotated[Span, LengthsBounds(0.5, 2000.0)] = (2.5, 4.0)
     threat_shift_m: Annotated[Span, LengthsBounds(-2000.0, 2000.0)] = (-4.0, 4.0)
     stand_off_m: Annotated[Span, LengthsBounds(1.0, 2000.0)] = (12.0, 20.0)
-    facade_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (8.0, 14.0)
-    depth_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (4.0, 10.0)
+    facade_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (6.0, 14.0)
+    depth_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (4.0, 12.0)
     building_shift_m: Annotated[Span, LengthsBounds(-2000.0, 2000.0)] = (-5.0, 5.0)
     neighbour_probability: Probability = 0.5
     neighbour_side_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (3.0, 6.0)
@@ -104,8 +104,8 @@ class SiteRanges:
     duct_width_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (1.5, 4.0)
     duct_module_cost: Annotated[Span, PairBounds(0.1, 1e9)] = (1.5, 4.0)
     budget_share: Annotated[Span, PairBounds(0.1, 1e6)] = (0.75, 1.5)
-    preset: str = "ballistic"
-    calibration: str = "ballistic_kb_100kg"
+    preset: str = "collisional"
+    calibration: str = "collisional_kb"
 
     def __post_init__(self) -> None:
         """Check the values; see the class for the errors."""

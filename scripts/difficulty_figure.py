@@ -1,0 +1,262 @@
+"""The picture of a scenario: site, threats and conditions, loads without and with a barrier."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from blast_env.evaluation import LayoutEvaluation
+from blast_env.rendering.captions import write_heading, write_names
+from blast_env.rendering.evaluation_plan import what_stands
+from blast_env.rendering.extra import render_extra
+from blast_env.rendering.site_plan import (
+    draw_loads,
+    draw_outline,
+    draw_site,
+    draw_zone,
+    in_metres,
+    load_colours,
+    rectangle_patch,
+)
+from blast_env.rendering.style import (
+    BARRIER,
+    EXPLOSIVE,
+    PROTECTED,
+    QUIET_INK,
+    STRUCTURE,
+    count_of,
+    nice_ceiling,
+    number_on_axis,
+    unit_interval,
+)
+from blast_env.scenario import AnySource, BuildZone, Placement, RectangleSource, Scenario
+from blast_env.scene import Scene, build_scene
+
+with render_extra():
+    from matplotlib import patheffects
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import PatchCollection
+    from matplotlib.colors import ListedColormap, Normalize
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+    from matplotlib.ticker import FuncFormatter
+
+# Okabe and Ito's blue: with the others here it can be told apart with any colour vision.
+_WAY: Final = "#0072B2"
+_FREE, _DEAR = "#d6eedb", "#f6dfa4"
+_PLAN_WIDTH_IN: Final = 6.6
+_EXTRA_HEIGHT_IN: Final = 2.1
+_PERCENT: Final = 100.0
+
+
+def difficulty_figure(evaluation: LayoutEvaluation, name: str) -> Figure:
+    """Return two plans of the site: no barrier, and a layout.
+
+    Both show where charges may be, where modules may stand and at what cost, and the mean load on
+    every module of the protected structures.
+
+    Args:
+        evaluation: The layout against no barrier.
+        name: What the layout is, for the title.
+    """
+    scenario, count = evaluation.scenario, len(evaluation.layout)
+    height_in = _PLAN_WIDTH_IN * scenario.site.height_m / scenario.site.width_m + _EXTRA_HEIGHT_IN
+    figure = Figure(figsize=(2.0 * _PLAN_WIDTH_IN + 1.0, height_in), layout="constrained")
+    plans = figure.subplots(1, 2, sharey=True)
+    scenes = _draw_plans(plans, evaluation)
+    plans[0].set_title(f"no barrier: {evaluation.unprotected_impulse_pa_s.value:,.0f} Pa·s")
+    with_pa_s = evaluation.impulse_pa_s.value
+    plans[1].set_title(f"{name}, {count_of('module', count)}: {with_pa_s:,.0f} Pa·s")
+    plans[1].set_ylabel("")
+    figure.legend(
+        handles=_legend(scenario), loc="outside lower center", ncols=4, fontsize=9, frameon=False
+    )
+    value, low, high = (_PERCENT * each for each in evaluation.reduction)
+    write_heading(
+        figure,
+        f"{scenario.name}: a reduction of {value:.0f} % (95 %: {low:.0f} to {high:.0f} %)",
+        f"best layout for all threats, means over {len(evaluation.threats)} threats; preset "
+        f"{scenario.simulation.preset}, calibration {evaluation.calibration.name}, engine "
+        f"{evaluation.engine_name}",
+    )
+    for axes, scene in zip(plans, scenes, strict=True):
+        # The others have names that say little and would cover much.
+        write_names(axes, [each for each in what_stands(scene) if each.protected or each.cells])
+    return figure
+
+
+def _draw_plans(plans: Sequence[Axes], evaluation: LayoutEvaluation) -> list[Scene]:
+    """Draw the site without and with the layout, with the loads on one scale; return the scenes."""
+    scenario, modules, threat = evaluation.scenario, evaluation.module_table, evaluation.threats[0]
+    columns = ["unprotected_impulse_sim", "impulse_sim"]
+    protected = [structure.name for structure in scenario.structures if structure.protected]
+    highest = float(modules.loc[modules.structure.isin(protected), columns].to_numpy().max())
+    scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
+    scenes = []
+    for axes, column, layout in zip(plans, columns, ((), evaluation.layout), strict=True):
+        scene = build_scene(scenario, layout, threat.seed, threat.charge)
+        impulse = dict(zip(modules.module_id, modules[column], strict=True))
+        _draw_plan(axes, scenario, scene, impulse, scale)
+        scenes.append(scene)
+    figure = plans[0].get_figure(root=True)
+    assert figure is not None
+    bar = figure.colorbar(
+        ScalarMappable(scale, load_colours()),
+        ax=list(plans),
+        shrink=0.8,
+        pad=0.01,
+        format=FuncFormatter(number_on_axis),
+    )
+    bar.set_label("mean impulse per module (simulation units); white: not hit")
+    return scenes
+
+
+def _draw_plan(
+    axes: Axes, scenario: Scenario, scene: Scene, impulse: dict[str, float], scale: Normalize
+) -> None:
+    draw_site(axes, in_metres(scene.site))
+    if scenario.build_zone is not None:
+        _draw_cells(axes, scenario, scenario.build_zone)
+        draw_zone(axes, scenario.build_zone)
+        _draw_way(axes, scenario.build_zone)
+    for obstacle in scene.obstacles():
+        if obstacle.protected:
+            for part in obstacle.parts:
+                part.impulse = impulse[part.module_id]
+                part.hits = int(part.impulse > 0.0)
+            draw_loads(axes, obstacle, scale, linewidth=0.2)
+            draw_outline(axes, obstacle)
+            continue
+        colour = unit_interval(STRUCTURE if obstacle.cells is None else BARRIER)
+        parts = [rectangle_patch(in_metres(part.rectangle)) for part in obstacle.parts]
+        axes.add_collection(PatchCollection(parts, color=colour, linewidth=0.3, zorder=4))
+    share = 1.0 / sum(source.weight for source in scenario.charge)
+    for source in scenario.charge:
+        _draw_source(axes, source, share * source.weight)
+
+
+def _draw_cells(axes: Axes, scenario: Scenario, zone: BuildZone) -> None:
+    """Colour the cells that may take a module, those that cost more in another colour."""
+    placement = Placement.empty(scenario)
+    dear = placement.module_costs > zone.module_cost
+    kinds = np.ma.masked_array(dear.astype(float), mask=~placement.free)
+    left, bottom, right, top = zone.rectangle_m
+    axes.imshow(
+        kinds,
+        cmap=ListedColormap([_FREE, _DEAR]),
+        vmin=0.0,
+        vmax=1.0,
+        origin="lower",
+        extent=(left, right, bottom, top),
+        interpolation="none",
+        zorder=1.5,
+        aspect="equal",
+    )
+
+
+def _draw_way(axes: Axes, zone: BuildZone) -> None:
+    """Draw the two sides of the zone that the access way connects."""
+    if zone.access_way is None:
+        return
+    left, bottom, right, top = zone.rectangle_m
+    sides = {
+        "left_right": (((left, left), (bottom, top)), ((right, right), (bottom, top))),
+        "bottom_top": (((left, right), (bottom, bottom)), ((left, right), (top, top))),
+    }[zone.access_way.between]
+    for xs, ys in sides:
+        axes.add_line(Line2D(xs, ys, color=_WAY, linewidth=2.6, zorder=2.5))
+
+
+def _draw_source(axes: Axes, source: AnySource, share: float) -> None:
+    """Draw where a charge may be, with its mass and how likely it is."""
+    colour = unit_interval(EXPLOSIVE)
+    if isinstance(source, RectangleSource):
+        patch = rectangle_patch(source.rectangle_m)
+        patch.set(facecolor=(*colour, 0.3), edgecolor=colour, linewidth=1.0, zorder=5)
+        axes.add_patch(patch)
+        x_m, y_m = source.rectangle_m.centre
+    else:
+        (x0_m, y0_m), (x1_m, y1_m) = source.segment_m
+        axes.plot(
+            (x0_m, x1_m),
+            (y0_m, y1_m),
+            color=(*colour, 0.6),
+            linewidth=6.0,
+            solid_capstyle="round",
+            marker="o",
+            markersize=4.0,
+            zorder=5,
+        )
+        x_m, y_m = (x0_m + x1_m) / 2.0, (y0_m + y1_m) / 2.0
+    _write_source(axes, source, (x_m, y_m), share)
+
+
+def _write_source(
+    axes: Axes, source: AnySource, middle_m: tuple[float, float], share: float
+) -> None:
+    """Write the mass of a charge and how likely it is: into an area, or beside a line or point."""
+    if isinstance(source, RectangleSource):
+        offset_pt, turn, across, along = (0.0, 0.0), 0.0, "center", "center"
+    elif source.segment_m[0][0] == source.segment_m[1][0] != source.segment_m[0][1]:
+        offset_pt, turn, across, along = (-7.0, 0.0), 90.0, "right", "center"
+    else:
+        offset_pt, turn, across, along = (0.0, 7.0), 0.0, "center", "bottom"
+    text = axes.annotate(
+        f"{source.tnt_kg:g} kg, {_PERCENT * share:.0f} %",
+        middle_m,
+        xytext=offset_pt,
+        textcoords="offset points",
+        rotation=turn,
+        ha=across,
+        va=along,
+        fontsize=8.5,
+        color=unit_interval(EXPLOSIVE),
+        zorder=6,
+    )
+    text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
+
+
+def _legend(scenario: Scenario) -> list[Artist]:
+    """Return the legend entries for what the scenario has."""
+    zone = scenario.build_zone
+    charge = (*unit_interval(EXPLOSIVE), 0.6)
+    handles: list[Artist] = [
+        Line2D([], [], color=charge, linewidth=6.0, label="charge: mass, how likely"),
+        Patch(
+            fill=False,
+            edgecolor=unit_interval(PROTECTED),
+            linewidth=2.4,
+            label="protected structure",
+        ),
+    ]
+    if not all(structure.protected for structure in scenario.structures):
+        handles.append(Patch(color=unit_interval(STRUCTURE), label="other structure"))
+    handles.append(Patch(color=unit_interval(BARRIER), label="barrier module"))
+    if zone is None:
+        return handles
+    quiet = unit_interval(QUIET_INK)
+    handles.append(Patch(fill=False, edgecolor=quiet, linestyle="--", label="build zone"))
+    handles.append(Patch(color=_FREE, label=_free_label(zone)))
+    if zone.cost_areas:
+        costs = sorted({f"{area.module_cost:g}" for area in zone.cost_areas})
+        budget = "" if zone.budget is None else f" (budget {zone.budget:g})"
+        handles.append(Patch(color=_DEAR, label=f"cost {' or '.join(costs)}{budget}"))
+    if zone.keep_outs:
+        handles.append(Patch(fill=False, edgecolor=quiet, hatch="////", label="keep-out"))
+    if zone.access_way is not None:
+        label = f"sides joined by an access way of {zone.access_way.width_m:g} m"
+        handles.append(Line2D([], [], color=_WAY, linewidth=2.6, label=label))
+    return handles
+
+
+def _free_label(zone: BuildZone) -> str:
+    """Return what the legend says about cells that may take a module."""
+    words = f"free cell, stock of {zone.stock}"
+    if zone.cost_areas:
+        words += f", cost {zone.module_cost:g}"
+    if zone.clearance_m > 0.0:
+        words += f", {zone.clearance_m:g} m from structures"
+    return words
