@@ -44,6 +44,26 @@ def user_errors() -> Iterator[None]:
 
 
 @contextmanager
+def agents_extra(what: str) -> Iterator[None]:
+    """Say how to get packages that are needed and not installed.
+
+    Args:
+        what: What needs them.
+
+    Raises:
+        BlastEnvError: If a package is missing.
+    """
+    try:
+        yield
+    except ImportError as error:
+        missing = error.name or str(error)
+        raise BlastEnvError(
+            f"{what} needs {missing!r}, which is not installed: "
+            "pip install blast-env[agents,render]"
+        ) from error
+
+
+@contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
     """Show a progress bar on standard error; it is gone when the work is done.
 

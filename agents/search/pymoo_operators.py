@@ -1,0 +1,161 @@
+"""Layouts as pymoo's individuals: how they are crossed, changed and repaired.
+
+An individual is one truth value a cell of the build zone, row by row (rows * columns,).
+"""
+
+from math import cos, pi, sin
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.crossover import Crossover
+from pymoo.core.mutation import Mutation
+from pymoo.core.repair import Repair
+
+from agents.search.moves import Moves, legal_part
+from agents.search.problem import Layout
+from blast_env.errors import LayoutError
+from blast_env.scenario import Cell, Placement, Scenario
+
+BoolArray = NDArray[np.bool_]
+
+
+def individual(scenario: Scenario, layout: Layout) -> BoolArray:
+    """Return a layout as an individual (cells,)."""
+    cells = np.zeros(Placement.empty(scenario).usable.shape, dtype=bool)
+    if layout:
+        cells[tuple(zip(*layout, strict=True))] = True
+    return cells.ravel()
+
+
+def layout_of(scenario: Scenario, cells: BoolArray) -> Layout:
+    """Return an individual (cells,) as a layout, its cells sorted."""
+    columns = Placement.empty(scenario).usable.shape[1]
+    return tuple(divmod(int(index), columns) for index in np.flatnonzero(cells))
+
+
+class SpatialCrossover(Crossover):
+    """Children with the modules of one parent on one side and the other's on the other side.
+
+    What works in a layout is a group of modules near each other, which a cut along a line in a
+    random direction mostly leaves whole. In some of the pairs a child draws its modules from those
+    of both parents instead, so that two walls in one place can become one. A child has as many
+    modules as one of its parents, unless two fall on one cell.
+
+    Args:
+        scenario: The scenario.
+        prob: Share of the pairs that are crossed at all.
+        mixed_share: Share of the crossed pairs that are mixed and not cut.
+    """
+
+    def __init__(self, scenario: Scenario, prob: float, mixed_share: float = 0.3) -> None:
+        super().__init__(2, 2, prob=prob)
+        self._scenario, self._mixed_share = scenario, mixed_share
+
+    def _do(
+        self,
+        _problem: Any,
+        cells: BoolArray,
+        *_: Any,
+        random_state: np.random.Generator,
+        **_options: Any,
+    ) -> BoolArray:
+        children = np.empty_like(cells)
+        for pair in range(cells.shape[1]):
+            parents = [layout_of(self._scenario, cells[each, pair]) for each in (0, 1)]
+            cross = mixed if random_state.random() < self._mixed_share else cut
+            for child, (first, second) in enumerate((parents, parents[::-1])):
+                layout = cross(first, second, random_state)
+                children[child, pair] = individual(self._scenario, layout)
+        return children
+
+
+def cut(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
+    """Return the first modules of one layout and the last ones of another in some direction."""
+    angle = rng.uniform(0.0, 2.0 * pi)
+
+    def along(cell: Cell) -> float:
+        return cos(angle) * cell[0] + sin(angle) * cell[1]
+
+    count = int(rng.integers(len(first) + 1))
+    last = sorted(second, key=along)[count:] if count < len(second) else []
+    return tuple(sorted({*sorted(first, key=along)[:count], *last}))
+
+
+def mixed(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
+    """Return as many modules as the first layout has, drawn from those of both."""
+    both = sorted({*first, *second})
+    chosen = rng.choice(len(both), size=min(len(first), len(both)), replace=False)
+    return tuple(both[index] for index in sorted(chosen))
+
+
+class MoveMutation(Mutation):
+    """A few moves of the neighbourhood that annealing uses too.
+
+    Args:
+        moves: The neighbourhood.
+        more: How likely each further move is after the first.
+    """
+
+    def __init__(self, moves: Moves, more: float) -> None:
+        super().__init__(prob=1.0)
+        self._moves, self._more = moves, more
+
+    def _do(
+        self,
+        _problem: Any,
+        cells: BoolArray,
+        *_: Any,
+        random_state: np.random.Generator,
+        **_options: Any,
+    ) -> BoolArray:
+        scenario = self._moves.scenario
+        return np.array([individual(scenario, self._changed(each, random_state)) for each in cells])
+
+    def _changed(self, cells: BoolArray, rng: np.random.Generator) -> Layout:
+        scenario = self._moves.scenario
+        layout = repaired(scenario, layout_of(scenario, cells), rng)
+        layout = self._moves.neighbour(layout, rng)
+        while rng.random() < self._more:
+            layout = self._moves.neighbour(layout, rng)
+        return layout
+
+
+class LayoutRepair(Repair):
+    """Leaves out modules of a child, chosen at random, until all conditions hold.
+
+    Args:
+        scenario: The scenario.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__()
+        self._scenario = scenario
+
+    def _do(
+        self,
+        _problem: Any,
+        cells: BoolArray,
+        *_: Any,
+        random_state: np.random.Generator,
+        **_options: Any,
+    ) -> BoolArray:
+        layouts = (
+            repaired(self._scenario, layout_of(self._scenario, each), random_state)
+            for each in cells
+        )
+        return np.array([individual(self._scenario, layout) for layout in layouts])
+
+
+def repaired(scenario: Scenario, layout: Layout, rng: np.random.Generator) -> Layout:
+    """Return as much of a layout as may stand: what is left out is chosen at random."""
+    zone = scenario.build_zone
+    stock = 0 if zone is None else zone.stock
+    if len(layout) > stock:
+        kept = rng.choice(len(layout), size=stock, replace=False)
+        layout = tuple(layout[index] for index in sorted(kept))
+    try:
+        return Placement.of(scenario, layout).cells
+    except LayoutError:
+        order = rng.permutation(len(layout))
+        return legal_part(scenario, [layout[index] for index in order]).cells

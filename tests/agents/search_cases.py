@@ -1,0 +1,57 @@
+"""A problem small enough that every layout can be tried, and evaluators that watch or break off."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from agents.search import Layout, LayoutProblem, visible_threats
+from blast_env import load_scenario
+from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
+from blast_env.scenario import Cell, Scenario
+from tests.agents.sites import site
+
+CALIBRATION = "ballistic_kb_100kg"
+
+
+def small_scenario(rows: int = 4, columns: int = 3, stock: int = 3) -> Scenario:
+    """Return a site with a few cells between the charge, a little off the middle, and building."""
+    scenario = site(
+        charge_m=(5.0, 20.5), corner_m=(15.0, 19.0), rows=rows, columns=columns, stock=stock
+    )
+    return scenario.model_copy(update={"calibration": CALIBRATION})
+
+
+def ballistic(name: str) -> Scenario:
+    """Return a bundled scenario in thin air, in which a blast takes a few milliseconds."""
+    document = load_scenario(name).model_dump()
+    document |= {"simulation": {"preset": "ballistic"}, "calibration": CALIBRATION}
+    return Scenario.from_document(document, name)
+
+
+def small_problem(
+    evaluator: BlastEvaluator | None = None, realisations: int = 2, processes: int = 1
+) -> LayoutProblem:
+    """Return the problem of the small site's own charge: 299 layouts, 598 blasts."""
+    evaluator = evaluator or BlastEvaluator(small_scenario(), "event")
+    charge = evaluator.scenario.sample_charge(np.random.default_rng(0))
+    return LayoutProblem(evaluator, visible_threats(charge, realisations, 5), processes=processes)
+
+
+class WatchedEvaluator(BlastEvaluator):
+    """Tells somebody which blasts are asked for, before they are run."""
+
+    def __init__(
+        self, scenario: Scenario, watch: Callable[[list[tuple[Layout, Threat]]], None]
+    ) -> None:
+        super().__init__(scenario, "event")
+        self._watch = watch
+
+    def loads_of_many(
+        self,
+        pairs: Iterable[tuple[Sequence[Cell], Threat]],
+        processes: int = 1,
+        progress: Callable[[float], None] | None = None,
+    ) -> list[BlastLoads]:
+        asked = [(tuple(layout), threat) for layout, threat in pairs]
+        self._watch(asked)
+        return super().loads_of_many(asked, processes, progress)

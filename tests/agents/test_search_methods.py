@@ -1,0 +1,273 @@
+"""Every search method: how near it comes to a known optimum, and what holds for all of them."""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from agents.rules import wall_near_building, wall_near_charge
+from agents.search import (
+    SEARCH_METHODS,
+    GeneticSearch,
+    Layout,
+    LayoutProblem,
+    SearchResult,
+    find_search_method,
+    hidden_threats,
+)
+from agents.search.exhaustive import every_layout
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.scenario import Placement, Scenario
+from tests.agents.search_cases import WatchedEvaluator, ballistic, small_problem, small_scenario
+
+ALL_BLASTS = 598
+DRAWN = ("random", "greedy", "annealing", "genetic", "nsga2")
+SEEDS = range(5)
+
+
+@pytest.fixture(scope="module")
+def problem() -> LayoutProblem:
+    """The small problem; what one test has simulated costs the others no time."""
+    return small_problem()
+
+
+@pytest.fixture(scope="module")
+def optimum(problem: LayoutProblem) -> SearchResult:
+    return find_search_method("exhaustive").search(problem, ALL_BLASTS, 0)
+
+
+def gap(problem: LayoutProblem, result: SearchResult, optimum: SearchResult) -> float:
+    """Return what a result misses of the optimum, as a share of the impulse without a barrier."""
+    assert optimum.impulse_pa_s is not None
+    missed_pa_s = problem.impulse_pa_s(result.layout) - optimum.impulse_pa_s
+    return missed_pa_s / problem.impulse_pa_s(())
+
+
+def test_the_optimum_is_known(problem: LayoutProblem, optimum: SearchResult) -> None:
+    layouts = list(every_layout(problem))
+    assert len(layouts) == len(set(layouts)) == 299
+    assert optimum.blasts == ALL_BLASTS
+    assert optimum.impulse_pa_s == min(map(problem.impulse_pa_s, layouts))
+    assert gap(problem, optimum, optimum) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "budget", "most"),
+    [
+        ("random", ALL_BLASTS // 2, 0.005),
+        ("greedy", ALL_BLASTS // 2, 0.015),  # what it has placed it never moves again
+        ("annealing", ALL_BLASTS // 2, 0.01),
+        ("genetic", ALL_BLASTS // 2, 0.005),
+        ("nsga2", ALL_BLASTS // 2, 0.02),  # also looks for layouts with fewer modules
+        ("random", ALL_BLASTS // 10, 0.02),
+        ("greedy", ALL_BLASTS // 10, 0.015),
+        ("annealing", ALL_BLASTS // 10, 0.02),
+        ("genetic", ALL_BLASTS // 10, 0.025),
+        ("nsga2", ALL_BLASTS // 10, 0.035),
+        ("wall_near_charge", 0, 0.04),
+        ("wall_near_building", 0, 0.045),
+    ],
+)
+def test_gaps_to_the_optimum(
+    name: str, budget: int, most: float, problem: LayoutProblem, optimum: SearchResult
+) -> None:
+    """Mean over seeds with a half and with a tenth of the blasts that exhaustive search takes.
+
+    The optimum takes 86 % off the impulse; one random layout after the other would do too on 299.
+    """
+    method = find_search_method(name)
+    gaps = [gap(problem, method.search(problem, budget, seed), optimum) for seed in SEEDS]
+    assert min(gaps) >= 0.0
+    assert float(np.mean(gaps)) <= most
+
+
+def test_exhaustive_search_is_for_small_instances(problem: LayoutProblem) -> None:
+    with pytest.raises(BlastEnvError, match=r"299 layouts \(12 .* 598 blasts; the budget is 597"):
+        find_search_method("exhaustive").search(problem, ALL_BLASTS - 1, 0)
+    scenario = ballistic("courtyard")
+    large = LayoutProblem(BlastEvaluator(scenario, "event"), problem.threats)
+    with pytest.raises(BlastEnvError, match=r"e\+\d\d layouts .* for small instances"):
+        find_search_method("exhaustive").search(large, 1000, 0)
+
+
+def test_exhaustive_search_leaves_out_what_is_not_legal() -> None:
+    """Two of three rows must stay open: nothing, or modules in the row at one of the borders."""
+    document = small_scenario(rows=3, columns=2, stock=2).model_dump()
+    document["build_zone"]["access_way"] = {"width_m": 1.0, "between": "left_right"}
+    scenario = Scenario.from_document(document, "with a way")
+    problem = LayoutProblem(BlastEvaluator(scenario, "event"), small_problem().threats)
+    lower, upper = ((0, 0), (0, 1)), ((2, 0), (2, 1))
+    single = {(cell,) for cell in (*lower, *upper)}
+    assert set(every_layout(problem)) == {(), lower, upper, *single}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_the_seed_decides_everything(name: str, problem: LayoutProblem) -> None:
+    method = find_search_method(name)
+    assert method.search(problem, 20, 3) == method.search(problem, 20, 3)
+    histories = {method.search(problem, 20, seed).history for seed in range(4)}
+    assert len(histories) > 1
+
+
+def test_the_number_of_processes_changes_nothing(problem: LayoutProblem) -> None:
+    fresh = small_problem(processes=2)
+    assert GeneticSearch().search(fresh, 24, 1) == GeneticSearch().search(problem, 24, 1)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("budget", [1, 2, 7, 33])
+def test_blasts_are_counted_and_never_exceed_the_budget(name: str, budget: int) -> None:
+    """Distinct pairs that were asked for; nearly all of the budget is spent."""
+    asked: list[tuple[Layout, Threat]] = []
+    watched = WatchedEvaluator(small_scenario(), asked.extend)
+    result = find_search_method(name).search(small_problem(watched), budget, 0)
+    assert result.blasts == len(asked) == len(set(asked)) <= budget
+    assert result.blasts >= 0.7 * budget
+    assert result.budget == budget
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_histories_say_what_was_best_when(name: str, problem: LayoutProblem) -> None:
+    result = find_search_method(name).search(problem, 60, 2)
+    for earlier, later in pairwise(result.history):
+        assert earlier.blasts < later.blasts
+        more = later.threats > earlier.threats
+        assert more or later.impulse_pa_s < earlier.impulse_pa_s
+    last = result.history[-1]
+    assert (last.layout, last.impulse_pa_s) == (result.layout, result.impulse_pa_s)
+    assert result.best_at(0) is None
+    assert result.best_at(last.blasts - 1) in (None, *result.history[:-1])
+    assert result.best_at(60) == last
+    table = result.history_table()
+    assert table["modules"].tolist() == [len(each.layout) for each in result.history]
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_an_interruption_keeps_the_best_so_far(name: str, problem: LayoutProblem) -> None:
+    interrupted = find_search_method(name).search(_interrupted_after(30), 100, 0)
+    whole = find_search_method(name).search(problem, 100, 0)
+    assert interrupted.interrupted
+    assert not whole.interrupted
+    assert 0 < interrupted.blasts <= 30
+    best = whole.best_at(interrupted.blasts)
+    assert best is not None
+    assert interrupted.layout == best.layout
+
+
+def test_an_interruption_before_the_first_blast_leaves_the_empty_layout() -> None:
+    result = find_search_method("genetic").search(_interrupted_after(0), 100, 0)
+    assert (result.layout, result.impulse_pa_s, result.blasts) == ((), None, 0)
+    assert result.interrupted
+
+
+def _interrupted_after(blasts: int) -> LayoutProblem:
+    """Return the small problem; Ctrl-C comes when more blasts are asked for."""
+    left = [blasts]
+
+    def watch(pairs: list[tuple[Layout, Threat]]) -> None:
+        left[0] -= len(pairs)
+        if left[0] < 0:
+            raise KeyboardInterrupt
+
+    return small_problem(WatchedEvaluator(small_scenario(), watch))
+
+
+@pytest.mark.parametrize("name", ["courtyard", "street_junction"])
+@pytest.mark.parametrize("method", DRAWN)
+def test_layouts_are_legal_on_real_sites(method: str, name: str) -> None:
+    """With keep-outs, a budget and an access way, against a hidden charge."""
+    scenario = ballistic(name)
+    evaluator = BlastEvaluator(scenario, "event")
+    problem = LayoutProblem(evaluator, hidden_threats(scenario, 3, 1, 0))
+    result = find_search_method(method).search(problem, 10, 0)
+    assert Placement.of(scenario, result.layout).cells == result.layout == (*sorted(result.layout),)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_it_ends_when_there_is_nothing_new_left(name: str) -> None:
+    """Two cells and one module make three layouts, whatever the budget."""
+    evaluator = BlastEvaluator(small_scenario(rows=2, columns=1, stock=1), "event")
+    problem = small_problem(evaluator)
+    result = find_search_method(name).search(problem, 1000, 0)
+    assert result.blasts <= 6
+    assert result.layout in (((0, 0),), ((1, 0),))
+
+
+@pytest.mark.parametrize("name", ["random", "annealing", "genetic", "nsga2"])
+def test_it_can_begin_with_given_layouts(name: str, optimum: SearchResult) -> None:
+    """They are among the first that are assessed, and a good one is not simply lost."""
+    asked: list[list[tuple[Layout, Threat]]] = []
+    watched = small_problem(WatchedEvaluator(small_scenario(), asked.append))
+    method = find_search_method(name, (optimum.layout,))
+    result = method.search(watched, 40, 0)
+    assert method.name == result.method == name
+    assert optimum.layout in {layout for layout, _ in asked[0]}
+    assert gap(watched, result, optimum) <= 0.03
+
+
+@pytest.mark.parametrize("name", ["greedy", "exhaustive", "wall_near_charge"])
+def test_some_begin_with_none(name: str) -> None:
+    with pytest.raises(BlastEnvError, match=f"{name} begins with no layouts"):
+        find_search_method(name, (((0, 0),),))
+
+
+def test_a_misspelt_method_is_told_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="no search method 'genetik', did you mean 'genet"):
+        find_search_method("genetik")
+
+
+@pytest.mark.parametrize(
+    ("name", "rule"),
+    [("wall_near_charge", wall_near_charge), ("wall_near_building", wall_near_building)],
+)
+def test_rules_spend_nothing(
+    name: str, rule: Callable[..., Layout], problem: LayoutProblem
+) -> None:
+    result = find_search_method(name).search(problem, 0, 0)
+    assert result.blasts == 0
+    assert result.impulse_pa_s is None
+    assert set(result.layout) == set(rule(problem.scenario, problem.charge))
+
+
+def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:
+    scenario = ballistic("courtyard")
+    evaluator = BlastEvaluator(scenario, "event")
+    problem = LayoutProblem(evaluator, hidden_threats(scenario, 8, 1, 0))
+    assert problem.charge.position_m == pytest.approx((5.0, 15.0))
+
+
+def test_the_front_is_near_the_true_one(problem: LayoutProblem, optimum: SearchResult) -> None:
+    """For each number of modules the gap to the best layout with at most as many."""
+    result = find_search_method("nsga2").search(problem, ALL_BLASTS // 2, 1)
+    bare_pa_s = problem.impulse_pa_s(())
+    layouts = list(every_layout(problem))
+    assert [len(each.layout) for each in result.front] == [0, 1, 2, 3]
+    for each in result.front:
+        true_pa_s = min(
+            problem.impulse_pa_s(layout) for layout in layouts if len(layout) <= len(each.layout)
+        )
+        assert (problem.impulse_pa_s(each.layout) - true_pa_s) / bare_pa_s <= 0.03
+    assert result.layout == result.front[-1].layout
+    assert len(result.front_table()) == 4
+
+
+def test_every_method_has_its_name() -> None:
+    assert all(name == method.name for name, method in SEARCH_METHODS.items())
+    assert {*DRAWN, "exhaustive", "wall_near_charge", "wall_near_building"} == set(SEARCH_METHODS)
+
+
+def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
+    """At equal cost, over two charges: what makes it a baseline worth beating."""
+    scenario = ballistic("courtyard")
+    evaluator = BlastEvaluator(scenario, "event", cache_size=10_000)
+    better_pa_s = []
+    for seed in (0, 1):
+        problem = LayoutProblem(evaluator, hidden_threats(scenario, 1, 2, seed))
+        genetic, drawn = (
+            problem.impulse_pa_s(find_search_method(name).search(problem, 100, seed).layout)
+            for name in ("genetic", "random")
+        )
+        better_pa_s.append(drawn - genetic)
+    assert sum(better_pa_s) > 0.0

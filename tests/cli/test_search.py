@@ -1,0 +1,168 @@
+"""`blast-env search`, run in this process."""
+
+import json
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner, Result
+
+from agents.search import LayoutProblem, find_search_method, hidden_threats, visible_threats
+from blast_env import load_scenario, save_scenario
+from blast_env.cli import app
+from blast_env.evaluation import BlastEvaluator
+from blast_env.physics.event_engine import EventRun
+from blast_env.scenario import Charge, LayoutFile, SegmentSource, load_layout
+from tests.agents.search_cases import small_scenario
+
+CHARGE = Charge((5.0, 20.5), 100.0)
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Path:
+    path = tmp_path / "site.toml"
+    save_scenario(small_scenario(), path)
+    return path
+
+
+def search(*arguments: str | Path | float) -> Result:
+    return CliRunner().invoke(app, ["search", *(str(argument) for argument in arguments)])
+
+
+def test_it_has_help_and_is_listed() -> None:
+    assert "search" in CliRunner().invoke(app, ["--help"]).stdout
+    result = search("--help")
+    assert result.exit_code == 0
+    assert "genetic" in result.stdout
+
+
+def test_it_finds_what_the_library_finds_and_writes_all_files(site: Path, tmp_path: Path) -> None:
+    out = tmp_path / "a" / "b"
+    options = ("--budget", 60, "--seed", 3, "--held-out", 4, "--out", out)
+    result = search("--method", "nsga2", "--scenario", site, *options)
+    assert result.exit_code == 0, result.output
+    evaluator = BlastEvaluator(load_scenario(site), "event")
+    problem = LayoutProblem(evaluator, visible_threats(CHARGE, 2, 3))
+    expected = find_search_method("nsga2").search(problem, 60, 3)
+    assert load_layout(out / "layout.json", evaluator.scenario) == expected.layout
+    assert f"{expected.blasts} of 60 blasts spent" in result.stdout
+    assert f"{problem.impulse_pa_s(expected.layout):,.0f}" in result.stdout
+    for name, table in (("history", expected.history_table()), ("front", expected.front_table())):
+        written = pd.read_csv(out / f"{name}.csv").fillna("")  # the empty layout is an empty field
+        pd.testing.assert_frame_equal(written, table, check_dtype=False, rtol=1e-9)
+    for name in ("layout.json", "history.csv", "front.csv", "search.png"):
+        assert f"wrote {out / name}" in result.stdout
+    assert (out / "search.png").stat().st_size > 10_000
+
+
+def test_the_layout_says_how_it_was_made(site: Path, tmp_path: Path) -> None:
+    options = ("--budget", 10, "--seed", 3, "--held-out", 2, "--charge-position", 5, 19)
+    result = search("--method", "random", "--scenario", site, *options, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    content = LayoutFile.load(tmp_path / "out" / "layout.json")
+    assert content.scenario_hash == load_scenario(site).content_hash
+    assert content.provenance["options"]["method"] == "random"
+    assert [each["charge_position_m"] for each in content.provenance["threats"]] == [
+        [5.0, 19.0]
+    ] * 2
+    assert content.provenance["result"]["blasts"] == 10
+    assert "blast_env" in content.provenance["versions"]
+
+
+def test_a_hidden_threat_is_searched_for_wherever_it_may_be(tmp_path: Path) -> None:
+    road = SegmentSource(kind="segment", start_m=(5.0, 15.0), end_m=(5.0, 25.0), tnt_kg=100.0)
+    scenario = small_scenario().model_copy(update={"charge": (road,)})
+    out, site = tmp_path / "out", tmp_path / "site.toml"
+    save_scenario(scenario, site)
+    options = ("--threat", "hidden", "--threats", 3, "--budget", 12, "--held-out", 2, "--out", out)
+    result = search("--scenario", site, "--method", "random", "--risk", "cvar", *options)
+    assert result.exit_code == 0, result.output
+    assert "mean of the worst 20 %" in result.stdout
+    threats = hidden_threats(scenario, 3, 1, 0)
+    listed = json.loads((out / "layout.json").read_text())["provenance"]["threats"]
+    assert [each["seed"] for each in listed] == [threat.seed for threat in threats]
+    assert len({tuple(each["charge_position_m"]) for each in listed}) == 3
+
+
+def test_a_rule_spends_nothing(site: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    options = ("--scenario", site, "--held-out", 2, "--out", out)
+    result = search("--method", "wall_near_charge", *options)
+    assert result.exit_code == 0, result.output
+    assert "0 of 200 blasts spent" in result.stdout
+    assert [path.name for path in out.iterdir()] == ["layout.json"]
+
+
+def test_it_begins_with_given_layouts_and_keeps_blasts(site: Path, tmp_path: Path) -> None:
+    """The second run asks the folder for all of its blasts, and spends and finds the same."""
+    start = tmp_path / "start.json"
+    start.write_text("[[0, 0], [1, 0], [3, 2]]")
+    options = ("--start-from", start, "--budget", 20, "--held-out", 2, "--cache", tmp_path / "kept")
+    first, second = (search("--scenario", site, *options) for _ in range(2))
+    assert first.exit_code == second.exit_code == 0, first.output
+    assert "20 of 20 blasts spent, 0 of the loads asked for known already" in first.stdout
+    assert "20 of 20 blasts spent, 20 of the loads asked for known already" in second.stdout
+    assert first.stdout.split("modules;")[0] == second.stdout.split("modules;")[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--scenario", "cortyard"), "did you mean 'courtyard'"),
+        (("--method", "genetik"), "did you mean 'genetic'"),
+        (("--engine", "evnt"), "did you mean 'event'"),
+        (("--risk", "men"), "did you mean 'mean'"),
+        (("--method", "exhaustive"), "exhaustive search is for small instances"),
+        (("--method", "greedy", "--start-from", "layout.json"), "greedy begins with no layouts"),
+        (("--start-from", "nowhere.json"), "nowhere.json"),
+        (("--threats", "4"), "threats is 4, must be 1 unless threat is 'hidden'"),
+        (("--threat", "hidden", "--charge-position", "5", "9"), "a hidden one is drawn"),
+        (("--charge-position", "28", "12"), "charge[0]"),
+        (("--scenario", "free_field"), "has no build zone"),
+        (("--budget", "0"), "greater than or equal to 1"),
+        (("--out", "layout.json"), "layout.json: cannot be a folder"),
+    ],
+)
+def test_bad_input_is_one_clear_message(
+    arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "layout.json").write_text("[]")
+    result = search("--budget", 4, *arguments)
+    assert result.exit_code == 2
+    assert words in " ".join(result.stderr.split())
+    assert "Traceback" not in result.output
+
+
+def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("agents.search")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "pymoo.algorithms.soo.nonconvex.ga", None)
+    result = search("--budget", 4)
+    assert result.exit_code == 2
+    assert "pip install blast-env[agents,render]" in result.stderr
+
+
+def test_an_interruption_keeps_the_best_so_far(
+    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C after some thirty blasts: the layout is written, and checked on other threats."""
+    left, advance = [30], EventRun.advance
+
+    def interrupted(self: EventRun, until_s: float) -> None:
+        left[0] -= 1
+        if left[0] == 0:
+            raise KeyboardInterrupt
+        advance(self, until_s)
+
+    monkeypatch.setattr(EventRun, "advance", interrupted)
+    out = tmp_path / "out"
+    result = search("--scenario", site, "--budget", 100, "--held-out", 2, "--out", out)
+    assert result.exit_code == 130
+    assert "interrupted: the best layout so far was kept" in result.stderr
+    content = json.loads((out / "layout.json").read_text())
+    assert content["provenance"]["result"]["interrupted"] is True
+    assert 0 < content["provenance"]["result"]["blasts"] < 30
+    assert 0 < len(content["cells"]) <= 3
+    assert (out / "search.png").exists()
