@@ -1,0 +1,1 @@
+"""Policies for stable-baselines3 that choose a cell of the build zone."""

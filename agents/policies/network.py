@@ -1,0 +1,113 @@
+"""The network of the spatial policies: small, and with the same weights for every cell."""
+
+from typing import Any, Final
+
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, MlpExtractor
+from torch import Tensor, nn
+
+from agents.policies.geometry import CELL_FEATURES, CHANNELS, SITE_FEATURES, zone_view
+
+_LOGIT_GAIN: Final = 0.01
+_OVERVIEW: Final = tuple(
+    CHANNELS.index(name) for name in ("protected", "other_structures", "charge", "barrier")
+)
+
+
+class ZoneExtractor(BaseFeaturesExtractor):
+    """Convolutions over the build zone and over the site: features of every cell and of the whole.
+
+    A cell's features come from where it lies on the line of sight (`geometry.zone_view`), from the
+    25 cells around it, and from an overview of the site. The result is flat: `width` features of
+    each cell, cell by cell, then `width` features of the whole.
+
+    Args:
+        observation_space: Of a `"grid"` observation.
+        rows: Rows of the build zone.
+        columns: Its columns.
+        width: Number of features.
+    """
+
+    def __init__(
+        self, observation_space: spaces.Space[Any], rows: int, columns: int, width: int
+    ) -> None:
+        super().__init__(observation_space, width * (rows * columns + 1))
+        self.rows, self.columns, self.width = rows, columns, width
+        self.near = nn.Conv2d(2, width, 5, padding=2)
+        self.overview = nn.Sequential(
+            nn.AvgPool2d(4, ceil_mode=True),
+            nn.Conv2d(len(_OVERVIEW), 16, 3, stride=2, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(16, width, 3, stride=2, padding=1),
+            nn.ReLU(),
+            nn.AdaptiveAvgPool2d(1),
+            nn.Flatten(),
+        )
+        self.cells = nn.Linear(CELL_FEATURES, width)
+        self.site = nn.Linear(SITE_FEATURES + width, width)
+        self.mixed = nn.Linear(width, width)
+        self.whole = nn.Linear(3 * width, width)
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """Return the features (batch, width * (rows * columns + 1)).
+
+        Args:
+            observations: From 0 to 255 (batch, channels, height, width).
+        """
+        with torch.no_grad():  # nothing in here has weights
+            view = zone_view(observations, self.rows, self.columns)
+            planes = observations[:, _OVERVIEW].float() / 255.0
+            around = torch.stack((view.barrier, view.free), dim=1)
+        site = self.site(torch.cat((view.site, self.overview(planes)), dim=1))
+        near = self.near(around).permute(0, 2, 3, 1)
+        cells = torch.relu(self.cells(view.cells) + near + site[:, None, None, :])
+        cells = torch.relu(self.mixed(cells)).flatten(1, 2)
+        whole = torch.cat((torch.relu(site), cells.mean(dim=1), cells.amax(dim=1)), dim=1)
+        return torch.cat((cells.flatten(1), torch.relu(self.whole(whole))), dim=1)
+
+
+class ZoneLatents(MlpExtractor):
+    """Hands the features of `ZoneExtractor` on: all to the actor, those of the whole to the critic.
+
+    Args:
+        width: Number of features of a cell, and of the whole.
+        critic_width: Neurons of the critic's hidden layer.
+    """
+
+    def __init__(self, width: int, critic_width: int) -> None:
+        super().__init__(width, {"pi": [], "vf": [critic_width]}, nn.ReLU)
+        self.width = width
+
+    def forward_actor(self, features: Tensor) -> Tensor:
+        """Return all features."""
+        return features
+
+    def forward_critic(self, features: Tensor) -> Tensor:
+        """Return the critic's hidden layer (batch, critic_width)."""
+        return super().forward_critic(features[:, -self.width :])
+
+
+class CellLogits(nn.Module):
+    """A logit of each cell from its own features, and one of finishing from those of the whole.
+
+    Args:
+        width: Number of features of a cell, and of the whole.
+        finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
+    """
+
+    def __init__(self, width: int, finish_bias: float) -> None:
+        super().__init__()
+        self.width = width
+        self.cell = nn.Linear(width, 1)
+        self.finish = nn.Linear(width, 1)
+        nn.init.orthogonal_(self.cell.weight, gain=_LOGIT_GAIN)
+        nn.init.orthogonal_(self.finish.weight, gain=_LOGIT_GAIN)
+        nn.init.constant_(self.cell.bias, 0.0)
+        nn.init.constant_(self.finish.bias, finish_bias)
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Return the logits (batch, cells + 1)."""
+        cells = features[:, : -self.width].reshape(len(features), -1, self.width)
+        finish = self.finish(features[:, -self.width :])
+        return torch.cat((self.cell(cells).flatten(1), finish), dim=1)

@@ -1,0 +1,118 @@
+"""`blast-env train`: an agent that proposes layouts."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from blast_env.cli.output import agents_extra, print_line, progress_bar, user_errors
+from blast_env.errors import BlastEnvError
+
+if TYPE_CHECKING:
+    from agents.training.train import TrainingResult
+
+_DEFAULT_ALGORITHM: Final = "maskable_ppo"
+_DEFAULT_SCENARIO: Final = "courtyard"
+
+
+def train(
+    algo: Annotated[
+        str | None, typer.Option(help="ppo or maskable_ppo.", show_default=_DEFAULT_ALGORITHM)
+    ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            help="Bundled name, a scenario file, or 'sites' for generated ones.",
+            show_default=_DEFAULT_SCENARIO,
+        ),
+    ] = None,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Steps, a module each; else as the YAML file says.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Decides everything.")] = None,
+    envs: Annotated[
+        int | None, typer.Option(min=1, help="Parallel environments; else as the YAML file says.")
+    ] = None,
+    run: Annotated[Path | None, typer.Option(help="Folder for the run; new or empty.")] = None,
+    threat: Annotated[
+        str | None, typer.Option(help="visible or hidden: whether the agent sees the charge.")
+    ] = None,
+    engine: Annotated[str | None, typer.Option(help="Engine that runs the blasts.")] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="key=value, e.g. ent_coef=0.01; may be given again."),
+    ] = None,
+    resume: Annotated[
+        Path | None, typer.Option(help="Go on with the run of this folder; no other option.")
+    ] = None,
+) -> None:
+    """Train an agent that proposes layouts, or go on with a training that was interrupted."""
+    fresh = {
+        "algo": algo,
+        "steps": steps,
+        "seed": seed,
+        "envs": envs,
+        "run": run,
+        "threat": threat,
+        "engine": engine,
+        "set": set_ or None,
+    }
+    given = {name: value for name, value in fresh.items() if value is not None}
+    with user_errors(), agents_extra("training"):
+        if resume is not None:
+            result = _resume(resume, scenario, given)
+        elif run is None:
+            raise BlastEnvError("--run is missing: the folder for the run (or --resume)")
+        else:
+            result = _train(run, scenario or _DEFAULT_SCENARIO, given, set_ or [], envs)
+    _print_result(result)
+
+
+def _resume(folder: Path, scenario: str | None, given: Mapping[str, object]) -> "TrainingResult":
+    from agents.training import resume
+
+    if given:
+        raise BlastEnvError(
+            f"--{next(iter(given))} cannot be changed with --resume: the run folder says it"
+        )
+    with progress_bar(f"training {folder}") as progress:
+        return resume(folder, scenario, progress)
+
+
+def _train(
+    run: Path, scenario: str, given: Mapping[str, object], options: list[str], envs: int | None
+) -> "TrainingResult":
+    from agents.training import load_hyperparameters, train
+    from agents.training.environments import environment_id
+    from agents.training.hyperparameters import HYPERPARAMETER_KEYS
+    from agents.training.set_options import parse_options
+    from agents.training.settings import SETTING_KEYS, settings_from
+
+    algorithm = str(given.get("algo", _DEFAULT_ALGORITHM))
+    changes = parse_options(options, [*HYPERPARAMETER_KEYS, *SETTING_KEYS])
+    values = {name: given[name] for name in ("steps", "seed", "threat", "engine") if name in given}
+    values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
+    hyperparameters = load_hyperparameters(algorithm, environment_id(scenario), changes, envs)
+    settings = settings_from(
+        {"steps": hyperparameters.n_timesteps, "algorithm": algorithm, "scenario": scenario}
+        | values
+    )
+    with progress_bar(f"training {run}") as progress:
+        return train(settings, hyperparameters, run, progress)
+
+
+def _print_result(result: "TrainingResult") -> None:
+    counters, folder = result.progress.counters, result.folder
+    print_line(
+        f"{counters.steps:,} steps, {counters.episodes:,} episodes, {counters.blasts:,} blasts "
+        f"in {counters.seconds:,.0f} s"
+    )
+    for row in result.progress.evaluations:
+        if row.steps == counters.best_steps:
+            print_line(
+                f"best on held-out threats, after {row.steps:,} steps: reduction "
+                f"{row.reduction:.1%} (95 % interval {row.low:.1%} to {row.high:.1%})"
+            )
+    for path in (folder.best, folder.last, folder.evaluations, folder.learning_curve):
+        print_line(f"wrote {path}")

@@ -1,0 +1,97 @@
+"""The YAML files fit the scenarios and RL Zoo, and a wrong value is refused with its bound."""
+
+import inspect
+from importlib import import_module
+
+import gymnasium as gym
+import pytest
+import yaml
+from sb3_contrib import MaskablePPO
+from stable_baselines3 import PPO
+
+import blast_env  # noqa: F401
+from agents.training.environments import environment_id, training_source
+from agents.training.hyperparameters import (
+    ALGORITHMS,
+    HYPERPARAMETER_KEYS,
+    WRAPPERS,
+    hyperparameter_file,
+    load_hyperparameters,
+)
+from agents.training.schedule import schedule
+from agents.training.set_options import parse_options
+from blast_env.envs.registration import WITHOUT_BUILD_ZONE
+from blast_env.errors import BlastEnvError
+from blast_env.scenario import bundled_scenarios
+
+SCENARIOS = ("sites", *(name for name in bundled_scenarios() if name not in WITHOUT_BUILD_ZONE))
+MODELS = {"ppo": PPO, "maskable_ppo": MaskablePPO}
+OF_RL_ZOO = {"n_timesteps", "n_envs", "env_wrapper", "normalize"}
+"""Keys that RL Zoo takes out before it hands the others to the algorithm."""
+
+
+def sections(algorithm: str) -> dict[str, dict]:
+    content: dict[str, dict] = yaml.safe_load(hyperparameter_file(algorithm).read_text())
+    return content
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_every_scenario_has_a_section_for_its_zone(algorithm: str, scenario: str) -> None:
+    """RL Zoo cannot fill in rows and columns, so the file must have the right ones."""
+    section = sections(algorithm)[environment_id(scenario)]
+    zone = training_source(scenario).representative.build_zone
+    assert zone is not None
+    arguments = section["policy_kwargs"]
+    assert (arguments["rows"], arguments["columns"]) == (zone.rows, zone.columns)
+    load_hyperparameters(algorithm, environment_id(scenario))
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_rl_zoo_can_use_every_section(algorithm: str) -> None:
+    """Its keys go to the algorithm as they are; policy and wrappers are imported by name."""
+    accepted = set(inspect.signature(MODELS[algorithm]).parameters)
+    for env_id, section in sections(algorithm).items():
+        assert env_id in gym.registry
+        assert set(section) - OF_RL_ZOO <= accepted
+        for name in (section["policy"], *WRAPPERS):
+            module, _, attribute = name.rpartition(".")
+            assert hasattr(import_module(module), attribute)
+
+
+def test_options_are_read_as_yaml_and_reach_the_policy() -> None:
+    options = ["ent_coef=0.02", "learning_rate=lin_3e-4", "policy_kwargs.width=16", "gamma=9e-1"]
+    changes = parse_options(options, HYPERPARAMETER_KEYS)
+    chosen = load_hyperparameters("maskable_ppo", "BlastBarrier-v0", changes)
+    assert (chosen.ent_coef, chosen.gamma, chosen.policy_kwargs.width) == (0.02, 0.9, 16)
+    rate = schedule(chosen.learning_rate)
+    assert callable(rate)
+    assert rate(0.5) == pytest.approx(1.5e-4)
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ("ent_coeff=0.1", "did you mean 'ent_coef'"),
+        ("policy_kwargs.widht=3", "did you mean 'policy_kwargs.width'"),
+        ("ent_coef", "must be key=value"),
+        ("ent_coef=[", "not YAML"),
+        ("ent_coef=-1", "ent_coef is -1: Input should be greater than or equal to 0"),
+        ("gamma=1.5", "less than or equal to 1"),
+        ("learning_rate=lin_fast", "'lin_' and a number"),
+        ("learning_rate=0", "above 0"),
+        ("batch_size=100", "must divide n_steps * n_envs = 512"),
+        ("policy=MlpPolicy", "CnnPolicy"),
+        ("env_wrapper=[os.system]", "RelativeReward"),
+    ],
+)
+def test_a_wrong_option_is_refused_with_the_reason(option: str, words: str) -> None:
+    with pytest.raises(BlastEnvError, match=words.replace("*", r"\*")):
+        load_hyperparameters(
+            "maskable_ppo", "BlastBarrier-v0", parse_options([option], HYPERPARAMETER_KEYS)
+        )
+
+
+def test_an_unknown_algorithm_is_refused_with_the_nearest() -> None:
+    with pytest.raises(BlastEnvError, match="did you mean 'maskable_ppo'"):
+        load_hyperparameters("maskable-ppo", "BlastBarrier-v0")

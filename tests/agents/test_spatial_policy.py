@@ -1,0 +1,121 @@
+"""The policy sees the cells where they are, alike wherever the charge is, and one by one."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+
+import blast_env  # noqa: F401
+from agents.policies.geometry import zone_view
+from agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
+from agents.rules import RULES
+from agents.training.model import logits_of
+from blast_env import load_scenario
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.scenario import Charge, Scenario
+from blast_env.sites.turning import turned
+
+LENGTH_M = 10.0  # what the features of length are divided by
+ALONG, ASIDE, COVERED = 0, 3, 7
+
+
+def environment(scenario: Scenario | str = "courtyard") -> BlastBarrierEnv:
+    env = gym.make("BlastBarrier-v0", scenario=scenario, engine="event").unwrapped
+    assert isinstance(env, BlastBarrierEnv)
+    return env
+
+
+def observed(env: BlastBarrierEnv, charge_m: tuple[float, float], **options: Any) -> torch.Tensor:
+    planes, _ = env.reset(seed=0, options={"charge_position_m": charge_m, **options})
+    return torch.as_tensor(planes)[None]
+
+
+@pytest.mark.parametrize("charge_m", [(5.0, 15.0), (5.0, 8.25), (5.0, 23.0)])
+def test_cells_are_measured_along_the_line_of_sight(charge_m: tuple[float, float]) -> None:
+    """Against the geometry of the scenario: the observation has to give it to half a square."""
+    scenario = load_scenario("courtyard")
+    zone = scenario.build_zone
+    assert zone is not None
+    view = zone_view(observed(environment(), charge_m), zone.rows, zone.columns)
+    middle_m = np.array(scenario.structures[0].rectangle_m.centre)
+    unit = (middle_m - charge_m) / np.hypot(*(middle_m - charge_m))
+    for cell in ((0, 0), (39, 0), (17, 15)):
+        offset_m = np.array(zone.cell_rectangle_m(cell).centre) - charge_m
+        along_m, aside_m = offset_m @ unit, offset_m @ (-unit[1], unit[0])
+        assert LENGTH_M * float(view.cells[0, *cell, ALONG]) == pytest.approx(along_m, abs=0.05)
+        assert LENGTH_M * float(view.cells[0, *cell, ASIDE]) == pytest.approx(aside_m, abs=0.05)
+
+
+def test_a_turned_site_has_the_same_features_at_the_turned_cells() -> None:
+    """What is learnt on one side of a building must hold on the others."""
+    document = load_scenario("courtyard").model_dump()
+    document["build_zone"] |= {"rows": 16, "columns": 16, "corner_m": (13.0, 16.0)}
+    document["build_zone"]["keep_outs"] = []
+    document["site"] |= {"width_m": 40.0, "height_m": 40.0}
+    scenario = Scenario.from_document(document, "square")
+    straight = zone_view(observed(environment(scenario), (5.0, 12.0)), 16, 16)
+    quarter = zone_view(observed(environment(turned(scenario, 1)), (28.0, 5.0)), 16, 16)
+    expected = torch.rot90(straight.cells, 1, dims=(2, 1))
+    torch.testing.assert_close(quarter.cells, expected, atol=0.02, rtol=0.0)
+
+
+def test_bearings_behind_a_module_are_covered_and_others_are_not() -> None:
+    env = environment()
+    planes = observed(env, (5.0, 12.0), layout=[(14, 0)])
+    view = zone_view(planes, 40, 16)
+    covered = view.cells[0, :, :, COVERED]
+    assert covered[14, 0] == 1.0
+    assert covered[14, 8] == 1.0  # straight behind it
+    assert covered[30, 0] == 0.0
+    assert view.barrier.sum() == 1.0
+
+
+@pytest.mark.parametrize("policy_class", [SpatialPolicy, SpatialMaskablePolicy])
+def test_acting_and_learning_agree_and_observations_do_not_mix(
+    policy_class: type[SpatialPolicy] | type[SpatialMaskablePolicy],
+) -> None:
+    """PPO divides the probability in an update by that of the action: both must be the same."""
+    env = environment()
+    policy = policy_class(
+        env.observation_space, env.action_space, lambda _: 1e-3, rows=40, columns=16, width=8
+    )
+    planes = torch.cat([observed(env, (5.0, y_m)) for y_m in (8.0, 12.0, 20.0)])
+    actions, values, log_probability = policy(planes)
+    learnt_values, learnt_log_probability, _ = policy.evaluate_actions(planes, actions)
+    torch.testing.assert_close(learnt_values, values)
+    torch.testing.assert_close(learnt_log_probability, log_probability)
+    torch.testing.assert_close(policy.predict_values(planes[1:2]), values[1:2])
+
+
+def test_an_untrained_policy_finishes_seldom() -> None:
+    """Otherwise the first layouts would be too short to learn from."""
+    env = environment()
+    policy = SpatialMaskablePolicy(
+        env.observation_space, env.action_space, lambda _: 1e-3, rows=40, columns=16
+    )
+    logits = logits_of(policy, observed(env, (5.0, 15.0)))
+    assert logits.softmax(dim=1)[0, -1].item() < 1e-3 / 2.0
+
+
+def test_the_optimiser_knows_all_weights() -> None:
+    """The head takes the place of stable-baselines3's after that has made an optimiser."""
+    env = environment()
+    policy = SpatialPolicy(
+        env.observation_space, env.action_space, lambda _: 1e-3, rows=40, columns=16
+    )
+    optimised = {id(weight) for weight in policy.optimizer.param_groups[0]["params"]}
+    assert optimised == {id(weight) for weight in policy.parameters()}
+
+
+def test_a_rule_s_wall_covers_the_bearings_to_the_facade() -> None:
+    """The share of the zone in shadow of a wall is what a policy has to see grow."""
+    scenario = load_scenario("courtyard")
+    charge = Charge((5.0, 10.0), 100.0)
+    layout = RULES["wall near the charge"](scenario, charge)
+    env = environment()
+    bare = zone_view(observed(env, charge.position_m), 40, 16).cells[..., COVERED].mean()
+    wall = zone_view(observed(env, charge.position_m, layout=layout[:8]), 40, 16)
+    assert float(bare) == 0.0
+    assert float(wall.cells[..., COVERED].mean()) > 0.1

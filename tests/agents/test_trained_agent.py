@@ -1,0 +1,176 @@
+"""A trained agent proposes legal layouts at once, and loading one never runs code."""
+
+import io
+import time
+from pathlib import Path
+from shutil import copytree
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from sb3_contrib import MaskablePPO
+
+from agents.proposal import LayoutAgent
+from agents.training import TrainedAgent, load_agent, load_archive, train
+from agents.training.checkpoint import Checkpoint
+from agents.training.environments import make_environments, training_source
+from agents.training.model import make_model, make_policy
+from agents.training.run_folder import RunFolder
+from agents.training.settings import RunConfiguration, TrainingSettings
+from blast_env import load_scenario
+from blast_env.envs.grid_observation import GridObservation
+from blast_env.errors import BlastEnvError
+from blast_env.scenario import Charge, Placement, Scenario
+from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
+
+CHARGES = (Charge((2.0, 5.5), 100.0), Charge((2.0, 8.5), 100.0), None)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run that is finished; not to be changed."""
+    folder = tmp_path_factory.mktemp("run")
+    train(settings(scenario_file(folder), steps=16), hyperparameters(), folder / "run")
+    return folder / "run"
+
+
+def untrained(scenario: Scenario) -> TrainedAgent:
+    zone = scenario.build_zone
+    assert zone is not None
+    torch.manual_seed(0)
+    chosen = hyperparameters().model_copy(
+        update={
+            "policy_kwargs": hyperparameters().policy_kwargs.model_copy(
+                update={"rows": zone.rows, "columns": zone.columns, "width": 24}
+            )
+        }
+    )
+    configuration = RunConfiguration(
+        settings=TrainingSettings(algorithm="maskable_ppo", scenario="any", steps=1),
+        hyperparameters=chosen,
+        scenario_hash=scenario.content_hash,
+    )
+    policy = make_policy(
+        configuration,
+        GridObservation().space(scenario),
+        spaces.Discrete(zone.rows * zone.columns + 1),
+    )
+    return TrainedAgent(policy, scenario, "event")
+
+
+def test_proposals_are_legal_and_always_the_same(run: Path) -> None:
+    agent: LayoutAgent = load_agent(run)
+    for charge in CHARGES:
+        layout = agent.propose(small_scenario(), charge)
+        assert Placement.of(small_scenario(), layout).cells == layout
+        assert layout == load_agent(run).propose(small_scenario(), charge)
+
+
+@pytest.mark.parametrize("name", ["courtyard", "perimeter_gate", "street_junction"])
+def test_proposals_keep_every_condition_of_a_bundled_site(name: str) -> None:
+    """Budget, clearance, access way and keep-outs, by an agent that knows nothing of them."""
+    scenario = load_scenario(name)
+    layout = untrained(scenario).propose(scenario)
+    assert Placement.of(scenario, layout).cells == layout
+
+
+def test_a_layout_is_proposed_within_50_ms() -> None:
+    scenario = load_scenario("courtyard")
+    agent = untrained(scenario)
+    times = []
+    for y_m in (8.0, 10.0, 12.0, 14.0, 16.0, 18.0):
+        began = time.process_time()
+        agent.propose(scenario, Charge((5.0, y_m), 100.0))
+        times.append(time.process_time() - began)
+    assert min(times) < 0.05
+
+
+def test_samples_differ_and_follow_from_their_seed(run: Path) -> None:
+    agent = load_agent(run)
+    layouts = agent.sample(small_scenario(), CHARGES[0], count=6, seed=1)
+    assert len(set(layouts)) > 1
+    assert layouts == agent.sample(small_scenario(), CHARGES[0], count=6, seed=1)
+    assert layouts != agent.sample(small_scenario(), CHARGES[0], count=6, seed=2)
+    for layout in layouts:
+        assert Placement.of(small_scenario(), layout).cells == layout
+    with pytest.raises(BlastEnvError, match="count is 0"):
+        agent.sample(small_scenario(), count=0)
+
+
+def test_the_charge_is_seen_when_it_is_told() -> None:
+    scenario = load_scenario("courtyard")
+    agent = untrained(scenario)
+    layouts = {agent.propose(scenario, Charge((5.0, y_m), 100.0)) for y_m in (7.0, 15.0, 23.0)}
+    assert len(layouts | {agent.propose(scenario)}) > 1
+
+
+def test_a_scenario_of_another_size_is_refused(run: Path) -> None:
+    with pytest.raises(BlastEnvError, match="must be"):
+        load_agent(run).propose(load_scenario("courtyard"))
+
+
+def test_best_and_last_weights_can_be_told_apart(run: Path, tmp_path: Path) -> None:
+    copy = RunFolder(Path(copytree(run, tmp_path / "run")))
+    last = Checkpoint.load(copy.last)
+    for values in last.policy.values():
+        values.zero_()
+    last.save(copy.last)
+    weights = load_agent(copy.path, "last").policy.state_dict()
+    assert all(not values.any() for values in weights.values())
+    assert any(values.any() for values in load_agent(copy.path).policy.state_dict().values())
+
+
+class _Exploit:
+    """What a pickle may do: make a file when it is read."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, tuple[object, ...]]:
+        return Path.touch, (self.path,)
+
+
+def test_code_in_a_checkpoint_does_not_run(run: Path, tmp_path: Path) -> None:
+    copy = RunFolder(Path(copytree(run, tmp_path / "run")))
+    victim = tmp_path / "victim"
+    stored = io.BytesIO()
+    torch.save({"format": 1, "policy": _Exploit(victim)}, stored)
+    copy.best.write_bytes(stored.getvalue())
+    with pytest.raises(BlastEnvError, match="damaged"):
+        load_agent(copy.path)
+    assert not victim.exists()
+
+
+def test_weights_of_another_network_are_refused(run: Path, tmp_path: Path) -> None:
+    copy = Path(copytree(run, tmp_path / "run"))
+    text = (copy / "config.yaml").read_text()
+    (copy / "config.yaml").write_text(text.replace("width: 8", "width: 9"))
+    with pytest.raises(BlastEnvError, match="weights and configuration differ"):
+        load_agent(copy)
+
+
+def test_an_archive_needs_trust(run: Path, tmp_path: Path) -> None:
+    folder = RunFolder(run)
+    configuration = folder.configuration()
+    environments = make_environments(configuration, training_source(str(run / "scenario.toml")))
+    model = make_model(configuration, environments)
+    assert isinstance(model, MaskablePPO)
+    archive = tmp_path / "model.zip"
+    model.save(archive)
+    environments.close()
+    with pytest.raises(BlastEnvError, match="pickled code"):
+        load_agent(archive)
+    with pytest.raises(BlastEnvError, match="trust_archive is False, must be True"):
+        load_archive(archive, "maskable_ppo", small_scenario())
+    agent = load_archive(archive, "maskable_ppo", small_scenario(), trust_archive=True)
+    expected = TrainedAgent(model.policy, small_scenario(), "event")
+    charge = CHARGES[0]
+    assert agent.propose(small_scenario(), charge) == expected.propose(small_scenario(), charge)
+
+
+def test_what_is_no_archive_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "model.zip"
+    path.write_bytes(np.arange(64, dtype=np.uint8).tobytes())
+    with pytest.raises(BlastEnvError, match="cannot be read"):
+        load_archive(path, "ppo", small_scenario(), trust_archive=True)

@@ -1,0 +1,65 @@
+"""What training changes about the environment: the reward, and which episodes there are."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import blast_env  # noqa: F401
+from agents.training.wrappers import RelativeReward, ThreatPool
+from blast_env.errors import BlastEnvError
+from tests.agents.training_runs import small_scenario
+
+
+def environment() -> gym.Env:
+    return gym.make(
+        "BlastBarrier-v0",
+        scenario=small_scenario(),
+        engine="event",
+        realisations=1,
+        disable_env_checker=True,
+    )
+
+
+def test_the_reward_is_the_reduction_less_what_illegal_actions_cost() -> None:
+    env = RelativeReward(environment(), illegal_action_cost=0.25)
+    env.reset(seed=0)
+    rewards = [env.step(np.int64(action))[1] for action in (3, 3, 4, 5)]
+    *_, info = env.step(np.int64(6))
+    assert rewards == [0.0, -0.25, 0.0, 0.0]
+    assert info["illegal_actions"] == 1
+    env.reset(seed=0)
+    last = [env.step(np.int64(action))[1] for action in (3, 4, 5, 6)][-1]
+    assert last == info["reduction"]
+
+
+def test_a_pool_repeats_its_threats_so_that_half_of_the_blasts_are_known() -> None:
+    env = ThreatPool(environment(), size=2, seed=5)
+    charges = set()
+    for seed in range(8):
+        env.reset(seed=seed)
+        *_, info = env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
+        charges.add(info["charges"])
+    assert len(charges) == 2
+    assert info["blasts"] == 2  # nothing was built, so there is one blast a charge
+
+
+def test_pools_of_other_seeds_are_other_threats_and_the_same_seed_the_same() -> None:
+    seeds = [ThreatPool(environment(), size=4, seed=seed).seeds for seed in (0, 1, 0)]
+    assert seeds[0] == seeds[2]
+    assert not set(seeds[0]) & set(seeds[1])
+
+
+def test_the_seed_of_a_reset_decides_the_episodes_that_follow() -> None:
+    env = ThreatPool(environment(), size=16)
+    drawn = []
+    for _ in range(2):
+        env.reset(seed=3)
+        drawn.append([env.reset()[0] for _ in range(3)])
+    np.testing.assert_array_equal(drawn[0], drawn[1])
+
+
+def test_bounds_are_named() -> None:
+    with pytest.raises(BlastEnvError, match="size is 0, must be an integer from 1"):
+        ThreatPool(environment(), size=0)
+    with pytest.raises(BlastEnvError, match="illegal_action_cost is -1"):
+        RelativeReward(environment(), illegal_action_cost=-1)

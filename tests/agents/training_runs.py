@@ -1,0 +1,71 @@
+"""A site and hyperparameters with which a training takes about a second."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from agents.training import Hyperparameters, TrainingSettings, load_hyperparameters
+from blast_env.scenario import Scenario, save_scenario
+
+SMALL: dict[str, Any] = {
+    "n_envs": 1,
+    "n_steps": 16,
+    "batch_size": 16,
+    "n_epochs": 2,
+    "policy_kwargs.width": 8,
+    "policy_kwargs.critic_width": 8,
+}
+ROLLOUT = 16
+STEPS = 3 * ROLLOUT
+
+
+def small_scenario(stock: int = 4) -> Scenario:
+    """Return a site of 20 m x 14 m with a road, a building, and a zone of 8 x 6 cells."""
+    document = {
+        "schema_version": 1,
+        "name": "small",
+        "calibration": "ballistic_kb_100kg",
+        "site": {"width_m": 20.0, "height_m": 14.0},
+        "charge": [
+            {"kind": "segment", "start_m": (2.0, 5.0), "end_m": (2.0, 9.0), "tnt_kg": 100.0}
+        ],
+        "structures": [
+            {
+                "kind": "ConcreteSquare",
+                "name": "building",
+                "corner_m": (14.0, 5.0),
+                "side_modules": 8,
+                "protected": True,
+            }
+        ],
+        "build_zone": {"corner_m": (6.0, 5.0), "rows": 8, "columns": 6, "stock": stock},
+        "simulation": {"preset": "ballistic"},
+    }
+    return Scenario.from_document(document, "small")
+
+
+def scenario_file(folder: Path) -> Path:
+    """Write the small scenario to a file."""
+    path = folder / "small.toml"
+    save_scenario(small_scenario(), path)
+    return path
+
+
+def settings(scenario: Path, **changes: Any) -> TrainingSettings:
+    """Return settings for three rollouts, with an evaluation after each."""
+    values: dict[str, Any] = {
+        "algorithm": "maskable_ppo",
+        "scenario": str(scenario),
+        "steps": STEPS,
+        "evaluation_interval": 1,
+        "evaluation_cases": 2,
+    }
+    return TrainingSettings.model_validate(values | changes)
+
+
+def hyperparameters(
+    changes: Mapping[str, Any] = MappingProxyType({}), algorithm: str = "maskable_ppo"
+) -> Hyperparameters:
+    """Return hyperparameters for the small scenario."""
+    return load_hyperparameters(algorithm, "BlastBarrier-v0", {**SMALL, **changes})
