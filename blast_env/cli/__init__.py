@@ -5,7 +5,10 @@ import typer
 from blast_env.cli.bench import bench
 from blast_env.cli.calibrate import calibrate
 from blast_env.cli.evaluate import evaluate
+from blast_env.cli.league import league
+from blast_env.cli.search import search
 from blast_env.cli.simulate import simulate
+from blast_env.cli.train import train
 from blast_env.cli.validate import validate
 
 app = typer.Typer(
@@ -19,4 +22,7 @@ app.command()(simulate)
 app.command()(validate)
 app.command()(calibrate)
 app.command()(evaluate)
+app.command()(search)
 app.command()(bench)
+app.command()(train)
+app.command()(league)

@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
-from blast_env import load_scenario
+from blast_env import Charge, load_scenario, save_scenario
 from blast_env.cli import app
 from blast_env.evaluation import evaluate_layout
-from blast_env.physics.pymunk_engine import PymunkRun
+from blast_env.physics.event_engine import EventRun
 
 CELLS = [(9, 0), (10, 0), (11, 0)]
 
@@ -63,17 +63,33 @@ def test_it_prints_json_and_says_when_one_threat_has_no_interval(layout: Path) -
     assert content["layout"] == [list(cell) for cell in CELLS]
     assert content["result"]["reduction"]["ci95_low"] is None
     assert content["files"] == []
+    assert content["cache"] == {"blasts": 2, "hits": 0, "hit_rate": 0.0}
     table = evaluate("--layout", layout, "--seeds", "1")
     assert "(95 % interval -)" in table.stdout
 
 
 def test_it_says_what_is_outside_the_calibration(tmp_path: Path) -> None:
-    """The first threat of the perimeter gate that seed 0 draws is a 500 kg vehicle."""
-    layout = tmp_path / "empty.json"
+    layout, light = tmp_path / "empty.json", tmp_path / "light.toml"
     layout.write_text("[]")
-    result = evaluate("--layout", layout, "--scenario", "perimeter_gate", "--seeds", "1")
+    save_scenario(load_scenario("courtyard").with_charge(Charge((10.0, 15.0), 15.0)), light)
+    options = ("--scenario", light, "--seeds", "1", "--engine", "event")
+    result = evaluate("--layout", layout, *options)
     assert result.exit_code == 0, result.output
     assert "note: building: 1 of 1 threats are outside the range of calibration" in result.stdout
+
+
+def test_the_next_run_finds_the_blasts_that_the_first_one_kept(
+    layout: Path, tmp_path: Path
+) -> None:
+    options = ("--engine", "event", "--cache", tmp_path / "blasts")
+    first = evaluate("--layout", layout, "--seeds", "2", *options)
+    assert first.exit_code == 0, first.output
+    assert "4 blasts run, 0 known already (cache hit rate 0.0 %)" in first.stdout
+    second = evaluate("--layout", layout, "--seeds", "3", "--json", *options)
+    content = json.loads(second.stdout)
+    assert content["cache"] == {"blasts": 2, "hits": 4, "hit_rate": pytest.approx(2 / 3)}
+    fresh = evaluate("--layout", layout, "--seeds", "3", "--json", "--engine", "event")
+    assert json.loads(fresh.stdout)["result"] == content["result"]
 
 
 @pytest.mark.parametrize(
@@ -106,10 +122,10 @@ def test_bad_input_is_one_clear_message(
 def test_an_interruption_leaves_nothing_half_written(
     layout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(self: PymunkRun, until_s: float) -> None:
+    def interrupted(self: EventRun, until_s: float) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(PymunkRun, "advance", interrupted)
+    monkeypatch.setattr(EventRun, "advance", interrupted)
     result = evaluate("--layout", layout, "--seeds", "2", "--out", tmp_path / "out")
     assert result.exit_code == 130
     assert "interrupted" in result.stderr

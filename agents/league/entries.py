@@ -1,0 +1,160 @@
+"""What takes part in a league."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from agents.league.tracks import Case
+from agents.proposal import LayoutAgent
+from agents.random_layouts import random_layout
+from agents.rules import RULES, expected_charge
+from agents.search import Layout, SearchMethod, find_search_method
+from blast_env.errors import BlastEnvError
+from blast_env.scenario import Charge, Scenario
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What an entry proposes for a case, and what that took.
+
+    Attributes:
+        layout: The cells, sorted.
+        blasts: Blasts spent on the case.
+        seconds: Time until the layout was there.
+    """
+
+    layout: Layout
+    blasts: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Training:
+    """What an agent cost before its first case.
+
+    Attributes:
+        blasts: Blasts simulated, with those that its best weights were chosen by.
+        seconds: Time that it took.
+    """
+
+    blasts: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class NoBarrier:
+    """Builds nothing: what all others are compared with."""
+
+    name: str = "no barrier"
+
+    def propose(self, case: Case) -> Layout:  # noqa: ARG002
+        """Return the empty layout."""
+        return ()
+
+
+@dataclass(frozen=True)
+class RandomLayout:
+    """Puts every module on a random cell, a layout a case."""
+
+    name: str = "random layout"
+
+    def propose(self, case: Case) -> Layout:
+        """Return a layout that the case's seed decides."""
+        return random_layout(case.scenario, np.random.default_rng(case.seed))
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Follows a rule of thumb; against a hidden charge for the middle of where it may be.
+
+    Attributes:
+        rule: Gives the layout for a charge.
+        name: In tables.
+    """
+
+    rule: Callable[[Scenario, Charge], Layout]
+    name: str
+
+    def propose(self, case: Case) -> Layout:
+        """Return the rule's layout.
+
+        Raises:
+            BlastEnvError: If there is no line of sight; see `line_of_sight_wall`.
+        """
+        return self.rule(case.scenario, case.charge or expected_charge(case.scenario.charge))
+
+
+@dataclass(frozen=True)
+class Agent:
+    """A trained agent.
+
+    Attributes:
+        agent: The agent.
+        name: In tables.
+        training: What it cost.
+    """
+
+    agent: LayoutAgent
+    name: str
+    training: Training
+
+    def propose(self, case: Case) -> Layout:
+        """Return the agent's layout; it is told the charge unless that is hidden."""
+        return self.agent.propose(case.scenario, case.charge)
+
+
+@dataclass(frozen=True)
+class Search:
+    """A search that spends blasts on every case.
+
+    Attributes:
+        method: The method.
+        budget: Most blasts a case.
+    """
+
+    method: SearchMethod
+    budget: int
+
+    def __post_init__(self) -> None:
+        """Check the budget.
+
+        Raises:
+            BlastEnvError: If it is below 1.
+        """
+        if self.budget < 1:
+            raise BlastEnvError(f"budget is {self.budget} blasts, must be at least 1")
+
+    @property
+    def name(self) -> str:
+        """Name in tables."""
+        return search_name(self.method.name, self.budget)
+
+
+Instant = NoBarrier | RandomLayout | Rule | Agent
+"""Entries that spend no blast on a case."""
+
+Entry = Instant | Search
+"""All entries."""
+
+
+def search_name(method: str, budget: int) -> str:
+    """Return the name of a search with a budget."""
+    return f"{method}, {budget:,} blasts"
+
+
+def standard_entries(methods: Sequence[str], budgets: Sequence[int]) -> tuple[Entry, ...]:
+    """Return all entries but agents: no barrier, a random layout, rules, searches.
+
+    Args:
+        methods: Names of search methods.
+        budgets: Blasts a case; each method enters with each.
+
+    Raises:
+        UnknownNameError: If there is no such method; the message names the nearest one.
+        BlastEnvError: If a budget is below 1.
+    """
+    rules = (Rule(rule, name) for name, rule in RULES.items())
+    found = [find_search_method(name) for name in methods]
+    searches = (Search(method, budget) for method in found for budget in budgets)
+    return (NoBarrier(), RandomLayout(), *rules, *searches)

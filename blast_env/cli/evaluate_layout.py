@@ -1,0 +1,157 @@
+"""One layout against all threats: evaluate it, print and write what came out."""
+
+import json
+from collections.abc import Sequence
+from math import isnan
+from pathlib import Path
+from typing import Final
+
+from blast_env.cli.evaluate_options import (
+    EvaluateOptions,
+    cache_record,
+    cache_text,
+    interval,
+    percent,
+    seeds_text,
+    write_table,
+)
+from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.evaluation import (
+    BlastEvaluator,
+    Estimate,
+    LayoutEvaluation,
+    draw_threats,
+    evaluate_against,
+)
+from blast_env.export import LayoutPlan, export_layouts
+from blast_env.units import PA_PER_PSI
+
+_HEADERS: Final = (
+    "structure",
+    "protected",
+    "without (Pa s)",
+    "with (Pa s)",
+    "reduction",
+    "95 % interval",
+    "threats in range",
+)
+
+
+def report_layout(
+    plan: LayoutPlan, evaluator: BlastEvaluator, seeds: range, options: EvaluateOptions
+) -> None:
+    """Evaluate a layout on threats that the seeds draw; print and write the result."""
+    threats = draw_threats(plan.scenario, seeds)
+    options.prepare_files(1)
+    with progress_bar(f"{2 * len(seeds)} blasts in {plan.scenario.name}") as progress:
+        evaluation = evaluate_against(
+            evaluator,
+            plan.layout,
+            threats,
+            options.processes,
+            cvar_level=options.cvar_level,
+            progress=progress,
+        )
+    written = [] if options.out is None else _write(evaluation, options.out)
+    if options.export is not None:
+        written += export_layouts({"layout": plan}, options.export)
+    if options.as_json:
+        content = {
+            **evaluation.to_dict(),
+            "provenance": dict(plan.provenance),
+            "cache": cache_record([evaluator]),
+            "files": [str(path) for path in written],
+        }
+        print_line(json.dumps(content, indent=2))
+        return
+    _print_evaluation(evaluation, seeds)
+    for path in written:
+        print_line(f"wrote {path}")
+    print_line(cache_text([evaluator]))
+
+
+def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
+    written = [evaluation.to_json(out / "evaluation.json")]
+    tables = {
+        "structures.csv": evaluation.table,
+        "modules.csv": evaluation.module_table,
+        "threats.csv": evaluation.threat_table,
+    }
+    written += [write_table(table, out / name) for name, table in tables.items()]
+    written.append(evaluation.figure(out / "evaluation.png"))
+    return written
+
+
+def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
+    """Print the structures' mean loads, and what the layout does over all threats."""
+    count = len(evaluation.threats)
+    table = make_table(
+        f"{evaluation.scenario.name}: {len(evaluation.layout)} barrier modules against none, "
+        f"{seeds_text(seeds)}",
+        _HEADERS,
+        text_columns=2,
+    )
+    for row in evaluation.table.to_dict("records"):
+        reduction = Estimate(row["reduction"], row["reduction_low"], row["reduction_high"])
+        table.add_row(
+            str(row["structure"]),
+            "yes" if row["protected"] else "no",
+            f"{row['unprotected_impulse_pa_s']:,.0f}",
+            f"{row['impulse_pa_s']:,.0f}",
+            percent(reduction.value),
+            interval(reduction),
+            f"{row['threats_in_range']} of {count}",
+        )
+    result_console().print(table)
+    _print_totals(evaluation)
+    for note in evaluation.notes:
+        print_line(f"note: {note}")
+
+
+def _print_totals(evaluation: LayoutEvaluation) -> None:
+    """Print what there is to say about the protected structures together."""
+    worst = evaluation.worst
+    print_means(
+        evaluation.reduction,
+        (evaluation.unprotected_impulse_pa_s, evaluation.impulse_pa_s),
+        (evaluation.unprotected_cvar, evaluation.cvar),
+        evaluation.cvar_level,
+    )
+    charge = worst.threat.charge
+    print_line(
+        f"worst threat: {charge.tnt_kg:g} kg TNT at ({charge.position_m[0]:.2f}, "
+        f"{charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: {worst.impulse_pa_s:,.0f} Pa s, "
+        f"reduction {percent(worst.reduction)}"
+    )
+    print_line(
+        f"engine {evaluation.engine_name} ({evaluation.engine_version}), calibration "
+        f"{evaluation.calibration.name}, scenario hash {evaluation.scenario.content_hash[:12]}"
+    )
+
+
+def print_means(
+    reduction: Estimate,
+    impulses_pa_s: Sequence[Estimate],
+    cvars_pa_s: Sequence[float],
+    cvar_level: float,
+) -> None:
+    """Print the reduction, and the mean impulses without and with barrier.
+
+    Args:
+        reduction: Of the protected structures, by weight.
+        impulses_pa_s: Without, with.
+        cvars_pa_s: Without, with.
+        cvar_level: Of these.
+    """
+    print_line(
+        f"protected structures, by weight: mean reduction {percent(reduction.value)} "
+        f"(95 % interval {interval(reduction)})"
+    )
+    names = ("without barrier", "with barrier")
+    for words, impulse, cvar in zip(names, impulses_pa_s, cvars_pa_s, strict=True):
+        half_width = "" if isnan(impulse.low) else f" +- {impulse.high - impulse.value:,.0f}"
+        print_line(
+            f"{words}: mean {impulse.value:,.0f}{half_width} Pa s "
+            f"({impulse.value / PA_PER_PSI:.4f} psi s), mean of the worst "
+            f"{100.0 * (1.0 - cvar_level):.3g} % {cvar:,.0f} Pa s"
+        )

@@ -1,0 +1,154 @@
+"""`blast-env league`: searches, rules and trained agents on the same held-out cases."""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from blast_env.cli.output import (
+    agents_extra,
+    make_table,
+    print_line,
+    progress_bar,
+    result_console,
+    user_errors,
+)
+from blast_env.errors import BlastEnvError
+
+if TYPE_CHECKING:
+    from agents.league import Contest, ResultStore, Standings, Track
+    from agents.league.trained import TrainedRun
+
+
+def league(
+    out: Annotated[
+        Path, typer.Option(help="Folder for tables, figures and results; goes on with what it has.")
+    ],
+    track: Annotated[str, typer.Option(help="known, hidden, sites or all.")] = "known",
+    cases: Annotated[
+        int, typer.Option(help="Cases of a track; a hidden threat on a known site is one.")
+    ] = 16,
+    seeds: Annotated[
+        int, typer.Option(help="Held-out threats of a case; 4 times as many where there is one.")
+    ] = 16,
+    budgets: Annotated[str, typer.Option(help="Blasts a search may spend on a case.")] = (
+        "50,200,1000"
+    ),
+    methods: Annotated[str, typer.Option(help="Search methods.")] = (
+        "random,greedy,annealing,genetic"
+    ),
+    run: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Run folder of a trained agent; may be given again. It enters the "
+            "tracks that it was trained for."
+        ),
+    ] = None,
+    scenario: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Scenario of the tracks known and hidden, in the place of the bundled "
+            "ones; may be given again."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Decides cases, threats and searches.")] = 0,
+    engine: Annotated[str, typer.Option(help="Engine that runs the blasts.")] = "event",
+    processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
+) -> None:
+    """Compare searches, rules and trained agents on the same held-out cases and seeds.
+
+    An interrupted league goes on when it is called again with the same folder.
+    """
+    with user_errors(), agents_extra("a league"):
+        from agents.league import ResultStore, find_tracks
+        from agents.league.report import write_league
+
+        tracks = find_tracks(track, cases, seeds, seed, scenario or ())
+        runs = _load_runs(run or (), tracks)
+        store = ResultStore(out / "results")
+        contests = [
+            _contest(each, runs, _names(methods), _numbers(budgets), store, engine)
+            for each in tracks
+        ]
+        _print_outlook(contests)
+        all_standings = [_play(contest, processes) for contest in contests]
+        written = write_league(all_standings, out, shlex.join(["blast-env", *sys.argv[1:]]))
+    for path in written:
+        print_line(f"wrote {path}")
+
+
+def _load_runs(runs: Sequence[Path], tracks: "Sequence[Track]") -> "list[TrainedRun]":
+    if not runs:
+        return []
+    from agents.league.trained import TrainedRun, check_runs  # these take torch with them
+
+    loaded = [TrainedRun.load(run) for run in runs]
+    check_runs(loaded, tracks)
+    return loaded
+
+
+def _contest(
+    track: "Track",
+    runs: "Sequence[TrainedRun]",
+    methods: Sequence[str],
+    budgets: Sequence[int],
+    store: "ResultStore",
+    engine: str,
+) -> "Contest":
+    from agents.league import Contest, standard_entries
+
+    agents = tuple(run.entry for run in runs if run.is_for(track))
+    return Contest(track, (*standard_entries(methods, budgets), *agents), store, engine)
+
+
+def _print_outlook(contests: "Sequence[Contest]") -> None:
+    """Say what is to come before it begins."""
+    total = 0
+    for contest in contests:
+        outlook = contest.outlook()
+        total += outlook.blasts
+        print_line(
+            f"{contest.track.name}: up to {outlook.search_blasts:,} blasts of searches and "
+            f"{outlook.held_out_blasts:,} on held-out threats; {outlook.kept_searches} of "
+            f"{outlook.searches} searches are through already"
+        )
+    print_line(f"up to {total:,} blasts in all")
+
+
+def _play(contest: "Contest", processes: int) -> "Standings":
+    from agents.league.report import HEADERS, sample_text, table_rows, verdict_lines
+
+    with progress_bar(contest.track.name) as progress:
+        standings = contest.play(processes, progress)
+    two_lines = [
+        "\n".join(header.rsplit(" ", 1)) for header in HEADERS
+    ]  # so that a page holds them
+    table = make_table(contest.track.title, two_lines)
+    for row in table_rows(standings):
+        table.add_row(*row)
+    result_console().print(table)
+    for line in (f"{sample_text(standings)}.", *verdict_lines(standings)):
+        print_line(line)
+    return standings
+
+
+def _names(text: str) -> list[str]:
+    """Return the names of a list with commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _numbers(text: str) -> list[int]:
+    """Return the numbers of a list with commas.
+
+    Raises:
+        BlastEnvError: If one is no whole number.
+    """
+    try:
+        return [int(number) for number in _names(text)]
+    except ValueError:
+        raise BlastEnvError(
+            f"--budgets is {text!r}, must be whole numbers with commas between, e.g. 50,200"
+        ) from None

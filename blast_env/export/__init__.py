@@ -1,0 +1,14 @@
+"""Layouts as files for other programs: JSON, CSV, GeoJSON and DXF."""
+
+from blast_env.export.files import SUFFIXES, check_target, export_layout, export_layouts
+from blast_env.export.plan import Feature, FeatureKind, LayoutPlan
+
+__all__ = [
+    "SUFFIXES",
+    "Feature",
+    "FeatureKind",
+    "LayoutPlan",
+    "check_target",
+    "export_layout",
+    "export_layouts",
+]

@@ -1,0 +1,123 @@
+"""Which file a layout goes to, and in which form."""
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from blast_env.errors import BlastEnvError, suggestion
+from blast_env.export.csv_file import write_csv
+from blast_env.export.geojson import write_geojson
+from blast_env.export.plan import LayoutPlan
+from blast_env.scenario import write_layout
+
+
+def _write_json(plan: LayoutPlan, path: Path) -> None:
+    """Write the layout file that `load_layout` reads, with the charge in its provenance."""
+    provenance = dict(plan.provenance)
+    if plan.charge is not None:
+        position_m, tnt_kg = plan.charge
+        provenance["charge"] = {"position_m": list(position_m), "tnt_kg": tnt_kg}
+    write_layout(path, plan.scenario, plan.layout, provenance)
+
+
+def _write_dxf(plan: LayoutPlan, path: Path) -> None:
+    from blast_env.export.dxf import write_dxf  # an extra
+
+    write_dxf(plan, path)
+
+
+_WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], None]]] = MappingProxyType(
+    {".json": _write_json, ".csv": write_csv, ".geojson": write_geojson, ".dxf": _write_dxf}
+)
+
+SUFFIXES: Final = tuple(_WRITERS)
+"""The forms in which a layout can be written."""
+
+
+def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
+    """Write a layout in the form that the suffix names.
+
+    Args:
+        plan: The layout on its site.
+        path: `.json` (a layout file), `.csv` (the modules), `.geojson` or `.dxf` (everything on
+            the site); an existing file is replaced as a whole.
+
+    Returns:
+        The path.
+
+    Raises:
+        BlastEnvError: If the suffix is another one, the file cannot be written, or a package
+            that it needs is not installed.
+    """
+    path = Path(path)
+    check_target(path, 1)
+    suffix = path.suffix.lower()
+    if suffix not in _WRITERS:
+        raise BlastEnvError(f"{path}: has no suffix, must be {_named_suffixes()}")
+    _WRITERS[suffix](plan, path)
+    return path
+
+
+def export_layouts(plans: Mapping[str, LayoutPlan], target: str | Path) -> list[Path]:
+    """Write layouts to a folder in all forms, or a single one to a file.
+
+    Args:
+        plans: By the name that its files get.
+        target: A file as for `export_layout`, if there is one layout; otherwise a folder, which
+            is made if need be.
+
+    Returns:
+        The files.
+
+    Raises:
+        BlastEnvError: As for `export_layout`.
+    """
+    target = Path(target)
+    check_target(target, len(plans))
+    if _is_file(target):
+        return [export_layout(plan, target) for plan in plans.values()]
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BlastEnvError(f"{target}: cannot be a folder: {error.strerror or error}") from error
+    return [
+        export_layout(plan, target / f"{name}{suffix}")
+        for name, plan in plans.items()
+        for suffix in SUFFIXES
+    ]
+
+
+def check_target(target: str | Path, count: int) -> None:
+    """Refuse a target before any work is done for it.
+
+    Args:
+        target: As for `export_layouts`.
+        count: How many layouts there are to be.
+
+    Raises:
+        BlastEnvError: If the suffix is of no use, a file is to hold more than one layout, or a
+            package that is needed is not installed.
+    """
+    target = Path(target)
+    suffix = target.suffix.lower()
+    if suffix and suffix not in SUFFIXES and not target.is_dir():
+        raise BlastEnvError(
+            f"{target}: suffix is {suffix!r}{suggestion(suffix, SUFFIXES)}, must be "
+            f"{_named_suffixes()}, or nothing for a folder"
+        )
+    if _is_file(target) and count != 1:
+        raise BlastEnvError(
+            f"{target}: is one file, but there are {count} layouts: name a folder, without a suffix"
+        )
+    if suffix == ".dxf" or not _is_file(target):
+        import_module("blast_env.export.dxf")  # says how to get what is missing
+
+
+def _is_file(target: Path) -> bool:
+    return target.suffix.lower() in SUFFIXES and not target.is_dir()
+
+
+def _named_suffixes() -> str:
+    return f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"

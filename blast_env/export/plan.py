@@ -1,0 +1,167 @@
+"""What a layout file for other programs shows: everything on the site, in metres.
+
+Coordinates are local: x to the right and y upwards from the lower left corner of the site.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from typing import Any
+
+from blast_env.geometry import Rectangle
+from blast_env.physics.structure import BARRIER_NAME, ModularObstacle, ModularPart
+from blast_env.scenario import (
+    AnySource,
+    BuildZone,
+    Cell,
+    Charge,
+    RectangleSource,
+    Scenario,
+    SegmentSource,
+    check_layout,
+)
+from blast_env.units import UNITS_PER_M
+
+_DIGITS = 9  # of a metre: what is beyond is rounding
+
+PlaceM = tuple[float, float]
+
+
+class FeatureKind(StrEnum):
+    """What a feature is; layers of a drawing are named after it."""
+
+    SITE = "site"
+    BUILD_ZONE = "build_zone"
+    COST_AREA = "cost_area"
+    KEEP_OUT = "keep_out"
+    STRUCTURE = "structure"
+    PROTECTED_STRUCTURE = "protected_structure"
+    CHARGE_PLACE = "charge_place"
+    CHARGE = "charge"
+    BARRIER = "barrier"
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One thing on the site.
+
+    Attributes:
+        kind: What it is.
+        places_m: One place of a point, two of a line, four of a rectangle: its corners,
+            counterclockwise from the lower left one.
+        name: For people: a structure's name, the reason of a keep-out, a module's identifier.
+        properties: What else there is to say; plain values, units in the keys.
+    """
+
+    kind: FeatureKind
+    places_m: tuple[PlaceM, ...]
+    name: str
+    properties: Mapping[str, str | float | bool] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class LayoutPlan:
+    """A layout on its site.
+
+    Attributes:
+        scenario: The scenario.
+        layout: (row, column) of each module; their order is kept.
+        charge: The charge that the layout was made for; `None` where it is for all the places
+            where the scenario may have one, or nobody knows.
+        provenance: How the layout was made: anything that JSON can hold.
+
+    Raises:
+        LayoutError: If the layout does not fit the scenario.
+    """
+
+    scenario: Scenario
+    layout: tuple[Cell, ...]
+    charge: Charge | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the layout."""
+        object.__setattr__(self, "layout", check_layout(self.scenario, self.layout))
+
+    @property
+    def modules(self) -> tuple[ModularPart, ...]:
+        """The modules in the order of the layout, with the identifiers of the blast's tables."""
+        zone = self.scenario.build_zone
+        if zone is None:
+            return ()
+        barrier = ModularObstacle(
+            name=BARRIER_NAME,
+            corner=(zone.corner_m[0] * UNITS_PER_M, zone.corner_m[1] * UNITS_PER_M),
+            rows=zone.rows,
+            columns=zone.columns,
+            cells=self.layout,
+        )
+        return tuple(barrier.parts)
+
+    @cached_property
+    def features(self) -> tuple[Feature, ...]:
+        """Everything on the site; what lies on top comes last."""
+        return tuple(self._features())
+
+    def _features(self) -> Iterator[Feature]:
+        scenario = self.scenario
+        yield _area(FeatureKind.SITE, scenario.site.rectangle_m, scenario.name)
+        if scenario.build_zone is not None:
+            yield from _zone_features(scenario.build_zone)
+        for structure in scenario.structures:
+            kind = FeatureKind.STRUCTURE
+            if structure.protected:
+                kind = FeatureKind.PROTECTED_STRUCTURE
+            yield _area(kind, structure.rectangle_m, structure.name, weight=structure.weight)
+        for source in scenario.charge:
+            yield _charge_place(source)
+        if self.charge is not None:
+            name = f"charge of {self.charge.tnt_kg:g} kg TNT"
+            places_m = (_rounded(*self.charge.position_m),)
+            yield Feature(FeatureKind.CHARGE, places_m, name, {"tnt_kg": self.charge.tnt_kg})
+        for part in self.modules:
+            rectangle = part.rectangle.scaled(1.0 / UNITS_PER_M)
+            yield _area(
+                FeatureKind.BARRIER, rectangle, part.module_id, row=part.row, column=part.column
+            )
+
+
+def _zone_features(zone: BuildZone) -> Iterator[Feature]:
+    """Yield the build zone and what else holds in parts of it."""
+    conditions: dict[str, str | float] = {
+        "stock": zone.stock,
+        "clearance_m": zone.clearance_m,
+        "module_cost": zone.module_cost,
+    }
+    if zone.budget is not None:
+        conditions["budget"] = zone.budget
+    if zone.access_way is not None:
+        conditions["access_way"] = zone.access_way.description
+    yield _area(FeatureKind.BUILD_ZONE, zone.rectangle_m, "build zone", **conditions)
+    for area in zone.cost_areas:
+        cost = area.module_cost
+        yield _area(FeatureKind.COST_AREA, area.rectangle_m, area.reason, module_cost=cost)
+    for keep_out in zone.keep_outs:
+        yield _area(FeatureKind.KEEP_OUT, keep_out.rectangle_m, keep_out.reason)
+
+
+def _charge_place(source: AnySource) -> Feature:
+    """Return where a charge may be: a point, a line or an area."""
+    name = f"charge of {source.tnt_kg:g} kg TNT may be here"
+    properties = {"tnt_kg": source.tnt_kg, "weight": source.weight}
+    if isinstance(source, RectangleSource):
+        return _area(FeatureKind.CHARGE_PLACE, source.rectangle_m, name, **properties)
+    ends_m = source.segment_m if isinstance(source, SegmentSource) else (source.position_m,)
+    places_m = tuple(_rounded(*place) for place in ends_m)
+    return Feature(FeatureKind.CHARGE_PLACE, places_m, name, properties)
+
+
+def _area(kind: FeatureKind, rectangle: Rectangle, name: str, **properties: str | float) -> Feature:
+    left, bottom, right, top = rectangle
+    corners = ((left, bottom), (right, bottom), (right, top), (left, top))
+    return Feature(kind, tuple(_rounded(x, y) for x, y in corners), name, properties)
+
+
+def _rounded(x_m: float, y_m: float) -> PlaceM:
+    return round(x_m, _DIGITS), round(y_m, _DIGITS)

@@ -1,0 +1,60 @@
+"""A small site, an agent that needs no training, and standings made of plain numbers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from agents.league import Proposal, Result, Standings, Track, Training, known_track
+from agents.rules import expected_charge, line_of_sight_wall
+from agents.search import Layout
+from blast_env.scenario import Charge, Scenario, SegmentSource
+from tests.agents.search_cases import small_scenario
+
+ROAD = SegmentSource(kind="segment", start_m=(5.0, 15.0), end_m=(5.0, 25.0), tnt_kg=100.0)
+TRAINING = Training(blasts=5000, seconds=60.0)
+
+
+def road_scenario(stock: int = 3) -> Scenario:
+    """Return the small site of the searches with a charge anywhere on a road."""
+    return small_scenario(stock=stock).model_copy(update={"charge": (ROAD,), "name": "road"})
+
+
+@dataclass(frozen=True)
+class WallAgent:
+    """Proposes a wall in the middle of the zone, and remembers what it was told."""
+
+    told: list[Charge | None] = field(default_factory=list, repr=False, compare=False)
+
+    def propose(self, scenario: Scenario, charge: Charge | None = None) -> Layout:
+        self.told.append(charge)
+        return line_of_sight_wall(scenario, charge or expected_charge(scenario.charge), 0.5)
+
+
+def result(
+    name: str,
+    impulse_pa_s: Sequence[Sequence[float]],
+    blasts: int = 0,
+    seconds: Sequence[float] | None = None,
+    training: Training | None = None,
+) -> Result:
+    """Return a result with a module in each layout, unless it is that of no barrier."""
+    layout = () if name == "no barrier" else ((0, 0),)
+    times = seconds or [0.01] * len(impulse_pa_s)
+    return Result(
+        name=name,
+        method=name.partition(",")[0],
+        budget=blasts,
+        training=training,
+        proposals=tuple(Proposal(layout, blasts, each) for each in times),
+        impulse_pa_s=np.array(impulse_pa_s, dtype=np.float64),
+    )
+
+
+def standings(
+    unprotected_pa_s: Sequence[Sequence[float]], *results: Result, track: Track | None = None
+) -> Standings:
+    """Return standings of results on so many cases and held-out threats."""
+    bare = np.array(unprotected_pa_s, dtype=np.float64)
+    track = track or known_track(road_scenario(), *bare.shape)
+    return Standings(track, (result("no barrier", bare.tolist()), *results), bare, "event")

@@ -1,0 +1,136 @@
+"""`blast-env league`, run in this process, and the agents of run folders in it."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner, Result
+
+from agents.league import find_tracks, hidden_track, known_track, sites_track
+from agents.league.trained import TrainedRun, check_runs
+from agents.training import train
+from blast_env.cli import app
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.scenario import load_scenario, save_scenario
+from blast_env.sites import SiteSource
+from tests.agents.training_runs import (
+    hyperparameters,
+    scenario_file,
+    settings,
+    small_scenario,
+)
+
+SMALL = ("--cases", 2, "--seeds", 2, "--budgets", "4,8", "--methods", "random,genetic")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A training on the small scenario, with known threats."""
+    folder = tmp_path_factory.mktemp("training")
+    train(settings(scenario_file(folder)), hyperparameters(), folder / "agent")
+    return folder / "agent"
+
+
+def league(*arguments: str | Path | int) -> Result:
+    return CliRunner().invoke(app, ["league", *(str(argument) for argument in arguments)])
+
+
+def test_it_has_help_and_is_listed() -> None:
+    assert "league" in CliRunner().invoke(app, ["--help"]).stdout
+    result = league("--help")
+    assert result.exit_code == 0
+    assert "known, hidden, sites or all" in " ".join(result.stdout.split())
+
+
+def test_all_enter_and_all_is_written(run: Path, tmp_path: Path) -> None:
+    out, scenario = tmp_path / "out", run / "scenario.toml"
+    result = league(*SMALL, "--scenario", scenario, "--run", run, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "known_small: up to 48 blasts of searches and" in result.stdout
+    summary = pd.read_csv(out / "known_small_summary.csv")
+    assert list(summary["entry"]) == [
+        "no barrier",
+        "random layout",
+        "wall near the charge",
+        "wall near the building",
+        "random, 4 blasts",
+        "random, 8 blasts",
+        "genetic, 4 blasts",
+        "genetic, 8 blasts",
+        "MaskablePPO (agent)",
+    ]
+    assert (summary["cases"] == 2).all()
+    assert len(pd.read_csv(out / "known_small_cases.csv")) == 18
+    for name in ("league.md", "known_small.png"):
+        assert f"wrote {out / name}" in result.stdout
+    assert "genetic search with 200 blasts has not entered" in result.stdout
+
+
+def test_called_again_it_has_nothing_left_to_simulate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = scenario_file(tmp_path)
+    arguments = (*SMALL, "--track", "hidden", "--scenario", path, "--out", tmp_path / "out")
+    first = league(*arguments)
+    assert first.exit_code == 0, first.output
+    assert "One case; intervals and worst case are over its 8 held-out threats" in first.stdout
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("a blast is simulated")
+
+    monkeypatch.setattr(BlastEvaluator, "loads_of_many", refuse)
+    second = league(*arguments)
+    assert second.exit_code == 0, second.output
+    assert "up to 0 blasts in all" in second.stdout
+    assert "4 of 4 searches are through already" in second.stdout
+
+
+def test_a_run_says_what_it_is_for_and_what_it_cost(run: Path) -> None:
+    trained = TrainedRun.load(run)
+    scenario = small_scenario()
+    assert trained.is_for(known_track(scenario, 1, 1))
+    assert not trained.is_for(hidden_track(scenario, 1))
+    assert not trained.is_for(sites_track([next(iter(SiteSource.held_out(1)))], 1))
+    rollouts, evaluations = (pd.read_csv(run / f"{n}.csv") for n in ("rollouts", "evaluations"))
+    selection = (len(evaluations) + 1) * 2  # two cases each, and the same without a barrier
+    assert trained.entry.training.blasts == rollouts["blasts"].iloc[-1] + selection
+    assert trained.entry.training.seconds > 0.0
+
+
+def test_an_agent_for_none_of_the_tracks_is_refused(run: Path, tmp_path: Path) -> None:
+    changed = tmp_path / "changed.toml"
+    save_scenario(small_scenario(stock=5), changed)
+    tracks = find_tracks("known", 1, 1, scenarios=[str(changed)])
+    with pytest.raises(BlastEnvError, match=r"trained for a visible threat on .*\(known_small\)"):
+        check_runs([TrainedRun.load(run)], tracks)
+    check_runs(
+        [TrainedRun.load(run)], [*tracks, known_track(load_scenario(run / "scenario.toml"), 1, 1)]
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--track", "knwon"), "did you mean 'known'"),
+        (("--methods", "genetik"), "did you mean 'genetic'"),
+        (("--budgets", "50;200"), "must be whole numbers with commas"),
+        (("--budgets", "0"), "budget is 0 blasts"),
+        (("--cases", "0"), "cases is 0"),
+        (("--scenario", "cortyard"), "did you mean 'courtyard'"),
+        (("--engine", "evnt"), "did you mean 'event'"),
+        (("--run", "nowhere"), "nowhere: is no run folder"),
+        (("--out", "file"), "cannot be a folder"),
+    ],
+)
+def test_bad_input_is_one_clear_message(
+    arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    scenario_file(tmp_path)
+    few = ("--scenario", "small.toml") if "--scenario" not in arguments else ()
+    result = league("--out", "out", "--cases", 1, "--seeds", 1, *few, *arguments)
+    assert result.exit_code == 2
+    assert words in " ".join(result.stderr.split())
+    assert "Traceback" not in result.output

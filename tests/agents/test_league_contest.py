@@ -1,0 +1,216 @@
+"""Entries on a track: the same blasts for all, and nothing is done twice."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.league import (
+    Agent,
+    Contest,
+    NoBarrier,
+    ResultStore,
+    Rule,
+    Search,
+    hidden_track,
+    known_track,
+    standard_entries,
+)
+from agents.league.store import search_key
+from agents.rules import wall_near_charge
+from agents.search import LayoutProblem, RandomSearch, Report, SearchResult, find_search_method
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, evaluate_against
+from tests.agents.league_cases import TRAINING, WallAgent, road_scenario
+
+SCENARIO = road_scenario()
+TRACK = known_track(SCENARIO, 3, 2)
+BUDGET = 6
+
+
+@dataclass(frozen=True)
+class CountedSearch:
+    """Random search that remembers how often it was called, and may be interrupted."""
+
+    interrupted: bool = False
+    calls: list[int] = field(default_factory=list, repr=False, compare=False)
+    name: str = "counted"
+
+    def search(
+        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
+    ) -> SearchResult:
+        self.calls.append(seed)
+        found = RandomSearch(batch=2).search(problem, budget, seed, report)
+        return replace(found, interrupted=self.interrupted)
+
+
+def store(folder: Path) -> ResultStore:
+    return ResultStore(folder / "results")
+
+
+def test_every_entry_meets_the_same_threats_as_no_barrier(tmp_path: Path) -> None:
+    """The numbers are those of an evaluation of each layout against none on the held-out seeds."""
+    entries = (
+        *standard_entries(["random"], [BUDGET]),
+        Agent(WallAgent(), "wall agent", TRAINING),
+    )
+    standings = Contest(TRACK, entries, store(tmp_path)).play()
+    assert [result.name for result in standings.results] == [
+        "no barrier",
+        "random layout",
+        "wall near the charge",
+        "wall near the building",
+        "random, 6 blasts",
+        "wall agent",
+    ]
+    evaluator = BlastEvaluator(SCENARIO)
+    for result in standings.results:
+        reductions = standings.case_reductions(result)
+        for case, proposal, reduction in zip(
+            TRACK.cases, result.proposals, reductions, strict=True
+        ):
+            expected = evaluate_against(evaluator, proposal.layout, case.held_out)
+            assert reduction == pytest.approx(expected.mean_reduction, abs=1e-12)
+    assert standings.reduction(standings.results[0]) == (0.0, 0.0, 0.0)
+    assert standings.reduction(standings.results[-1]).value > 0.05
+
+
+def test_a_search_finds_what_it_finds_alone(tmp_path: Path) -> None:
+    """On the threats for searching, with the budget, and with the case's seed."""
+    entries = (NoBarrier(), Search(find_search_method("genetic"), BUDGET))
+    proposals = Contest(TRACK, entries, store(tmp_path)).play().results[1].proposals
+    for case, proposal in zip(TRACK.cases, proposals, strict=True):
+        problem = LayoutProblem(BlastEvaluator(SCENARIO), case.search_threats)
+        expected = find_search_method("genetic").search(problem, BUDGET, case.seed)
+        assert proposal.layout == expected.layout
+        assert 0 < proposal.blasts == expected.blasts <= BUDGET
+        assert proposal.seconds > 0.0
+
+
+def test_an_agent_is_told_the_charge_only_where_it_is_known(tmp_path: Path) -> None:
+    agent = WallAgent()
+    entries = (NoBarrier(), Agent(agent, "agent", TRAINING))
+    Contest(TRACK, entries, store(tmp_path)).play()
+    assert agent.told[-3:] == [case.charge for case in TRACK.cases]
+    agent.told.clear()
+    Contest(hidden_track(SCENARIO, 1), entries, store(tmp_path)).play()
+    assert set(agent.told) == {None}
+
+
+def test_a_rule_stands_in_the_middle_of_a_hidden_threat() -> None:
+    (case,) = hidden_track(SCENARIO, 1).cases
+    middle = case.search_threats[0].charge._replace(position_m=(5.0, 20.0))
+    assert Rule(wall_near_charge, "rule").propose(case) == wall_near_charge(SCENARIO, middle)
+
+
+def test_an_interrupted_league_goes_on(tmp_path: Path) -> None:
+    """After two of three searches: one is left, and all comes out as if nothing had happened."""
+    counted = CountedSearch()
+    entries = (NoBarrier(), Search(counted, BUDGET))
+    shares: list[float] = []
+
+    def interrupt(share: float) -> None:
+        shares.append(share)
+        if len(shares) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        Contest(TRACK, entries, store(tmp_path)).play(progress=interrupt)
+    assert len(counted.calls) == 2
+    again = Contest(TRACK, entries, store(tmp_path))
+    outlook = again.outlook()
+    assert (outlook.searches, outlook.kept_searches, outlook.search_blasts) == (3, 2, BUDGET)
+    standings = again.play(progress=shares.append)
+    assert len(counted.calls) == 3
+    assert shares[-1] == 1.0
+    untroubled = Contest(TRACK, entries, store(tmp_path / "other")).play()
+    assert np.array_equal(
+        standings.results[1].impulse_pa_s, untroubled.results[1].impulse_pa_s, equal_nan=False
+    )
+
+
+def test_what_is_finished_is_not_done_again(tmp_path: Path) -> None:
+    counted = CountedSearch()
+    entries = (NoBarrier(), Search(counted, BUDGET))
+    first = Contest(TRACK, entries, store(tmp_path)).play()
+    second = Contest(TRACK, entries, store(tmp_path))
+    assert second.outlook().blasts == 0
+    repeated = second.play()
+    assert len(counted.calls) == 3
+    assert repeated.results[1].proposals == first.results[1].proposals  # times as well
+    more_seeds = Contest(known_track(SCENARIO, 3, 4), entries, store(tmp_path))
+    assert more_seeds.outlook().search_blasts == 0
+    assert more_seeds.outlook().held_out_blasts == 2 * 3 * 4
+
+
+def test_a_result_of_something_else_is_not_taken() -> None:
+    """Other settings, budget, seed, scenario or engine: other keys."""
+    case = TRACK.cases[0]
+    other = road_scenario(stock=2)
+    keys = {
+        search_key(case, Search(RandomSearch(), 6), "event"),
+        search_key(case, Search(RandomSearch(batch=4), 6), "event"),
+        search_key(case, Search(RandomSearch(), 7), "event"),
+        search_key(replace(case, seed=9), Search(RandomSearch(), 6), "event"),
+        search_key(TRACK.cases[1], Search(RandomSearch(), 6), "event"),
+        search_key(replace(case, scenario=other), Search(RandomSearch(), 6), "event"),
+        search_key(case, Search(RandomSearch(), 6), "pymunk"),
+    }
+    assert len(keys) == 7
+
+
+def test_a_key_is_the_same_in_every_process() -> None:
+    """A method's settings may hold functions; where these lie in memory does not matter."""
+    key = search_key(TRACK.cases[0], Search(find_search_method("genetic"), 6), "event")
+    assert "random_walls" in key.method
+    assert " at 0x" not in key.method
+
+
+@pytest.mark.parametrize("damage", [b"", b"{", b'{"key": "another", "value": null}'])
+def test_a_damaged_result_is_found_again(tmp_path: Path, damage: bytes) -> None:
+    entries = (NoBarrier(), Search(CountedSearch(), BUDGET))
+    first = Contest(TRACK, entries, store(tmp_path)).play()
+    for path in (tmp_path / "results").iterdir():
+        path.write_bytes(damage)
+    again = Contest(TRACK, entries, store(tmp_path))
+    assert again.outlook().kept_searches == 0
+    for one, other in zip(first.results, again.play().results, strict=True):
+        assert np.array_equal(one.impulse_pa_s, other.impulse_pa_s)
+
+
+def test_what_an_interrupted_search_has_is_not_its_answer(tmp_path: Path) -> None:
+    """Searches end at Ctrl-C with the best so far; the league must not take that for more."""
+    entries = (NoBarrier(), Search(CountedSearch(interrupted=True), BUDGET))
+    contest = Contest(TRACK, entries, store(tmp_path))
+    with pytest.raises(KeyboardInterrupt):
+        contest.play()
+    assert contest.outlook().kept_searches == 0
+
+
+def test_processes_change_nothing(tmp_path: Path) -> None:
+    track = known_track(SCENARIO, 2, 1)
+    entries = standard_entries(["random"], [BUDGET])
+    one, two = (
+        Contest(track, entries, store(tmp_path / str(processes))).play(processes)
+        for processes in (1, 2)
+    )
+    for first, second in zip(one.results, two.results, strict=True):
+        assert np.array_equal(first.impulse_pa_s, second.impulse_pa_s)
+
+
+def test_bad_input_is_refused(tmp_path: Path) -> None:
+    kept = store(tmp_path)
+    with pytest.raises(BlastEnvError, match="'no barrier' is there twice"):
+        Contest(TRACK, (NoBarrier(), NoBarrier()), kept)
+    with pytest.raises(BlastEnvError, match="no barrier is not among"):
+        Contest(TRACK, (Search(RandomSearch(), 6),), kept)
+    with pytest.raises(BlastEnvError, match="budget is 0 blasts"):
+        Search(RandomSearch(), 0)
+    with pytest.raises(BlastEnvError, match="did you mean 'genetic'"):
+        standard_entries(["genetik"], [6])
+    with pytest.raises(BlastEnvError, match="processes is 0"):
+        Contest(TRACK, (NoBarrier(),), kept).play(0)
+    (tmp_path / "file").touch()
+    with pytest.raises(BlastEnvError, match="cannot be a folder"):
+        ResultStore(tmp_path / "file")

@@ -1,0 +1,122 @@
+"""What a league asks: nobody has met the blasts that layouts are judged on."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.league import Track, find_tracks, hidden_track, known_track, sites_track
+from agents.league.tracks import MOST_CASES, MOST_LEAGUE_SEED, MOST_SEEDS
+from agents.search.problem import SEED_SPAN
+from blast_env.errors import BlastEnvError
+from blast_env.scenario import save_scenario
+from blast_env.sites import HELD_OUT_SITES, SiteSource
+from tests.agents.league_cases import ROAD, road_scenario
+
+SCENARIO = road_scenario()
+
+
+def seeds_of(track: Track) -> list[int]:
+    return [threat.seed for case in track.cases for threat in case.held_out]
+
+
+@settings(max_examples=20, deadline=None)
+@given(cases=st.integers(1, 6), seeds=st.integers(1, 6), seed=st.integers(0, MOST_LEAGUE_SEED))
+def test_held_out_blasts_are_met_once_and_never_before(cases: int, seeds: int, seed: int) -> None:
+    """Training and search draw their seeds below SEED_SPAN; here all are above, none twice."""
+    for track in (known_track(SCENARIO, cases, seeds, seed), hidden_track(SCENARIO, seeds, seed)):
+        held_out = seeds_of(track)
+        assert min(held_out) >= SEED_SPAN
+        assert len(set(held_out)) == len(held_out)
+        assert all(t.seed < SEED_SPAN for case in track.cases for t in case.search_threats)
+
+
+def test_seeds_of_different_leagues_and_cases_cannot_meet() -> None:
+    """The stride from case to case, and from league to league, holds the most there may be."""
+    last = known_track(SCENARIO, MOST_CASES, 1, 0).cases[-1].held_out[0].seed
+    assert hidden_track(SCENARIO, 1, 1).cases[0].held_out[0].seed - last >= 4 * MOST_SEEDS
+
+
+def test_a_known_threat_is_the_same_charge_in_search_and_judgement() -> None:
+    track = known_track(SCENARIO, 5, 3)
+    places = {case.charge.position_m for case in track.cases if case.charge is not None}
+    assert len(places) == 5
+    (x_m, low_m), (_, high_m) = ROAD.start_m, ROAD.end_m
+    assert all(x == x_m and low_m <= y <= high_m for x, y in places)
+    for case in track.cases:
+        threats = (*case.search_threats, *case.held_out)
+        assert {threat.charge for threat in threats} == {case.charge}
+
+
+def test_a_hidden_threat_is_judged_at_places_of_its_own() -> None:
+    (case,) = hidden_track(SCENARIO, 3).cases
+    assert case.charge is None
+    assert len(case.held_out) == 12
+    searched = {threat.charge for threat in case.search_threats}
+    judged = {threat.charge for threat in case.held_out}
+    assert len(searched) == 16
+    assert len(judged) == 12
+    assert not searched & judged
+
+
+def test_sites_are_those_that_training_never_sees() -> None:
+    (track,) = find_tracks("sites", 3, 2)
+    held_out = [site.content_hash for site in SiteSource(0, 3)]
+    assert [case.scenario.content_hash for case in track.cases] == held_out
+    assert HELD_OUT_SITES > 3
+    assert all(case.charge is None for case in track.cases)
+    assert track.scenario_hash is None
+
+
+def test_more_cases_and_seeds_keep_the_first_ones() -> None:
+    """So that a larger league goes on from a smaller one."""
+    few, many = known_track(SCENARIO, 2, 3), known_track(SCENARIO, 4, 5)
+    for one, other in zip(few.cases, many.cases, strict=False):
+        assert one.charge == other.charge
+        assert one.search_threats == other.search_threats
+        assert one.held_out == other.held_out[:3]
+
+
+def test_another_seed_asks_something_else() -> None:
+    one, other = (known_track(SCENARIO, 2, 2, seed).cases for seed in (0, 1))
+    assert not {case.charge for case in one} & {case.charge for case in other}
+
+
+def test_all_tracks_and_the_reference_of_each(tmp_path: Path) -> None:
+    path = tmp_path / "road.toml"
+    save_scenario(SCENARIO, path)
+    tracks = find_tracks("all", 1, 1, scenarios=[str(path)])
+    found = [(track.name, track.threat, track.reference_budget) for track in tracks]
+    assert found == [
+        ("known_road", "visible", 200),
+        ("hidden_road", "hidden", 200),
+        ("sites", "hidden", 50),
+    ]
+    assert [track.name for track in find_tracks("known", 1, 1)] == [
+        "known_courtyard",
+        "known_perimeter_gate",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("knwon", 1, 1), "did you mean 'known'"),
+        (("known", 0, 1), "cases is 0, must be an integer from 1 to 1000"),
+        (("sites", 1001, 1), "cases is 1001"),
+        (("hidden", 1, 0), "seeds is 0, must be an integer from 1 to 1000"),
+        (("hidden", 1, 1, 1001), "seed is 1001"),
+        (("sites", 1, 1, 0, ["courtyard"]), "generates its own"),
+        (("known", 1, 1, 0, ["courtyard", "courtyard"]), "'known_courtyard' is there twice"),
+        (("known", 1, 1, 0, ["free_field"]), "no build zone"),
+    ],
+)
+def test_bad_input_is_refused(arguments: tuple, words: str) -> None:
+    with pytest.raises(BlastEnvError, match=words):
+        find_tracks(*arguments)
+
+
+def test_no_sites_are_refused() -> None:
+    with pytest.raises(BlastEnvError, match="cases is 0"):
+        sites_track([], 1)
