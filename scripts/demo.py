@@ -1,60 +1,256 @@
-"""`make demo`: simulate the default scenario and write what a person would look at.
+"""`make demo`: train an agent for a few minutes, and see what it has learnt.
 
-Writes the collision workbook, the heat map, the film and the other figures under `out/`.
+Trains MaskablePPO on `courtyard`, holds its layouts against no barrier, random layouts and the
+rules of thumb on threats that the training has not met, and films one blast with and without them.
 """
 
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from time import perf_counter
+from typing import Any
 
-from blast_env import Blast, BlastResult, load_scenario
-from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.cli.simulate import print_summary
-from blast_env.rendering.figures import (
-    heat_map,
-    impulse_over_time,
-    initial_velocities,
-    model_scheme,
-    save_figure,
+from agents.evaluation import CaseOutcome
+from agents.training import TrainingSettings, load_agent, load_hyperparameters, train
+from agents.training.environments import environment_id
+from agents.training.records import EvaluationRow, read_rows
+from agents.training.run_folder import RunFolder
+from agents.training.train import TrainingResult
+from agents.unseen_cases import FIRST_SEED, unseen_cases
+from blast_env.cli.evaluate_options import interval, percent
+from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
+from blast_env.envs.scenario_source import SingleScenario
+from blast_env.errors import BlastEnvError
+from blast_env.export import LayoutPlan, export_layouts
+from blast_env.rendering.figures import heat_map, save_figure
+from blast_env.rendering.side_by_side import FilmPanel, write_side_by_side
+from blast_env.simulation import Blast
+from scripts.demo_comparison import AGENT, Comparison, compare
+
+_HEADERS = (
+    "layouts",
+    "Pa s",
+    "reduction",
+    "95 % interval",
+    "agent ahead by",
+    "95 % interval",
+    "ms",
 )
-from blast_env.rendering.film import write_film
 
-OUT = Path("out")
-SCENARIO = "courtyard"
-LINE_OF_SIGHT_WALL = tuple((row, 0) for row in range(8, 18)) + ((22, 0), (23, 0), (24, 0))
-"""Cells at the road's side of the build zone, on both sides of the path that stays open."""
+
+@dataclass(frozen=True)
+class DemoSettings:
+    """What the demonstration does.
+
+    Attributes:
+        out: Folder for everything.
+        scenario: Bundled name, or a scenario file.
+        steps: Steps of training, a module each.
+        seed: Of the training and the random layouts.
+        changes: Hyperparameters in the place of those of the package.
+        evaluation_interval: Rollouts from one point of the learning curve to the next.
+        evaluation_cases: Held-out threats of such a point.
+        threats: Unseen threats of the comparison.
+        processes: Worker processes of the comparison.
+        film_width_px: Width of the film.
+        frames_per_s: Frames in a second of the film.
+    """
+
+    out: Path = Path("out/demo")
+    scenario: str = "courtyard"
+    steps: int = 24_576
+    seed: int = 0
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    evaluation_interval: int = 4
+    evaluation_cases: int = 16
+    threats: int = 64
+    processes: int = 2
+    film_width_px: int = 1600
+    frames_per_s: float = 25.0
+
+    @property
+    def run(self) -> Path:
+        """The run folder."""
+        return self.out / "run"
 
 
 def main() -> None:
     """Run the demonstration."""
-    scenario = load_scenario(SCENARIO)
     with user_errors():
-        OUT.mkdir(exist_ok=True)
-        bare = show(Blast(scenario, seed=0), SCENARIO)
-        workbook = bare.to_excel(OUT / f"{SCENARIO}_collisions.xlsx")
-        behind = show(Blast(scenario, LINE_OF_SIGHT_WALL, seed=0), f"{SCENARIO}_barrier")
-        schemes = [
-            save_figure(initial_velocities(scenario.parameters), OUT / "initial_velocities.png"),
-            save_figure(model_scheme(behind.blast.scene), OUT / "model_scheme.png"),
-        ]
-    for path in (workbook, *schemes):
+        demonstrate(DemoSettings())
+
+
+def demonstrate(settings: DemoSettings) -> Comparison:
+    """Train, compare, film; print a table and the paths.
+
+    Returns:
+        The comparison that the verdict rests on.
+
+    Raises:
+        BlastEnvError: If a setting is of no use, or a file cannot be written.
+    """
+    began = perf_counter()
+    trained = train_agent(settings)
+    comparison = compare_methods(settings, trained)
+    print_comparison(comparison)
+    written = [trained.folder.learning_curve]
+    written += write_pictures(settings, comparison.agent.evaluation.outcomes[0])
+    print_line(f"\n{comparison.verdict}\n", style="bold")
+    for path in written:
         print_line(f"wrote {path}")
-    share = behind.impulse_sim("building") / bare.impulse_sim("building")
-    print_line(
-        f"\nbehind the barrier the building took {100 * share:.0f} % of the impulse that it took "
-        "without it, in this one blast (seed 0)"
+    print_line(f"the run folder is {settings.run}; try: blast-env evaluate --run {settings.run}")
+    print_line(f"{perf_counter() - began:.0f} s in all")
+    return comparison
+
+
+def train_agent(settings: DemoSettings) -> TrainingResult:
+    """Train MaskablePPO in a fresh run folder, and print the learning curve as it grows."""
+    hyperparameters = load_hyperparameters(
+        "maskable_ppo", environment_id(settings.scenario), settings.changes
     )
-
-
-def show(blast: Blast, name: str) -> BlastResult:
-    """Run a blast; write its film, heat map and history, and print its table."""
-    with progress_bar(f"{name}: blast and film") as progress:
-        result = write_film(blast, OUT / f"{name}.mp4", progress=progress)
-    written = [
-        OUT / f"{name}.mp4",
-        save_figure(heat_map(result), OUT / f"{name}_heat_map.png"),
-        save_figure(impulse_over_time(result), OUT / f"{name}_history.png"),
-    ]
-    print_summary(result, written)
+    training = TrainingSettings(
+        algorithm="maskable_ppo",
+        scenario=settings.scenario,
+        steps=settings.steps,
+        seed=settings.seed,
+        evaluation_interval=settings.evaluation_interval,
+        evaluation_cases=settings.evaluation_cases,
+    )
+    _clear(settings.run)
+    print_line(f"training {AGENT} on {settings.scenario}: {settings.steps:,} steps, a module each")
+    with _learning_curve(RunFolder(settings.run)) as progress:
+        result = train(training, hyperparameters, settings.run, progress)
+    counters = result.progress.counters
+    print_line(
+        f"{counters.episodes:,} layouts tried with {counters.blasts:,} blasts in "
+        f"{counters.seconds:.0f} s\n"
+    )
     return result
+
+
+@contextmanager
+def _learning_curve(folder: RunFolder) -> Iterator[Callable[[float], None]]:
+    """Show a progress bar, and print each evaluation as soon as it is there."""
+    printed = 0
+
+    def print_new() -> None:
+        nonlocal printed
+        rows = _evaluations(folder)
+        for row in rows[printed:]:
+            print_line(
+                f"  after {row.episodes:>5,} layouts, {row.seconds:>4.0f} s: reduction "
+                f"{percent(row.reduction):>6} (95 % interval {percent(row.low)} to "
+                f"{percent(row.high)})"
+            )
+        printed = len(rows)
+
+    with progress_bar("training") as show:
+
+        def progress(share: float) -> None:
+            show(share)
+            print_new()
+
+        yield progress
+    print_new()
+
+
+def _evaluations(folder: RunFolder) -> list[EvaluationRow]:
+    if not folder.evaluations.exists():
+        return []
+    return read_rows(folder.evaluations, EvaluationRow, 10**10)
+
+
+def _clear(run: Path) -> None:
+    """Remove the run of an earlier demonstration; anything else is left alone."""
+    if (run / "config.yaml").exists():
+        try:
+            shutil.rmtree(run)
+        except OSError as error:
+            raise BlastEnvError(f"{run}: cannot be removed: {error.strerror or error}") from error
+
+
+def compare_methods(settings: DemoSettings, trained: TrainingResult) -> Comparison:
+    """Hold the best weights of the training against the other methods, on unseen threats."""
+    training = trained.configuration.settings
+    source = SingleScenario(trained.folder.scenario(trained.configuration))
+    seeds = range(FIRST_SEED, FIRST_SEED + settings.threats)
+    cases = unseen_cases(training, source, seeds, training.engine)
+    agent = load_agent(settings.run)
+    with progress_bar(f"{settings.threats} unseen threats") as progress:
+        return compare(agent, cases, settings.seed, settings.processes, progress)
+
+
+def print_comparison(comparison: Comparison) -> None:
+    """Print a row a method, and no barrier: mean impulse, reduction, time to propose a layout."""
+    outcomes = comparison.agent.evaluation.outcomes
+    table = make_table(
+        f"{outcomes[0].case.evaluator.scenario.name}: {len(outcomes)} threats that the training "
+        "has not met, the same for all\n(Pa s: mean impulse on the protected structures; ahead: in "
+        "percentage points, paired; ms: time to propose a layout)",
+        _HEADERS,
+    )
+    bare_pa_s = comparison.agent.evaluation.unprotected_impulse_pa_s.value
+    table.add_row("no barrier", f"{bare_pa_s:,.0f}", percent(0.0), *4 * ("-",))
+    for entry in comparison.entries:
+        evaluation = entry.evaluation
+        ahead = ("-", "-")
+        if entry is not comparison.agent:
+            gain = comparison.gain_over(entry)
+            ahead = (percent(gain.value), interval(gain))
+        table.add_row(
+            entry.name,
+            f"{evaluation.impulse_pa_s.value:,.0f}",
+            percent(evaluation.reduction.value),
+            interval(evaluation.reduction),
+            *ahead,
+            f"{entry.proposal_ms:.1f}",
+        )
+    result_console().print(table)
+
+
+def write_pictures(settings: DemoSettings, outcome: CaseOutcome) -> list[Path]:
+    """Film a blast without barrier and with the agent's layout; write the layout and the loads.
+
+    Args:
+        settings: The settings.
+        outcome: What the agent's layout does against one of the threats.
+
+    Returns:
+        The files.
+    """
+    evaluator, threat = outcome.case.evaluator, outcome.case.threat
+    blasts = [
+        Blast(evaluator.scenario, layout, threat.seed, evaluator.engine, threat.charge)
+        for layout in ((), tuple(sorted(outcome.layout)))
+    ]
+    where = ", ".join(each.name for each in evaluator.scenario.structures if each.protected)
+    impulses_pa_s = (outcome.outcome.unprotected_impulse_pa_s, outcome.outcome.impulse_pa_s)
+    titles = [
+        f"{name}: {impulse_pa_s:,.0f} Pa s on {where}"
+        for name, impulse_pa_s in zip(
+            ("no barrier", f"layout of {AGENT}"), impulses_pa_s, strict=True
+        )
+    ]
+    panels = [FilmPanel(blast, title) for blast, title in zip(blasts, titles, strict=True)]
+    film = settings.out / "side_by_side.mp4"
+    with progress_bar("film") as progress:
+        bare, protected = write_side_by_side(
+            panels,
+            film,
+            frames_per_s=settings.frames_per_s,
+            width_px=settings.film_width_px,
+            progress=progress,
+        )
+    plan = LayoutPlan(evaluator.scenario, outcome.layout, threat.charge, {"run": str(settings.run)})
+    return [
+        film,
+        save_figure(heat_map(bare), settings.out / "heat_map_no_barrier.png"),
+        save_figure(heat_map(protected), settings.out / "heat_map_layout.png"),
+        protected.to_excel(settings.out / "collisions.xlsx"),
+        *export_layouts({"layout": plan}, settings.out),
+    ]
 
 
 if __name__ == "__main__":

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from blast_env.atomic import write_atomically
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engine import BallStates, BlastRun
+from blast_env.physics.engine import BlastRun
 from blast_env.rendering.film_files import FilmFile, GifFile, Mp4File
-from blast_env.rendering.frames import FramePainter
+from blast_env.rendering.frames import Frame, FramePainter
 from blast_env.rendering.span import shown_until_s
 from blast_env.rendering.style import nice_ceiling, nice_numbers
 from blast_env.simulation import Blast, BlastResult
@@ -132,7 +132,7 @@ def write_film(
         plan = plan_film(result, frames_per_s, slow_motion)
         if suffix == ".gif":
             plan, width_px = _for_gif(plan, width_px)
-        full_impulse = _largest_load(result) if full_impulse is None else full_impulse
+        full_impulse = largest_load(result) if full_impulse is None else full_impulse
         even_px = width_px - width_px % 2
         painter = FramePainter.for_blast(blast, width_px=even_px, full_impulse=full_impulse)
         with _open_film(suffix, temporary, plan, blast) as film:
@@ -160,16 +160,25 @@ def _draw(
 ) -> None:
     for frame in range(plan.frame_count):
         time_s = plan.time_s(frame)
-        run.advance(time_s)
-        balls = _moved(run.balls(), time_s - run.time_s)
-        film.append(painter.paint(balls, run.obstacles, time_s, plan.real_time_factor))
+        film.append(paint_at(run, painter, time_s, plan.real_time_factor))
         drawn = (frame + 1) / plan.frame_count
         progress(_SHARE_OF_FIRST_RUN + (1.0 - _SHARE_OF_FIRST_RUN) * drawn)
 
 
-def _moved(balls: BallStates, by_s: float) -> BallStates:
-    """Return the balls where they are a part of a step earlier or later, in free flight."""
-    return replace(balls, position=balls.position + by_s * balls.velocity)
+def paint_at(run: BlastRun, painter: FramePainter, time_s: float, note: str) -> Frame:
+    """Bring a blast to a moment and paint it.
+
+    Args:
+        run: The blast on its way.
+        painter: What paints it.
+        time_s: The moment; not before where the blast is.
+        note: What is written beside the time.
+    """
+    run.advance(time_s)
+    balls = run.balls()
+    # Engines with steps may be a part of one ahead or behind: free flight in between.
+    balls = replace(balls, position=balls.position + (time_s - run.time_s) * balls.velocity)
+    return painter.paint(balls, run.obstacles, time_s, note)
 
 
 def _open_film(suffix: str, path: Path, plan: FilmPlan, blast: Blast) -> FilmFile:
@@ -203,7 +212,7 @@ def _usual_slow_motion(end_s: float) -> float:
     return min(factors, key=lambda factor: abs(factor * end_s - _USUAL_S))
 
 
-def _largest_load(result: BlastResult) -> float | None:
+def largest_load(result: BlastResult) -> float | None:
     """Return the largest load of a protected module, of any one if these have none, or None."""
     for obstacles in (
         [obstacle for obstacle in result.obstacles if obstacle.protected],

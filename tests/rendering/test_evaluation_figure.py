@@ -15,7 +15,7 @@ WALL = [(row, 0) for row in range(22, 32)]
 THREATS = (
     Threat(Charge((5.0, 20.0), 100.0), 0),
     Threat(Charge((5.0, 9.0), 100.0), 1),
-    Threat(Charge((5.0, 14.0), 50.0), 2),  # no mass that the calibration was made for
+    Threat(Charge((5.0, 14.0), 15.0), 2),  # no mass that the calibration was made for
 )
 
 

@@ -1,0 +1,103 @@
+"""Two blasts in one film: the same moment, the same colours, nothing shifted."""
+
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from imageio.plugins import ffmpeg
+
+from blast_env.errors import BlastEnvError
+from blast_env.rendering.film import plan_film
+from blast_env.rendering.frames import FramePainter
+from blast_env.rendering.side_by_side import FilmPanel, write_side_by_side
+from blast_env.simulation import Blast
+
+WIDTH_PX = 1280
+
+
+def frames_of(path: Path) -> np.ndarray:
+    """Return all frames (frames, height, width, 3), as ffmpeg reads them."""
+    untyped: Any = ffmpeg
+    command = [untyped.get_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    done = subprocess.run(command, capture_output=True, check=True)
+    size = re.search(r"yuv420p.*?, (\d+)x(\d+)", done.stderr.decode())
+    assert size is not None
+    width, height = int(size[1]), int(size[2])
+    return np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, height, width, 3)
+
+
+def panels(blast: Blast, barrier_blast: Blast) -> tuple[FilmPanel, ...]:
+    return FilmPanel(blast, "no barrier"), FilmPanel(barrier_blast, "with barrier")
+
+
+def write(shown: tuple[FilmPanel, ...], path: Path, **changes: Any) -> tuple[Any, ...]:
+    options = {"frames_per_s": 5.0, "slow_motion": 40.0, "width_px": WIDTH_PX, **changes}
+    return write_side_by_side(shown, path, **options)
+
+
+def test_both_blasts_are_shown_to_the_end_of_the_longer_one(
+    blast: Blast, barrier_blast: Blast, tmp_path: Path
+) -> None:
+    path = tmp_path / "both.mp4"
+    results = write(panels(blast, barrier_blast), path)
+    assert [each.digest for each in results] == [blast.run().digest, barrier_blast.run().digest]
+    frames = frames_of(path)
+    plans = [plan_film(each, 5.0, 40.0) for each in results]
+    assert len(frames) == max(plan.frame_count for plan in plans) > 3
+    assert frames.shape[2] == WIDTH_PX
+    assert frames.shape[1] % 2 == 0
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_same_blast_twice_gives_two_equal_halves(blast: Blast, tmp_path: Path) -> None:
+    """Neither half may lag behind or be moved; the codec alone may differ."""
+    path = tmp_path / "twins.mp4"
+    write((FilmPanel(blast, "one"), FilmPanel(blast, "one")), path)
+    frames = frames_of(path).astype(int)
+    left, right = np.split(frames, 2, axis=2)
+    assert np.abs(left - right).mean() < 1.0
+    assert np.abs(frames[0] - frames[-1]).max() > 100
+
+
+def test_the_barrier_is_in_its_own_half_alone(
+    blast: Blast, barrier_blast: Blast, tmp_path: Path
+) -> None:
+    path = tmp_path / "both.mp4"
+    write(panels(blast, barrier_blast), path)
+    first = frames_of(path)[0].astype(int)
+    painter = FramePainter.for_blast(barrier_blast, width_px=WIDTH_PX // 2)
+    part = barrier_blast.scene.obstacles()[-1].parts[0]
+    across, down = painter.view.pixel(part.x, part.y)
+    left, right = first[down, across], first[down, across + WIDTH_PX // 2]
+    assert np.abs(left - right).max() > 8  # an unloaded module beside the colour of the ground
+
+
+def test_ctrl_c_leaves_nothing_behind(blast: Blast, barrier_blast: Blast, tmp_path: Path) -> None:
+    def stop(share: float) -> None:
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write(panels(blast, barrier_blast), tmp_path / "both.mp4", progress=stop)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_progress_rises_to_one(blast: Blast, barrier_blast: Blast, tmp_path: Path) -> None:
+    shares: list[float] = []
+    write(panels(blast, barrier_blast), tmp_path / "both.mp4", progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+def test_what_is_no_film_of_two_is_refused(blast: Blast, tmp_path: Path) -> None:
+    pair = (FilmPanel(blast, "one"), FilmPanel(blast, "other"))
+    with pytest.raises(BlastEnvError, match="there are 1, must be at least 2"):
+        write(pair[:1], tmp_path / "film.mp4")
+    with pytest.raises(BlastEnvError, match=r"suffix is '.gif', must be '.mp4'"):
+        write(pair, tmp_path / "film.gif")
+    with pytest.raises(BlastEnvError, match="width_px is 300, must be 320"):
+        write(pair, tmp_path / "film.mp4", width_px=600)
+    assert list(tmp_path.iterdir()) == []
