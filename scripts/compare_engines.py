@@ -19,7 +19,7 @@ from scripts.engine_figure import convergence_figure
 from scripts.engine_scenes import BlastSet, EngineScene, engine_scenes, write_collisions
 
 OUT: Final = Path("out/compare_engines")
-_SHARES: Final = {0.5: 1.0, 0.25: 0.8, 0.1: 0.4, 0.05: 0.24, 0.02: 0.16}
+_SHARES: Final = {0.5: 1.0, 0.25: 0.8, 0.1: 0.4, 0.05: 0.25, 0.02: 0.25}
 """Of the seeds, by the step: short steps take long."""
 
 

@@ -26,7 +26,7 @@ _LOOKS: Final = (
 _SPREAD: Final = 0.012
 """Lines are shifted sideways by this share of the axis, so that their intervals lie apart."""
 _LOADS: Final = ("impulse", "transferred", "hits")
-_MOST_SHOWN_PERCENT: Final = 30.0
+_MOST_SHOWN_PERCENT: Final = 45.0
 
 
 def convergence_figure(comparisons: Sequence[Comparison], event_seeds: int) -> Figure:

@@ -44,7 +44,8 @@ class EngineScene:
 
 def engine_scenes() -> tuple[EngineScene, ...]:
     """Return the scenes: three distances in the open, the courtyard, a wall, and dense air."""
-    free_field, courtyard = load_scenario("free_field"), load_scenario("courtyard")
+    free_field = load_scenario("free_field")
+    courtyard = load_scenario("courtyard").with_simulation("ballistic")
     return (
         EngineScene("free_field, 15 m", free_field.at_stand_off(15.0), steps_radii=_FINER_STEPS),
         EngineScene("free_field, 60 m", free_field.at_stand_off(60.0)),

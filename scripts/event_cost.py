@@ -4,6 +4,7 @@ A dense, elastic gas in which every ball moves, in boxes of different sizes. Pri
 table and the fit against the logarithm of the number of balls, and draws a figure.
 """
 
+from functools import partial
 from math import ceil
 from pathlib import Path
 from time import process_time
@@ -13,7 +14,9 @@ import numpy as np
 import typer
 
 from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
+from blast_env.physics.event.layout import world_of
 from blast_env.physics.event_engine import EventRun
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, CollisionType
@@ -34,6 +37,8 @@ SPEED_UNITS_PER_S: Final = 1000.0
 MIXED_AFTER: Final = 1.0
 """Spacings that a ball goes at the mean speed before the lattice is forgotten."""
 MEASURED_UNTIL: Final = 5.0
+MOST_FITTED: Final = 20_000
+"""Up to so many balls everything that the engine works on fits into a few MB of cache."""
 
 
 class Cost(NamedTuple):
@@ -44,12 +49,14 @@ class Cost(NamedTuple):
         events: Collisions, moves into other cells, and collisions foreseen that did not happen.
         collisions: Collisions.
         seconds: Processor time.
+        megabytes: Size of the arrays.
     """
 
     balls: int
     events: int
     collisions: int
     seconds: float
+    megabytes: float
 
     @property
     def event_ns(self) -> float:
@@ -71,34 +78,45 @@ class LogFit(NamedTuple):
 
 def main(
     repeats: Annotated[int, typer.Option(min=1, help="Runs of each size; the least counts.")] = 5,
+    least_balls: Annotated[int, typer.Option(help="The smallest size.")] = BALLS[0],
     most_balls: Annotated[int, typer.Option(help="The largest size.")] = BALLS[-1],
     out: Annotated[Path, typer.Option(help="The figure.")] = OUT,
 ) -> None:
     """Measure, print and draw."""
     with user_errors():
         out.parent.mkdir(parents=True, exist_ok=True)
-        costs = measure([count for count in BALLS if count <= most_balls], repeats)
-        print_line("| balls | events | ns an event | collisions | ns a collision |")
-        print_line("|---|---|---|---|---|")
-        for cost in costs:
-            print_line(
-                f"| {cost.balls:,} | {cost.events:,} | {cost.event_ns:.0f} "
-                f"| {cost.collisions:,} | {cost.collision_ns:.0f} |"
+        sizes = [count for count in BALLS if least_balls <= count <= most_balls]
+        if len(sizes) < 2:
+            raise BlastEnvError(
+                f"least_balls is {least_balls} and most_balls {most_balls}, must leave at least "
+                f"two of {', '.join(map(str, BALLS))} for a fit"
             )
-        fit = log_fit(costs)
+        costs = measure([gas(count) for count in sizes], repeats)
+        print_costs(costs)
+        fit = log_fit([cost for cost in costs if cost.balls <= MOST_FITTED] or costs)
         print_line(f"ns an event = {fit.at_one:.0f} + {fit.per_doubling:.1f} log2(balls)")
         print_line(f"wrote {save_figure(cost_figure(costs, fit), out)}")
 
 
-def measure(sizes: list[int], repeats: int) -> list[Cost]:
-    """Return the least cost of each size over the repeats."""
+def print_costs(costs: list[Cost]) -> None:
+    """Print a table."""
+    print_line("| balls | MB | events | ns an event | collisions | ns a collision |")
+    print_line("|---|---|---|---|---|---|")
+    for cost in costs:
+        print_line(
+            f"| {cost.balls:,} | {cost.megabytes:.1f} | {cost.events:,} | {cost.event_ns:.0f} "
+            f"| {cost.collisions:,} | {cost.collision_ns:.0f} |"
+        )
+
+
+def measure(gases: list[Scene], repeats: int) -> list[Cost]:
+    """Return the least cost of each gas over the repeats."""
     costs = []
     with progress_bar("gases") as progress:
-        for done, balls in enumerate(sizes):
-            scene = gas(balls)
+        for done, scene in enumerate(gases):
             runs = [measure_once(scene) for _ in range(repeats)]
             costs.append(min(runs, key=lambda cost: cost.seconds))
-            progress((done + 1) / len(sizes))
+            progress((done + 1) / len(gases))
     return costs
 
 
@@ -111,7 +129,19 @@ def measure_once(scene: Scene) -> Cost:
     start = process_time()
     run.advance(MEASURED_UNTIL * spacing_s)
     seconds = process_time() - start
-    return Cost(len(scene.balls), _events(run) - events, run.steps - collisions, seconds)
+    return Cost(
+        len(scene.balls),
+        _events(run) - events,
+        run.steps - collisions,
+        seconds,
+        _megabytes(scene),
+    )
+
+
+def _megabytes(scene: Scene) -> float:
+    """Return the size of the arrays that the engine works on, its record excepted."""
+    parts = [part for obstacle in scene.obstacles() for part in obstacle.parts]
+    return sum(array.nbytes for array in world_of(scene, parts)) / 1e6
 
 
 def _events(run: EventRun) -> int:
@@ -187,15 +217,21 @@ def cost_figure(costs: list[Cost], fit: LogFit) -> Figure:
     event_ns = [cost.event_ns for cost in costs]
     axes.plot(balls, event_ns, color="#0072B2", marker="o", ls="", label="an event")
     fitted = fit.at_one + fit.per_doubling * np.log2(balls)
-    label = f"{fit.at_one:.0f} + {fit.per_doubling:.0f} log$_2$(balls)"
+    label = (
+        f"{fit.at_one:.0f} + {fit.per_doubling:.0f} log$_2$(balls), "
+        f"fitted up to {MOST_FITTED:,} balls"
+    )
     axes.plot(balls, fitted, color="#0072B2", lw=1.2, ls="--", label=label)
     axes.axhline(1000.0, color="#000000", lw=1.0, ls=":", label="1 µs")
     axes.set_xscale("log")
     axes.set_ylim(0.0, 1.15 * max(1000.0, *collision_ns))
     axes.set_xlabel("balls, all moving, three radii apart")
     axes.set_ylabel("processor time (ns)")
-    axes.set_title("What the event engine takes", fontweight="bold")
+    axes.set_title("What an event costs the event engine", fontweight="bold")
     axes.grid(alpha=0.3, which="both")
+    megabytes = float(np.mean([cost.megabytes / cost.balls for cost in costs]))
+    scale = (partial(np.multiply, megabytes), partial(np.multiply, 1.0 / megabytes))
+    axes.secondary_xaxis("top", functions=scale).set_xlabel("size of the engine's arrays (MB)")
     axes.legend(loc="upper left")
     return figure
 

@@ -53,7 +53,8 @@ def main(
     """Run the blasts and print the correlations."""
     with user_errors():
         out.parent.mkdir(parents=True, exist_ok=True)
-        scenario, rng = load_scenario("courtyard"), np.random.default_rng(0)
+        scenario = load_scenario("courtyard").with_simulation("ballistic")
+        rng = np.random.default_rng(0)
         drawn = random_layouts(scenario, layouts, rng)
         threats = [scenario.sample_charge(rng) for _ in range(charges)]
         loads = measured_loads(scenario, drawn, threats, processes)

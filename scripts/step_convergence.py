@@ -19,7 +19,7 @@ def main() -> None:
     """Run the study."""
     free_field = load_scenario("free_field")
     scenarios = {
-        "courtyard": load_scenario("courtyard"),
+        "courtyard": load_scenario("courtyard").with_simulation("ballistic"),
         "free_field, 15 m": free_field.at_stand_off(15.0),
         "free_field, 60 m": free_field.at_stand_off(60.0),
     }

@@ -2,13 +2,12 @@
 
 import pytest
 
-from blast_env import load_scenario
 from blast_env.batch import simulate_many
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
 from blast_env.simulation import Blast
+from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 
-COURTYARD = load_scenario("courtyard")
 WALL = tuple((row, 0) for row in range(2, 12))
 KEEP_OUT = (18, 0)
 """A cell of the courtyard that must stay empty."""

@@ -13,8 +13,11 @@ from blast_env.benchmark import (
     measure_memory_mb,
     measure_speed,
 )
+from blast_env.benchmark_env import measure_environment
+from blast_env.benchmark_fleets import measure_fleets
+from blast_env.benchmark_threads import measure_threads
 from blast_env.cli.output import make_table, print_line, result_console, user_errors
-from blast_env.scenario import load_scenario
+from blast_env.scenario import Scenario, load_scenario
 from blast_env.scene import build_scene
 
 _MANY_BALLS: Final = {
@@ -25,10 +28,19 @@ _ENGINE_HEADERS: Final = (
     "scenario",
     "balls",
     "pymunk (ms)",
-    "within 5 % (ms)",
+    "5 % step",
+    "pymunk at it (ms)",
     "event (ms)",
-    "pymunk / event",
-    "within 5 % / event",
+    "ratio",
+    "at the 5 % step",
+    "target",
+)
+_THREAD_HEADERS: Final = (
+    "scenario",
+    "blasts",
+    "1 thread (blasts/s)",
+    "threads (blasts/s)",
+    "ratio",
 )
 _PYMUNK_HEADERS: Final = (
     "scenario",
@@ -39,6 +51,17 @@ _PYMUNK_HEADERS: Final = (
     "time / pymunk alone",
     "time / pymunk alone, same balls",
 )
+_ENVIRONMENT_HEADERS: Final = (
+    "scenario",
+    "engine",
+    "episode (ms)",
+    "outside engine",
+    "outside physics",
+    "reset (ms)",
+    "mask (ms)",
+    "observation (ms)",
+)
+_FLEET_HEADERS: Final = ("environments", "processes", "steps/s", "blasts/s")
 
 
 def bench(
@@ -46,7 +69,11 @@ def bench(
     scenario: Annotated[
         str | None, typer.Option(help="Time only this scenario: bundled name, or a file.")
     ] = None,
+    threads: Annotated[
+        int, typer.Option(min=1, help="Threads of `simulate_many`; 1: do not measure them.")
+    ] = 2,
     memory: Annotated[bool, typer.Option(help="Also measure the memory of a large blast.")] = True,
+    environment: Annotated[bool, typer.Option(help="Also time `BlastBarrier-v0`.")] = True,
 ) -> None:
     """Time blasts on both engines and against pymunk alone, and measure the memory."""
     with user_errors():
@@ -56,9 +83,13 @@ def bench(
         print_line(hardware())
         result_console().print(_engine_table(scenes, repeats))
         print_line(
-            "within 5 %: the step at which pymunk's loads are within 5 % of those of the event "
-            "engine, as `python -m scripts.compare_engines` finds.\n"
+            "5 % step: the longest at which pymunk's loads are within 5 % of those of the event "
+            "engine, as `python -m scripts.compare_engines` finds.\nRatio: time of pymunk over "
+            "time of the event engine.\n"
         )
+        if threads > 1:
+            result_console().print(_thread_table(scenes, threads, repeats))
+            print_line("by the clock: needs as many idle cores as threads.\n")
         result_console().print(_pymunk_table(scenes, repeats))
         print_line(
             "pymunk alone: no handler, no recording, no shrinking; every ball stays and is "
@@ -69,6 +100,8 @@ def bench(
             many = many.with_simulation(overrides=_MANY_BALLS)
             balls = len(build_scene(many).balls)
             print_line(f"peak memory with {balls:,} balls: {measure_memory_mb(many):.0f} MB")
+        if environment:
+            _print_environment(load_scenario(scenario or "courtyard"), repeats)
 
 
 def _engine_table(scenes: tuple[BenchmarkScene, ...], repeats: int) -> Table:
@@ -83,10 +116,28 @@ def _engine_table(scenes: tuple[BenchmarkScene, ...], repeats: int) -> Table:
             scene.name,
             f"{figures.balls:,}",
             f"{1e3 * figures.pymunk_s:.0f}",
-            "-" if close_s is None else f"{1e3 * close_s:.0f} at {scene.close_step_radii:g} radii",
+            "-" if close_s is None else f"{scene.close_step_radii:g} radii",
+            "-" if close_s is None else f"{1e3 * close_s:.0f}",
             f"{1e3 * figures.event_s:.1f}",
             f"{figures.ratio:.1f}",
             "-" if close_ratio is None else f"{close_ratio:.1f}",
+            "-" if scene.least_ratio is None else f"{scene.least_ratio:g}",
+        )
+    return table
+
+
+def _thread_table(scenes: tuple[BenchmarkScene, ...], threads: int, repeats: int) -> Table:
+    """Time the event engine in one thread and in several."""
+    title = f"event engine, simulate_many in {threads} threads: the fastest of {repeats} runs"
+    table = make_table(title, _THREAD_HEADERS)
+    for scene in scenes:
+        figures = measure_threads(scene.scenario, threads, repeats)
+        table.add_row(
+            scene.name,
+            f"{figures.blasts:,}",
+            f"{figures.blasts / figures.one_thread_s:.1f}",
+            f"{figures.blasts / figures.all_threads_s:.1f}",
+            f"{figures.scaling:.2f}",
         )
     return table
 
@@ -109,3 +160,36 @@ def _pymunk_table(scenes: tuple[BenchmarkScene, ...], repeats: int) -> Table:
             f"{speed.ratio_same_balls:.2f}",
         )
     return table
+
+
+def _print_environment(scenario: Scenario, repeats: int) -> None:
+    """Time the environment on a scenario: its parts, and in several processes."""
+    name = scenario.name
+    if scenario.build_zone is None or scenario.calibration is None:
+        print_line(f"BlastBarrier-v0: needs a build zone and a calibration, {name} lacks one")
+        return
+    figures = measure_environment(scenario, repeats)
+    table = make_table(
+        f"BlastBarrier-v0: processor time, medians of {repeats} episodes of random placements",
+        _ENVIRONMENT_HEADERS,
+        text_columns=2,
+    )
+    table.add_row(
+        name,
+        figures.engine,
+        f"{figures.episode_ms:.1f}",
+        f"{100.0 * figures.outside_engine:.1f} %",
+        f"{100.0 * figures.outside_physics:.1f} %",
+        *(f"{ms:.3f}" for ms in (figures.reset_ms, figures.mask_ms, figures.observation_ms)),
+    )
+    result_console().print(table)
+    print_line("physics: the engine, and laying out the scenes of the blasts.\n")
+    fleets = make_table(f"{name}: by the clock, {repeats} episodes each", _FLEET_HEADERS)
+    for fleet in measure_fleets(scenario, repeats):
+        fleets.add_row(
+            fleet.name,
+            str(fleet.processes),
+            f"{fleet.steps_per_s:,.0f}",
+            f"{fleet.blasts_per_s:,.1f}",
+        )
+    result_console().print(fleets)

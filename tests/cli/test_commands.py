@@ -7,16 +7,25 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
-from blast_env import load_scenario, simulate
+from blast_env import load_scenario, save_scenario, simulate
 from blast_env.calibration.stored import load_calibration
 from blast_env.cli import app
 from blast_env.physics.pymunk_engine import PymunkRun
+from tests.scenarios import BALLISTIC_COURTYARD
 
 COMMANDS = ("simulate", "validate", "calibrate", "bench")
 
 
 def run(*arguments: str | Path) -> Result:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def sparse(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of a scenario of which pymunk runs a blast in no time."""
+    path = tmp_path_factory.mktemp("scenarios") / "sparse.toml"
+    save_scenario(BALLISTIC_COURTYARD, path)
+    return path
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -26,16 +35,18 @@ def test_every_command_has_help(command: str) -> None:
     assert command in result.stdout
 
 
-def test_simulate_prints_loads_with_units_and_writes_all_files(tmp_path: Path) -> None:
+def test_simulate_prints_loads_with_units_and_writes_all_files(
+    sparse: Path, tmp_path: Path
+) -> None:
     names = ("film.mp4", "table.xlsx", "table.parquet", "map.png")
     options = ("--film", "--excel", "--parquet", "--heat-map")
     written = [tmp_path / name for name in names]
     layout = tmp_path / "layout.json"
     layout.write_text("[[4, 0], [5, 0]]")
     pairs = [text for pair in zip(options, written, strict=True) for text in pair]
-    result = run("simulate", "courtyard", "--seed", "3", "--layout", layout, *pairs)
+    result = run("simulate", sparse, "--seed", "3", "--layout", layout, *pairs)
     assert result.exit_code == 0, result.output
-    blast = simulate(load_scenario("courtyard"), [(4, 0), (5, 0)], seed=3)
+    blast = simulate(BALLISTIC_COURTYARD, [(4, 0), (5, 0)], seed=3)
     assert f"{blast.impulse_sim('building'):,.0f}" in result.stdout
     assert "impulse m|v| (sim)" in result.stdout
     assert blast.digest in result.stdout
@@ -69,9 +80,9 @@ def test_simulate_takes_charge_and_preset() -> None:
         (("courtyard", "--layout", "nowhere.json"), "nowhere.json"),
         (("courtyard", "--charge", "29", "15"), "building"),
         (("courtyard", "--stand-off", "20"), "needs one point charge"),
-        (("courtyard", "--excel", "table.txt"), "table.txt"),
-        (("courtyard", "--film", "film.avi"), "film.avi"),
-        (("courtyard", "--heat-map", "no/such/folder/map.png"), "no/such/folder"),
+        (("free_field", "--excel", "table.txt"), "table.txt"),
+        (("free_field", "--film", "film.avi"), "film.avi"),
+        (("free_field", "--heat-map", "no/such/folder/map.png"), "no/such/folder"),
     ],
 )
 def test_bad_input_is_one_clear_message(
@@ -86,7 +97,7 @@ def test_bad_input_is_one_clear_message(
 
 
 def test_an_interruption_leaves_nothing_half_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sparse: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     advance = PymunkRun.advance
 
@@ -96,7 +107,7 @@ def test_an_interruption_leaves_nothing_half_written(
             raise KeyboardInterrupt
 
     monkeypatch.setattr(PymunkRun, "advance", interrupted)
-    result = run("simulate", "courtyard", "--film", tmp_path / "film.mp4")
+    result = run("simulate", sparse, "--film", tmp_path / "film.mp4")
     assert result.exit_code == 130
     assert "interrupted" in result.stderr
     assert list(tmp_path.iterdir()) == []
@@ -115,10 +126,14 @@ def test_validate_reports_all_problems_of_all_files(tmp_path: Path) -> None:
     assert run("validate", "courtyard").exit_code == 0
 
 
-def test_bench_prints_the_hardware_and_the_ratios() -> None:
-    result = run("bench", "--repeats", "1", "--scenario", "courtyard", "--no-memory")
+def test_bench_prints_the_hardware_and_the_ratios(
+    sparse: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(sparse.parent)
+    options = ("--scenario", sparse.name, "--no-memory", "--no-environment")
+    result = run("bench", "--repeats", "1", *options)
     assert result.exit_code == 0, result.output
-    for words in ("cores", "pymunk 7", "courtyard", "blasts/s", "time / pymunk alone"):
+    for words in ("cores", "pymunk 7", sparse.name, "blasts/s", "time / pymunk alone"):
         assert words in result.stdout
 
 

@@ -43,7 +43,7 @@ class Schedule:
         entries = self.heap[1 : size + 1]
         held = dict(zip(entries["ball"].tolist(), entries["time_s"].tolist(), strict=True))
         assert held == self.times
-        places = self.balls["place"]
+        places = self.heap["place"]  # by the number of the ball
         assert all(places[ball] == 1 + place for place, ball in enumerate(entries["ball"].tolist()))
         assert (places > 0).sum() == size
         for place in range(2, size + 1):

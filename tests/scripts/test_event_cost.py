@@ -24,7 +24,7 @@ def test_no_ball_leaves_the_box() -> None:
 
 def test_same_density_means_as_many_collisions_a_ball() -> None:
     """Otherwise the costs of different sizes would not compare."""
-    small, large = measure([900, 6400], repeats=1)
+    small, large = measure([gas(900), gas(6400)], repeats=1)
     assert (small.balls, large.balls) == (900, 6400)
     assert large.collisions / 6400 == pytest.approx(small.collisions / 900, rel=0.1)
     assert large.collisions > 3 * large.balls
@@ -39,7 +39,7 @@ def test_an_event_takes_less_than_10_microseconds() -> None:
 
 
 def test_fit_finds_the_cost_of_a_doubling() -> None:
-    costs = [Cost(2**k, 1000, 500, 1e-6 * (100.0 + 20.0 * k)) for k in range(8, 16)]
+    costs = [Cost(2**k, 1000, 500, 1e-6 * (100.0 + 20.0 * k), 2**k / 5e3) for k in range(8, 16)]
     fit = log_fit(costs)
     assert fit.at_one == pytest.approx(100.0)
     assert fit.per_doubling == pytest.approx(20.0)

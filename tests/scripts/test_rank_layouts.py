@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from blast_env import load_scenario, simulate
+from blast_env import simulate
 from blast_env.scenario import Charge, check_layout
 from scripts.rank_layouts import (
     ENGINES,
@@ -18,8 +18,7 @@ from scripts.rank_layouts import (
     spearman,
     without_noise,
 )
-
-COURTYARD = load_scenario("courtyard")
+from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 
 
 def noisy_loads(noise: float, shift: float = 0.0) -> np.ndarray:

@@ -16,7 +16,7 @@ _MOST_BALLS: Final = 2**31
 @njit(error_model="numpy", inline="always")
 def schedule(heap: RecordArray, balls: RecordArray, ball: int, time_s: float) -> None:
     """Put a ball into the heap, or move it to another time."""
-    place = balls[ball].place
+    place = heap[ball].place
     if place == 0:
         heap[0].ball += 1
         _rise(heap, balls, heap[0].ball, ball, time_s)
@@ -29,10 +29,10 @@ def schedule(heap: RecordArray, balls: RecordArray, ball: int, time_s: float) ->
 @njit(error_model="numpy", inline="always")
 def unschedule(heap: RecordArray, balls: RecordArray, ball: int) -> None:
     """Take a ball out of the heap, if it is in it."""
-    place = balls[ball].place
+    place = heap[ball].place
     if place == 0:
         return
-    balls[ball].place = 0
+    heap[ball].place = 0
     last = heap[0].ball
     heap[0].ball -= 1
     if place == last:
@@ -70,9 +70,9 @@ def _rise(heap: RecordArray, balls: RecordArray, place: int, ball: int, time_s: 
         above = place >> 1
         if not _is_before(balls, ball, time_s, heap[above]):
             break
-        _put(heap, balls, place, heap[above].ball, heap[above].time_s)
+        _put(heap, place, heap[above].ball, heap[above].time_s)
         place = above
-    _put(heap, balls, place, ball, time_s)
+    _put(heap, place, ball, time_s)
 
 
 @njit(error_model="numpy", inline="always")
@@ -89,13 +89,13 @@ def _sink(heap: RecordArray, balls: RecordArray, place: int, ball: int, time_s: 
             below += 1
         if _is_before(balls, ball, time_s, heap[below]):
             break
-        _put(heap, balls, place, heap[below].ball, heap[below].time_s)
+        _put(heap, place, heap[below].ball, heap[below].time_s)
         place = below
-    _put(heap, balls, place, ball, time_s)
+    _put(heap, place, ball, time_s)
 
 
 @njit(error_model="numpy", inline="always")
-def _put(heap: RecordArray, balls: RecordArray, place: int, ball: int, time_s: float) -> None:
+def _put(heap: RecordArray, place: int, ball: int, time_s: float) -> None:
     heap[place].time_s = time_s
     heap[place].ball = ball
-    balls[ball].place = place
+    heap[ball].place = place

@@ -130,7 +130,7 @@ def _look_again(
 ) -> None:
     """Look ahead again for every ball that moves."""
     for ball in range(len(balls)):
-        if balls[ball].place > 0:
+        if heap[ball].place > 0:
             look_ahead(balls, cells, heap, surfaces, rules, ball)
 
 

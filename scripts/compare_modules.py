@@ -1,0 +1,148 @@
+"""Whether single modules take the same from pymunk and from the event engine, for docs/engines.md.
+
+Prints a Markdown table: pymunk at its default step and at the one where its loads are within 5 %.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Annotated, Final, NamedTuple
+
+import joblib
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from scipy.stats import ks_2samp
+
+from blast_env.benchmark import BenchmarkScene, benchmark_scenes
+from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.scenario import Scenario
+from blast_env.simulation import Blast
+
+Array = NDArray[np.float64]
+
+STRUCTURE: Final = "building"
+_SPLITS: Final = 200
+
+
+class Agreement(NamedTuple):
+    """A distance between the engines, and how large it gets by chance.
+
+    Attributes:
+        value: Between blasts on pymunk and blasts on the event engine.
+        chance: 95 % of the distances between as many blasts on the event engine and the others
+            there are smaller.
+    """
+
+    value: float
+    chance: float
+
+    def __str__(self) -> str:
+        """Return both, with three digits."""
+        return f"{self.value:.3f} ({self.chance:.3f})"
+
+
+def main(
+    seeds: Annotated[int, typer.Option(min=20, help="Blasts on pymunk.")] = 60,
+    event_seeds: Annotated[int, typer.Option(help="Blasts on the event engine.")] = 400,
+    processes: int = 2,
+) -> None:
+    """Run the blasts and print the table."""
+    with user_errors():
+        print_line(
+            "| scene | step (radii) | distribution of m\\|v\\| (chance) | its profile (chance) "
+            "| distribution of the transferred impulse (chance) | its profile (chance) |"
+        )
+        print_line("|---" * 6 + "|")
+        for scene in benchmark_scenes():
+            event = module_impulses(scene.scenario, "event", event_seeds, processes)
+            for step_radii, scenario in stepped(scene):
+                pymunk = module_impulses(scenario, "pymunk", seeds, processes)
+                cells = (
+                    str(agreement(distance, pymunk[..., kind], event[..., kind]))
+                    for kind in range(2)
+                    for distance in (distribution_distance, profile_distance)
+                )
+                print_line(f"| {scene.name} | {step_radii:g} | {' | '.join(cells)} |")
+
+
+def stepped(scene: BenchmarkScene) -> Iterator[tuple[float, Scenario]]:
+    """Yield the default step and, if it is another, the one at which pymunk is within 5 %."""
+    default = scene.scenario.parameters.stepping.step_radii
+    yield default, scene.scenario
+    close = scene.at_close_step()
+    if close is not None and scene.close_step_radii not in (None, default):
+        yield close.parameters.stepping.step_radii, close
+
+
+def module_impulses(scenario: Scenario, engine: str, seeds: int, processes: int) -> Array:
+    """Return m |v| and the transferred impulse of every module of the building.
+
+    Args:
+        scenario: The scenario.
+        engine: Name of the engine.
+        seeds: Number of blasts; their seeds are 0 and up.
+        processes: Worker processes.
+
+    Returns:
+        Simulation units (seeds, modules, 2).
+    """
+    parallel = joblib.Parallel(n_jobs=processes, return_as="generator")
+    blasts: list[list[tuple[float, float]]] = []
+    with progress_bar(f"{scenario.name}: {engine}") as progress:
+        for blast in parallel(_jobs(scenario, engine, seeds)):
+            blasts.append(blast)
+            progress(len(blasts) / seeds)
+    return np.array(blasts)
+
+
+def _jobs(scenario: Scenario, engine: str, seeds: int) -> Iterable[object]:
+    return (joblib.delayed(_of_one_blast)(scenario, engine, seed) for seed in range(seeds))
+
+
+def _of_one_blast(scenario: Scenario, engine: str, seed: int) -> list[tuple[float, float]]:
+    building = Blast(scenario, seed=seed, engine=engine).run().obstacle(STRUCTURE)
+    return [(part.impulse, part.transferred_impulse) for part in building.parts]
+
+
+def distribution_distance(one: Array, other: Array) -> float:
+    """Return the Kolmogorov-Smirnov distance of the impulses of single modules.
+
+    Over all modules that any of these blasts hits.
+
+    Args:
+        one: Impulses (seeds, modules).
+        other: Likewise, of as many modules.
+    """
+    hit = one.any(axis=0) | other.any(axis=0)
+    return float(ks_2samp(one[:, hit].ravel(), other[:, hit].ravel(), method="asymp").statistic)
+
+
+def profile_distance(one: Array, other: Array) -> float:
+    """Return how far the mean impulses along the facade are apart.
+
+    The root of the sum of the squares of their differences over that of the second ones.
+
+    Args:
+        one: Impulses (seeds, modules).
+        other: Likewise, of as many modules.
+    """
+    profile, other_profile = one.mean(axis=0), other.mean(axis=0)
+    return float(np.linalg.norm(profile - other_profile) / np.linalg.norm(other_profile))
+
+
+def agreement(distance: Callable[[Array, Array], float], pymunk: Array, event: Array) -> Agreement:
+    """Compare impulses of modules with a distance.
+
+    Args:
+        distance: One of the two above.
+        pymunk: Impulses (seeds, modules).
+        event: Of more blasts.
+    """
+    rng, chances = np.random.default_rng(0), []
+    for _ in range(_SPLITS):
+        order = rng.permutation(len(event))
+        chances.append(distance(event[order[: len(pymunk)]], event[order[len(pymunk) :]]))
+    return Agreement(distance(pymunk, event), float(np.percentile(chances, 95.0)))
+
+
+if __name__ == "__main__":
+    typer.run(main)
