@@ -15,6 +15,8 @@ from blast_env.physics.event.layout import with_walls, world_of
 from blast_env.scene import Scene
 
 _RECORD_ROWS: Final = 4096
+MOST_RECORDS: Final = 20_000_000
+"""Hits on modules after which a run ends as at `most_collisions`: they take some 2 GB."""
 _END_REASONS: Final = {
     loop.OUT_OF_REACH: EndReason.OUT_OF_REACH,
     loop.EVENT_LIMIT: EndReason.EVENT_LIMIT,
@@ -51,6 +53,7 @@ class EventRun:
         self._parts = [part for obstacle in self.obstacles for part in obstacle.parts]
         self._world = world_of(scene, self._parts, cell_units)
         self._record = np.empty((_RECORD_ROWS, len(RECORD_COLUMNS)))
+        self._recorded = 0
 
     @property
     def crossings(self) -> int:
@@ -72,7 +75,9 @@ class EventRun:
         while answer in (loop.RECORD_FULL, loop.MODULE_DESTROYED):
             answer = run_world(self._world, self._record, target_s)
             self._read_record()
-            if answer == loop.MODULE_DESTROYED:
+            if self._recorded >= MOST_RECORDS:
+                answer = loop.EVENT_LIMIT
+            elif answer == loop.MODULE_DESTROYED:
                 self._world = with_walls(self._world, self.scene, self._parts)
         self.time_s = target_s
         if answer in _END_REASONS:
@@ -104,6 +109,7 @@ class EventRun:
         """Move what the compiled loop recorded to the log."""
         rows = self._record[: self._world.progress["records"]]
         self._world.progress["records"] = 0
+        self._recorded += len(rows)
         if not len(rows):
             return
         collisions = np.empty(len(rows), dtype=COLLISION_DTYPE)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from blast_env import load_scenario, simulate
+from blast_env.physics import event_engine
 from blast_env.physics.engine import EndReason
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.particles import Balls
@@ -232,6 +233,15 @@ def test_an_elastic_ball_in_such_a_gap_meets_the_limit_of_collisions() -> None:
     assert run.time_s == 0.0
     run.advance(np.inf)  # it stays at its end
     assert run.steps == 12_345
+
+
+def test_a_record_too_large_for_memory_ends_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long before 10^8 collisions, if all of them are hits."""
+    monkeypatch.setattr(event_engine, "MOST_RECORDS", 10_000)
+    settings = rules(1.0, 1.0, stepping={"most_collisions": 10**8})
+    run = finished(scene(balls([AIR], [(101.0, 80.0)], [(10.0, 0.0)]), SLOT, settings))
+    assert run.end_reason is EndReason.EVENT_LIMIT
+    assert 10_000 <= len(run.log) < 20_000
 
 
 def test_gaps_of_one_module_in_a_barrier_do_not_stop_a_blast() -> None:
