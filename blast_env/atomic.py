@@ -1,4 +1,4 @@
-"""Writing a file so that it is either complete or not there."""
+"""Writing a file so that it is either complete or not there, and making the folder for it."""
 
 import os
 import secrets
@@ -8,6 +8,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from blast_env.errors import BlastEnvError
+
+
+def make_folder(folder: str | Path) -> None:
+    """Make a folder, and those above it, unless it is there.
+
+    Raises:
+        BlastEnvError: If something else is there, or it cannot be made.
+    """
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BlastEnvError(f"{folder}: cannot be a folder: {error.strerror or error}") from error
 
 
 @contextmanager

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from blast_env.atomic import write_atomically
+from blast_env.atomic import make_folder, write_atomically
 from blast_env.errors import BlastEnvError
 
 
@@ -98,3 +98,16 @@ def test_name_too_long_for_the_file_system_leaves_nothing(tmp_path: Path) -> Non
     ):
         pass
     assert os.listdir(tmp_path) == []
+
+
+def test_a_folder_is_made_with_those_above_it_and_may_be_there(tmp_path: Path) -> None:
+    make_folder(tmp_path / "out" / "today")
+    make_folder(tmp_path / "out" / "today")
+    assert (tmp_path / "out" / "today").is_dir()
+
+
+def test_a_file_cannot_be_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    with pytest.raises(BlastEnvError, match=r"out: cannot be a folder: File exists"):
+        make_folder(tmp_path / "out")
+    assert (tmp_path / "out").read_text() == "mine"

@@ -20,9 +20,8 @@ import agents
 from agents.league.entries import Proposal, Search
 from agents.league.tracks import Case
 from agents.search import Layout
-from blast_env.atomic import write_atomically
+from blast_env.atomic import make_folder, write_atomically
 from blast_env.calibration.stored import scenario_calibration
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Threat
 from blast_env.evaluation.cache import calibration_digest, code_version, engine_text
 from blast_env.physics.engine import find_engine
@@ -140,12 +139,7 @@ class ResultStore:
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise BlastEnvError(
-                f"{folder}: cannot be a folder: {error.strerror or error}"
-            ) from error
+        make_folder(self.folder)
 
     def proposal(self, key: SearchKey) -> Proposal | None:
         """Return what a search proposed, or `None` if that is not known."""

@@ -35,13 +35,6 @@ def legal_part(scenario: Scenario, cells: Iterable[Cell]) -> Placement:
     return placement
 
 
-def filled_at_random(placement: Placement, rng: np.random.Generator) -> Placement:
-    """Return the placement with modules on random cells until no cell may take another."""
-    while not placement.is_full:
-        placement = placement.place(_one_of(placement.free, rng))
-    return placement
-
-
 def random_walls(scenario: Scenario, rng: np.random.Generator) -> Layout:
     """Return a layout of straight walls: where, in which direction and how long is random.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from blast_env.atomic import write_atomically
+from blast_env.atomic import make_folder, write_atomically
 from blast_env.calibration.shielding import (
     EXPERIMENT,
     Region,
@@ -72,7 +72,7 @@ def calibrate_shielding(options: ShieldingOptions) -> None:
     settings = (options.preset, options.seeds, options.engine)
     study, reflection_study = ShieldingStudy(*settings), ReflectionStudy(*settings)
     exponent = _exponent(options, study)
-    _make_folder(options.out)
+    make_folder(options.out)
     blasts = 2 * len(study.seeds)
     with progress_bar(f"{blasts} blasts on a block and in the open") as progress:
         report = study.run(options.processes, progress)
@@ -107,14 +107,6 @@ def _exponent(options: ShieldingOptions, study: ShieldingStudy) -> float | None:
             "only that one has an exponent"
         )
     return calibration.coefficients["B"]
-
-
-def _make_folder(out: Path) -> None:
-    """Create the folder before the blasts, so that no result is lost for want of it."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BlastEnvError(f"{out}: cannot be a folder: {error.strerror or error}") from error
 
 
 def _write(

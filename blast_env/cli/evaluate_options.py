@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from blast_env.atomic import write_atomically
-from blast_env.errors import BlastEnvError
+from blast_env.atomic import make_folder, write_atomically
 from blast_env.evaluation import BlastEvaluator, Estimate
 from blast_env.export import check_target
 
@@ -47,11 +46,7 @@ class EvaluateOptions:
             check_target(self.export, layouts)
         if self.out is None:
             return
-        try:
-            self.out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            reason = error.strerror or error
-            raise BlastEnvError(f"{self.out}: cannot be a folder: {reason}") from error
+        make_folder(self.out)
 
 
 def write_table(table: pd.DataFrame, path: Path) -> Path:

@@ -9,6 +9,7 @@ import numpy as np
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from blast_env.atomic import make_folder
 from blast_env.cli.output import (
     agents_extra,
     message_console,
@@ -105,7 +106,7 @@ def search(
         )
         evaluator = BlastEvaluator(load_scenario(scenario), engine, cache=cache)
         if out is not None:
-            _make_folder(out)
+            make_folder(out)
         run = _run(options, evaluator, processes)
         checked = _check(run, options, held_out)
         print_search(run, options, checked)
@@ -199,11 +200,3 @@ def _check(run: SearchRun, options: SearchOptions, held_out: int) -> LayoutEvalu
             cvar_level=options.cvar_level,
             progress=progress,
         )
-
-
-def _make_folder(out: Path) -> None:
-    """Create the folder before the blasts, so that no result is lost for want of it."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BlastEnvError(f"{out}: cannot be a folder: {error.strerror or error}") from error

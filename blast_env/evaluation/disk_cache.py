@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from blast_env.atomic import write_atomically
+from blast_env.atomic import make_folder, write_atomically
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cache import BlastCache, BlastKey
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
@@ -70,12 +70,7 @@ class DiskCache:
         self.most_bytes = most_bytes
         self.damaged = 0
         self._unseen_bytes = most_bytes  # nobody has looked yet
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise BlastEnvError(
-                f"{folder}: cannot be a folder: {error.strerror or error}"
-            ) from error
+        make_folder(self.folder)
 
     def get(self, key: BlastKey) -> BlastLoads | None:
         """Return the loads of a blast, or `None` if they are not there in one piece."""

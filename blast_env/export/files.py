@@ -6,6 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+from blast_env.atomic import make_folder
 from blast_env.errors import BlastEnvError, suggestion
 from blast_env.export.csv_file import write_csv
 from blast_env.export.geojson import write_geojson
@@ -78,10 +79,7 @@ def export_layouts(plans: Mapping[str, LayoutPlan], target: str | Path) -> list[
     check_target(target, len(plans))
     if _is_file(target):
         return [export_layout(plan, target) for plan in plans.values()]
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BlastEnvError(f"{target}: cannot be a folder: {error.strerror or error}") from error
+    make_folder(target)
     return [
         export_layout(plan, target / f"{name}{suffix}")
         for name, plan in plans.items()
