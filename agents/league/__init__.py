@@ -9,6 +9,7 @@ from agents.league.entries import (
     RandomLayout,
     Rule,
     Search,
+    SightLineLayout,
     Training,
     standard_entries,
 )
@@ -39,6 +40,7 @@ __all__ = [
     "ResultStore",
     "Rule",
     "Search",
+    "SightLineLayout",
     "Standings",
     "Track",
     "Training",

@@ -11,7 +11,8 @@ from agents.random_layouts import random_layout
 from agents.rules import RULES, expected_charge
 from agents.search import Layout, SearchMethod, find_search_method
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Charge, Scenario
+from blast_env.scenario import Charge, PointSource, Scenario
+from blast_env.sites import SightLines, sight_line_layout
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,25 @@ class Rule:
 
 
 @dataclass(frozen=True)
+class SightLineLayout:
+    """Cuts as many lines of sight as it can; see `blast_env.sites.sight_line_layout`.
+
+    Attributes:
+        name: In tables.
+    """
+
+    name: str = "most sight lines cut"
+
+    def propose(self, case: Case) -> Layout:
+        """Return the layout for the charge, or for all the places where a hidden one may be."""
+        scenario = case.scenario
+        if case.charge is not None:
+            at_it = PointSource(position_m=case.charge.position_m, tnt_kg=case.charge.tnt_kg)
+            scenario = scenario.model_copy(update={"charge": (at_it,)})
+        return sight_line_layout(scenario, SightLines.of(scenario))
+
+
+@dataclass(frozen=True)
 class Agent:
     """A trained agent.
 
@@ -131,7 +151,7 @@ class Search:
         return search_name(self.method.name, self.budget)
 
 
-Instant = NoBarrier | RandomLayout | Rule | Agent
+Instant = NoBarrier | RandomLayout | Rule | SightLineLayout | Agent
 """Entries that spend no blast on a case."""
 
 Entry = Instant | Search
@@ -144,7 +164,7 @@ def search_name(method: str, budget: int) -> str:
 
 
 def standard_entries(methods: Sequence[str], budgets: Sequence[int]) -> tuple[Entry, ...]:
-    """Return all entries but agents: no barrier, a random layout, rules, searches.
+    """Return all entries but agents: no barrier, a random layout, rules, sight lines, searches.
 
     Args:
         methods: Names of search methods.
@@ -157,4 +177,4 @@ def standard_entries(methods: Sequence[str], budgets: Sequence[int]) -> tuple[En
     rules = (Rule(rule, name) for name, rule in RULES.items())
     found = [find_search_method(name) for name in methods]
     searches = (Search(method, budget) for method in found for budget in budgets)
-    return (NoBarrier(), RandomLayout(), *rules, *searches)
+    return (NoBarrier(), RandomLayout(), *rules, SightLineLayout(), *searches)

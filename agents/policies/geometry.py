@@ -5,6 +5,8 @@ from typing import Final, NamedTuple
 import torch
 from torch import Tensor
 
+from agents.policies.shadow import BEARINGS, Shadow, shadow
+from agents.policies.sight import LinesOfSight, Spread, likely_places, stands_before
 from blast_env.envs.grid_observation import GridObservation
 
 CHANNELS: Final = GridObservation.channels
@@ -13,15 +15,14 @@ PROTECTED, CHARGE, COST, BARRIER, FREE = (
 )
 SHARES: Final = tuple(CHANNELS.index(name) for name in ("stock_share", "stock", "budget_share"))
 
-CELL_FEATURES: Final = 10
-BEARINGS: Final = 48
-SITE_FEATURES: Final = 6 + len(SHARES) + BEARINGS
+CELL_FEATURES: Final = 13
+SITE_FEATURES: Final = 7 + len(SHARES) + BEARINGS
 
 _LEVELS: Final = 255.0
 _LENGTH: Final = 20.0
 """Lengths are divided by so many squares, 10 m, to be of the order of 1."""
-_MOST_SHADE: Final = 3.0
-"""Bearings are told apart up to so many times the half width of the facade on either side."""
+_SHARE_GAIN: Final = 10.0
+"""A module hides some tenth of a facade; times this it is of the order of 1."""
 
 
 class ZoneView(NamedTuple):
@@ -40,146 +41,85 @@ class ZoneView(NamedTuple):
     site: Tensor
 
 
-def zone_view(planes: Tensor, rows: int, columns: int) -> ZoneView:
-    """Return the build zone as seen along the line of sight from charge to protected structures.
+def zone_view(planes: Tensor, rows: int, columns: int, places: int = 1) -> ZoneView:
+    """Return the build zone as seen along the lines of sight from charge to protected structures.
 
     The features of a cell turn with the site: how far it is along the line of sight and aside of
-    it, in metres and as shares of the whole way and of the facade, and whether a module stands on
-    its bearing already. So what is learnt at one place of the charge holds at the others, and on
-    a turned site. Where the charge is hidden, the line begins in the middle of its places.
+    it, in metres and as shares of the whole way and of the facade; how much of the facade a module
+    hides there, how much of that nothing hides yet, and what stands on its bearing already. So
+    what is learnt at one place of the charge holds at the others, and on a turned site. Where the
+    charge is hidden, they are means over places that it may be at.
 
     Args:
         planes: A `"grid"` observation, from 0 to 255 (batch, channels, height, width).
         rows: Rows of the build zone.
         columns: Its columns.
+        places: Places that stand for where the charge may be; 1 takes the middle.
     """
     row, column = _corner(planes[:, COST])
     cost, barrier, free = (
         _crop(planes[:, channel], row, column, rows, columns).float() / _LEVELS
         for channel in (COST, BARRIER, FREE)
     )
-    sight = _LineOfSight.of(planes)
-    x = column[:, None] + torch.arange(columns, device=planes.device) + 0.5
-    y = row[:, None] + torch.arange(rows, device=planes.device) + 0.5
-    along, aside = sight.coordinates(x[:, None, :], y[:, :, None])
-    distance, facade = sight.distance[:, None, None], sight.facade[:, None, None]
-    shade = (aside / along.clamp(min=1.0) * distance / facade).clamp(-_MOST_SHADE, _MOST_SHADE)
-    bearing = ((shade / _MOST_SHADE + 1.0) / 2.0 * (BEARINGS - 1)).round().long().flatten(1)
-    covered = _covered_bearings(bearing, barrier)
-    cells = torch.stack(
+    # The plane shows the root of how likely the charge is in a square.
+    likely = planes[:, CHARGE].float().square()
+    target = Spread.of(planes[:, PROTECTED].float())
+    lines = LinesOfSight.between(*likely_places(likely, places), target)
+    x = (column[:, None, None] + torch.arange(columns, device=planes.device) + 0.5).float()
+    y = (row[:, None, None] + torch.arange(rows, device=planes.device)[:, None] + 0.5).float()
+    shape = (len(planes), rows, columns)
+    x, y = x.expand(shape).flatten(1), y.expand(shape).flatten(1)
+    along, aside = lines.coordinates(x, y)
+    before = stands_before(lines, x, y, target)
+    seen = shadow(lines, along, aside, before, barrier.flatten(1))
+    cells = _cell_features(lines, along, aside, seen).view(*shape, -1)
+    shares = planes[:, SHARES, 0, 0].float() / _LEVELS
+    site = (_measures(planes, likely, target), seen.open_facade[:, None], shares, seen.hidden)
+    return ZoneView(
+        torch.cat((cells, cost[..., None], free[..., None]), dim=-1),
+        barrier,
+        free,
+        torch.cat(site, dim=1),
+    )
+
+
+def _cell_features(lines: LinesOfSight, along: Tensor, aside: Tensor, seen: Shadow) -> Tensor:
+    """Return what there is to say of each cell but its cost (batch, cells, features)."""
+    distance = lines.distance[..., None]
+    return torch.stack(
         (
-            along / _LENGTH,
-            (distance - along) / _LENGTH,
-            along / distance,
-            aside / _LENGTH,
-            aside.abs() / _LENGTH,
-            shade,
-            shade.abs(),
-            covered.gather(1, bearing).reshape(barrier.shape),
-            cost,
-            free,
+            along.mean(dim=1) / _LENGTH,
+            (distance - along).mean(dim=1) / _LENGTH,
+            (along / distance).mean(dim=1),
+            aside.mean(dim=1) / _LENGTH,
+            aside.abs().mean(dim=1) / _LENGTH,
+            seen.shade,
+            seen.shade_size,
+            seen.cut * _SHARE_GAIN,
+            seen.open_cut * _SHARE_GAIN,
+            seen.covered,
+            seen.depth,
         ),
         dim=-1,
     )
-    shares = planes[:, SHARES, 0, 0].float() / _LEVELS
-    return ZoneView(cells, barrier, free, torch.cat((sight.measures, shares, covered), dim=1))
 
 
-class _Cloud(NamedTuple):
-    """Mean place of a plane's values, in squares, and how far they spread about it (batch,)."""
-
-    x: Tensor
-    y: Tensor
-    xx: Tensor
-    xy: Tensor
-    yy: Tensor
-
-    @classmethod
-    def of(cls, plane: Tensor) -> "_Cloud":
-        """Measure a plane (batch, rows, columns)."""
-        over_y, over_x = plane.sum(dim=2), plane.sum(dim=1)
-        total = over_x.sum(dim=1).clamp(min=1e-6)
-        y_of = torch.arange(plane.shape[1], dtype=plane.dtype, device=plane.device) + 0.5
-        x_of = torch.arange(plane.shape[2], dtype=plane.dtype, device=plane.device) + 0.5
-        x, y = over_x @ x_of / total, over_y @ y_of / total
-        xx = over_x @ x_of.square() / total - x.square()
-        yy = over_y @ y_of.square() / total - y.square()
-        xy = (plane @ x_of) @ y_of / total - x * y
-        return cls(x, y, xx, xy, yy)
-
-    def half_width(self, along_x: Tensor, along_y: Tensor) -> Tensor:
-        """Return half the width of an even spread in a direction, in squares (batch,)."""
-        variance = (
-            self.xx * along_x.square()
-            + 2.0 * self.xy * along_x * along_y
-            + self.yy * along_y.square()
-        )
-        return (3.0 * variance.clamp(min=0.0)).sqrt()
-
-
-class _LineOfSight(NamedTuple):
-    """The line from the middle of the charge to that of the protected structures.
-
-    Attributes:
-        x: Where it begins, in squares (batch,).
-        y: Likewise.
-        along_x: Its direction, of length 1 (batch,).
-        along_y: Likewise.
-        distance: Its length in squares (batch,).
-        facade: Half the width of the structures across it, in squares (batch,).
-        measures: What there is to say of it, each of the order of 1 (batch, 6).
-    """
-
-    x: Tensor
-    y: Tensor
-    along_x: Tensor
-    along_y: Tensor
-    distance: Tensor
-    facade: Tensor
-    measures: Tensor
-
-    @classmethod
-    def of(cls, planes: Tensor) -> "_LineOfSight":
-        """Find it in an observation (batch, channels, height, width)."""
-        levels = planes[:, CHARGE].float()
-        # The plane shows the root of how likely the charge is in a square.
-        charge, target = _Cloud.of(levels.square()), _Cloud.of(planes[:, PROTECTED].float())
-        towards_x, towards_y = target.x - charge.x, target.y - charge.y
-        distance = torch.hypot(towards_x, towards_y).clamp(min=1.0)
-        along_x, along_y = towards_x / distance, towards_y / distance
-        facade = target.half_width(-along_y, along_x).clamp(min=1.0)
-        measures = torch.stack(
-            (
-                distance / (2.0 * _LENGTH),
-                facade / _LENGTH,
-                target.half_width(along_x, along_y) / _LENGTH,
-                charge.half_width(along_x, along_y) / _LENGTH,
-                charge.half_width(-along_y, along_x) / _LENGTH,
-                levels.amax(dim=(1, 2)) / _LEVELS,
-            ),
-            dim=1,
-        )
-        return cls(charge.x, charge.y, along_x, along_y, distance, facade, measures)
-
-    def coordinates(self, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-        """Return how far places are along the line and aside of it, in squares.
-
-        Args:
-            x: In squares (batch, 1, columns).
-            y: Likewise (batch, rows, 1).
-
-        Returns:
-            Two tensors (batch, rows, columns); to the left of the line is positive.
-        """
-        from_x, from_y = x - self.x[:, None, None], y - self.y[:, None, None]
-        along_x, along_y = self.along_x[:, None, None], self.along_y[:, None, None]
-        return from_x * along_x + from_y * along_y, from_y * along_x - from_x * along_y
-
-
-def _covered_bearings(bearing: Tensor, barrier: Tensor) -> Tensor:
-    """Return on which bearings a module stands, 0 or 1 (batch, BEARINGS)."""
-    covered = torch.zeros(len(bearing), BEARINGS, device=bearing.device)
-    return covered.scatter_add_(1, bearing, barrier.flatten(1)).clamp_(max=1.0)
+def _measures(planes: Tensor, likely: Tensor, target: Spread) -> Tensor:
+    """Return what there is to say of charge and structures, of the order of 1 (batch, 6)."""
+    charge = Spread.of(likely)
+    line = LinesOfSight.between(charge.x[:, None], charge.y[:, None], target)
+    along_x, along_y = line.along_x, line.along_y
+    return torch.cat(
+        (
+            line.distance / (2.0 * _LENGTH),
+            line.facade / _LENGTH,
+            target.half_width(along_x, along_y) / _LENGTH,
+            charge.half_width(along_x, along_y) / _LENGTH,
+            charge.half_width(-along_y, along_x) / _LENGTH,
+            planes[:, CHARGE].float().amax(dim=(1, 2))[:, None] / _LEVELS,
+        ),
+        dim=1,
+    )
 
 
 def _corner(cost: Tensor) -> tuple[Tensor, Tensor]:

@@ -26,14 +26,20 @@ class ZoneExtractor(BaseFeaturesExtractor):
         observation_space: Of a `"grid"` observation.
         rows: Rows of the build zone.
         columns: Its columns.
+        places: Places that stand for where the charge may be.
         width: Number of features.
     """
 
     def __init__(
-        self, observation_space: spaces.Space[Any], rows: int, columns: int, width: int
+        self,
+        observation_space: spaces.Space[Any],
+        rows: int,
+        columns: int,
+        places: int,
+        width: int,
     ) -> None:
         super().__init__(observation_space, width * (rows * columns + 1))
-        self.rows, self.columns, self.width = rows, columns, width
+        self.rows, self.columns, self.places, self.width = rows, columns, places, width
         self.near = nn.Conv2d(2, width, 5, padding=2)
         self.overview = nn.Sequential(
             nn.AvgPool2d(4, ceil_mode=True),
@@ -56,7 +62,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
             observations: From 0 to 255 (batch, channels, height, width).
         """
         with torch.no_grad():  # nothing in here has weights
-            view = zone_view(observations, self.rows, self.columns)
+            view = zone_view(observations, self.rows, self.columns, self.places)
             planes = observations[:, _OVERVIEW].float() / 255.0
             around = torch.stack((view.barrier, view.free), dim=1)
         site = self.site(torch.cat((view.site, self.overview(planes)), dim=1))

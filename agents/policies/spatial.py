@@ -21,6 +21,7 @@ class ZonePolicy(BasePolicy):
         lr_schedule: Learning rate by the share of the training that is left.
         rows: Rows of the build zone.
         columns: Its columns.
+        places: Places that stand for where the charge may be: 1 if it is visible, more if not.
         width: Number of features of a cell.
         critic_width: Neurons of the critic's hidden layer.
         finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
@@ -36,6 +37,7 @@ class ZonePolicy(BasePolicy):
         lr_schedule: Schedule,
         rows: int,
         columns: int,
+        places: int | None = None,
         width: int = 24,
         critic_width: int = 64,
         finish_bias: float = -3.0,
@@ -45,7 +47,12 @@ class ZonePolicy(BasePolicy):
         arguments: dict[str, Any] = {
             "lr_schedule": lr_schedule,
             "features_extractor_class": ZoneExtractor,
-            "features_extractor_kwargs": {"rows": rows, "columns": columns, "width": width},
+            "features_extractor_kwargs": {
+                "rows": rows,
+                "columns": columns,
+                "places": places or 1,
+                "width": width,
+            },
             "normalize_images": False,  # the extractor does it, for the planes that it needs
         }
         super().__init__(observation_space, action_space, **arguments, **others)

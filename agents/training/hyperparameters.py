@@ -41,6 +41,8 @@ class PolicyArguments(BaseModel):
     Attributes:
         rows: Rows of the build zone; the scenario decides.
         columns: Its columns; likewise.
+        places: Places that stand for where the charge may be; unless given, 1 for a visible charge
+            and 9 for a hidden one.
         width: Number of features of a cell.
         critic_width: Neurons of the critic's hidden layer.
         finish_bias: What the logit of finishing begins with.
@@ -50,6 +52,7 @@ class PolicyArguments(BaseModel):
 
     rows: Annotated[int, Field(ge=1)] = 1
     columns: Annotated[int, Field(ge=1)] = 1
+    places: Annotated[int, Field(ge=1, le=64)] | None = None
     width: Annotated[int, Field(ge=1, le=512)] = 24
     critic_width: Annotated[int, Field(ge=1, le=4096)] = 64
     finish_bias: Annotated[float, Field(ge=-50.0, le=50.0)] = -3.0

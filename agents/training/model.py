@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 import torch
 from gymnasium import spaces
@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
 from agents.training.hyperparameters import Hyperparameters
 from agents.training.schedule import schedule
-from agents.training.settings import RunConfiguration
+from agents.training.settings import RunConfiguration, TrainingSettings
 from blast_env.envs.scenario_source import zone_of
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
@@ -30,21 +30,28 @@ _SPATIAL = {"ppo": SpatialPolicy, "maskable_ppo": SpatialMaskablePolicy}
 _FLAT = {"ppo": ActorCriticCnnPolicy, "maskable_ppo": MaskableActorCriticCnnPolicy}
 
 
-def fitted(hyperparameters: Hyperparameters, algorithm: str, scenario: Scenario) -> Hyperparameters:
-    """Return hyperparameters with the size of a scenario's build zone.
+_PLACES: Final = {"visible": 1, "hidden": 9}
+
+
+def fitted(
+    hyperparameters: Hyperparameters, settings: TrainingSettings, scenario: Scenario
+) -> Hyperparameters:
+    """Return hyperparameters with what follows from the scenario's build zone and the threat.
 
     Raises:
         BlastEnvError: If the policy is not one for the algorithm.
     """
     zone = zone_of(scenario)
-    size = {"rows": zone.rows, "columns": zone.columns}
-    spatial = _SPATIAL[algorithm]
+    places = hyperparameters.policy_kwargs.places or _PLACES[settings.threat]
+    changes = {"rows": zone.rows, "columns": zone.columns, "places": places}
+    spatial = _SPATIAL[settings.algorithm]
     names = (f"{spatial.__module__}.{spatial.__name__}", "CnnPolicy")
     if hyperparameters.policy not in names:
         raise BlastEnvError(
-            f"policy is {hyperparameters.policy}, must be one of {', '.join(names)} for {algorithm}"
+            f"policy is {hyperparameters.policy}, must be one of {', '.join(names)} for "
+            f"{settings.algorithm}"
         )
-    arguments = hyperparameters.policy_kwargs.model_copy(update=size)
+    arguments = hyperparameters.policy_kwargs.model_copy(update=changes)
     return hyperparameters.model_copy(update={"policy_kwargs": arguments})
 
 

@@ -60,7 +60,7 @@ def train(
     scenario = source.representative
     configuration = RunConfiguration(
         settings=settings,
-        hyperparameters=fitted(hyperparameters, settings.algorithm, scenario),
+        hyperparameters=fitted(hyperparameters, settings, scenario),
         scenario_hash=scenario.content_hash,
     )
     held_out = HeldOut.of(settings, source)  # refuses an unknown engine before anything is written

@@ -54,6 +54,7 @@ def test_all_enter_and_all_is_written(run: Path, tmp_path: Path) -> None:
         "random layout",
         "wall near the charge",
         "wall near the building",
+        "most sight lines cut",
         "random, 4 blasts",
         "random, 8 blasts",
         "genetic, 4 blasts",
@@ -61,7 +62,7 @@ def test_all_enter_and_all_is_written(run: Path, tmp_path: Path) -> None:
         "MaskablePPO (agent)",
     ]
     assert (summary["cases"] == 2).all()
-    assert len(pd.read_csv(out / "known_small_cases.csv")) == 18
+    assert len(pd.read_csv(out / "known_small_cases.csv")) == 20
     for name in ("league.md", "known_small.png"):
         assert f"wrote {out / name}" in result.stdout
     assert "genetic search with 200 blasts has not entered" in result.stdout

@@ -13,6 +13,7 @@ from agents.league import (
     ResultStore,
     Rule,
     Search,
+    SightLineLayout,
     hidden_track,
     known_track,
     standard_entries,
@@ -20,8 +21,11 @@ from agents.league import (
 from agents.league.store import search_key
 from agents.rules import wall_near_charge
 from agents.search import LayoutProblem, RandomSearch, Report, SearchResult, find_search_method
+from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, evaluate_against
+from blast_env.scenario import Charge, PointSource
+from blast_env.sites import SightLines
 from tests.agents.league_cases import TRAINING, WallAgent, road_scenario
 
 SCENARIO = road_scenario()
@@ -61,6 +65,7 @@ def test_every_entry_meets_the_same_threats_as_no_barrier(tmp_path: Path) -> Non
         "random layout",
         "wall near the charge",
         "wall near the building",
+        "most sight lines cut",
         "random, 6 blasts",
         "wall agent",
     ]
@@ -102,6 +107,19 @@ def test_a_rule_stands_in_the_middle_of_a_hidden_threat() -> None:
     (case,) = hidden_track(SCENARIO, 1).cases
     middle = case.search_threats[0].charge._replace(position_m=(5.0, 20.0))
     assert Rule(wall_near_charge, "rule").propose(case) == wall_near_charge(SCENARIO, middle)
+
+
+def test_sight_lines_are_cut_before_the_charge_or_before_all_its_places() -> None:
+    """A known charge has but one place: its lines are cut, and not those of the others."""
+    scenario = load_scenario("courtyard")
+    place = PointSource(position_m=(5.0, 10.0), tnt_kg=100.0)
+    (hidden,) = hidden_track(scenario, 1).cases
+    known = replace(hidden, charge=Charge(place.position_m, place.tnt_kg))
+    lines_of_one = SightLines.of(scenario.model_copy(update={"charge": (place,)}))
+    lines_of_all = SightLines.of(scenario)
+    of_one, of_all = (SightLineLayout().propose(case) for case in (known, hidden))
+    assert lines_of_one.cut_share(of_one) > lines_of_one.cut_share(of_all)
+    assert lines_of_all.cut_share(of_all) > lines_of_all.cut_share(of_one)
 
 
 def test_an_interrupted_league_goes_on(tmp_path: Path) -> None:

@@ -15,10 +15,13 @@ from agents.training.model import logits_of
 from blast_env import load_scenario
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.scenario import Charge, Scenario
+from blast_env.sites import SightLines, generate_site
 from blast_env.sites.turning import turned
 
 LENGTH_M = 10.0  # what the features of length are divided by
-ALONG, ASIDE, COVERED = 0, 3, 7
+ALONG, ASIDE, CUT, OPEN_CUT, COVERED = 0, 3, 7, 8, 9
+OPEN_FACADE = 6  # of the features of the whole
+SHARE_GAIN = 10.0  # what the features of shares of the facade are multiplied by
 
 
 def environment(scenario: Scenario | str = "courtyard") -> BlastBarrierEnv:
@@ -68,6 +71,7 @@ def test_bearings_behind_a_module_are_covered_and_others_are_not() -> None:
     covered = view.cells[0, :, :, COVERED]
     assert covered[14, 0] == 1.0
     assert covered[14, 8] == 1.0  # straight behind it
+    assert covered[14, 15] == 1.0
     assert covered[30, 0] == 0.0
     assert view.barrier.sum() == 1.0
 
@@ -109,13 +113,53 @@ def test_the_optimiser_knows_all_weights() -> None:
     assert optimised == {id(weight) for weight in policy.parameters()}
 
 
+def test_the_cells_of_a_row_across_the_sight_share_the_facade_out() -> None:
+    """What each of them hides adds up to all of it: no gap and no overlap between neighbours."""
+    env = environment()
+    view = zone_view(observed(env, (5.0, 15.0)), 40, 16)
+    for column in (0, 7, 15):  # columns of the zone stand across the line of sight
+        assert view.cells[0, :, column, CUT].sum() == pytest.approx(SHARE_GAIN, rel=0.05)
+
+
+def test_what_a_module_hides_it_takes_from_those_in_line_with_it_and_from_no_others() -> None:
+    env = environment()
+    bare = zone_view(observed(env, (5.0, 12.0)), 40, 16).cells[0]
+    view = zone_view(observed(env, (5.0, 12.0), layout=[(14, 0)]), 40, 16).cells[0]
+    torch.testing.assert_close(view[..., CUT], bare[..., CUT])
+    assert bare[14, 8, OPEN_CUT] == bare[14, 8, CUT] > 0.0
+    assert view[14, 8, OPEN_CUT] == 0.0  # straight behind it
+    assert view[22, 8, OPEN_CUT] == bare[22, 8, OPEN_CUT] > 0.0  # at another part of the facade
+
+
+@pytest.mark.parametrize("seed", [10_000, 10_003, 10_005, 10_010])
+def test_what_modules_hide_is_what_sight_lines_say(seed: int) -> None:
+    """A charge that may be anywhere on a road or in a parking area, against lines drawn one by one.
+
+    The features know the structures by their extent alone, and 64 bearings of each of 9 places.
+    """
+    site = generate_site(seed)
+    bare_site = site.model_copy(  # the features do not say what a neighbouring building hides
+        update={"structures": tuple(each for each in site.structures if each.protected)}
+    )
+    zone = bare_site.build_zone
+    assert zone is not None
+    env = gym.make("BlastBarrier-v0", scenario=bare_site, engine="event", threat="hidden")
+    planes, _ = env.reset(seed=0)
+    view = zone_view(torch.as_tensor(planes)[None], zone.rows, zone.columns, places=9)
+    lines = SightLines.of(bare_site)
+    expected = np.tensordot(lines.weight, lines.cut, axes=1) / lines.weight.sum()
+    found = view.cells[0, :, :, CUT].numpy() / SHARE_GAIN
+    assert np.corrcoef(found.ravel(), expected.ravel())[0, 1] > 0.95
+    assert np.abs(found - expected).max() < 0.05
+
+
 def test_a_rule_s_wall_covers_the_bearings_to_the_facade() -> None:
-    """The share of the zone in shadow of a wall is what a policy has to see grow."""
+    """What is left open of the facade is what a policy has to see shrink."""
     scenario = load_scenario("courtyard")
     charge = Charge((5.0, 10.0), 100.0)
     layout = RULES["wall near the charge"](scenario, charge)
     env = environment()
-    bare = zone_view(observed(env, charge.position_m), 40, 16).cells[..., COVERED].mean()
+    bare = zone_view(observed(env, charge.position_m), 40, 16).site[0, OPEN_FACADE]
     wall = zone_view(observed(env, charge.position_m, layout=layout[:8]), 40, 16)
-    assert float(bare) == 0.0
-    assert float(wall.cells[..., COVERED].mean()) > 0.1
+    assert bare == 1.0
+    assert wall.site[0, OPEN_FACADE] < 0.7
