@@ -7,9 +7,9 @@ from torch import Tensor
 
 from agents.policies.sight import LinesOfSight
 
-BEARINGS: Final = 64
+BEARINGS: Final = 96
 """Bearings that are told apart from each place of the charge."""
-MOST_SHADE: Final = 2.0
+MOST_SHADE: Final = 4.0
 """They reach so many half widths of the facade to either side of its middle."""
 
 

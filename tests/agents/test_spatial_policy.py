@@ -135,7 +135,7 @@ def test_what_a_module_hides_it_takes_from_those_in_line_with_it_and_from_no_oth
 def test_what_modules_hide_is_what_sight_lines_say(seed: int) -> None:
     """A charge that may be anywhere on a road or in a parking area, against lines drawn one by one.
 
-    The features know the structures by their extent alone, and 64 bearings of each of 9 places.
+    The features know the structures by their extent alone, and 96 bearings of each of 9 places.
     """
     site = generate_site(seed)
     bare_site = site.model_copy(  # the features do not say what a neighbouring building hides
