@@ -7,7 +7,13 @@ from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, MlpExtractor
 from torch import Tensor, nn
 
-from agents.policies.geometry import CELL_FEATURES, CHANNELS, SITE_FEATURES, zone_view
+from agents.policies.geometry import (
+    CELL_FEATURES,
+    CHANNELS,
+    SITE_FEATURES,
+    STATIC,
+    ZoneGeometry,
+)
 
 _LOGIT_GAIN: Final = 0.01
 _OVERVIEW: Final = tuple(
@@ -40,6 +46,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
     ) -> None:
         super().__init__(observation_space, width * (rows * columns + 1))
         self.rows, self.columns, self.places, self.width = rows, columns, places, width
+        self._known: tuple[Tensor, ZoneGeometry] | None = None
         self.near = nn.Conv2d(2, width, 5, padding=2)
         self.overview = nn.Sequential(
             nn.AvgPool2d(4, ceil_mode=True),
@@ -62,7 +69,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
             observations: From 0 to 255 (batch, channels, height, width).
         """
         with torch.no_grad():  # nothing in here has weights
-            view = zone_view(observations, self.rows, self.columns, self.places)
+            view = self._geometry(observations).view(observations)
             planes = observations[:, _OVERVIEW].float() / 255.0
             around = torch.stack((view.barrier, view.free), dim=1)
         site = self.site(torch.cat((view.site, self.overview(planes)), dim=1))
@@ -71,6 +78,14 @@ class ZoneExtractor(BaseFeaturesExtractor):
         cells = torch.relu(self.mixed(cells)).flatten(1, 2)
         whole = torch.cat((torch.relu(site), cells.mean(dim=1), cells.amax(dim=1)), dim=1)
         return torch.cat((cells.flatten(1), torch.relu(self.whole(whole))), dim=1)
+
+    def _geometry(self, observations: Tensor) -> ZoneGeometry:
+        """Return the geometry; while sites and charges stay the same, it is not worked out anew."""
+        static = observations[:, STATIC]
+        if self._known is None or not torch.equal(self._known[0], static):
+            geometry = ZoneGeometry.of(observations, self.rows, self.columns, self.places)
+            self._known = static, geometry
+        return self._known[1]
 
 
 class ZoneLatents(MlpExtractor):

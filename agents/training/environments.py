@@ -14,10 +14,14 @@ from agents.training.settings import SITES, RunConfiguration, TrainingSettings
 from agents.training.wrappers import RelativeReward, ThreatPool
 from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.scenario_source import ScenarioSource, SingleScenario, scenario_source
+from blast_env.evaluation.cache import LoadsCache
 from blast_env.scenario import Scenario, bundled_scenarios
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 
 SITES_ID: Final = "BlastBarrierSites-v0"
+
+_LOADS: Final = 8192
+"""Loads that an environment remembers, so that a site that comes again costs no blast twice."""
 
 _FORK_SERVER: Final = "forkserver"
 """How stable-baselines3 starts processes where the system can."""
@@ -75,6 +79,7 @@ class EnvironmentMaker:
             scenario=self.source,
             realisations=1,
             engine=settings.engine,
+            cache=LoadsCache(_LOADS),
             **_threat_arguments(settings),
         )
         for name, arguments in self.configuration.hyperparameters.wrappers():

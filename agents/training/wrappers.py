@@ -48,11 +48,11 @@ class RelativeReward(_Wrapper):
 
 
 class ThreatPool(_Wrapper):
-    """Draws the episodes from a set that is fixed once for all.
+    """Draws the episodes, with their sites and charges, from a set that is fixed once for all.
 
     The blast without a barrier is then the same again and again, and the environment remembers
-    it: an episode costs half the blasts. The environment remembers a thousand loads, which is
-    enough for a few hundred visible charges.
+    it: an episode costs half the blasts. By itself an environment remembers a thousand loads of
+    each of four sites; for more of either give it a `cache`.
 
     Args:
         env: A `BlastBarrier` environment.

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 import blast_env  # noqa: F401
-from agents.policies.geometry import zone_view
+from agents.policies.geometry import ZoneGeometry, ZoneView
 from agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
 from agents.rules import RULES
 from agents.training.model import logits_of
@@ -28,6 +28,10 @@ def environment(scenario: Scenario | str = "courtyard") -> BlastBarrierEnv:
     env = gym.make("BlastBarrier-v0", scenario=scenario, engine="event").unwrapped
     assert isinstance(env, BlastBarrierEnv)
     return env
+
+
+def zone_view(planes: torch.Tensor, rows: int, columns: int, places: int = 1) -> ZoneView:
+    return ZoneGeometry.of(planes, rows, columns, places).view(planes)
 
 
 def observed(env: BlastBarrierEnv, charge_m: tuple[float, float], **options: Any) -> torch.Tensor:
@@ -91,6 +95,22 @@ def test_acting_and_learning_agree_and_observations_do_not_mix(
     torch.testing.assert_close(learnt_values, values)
     torch.testing.assert_close(learnt_log_probability, log_probability)
     torch.testing.assert_close(policy.predict_values(planes[1:2]), values[1:2])
+
+
+def test_another_charge_is_not_taken_for_the_one_before() -> None:
+    """What stays the same in an episode is kept: it must not outlive the episode."""
+    env = environment()
+    arguments = {"rows": 40, "columns": 16, "width": 8}
+    used, fresh = (
+        SpatialPolicy(env.observation_space, env.action_space, lambda _: 1e-3, **arguments)
+        for _ in range(2)
+    )
+    fresh.load_state_dict(used.state_dict())
+    for y_m in (8.0, 20.0):
+        logits = logits_of(used, observed(env, (5.0, y_m)))
+    torch.testing.assert_close(logits, logits_of(fresh, observed(env, (5.0, 20.0))))
+    placed = observed(env, (5.0, 20.0), layout=[(30, 2), (31, 2)])
+    assert not torch.equal(logits_of(used, placed), logits)
 
 
 def test_an_untrained_policy_finishes_seldom() -> None:
