@@ -13,7 +13,6 @@ import pandas as pd
 
 from agents.proposal import Layout
 from agents.training.held_out import Case
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     Estimate,
     ThreatOutcome,
@@ -85,24 +84,6 @@ class CasesEvaluation:
     def worst(self) -> CaseOutcome:
         """The case with the largest impulse in spite of the layout."""
         return max(self.outcomes, key=lambda each: each.outcome.impulse_psi_s)
-
-    def gain_over(self, other: "CasesEvaluation") -> Estimate:
-        """Return how much more these layouts take off than others, as a share of no barrier.
-
-        Both meet the same blasts, so what these have in common drops out of the interval.
-
-        Args:
-            other: Other layouts for the same cases.
-
-        Raises:
-            BlastEnvError: If it has other cases.
-        """
-        cases = [[each.case for each in evaluation.outcomes] for evaluation in (self, other)]
-        if cases[0] != cases[1]:
-            raise BlastEnvError("other: has other cases, must have the same ones")
-        # 1 - mean(i + bare - other) / mean(bare) = mean(other - i) / mean(bare)
-        shifted = self._impulse_pa_s + self._unprotected_pa_s - other._impulse_pa_s
-        return reduction_estimate(shifted, self._unprotected_pa_s)
 
     @cached_property
     def table(self) -> pd.DataFrame:

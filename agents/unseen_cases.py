@@ -1,12 +1,11 @@
 """Cases that the training of an agent has not met, and what it proposes for them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import Final
 
-from agents.proposal import Layout, LayoutAgent
+from agents.proposal import LayoutAgent, Proposal, timed_proposal
 from agents.search.problem import SEED_SPAN
 from agents.training.held_out import Case
 from agents.training.settings import TrainingSettings
@@ -56,19 +55,6 @@ def unseen_cases(
     )
 
 
-@dataclass(frozen=True)
-class Proposal:
-    """A layout that an agent proposes for a case.
-
-    Attributes:
-        layout: (row, column) of the modules in the order of their placing.
-        seconds: How long it took.
-    """
-
-    layout: Layout
-    seconds: float
-
-
 def told_charge(case: Case) -> Charge | None:
     """Return the charge, if the agent is told where it is."""
     return case.threat.charge if case.is_visible else None
@@ -76,6 +62,4 @@ def told_charge(case: Case) -> Charge | None:
 
 def propose(agent: LayoutAgent, scenario: Scenario, charge: Charge | None) -> Proposal:
     """Return what an agent proposes, and how long it took."""
-    began = perf_counter()
-    layout = agent.propose(scenario, charge)
-    return Proposal(layout, perf_counter() - began)
+    return timed_proposal(partial(agent.propose, scenario, charge))

@@ -1,43 +1,35 @@
 """`make demo`: train an agent for a few minutes, and see what it has learnt.
 
-Trains MaskablePPO on `courtyard`, holds its layouts against no barrier, random layouts and the
-rules of thumb on threats that the training has not met, and films one blast with and without them.
+Trains MaskablePPO on `courtyard`, holds its layouts against no barrier, random layouts, rules of
+thumb and the most lines of sight cut, on threats that the training has not met, and films one blast
+with and without them.
 """
 
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, Final
 
-from agents.evaluation import CaseOutcome
-from agents.training import TrainingSettings, load_agent, load_hyperparameters, train
+from agents.league import Contest, ResultStore, known_track, standard_entries
+from agents.league.trained import TrainedRun
+from agents.training import TrainingSettings, load_hyperparameters, train
 from agents.training.environments import environment_id
 from agents.training.records import EvaluationRow, read_rows
 from agents.training.run_folder import RunFolder
 from agents.training.train import TrainingResult
-from agents.unseen_cases import FIRST_SEED, unseen_cases
-from blast_env.cli.evaluate_options import interval, percent
+from blast_env.cli.evaluate_options import percent
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
-from blast_env.envs.scenario_source import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.rendering.figures import heat_map, save_figure
 from blast_env.rendering.side_by_side import FilmPanel, write_side_by_side
 from blast_env.simulation import Blast
-from scripts.demo_comparison import AGENT, Comparison, compare
+from scripts.demo_comparison import HEADERS, Comparison
 
-_HEADERS = (
-    "layouts",
-    "Pa s",
-    "reduction",
-    "95 % interval",
-    "agent ahead by",
-    "95 % interval",
-    "ms",
-)
+AGENT: Final = "MaskablePPO"
 
 
 @dataclass(frozen=True)
@@ -48,7 +40,7 @@ class DemoSettings:
         out: Folder for everything.
         scenario: Bundled name, or a scenario file.
         steps: Steps of training, a module each.
-        seed: Of the training and the random layouts.
+        seed: Of the training.
         changes: Hyperparameters in the place of those of the package.
         evaluation_interval: Rollouts from one point of the learning curve to the next.
         evaluation_cases: Held-out threats of such a point.
@@ -96,7 +88,7 @@ def demonstrate(settings: DemoSettings) -> Comparison:
     comparison = compare_methods(settings, trained)
     print_comparison(comparison)
     written = [trained.folder.learning_curve]
-    written += write_pictures(settings, comparison.agent.evaluation.outcomes[0])
+    written += write_pictures(settings, comparison)
     print_line(f"\n{comparison.verdict}\n", style="bold")
     for path in written:
         print_line(f"wrote {path}")
@@ -173,67 +165,56 @@ def _clear(run: Path) -> None:
 
 def compare_methods(settings: DemoSettings, trained: TrainingResult) -> Comparison:
     """Hold the best weights of the training against the other methods, on unseen threats."""
-    training = trained.configuration.settings
-    source = SingleScenario(trained.folder.scenario(trained.configuration))
-    seeds = range(FIRST_SEED, FIRST_SEED + settings.threats)
-    cases = unseen_cases(training, source, seeds, training.engine)
-    agent = load_agent(settings.run)
+    scenario = trained.folder.scenario(trained.configuration)
+    agent = replace(TrainedRun.load(settings.run).entry, name=AGENT)
+    contest = Contest(
+        known_track(scenario, settings.threats, seeds=1),
+        (*standard_entries(methods=(), budgets=()), agent),
+        ResultStore(settings.out / "results"),
+        trained.configuration.settings.engine,
+    )
     with progress_bar(f"{settings.threats} unseen threats") as progress:
-        return compare(agent, cases, settings.seed, settings.processes, progress)
+        return Comparison(contest.play(settings.processes, progress))
 
 
 def print_comparison(comparison: Comparison) -> None:
-    """Print a row a method, and no barrier: mean impulse, reduction, time to propose a layout."""
-    outcomes = comparison.agent.evaluation.outcomes
+    """Print a row a method: mean impulse, reduction, time to propose a layout."""
+    cases = comparison.standings.track.cases
     table = make_table(
-        f"{outcomes[0].case.evaluator.scenario.name}: {len(outcomes)} threats that the training "
-        "has not met, the same for all\n(Pa s: mean impulse on the protected structures; ahead: in "
-        "percentage points, paired; ms: time to propose a layout)",
-        _HEADERS,
+        f"{cases[0].scenario.name}: {len(cases)} threats that the training has not met, the same "
+        "for all\n(Pa s: mean impulse on the protected structures; ahead: in percentage points, "
+        "paired; ms: time to propose a layout)",
+        HEADERS,
     )
-    bare_pa_s = comparison.agent.evaluation.unprotected_impulse_pa_s.value
-    table.add_row("no barrier", f"{bare_pa_s:,.0f}", percent(0.0), *4 * ("-",))
-    for entry in comparison.entries:
-        evaluation = entry.evaluation
-        ahead = ("-", "-")
-        if entry is not comparison.agent:
-            gain = comparison.gain_over(entry)
-            ahead = (percent(gain.value), interval(gain))
-        table.add_row(
-            entry.name,
-            f"{evaluation.impulse_pa_s.value:,.0f}",
-            percent(evaluation.reduction.value),
-            interval(evaluation.reduction),
-            *ahead,
-            f"{entry.proposal_ms:.1f}",
-        )
+    for row in comparison.rows():
+        table.add_row(*row)
     result_console().print(table)
 
 
-def write_pictures(settings: DemoSettings, outcome: CaseOutcome) -> list[Path]:
+def write_pictures(settings: DemoSettings, comparison: Comparison) -> list[Path]:
     """Film a blast without barrier and with the agent's layout; write the layout and the loads.
 
     Args:
         settings: The settings.
-        outcome: What the agent's layout does against one of the threats.
+        comparison: Its first threat is filmed.
 
     Returns:
         The files.
     """
-    evaluator, threat = outcome.case.evaluator, outcome.case.threat
-    blasts = [
-        Blast(evaluator.scenario, layout, threat.seed, evaluator.engine, threat.charge)
-        for layout in ((), tuple(sorted(outcome.layout)))
-    ]
-    where = ", ".join(each.name for each in evaluator.scenario.structures if each.protected)
-    impulses_pa_s = (outcome.outcome.unprotected_impulse_pa_s, outcome.outcome.impulse_pa_s)
-    titles = [
-        f"{name}: {impulse_pa_s:,.0f} Pa s on {where}"
-        for name, impulse_pa_s in zip(
-            ("no barrier", f"layout of {AGENT}"), impulses_pa_s, strict=True
+    standings, agent = comparison.standings, comparison.agent
+    case, layout = standings.track.cases[0], agent.proposals[0].layout
+    scenario, threat = case.scenario, case.held_out[0]
+    where = ", ".join(each.name for each in scenario.structures if each.protected)
+    panels = [
+        FilmPanel(
+            Blast(scenario, cells, threat.seed, standings.engine, threat.charge),
+            f"{name}: {impulse_pa_s:,.0f} Pa s on {where}",
+        )
+        for name, cells, impulse_pa_s in (
+            ("no barrier", (), standings.unprotected_pa_s[0, 0]),
+            (f"layout of {AGENT}", layout, agent.impulse_pa_s[0, 0]),
         )
     ]
-    panels = [FilmPanel(blast, title) for blast, title in zip(blasts, titles, strict=True)]
     film = settings.out / "side_by_side.mp4"
     with progress_bar("film") as progress:
         bare, protected = write_side_by_side(
@@ -243,7 +224,7 @@ def write_pictures(settings: DemoSettings, outcome: CaseOutcome) -> list[Path]:
             width_px=settings.film_width_px,
             progress=progress,
         )
-    plan = LayoutPlan(evaluator.scenario, outcome.layout, threat.charge, {"run": str(settings.run)})
+    plan = LayoutPlan(scenario, layout, threat.charge, {"run": str(settings.run)})
     return [
         film,
         save_figure(heat_map(bare), settings.out / "heat_map_no_barrier.png"),

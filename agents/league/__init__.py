@@ -5,7 +5,6 @@ from agents.league.entries import (
     Agent,
     Entry,
     NoBarrier,
-    Proposal,
     RandomLayout,
     Rule,
     Search,
@@ -17,8 +16,8 @@ from agents.league.standings import Result, Standings
 from agents.league.store import ResultStore
 from agents.league.tracks import (
     TRACKS,
-    Case,
     Track,
+    TrackCase,
     find_tracks,
     hidden_track,
     known_track,
@@ -29,12 +28,10 @@ from agents.league.verdict import Verdict, verdicts
 __all__ = [
     "TRACKS",
     "Agent",
-    "Case",
     "Contest",
     "Entry",
     "NoBarrier",
     "Outlook",
-    "Proposal",
     "RandomLayout",
     "Result",
     "ResultStore",
@@ -43,6 +40,7 @@ __all__ = [
     "SightLineLayout",
     "Standings",
     "Track",
+    "TrackCase",
     "Training",
     "Verdict",
     "find_tracks",

@@ -6,12 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from agents.league.entries import Agent, Entry, NoBarrier, Proposal, Search
+from agents.league.entries import Agent, Entry, NoBarrier, Search
 from agents.league.jobs import EvaluationJob, SearchJob, propose_at_once, run_jobs
 from agents.league.standings import Result, Standings
 from agents.league.store import ResultStore, evaluation_key, search_key
-from agents.league.tracks import Case, Track
-from agents.search import Layout
+from agents.league.tracks import Track, TrackCase
+from agents.proposal import Layout, Proposal
 from blast_env.errors import BlastEnvError
 
 Progress = Callable[[float], None]
@@ -157,7 +157,7 @@ class Contest:
         cases = self.track.cases
         return [self.store.proposal(search_key(case, entry, self.engine)) for case in cases]
 
-    def _impulses_pa_s(self, case: Case, layout: Layout) -> tuple[float, ...] | None:
+    def _impulses_pa_s(self, case: TrackCase, layout: Layout) -> tuple[float, ...] | None:
         return self.store.impulses_pa_s(evaluation_key(case, layout, self.engine))
 
     def _standings(self) -> Standings:

@@ -5,29 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.league.tracks import Case
-from agents.proposal import LayoutAgent
+from agents.league.tracks import TrackCase
+from agents.proposal import Layout, LayoutAgent
 from agents.random_layouts import random_layout
 from agents.rules import RULES, expected_charge
-from agents.search import Layout, SearchMethod, find_search_method
+from agents.search import SearchMethod, find_search_method
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Charge, PointSource, Scenario
 from blast_env.sites import SightLines, sight_line_layout
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """What an entry proposes for a case, and what that took.
-
-    Attributes:
-        layout: The cells, sorted.
-        blasts: Blasts spent on the case.
-        seconds: Time until the layout was there.
-    """
-
-    layout: Layout
-    blasts: int
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -49,7 +34,7 @@ class NoBarrier:
 
     name: str = "no barrier"
 
-    def propose(self, case: Case) -> Layout:  # noqa: ARG002
+    def propose(self, case: TrackCase) -> Layout:  # noqa: ARG002
         """Return the empty layout."""
         return ()
 
@@ -60,7 +45,7 @@ class RandomLayout:
 
     name: str = "random layout"
 
-    def propose(self, case: Case) -> Layout:
+    def propose(self, case: TrackCase) -> Layout:
         """Return a layout that the case's seed decides."""
         return random_layout(case.scenario, np.random.default_rng(case.seed))
 
@@ -77,7 +62,7 @@ class Rule:
     rule: Callable[[Scenario, Charge], Layout]
     name: str
 
-    def propose(self, case: Case) -> Layout:
+    def propose(self, case: TrackCase) -> Layout:
         """Return the rule's layout.
 
         Raises:
@@ -96,7 +81,7 @@ class SightLineLayout:
 
     name: str = "most sight lines cut"
 
-    def propose(self, case: Case) -> Layout:
+    def propose(self, case: TrackCase) -> Layout:
         """Return the layout for the charge, or for all the places where a hidden one may be."""
         scenario = case.scenario
         if case.charge is not None:
@@ -119,7 +104,7 @@ class Agent:
     name: str
     training: Training
 
-    def propose(self, case: Case) -> Layout:
+    def propose(self, case: TrackCase) -> Layout:
         """Return the agent's layout; it is told the charge unless that is hidden."""
         return self.agent.propose(case.scenario, case.charge)
 

@@ -1,15 +1,17 @@
 """What a league has to simulate, in pieces that any process can do."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 from typing import TypeVar
 
 import joblib
 
-from agents.league.entries import Instant, Proposal, Search
-from agents.league.tracks import Case
-from agents.search import Layout, LayoutProblem
+from agents.league.entries import Instant, Search
+from agents.league.tracks import TrackCase
+from agents.proposal import Layout, Proposal, timed_proposal
+from agents.search import LayoutProblem
 from blast_env.evaluation import BlastEvaluator
 
 Found = TypeVar("Found")
@@ -25,7 +27,7 @@ class SearchJob:
         engine: Name of the engine.
     """
 
-    case: Case
+    case: TrackCase
     search: Search
     engine: str
 
@@ -51,7 +53,7 @@ class SearchJob:
         seconds = perf_counter() - began_s
         if result.interrupted:
             raise KeyboardInterrupt
-        return Proposal(tuple(sorted(result.layout)), result.blasts, seconds)
+        return Proposal(tuple(sorted(result.layout)), seconds, result.blasts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +66,7 @@ class EvaluationJob:
         engine: Name of the engine.
     """
 
-    case: Case
+    case: TrackCase
     layout: Layout
     engine: str
 
@@ -95,18 +97,14 @@ def run_jobs(jobs: Sequence[Callable[[], Found]], processes: int) -> Iterator[tu
     yield from workers(calls)
 
 
-def propose_at_once(entry: Instant, cases: Sequence[Case]) -> tuple[Proposal, ...]:
+def propose_at_once(entry: Instant, cases: Sequence[TrackCase]) -> tuple[Proposal, ...]:
     """Return an entry's proposals, none of which takes a blast.
 
     The time of one more proposal before these is not counted: it loads what has to be loaded.
     """
     entry.propose(cases[0])
-    proposals = []
-    for case in cases:
-        began_s = perf_counter()
-        layout = entry.propose(case)
-        proposals.append(Proposal(tuple(sorted(layout)), 0, perf_counter() - began_s))
-    return tuple(proposals)
+    proposals = [timed_proposal(partial(entry.propose, case)) for case in cases]
+    return tuple(replace(each, layout=tuple(sorted(each.layout))) for each in proposals)
 
 
 def _numbered(index: int, job: Callable[[], Found]) -> tuple[int, Found]:

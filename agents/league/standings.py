@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Final
 
-from agents.league.entries import Proposal, Training, search_name
+from agents.league.entries import Training, search_name
 from agents.league.tracks import Track
+from agents.proposal import Proposal
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Estimate, mean_estimate, reduction_estimate
 from blast_env.evaluation.statistics import FloatArray
@@ -23,7 +24,7 @@ class Result:
         method: Of the search; else the name.
         budget: Most blasts of a search for a case; else 0.
         training: What an agent cost before; `None` for all others.
-        proposals: One a case.
+        proposals: One a case; the cells are sorted.
         impulse_pa_s: With the layouts, Pa*s (cases, held-out threats).
     """
 

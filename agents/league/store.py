@@ -17,9 +17,9 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 import agents
-from agents.league.entries import Proposal, Search
-from agents.league.tracks import Case
-from agents.search import Layout
+from agents.league.entries import Search
+from agents.league.tracks import TrackCase
+from agents.proposal import Layout, Proposal
 from blast_env.atomic import make_folder, write_atomically
 from blast_env.calibration.stored import scenario_calibration
 from blast_env.evaluation import Threat
@@ -84,7 +84,7 @@ class EvaluationKey(NamedTuple):
     layout: Layout
 
 
-def search_key(case: Case, search: Search, engine: str) -> SearchKey:
+def search_key(case: TrackCase, search: Search, engine: str) -> SearchKey:
     """Return the key of a search for a case.
 
     Raises:
@@ -102,7 +102,7 @@ def search_key(case: Case, search: Search, engine: str) -> SearchKey:
     )
 
 
-def evaluation_key(case: Case, layout: Layout, engine: str) -> EvaluationKey:
+def evaluation_key(case: TrackCase, layout: Layout, engine: str) -> EvaluationKey:
     """Return the key of the impulses with a layout on a case's held-out threats.
 
     Raises:
@@ -199,7 +199,7 @@ def _search_code() -> str:
     return f"{digest.hexdigest()[:16]} {versions}"
 
 
-def _model(case: Case, engine: str) -> Model:
+def _model(case: TrackCase, engine: str) -> Model:
     found = find_engine(engine)
     calibration = scenario_calibration(case.scenario, found.name)
     return Model(

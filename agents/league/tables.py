@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from agents.league.entries import Proposal, Training
+from agents.league.entries import Training
 from agents.league.standings import Result, Standings
-from agents.league.tracks import Case
-from agents.search import Layout
+from agents.league.tracks import TrackCase
+from agents.proposal import Layout, Proposal
 from blast_env.evaluation.statistics import FloatArray
 
 
@@ -69,7 +69,7 @@ def _summary(standings: Standings, result: Result) -> dict[str, Any]:
 
 
 def _case(
-    case: Case, proposal: Proposal, impulses_pa_s: FloatArray, bare_pa_s: FloatArray
+    case: TrackCase, proposal: Proposal, impulses_pa_s: FloatArray, bare_pa_s: FloatArray
 ) -> dict[str, Any]:
     x_m, y_m = (np.nan, np.nan) if case.charge is None else case.charge.position_m
     return {

@@ -29,7 +29,7 @@ HIDDEN_SEEDS: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class TrackCase:
     """One layout that is asked for.
 
     Attributes:
@@ -67,7 +67,7 @@ class Track:
     title: str
     threat: Literal["visible", "hidden"]
     scenario_hash: str | None
-    cases: tuple[Case, ...]
+    cases: tuple[TrackCase, ...]
     reference_budget: int
 
 
@@ -89,7 +89,7 @@ def known_track(scenario: Scenario, cases: int, seeds: int, seed: int = 0) -> Tr
     drawn = []
     for index, first in enumerate(_first_seeds(cases, seeds, seed)):
         charge, search_seed = draw_charge(scenario, first), seed * MOST_CASES + index
-        case = Case(
+        case = TrackCase(
             name=f"{scenario.name} {index}",
             scenario=scenario,
             charge=charge,
@@ -198,8 +198,10 @@ def find_tracks(
     return tuple(tracks)
 
 
-def _hidden_case(name: str, scenario: Scenario, first: int, seeds: int, search_seed: int) -> Case:
-    return Case(
+def _hidden_case(
+    name: str, scenario: Scenario, first: int, seeds: int, search_seed: int
+) -> TrackCase:
+    return TrackCase(
         name=name,
         scenario=scenario,
         charge=None,

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.league import Proposal, Result, Standings, Track, Training, known_track
+from agents.league import Result, Standings, Track, Training, known_track
+from agents.proposal import Proposal
 from agents.rules import expected_charge, line_of_sight_wall
 from agents.search import Layout
 from blast_env.scenario import Charge, Scenario, SegmentSource
@@ -46,7 +47,7 @@ def result(
         method=name.partition(",")[0],
         budget=blasts,
         training=training,
-        proposals=tuple(Proposal(layout, blasts, each) for each in times),
+        proposals=tuple(Proposal(layout, each, blasts) for each in times),
         impulse_pa_s=np.array(impulse_pa_s, dtype=np.float64),
     )
 

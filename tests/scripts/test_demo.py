@@ -2,20 +2,17 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from agents.evaluation import CaseOutcome, CasesEvaluation
-from agents.proposal import Layout
-from agents.training.held_out import Case
+from agents.league import RandomLayout
 from agents.training.run_folder import RunFolder
 from agents.unseen_cases import FIRST_SEED
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, ThreatOutcome, draw_threats
 from blast_env.export import SUFFIXES
-from blast_env.scenario import Charge, Placement, Scenario
-from scripts.demo import DemoSettings, demonstrate
-from scripts.demo_comparison import AGENT, RANDOM, Comparison, Entry, compare
+from blast_env.scenario import Placement
+from scripts.demo import AGENT, DemoSettings, demonstrate
+from scripts.demo_comparison import Comparison
+from tests.agents.league_cases import TRAINING, result, standings
 from tests.agents.training_runs import SMALL, scenario_file, small_scenario
 
 
@@ -43,15 +40,26 @@ def test_it_trains_compares_and_films(tmp_path: Path, capsys: pytest.CaptureFixt
         "4",
         "8",
     ]
-    for words in ("no barrier", AGENT, RANDOM, "wall near the charge", "wall near the building"):
-        assert words in printed
+    names = [each.name for each in comparison.standings.results]
+    assert names == [
+        "no barrier",
+        "random layout",
+        "wall near the charge",
+        "wall near the building",
+        "most sight lines cut",
+        AGENT,
+    ]
+    assert all(name in printed for name in names)
     files = ["run/learning_curve.png", "side_by_side.mp4", "collisions.xlsx"]
     files += [f"layout{suffix}" for suffix in SUFFIXES]
     for name in files:
         assert f"wrote {settings.out / name}" in printed
         assert (settings.out / name).stat().st_size > 0
-    seeds = [each.case.threat.seed for each in comparison.agent.evaluation.outcomes]
-    assert seeds == [FIRST_SEED + number for number in range(4)]
+    seeds = {case.held_out[0].seed for case in comparison.standings.track.cases}
+    assert len(seeds) == 4
+    assert min(seeds) >= FIRST_SEED
+    for proposal in comparison.agent.proposals:
+        assert set(Placement.of(small_scenario(), proposal.layout).cells) == set(proposal.layout)
 
 
 def test_it_can_be_run_again_but_removes_nothing_of_others(tmp_path: Path) -> None:
@@ -63,51 +71,14 @@ def test_it_can_be_run_again_but_removes_nothing_of_others(tmp_path: Path) -> No
         demonstrate(settings)
 
 
-class _Nothing:
-    """An agent that builds nothing, whatever it is asked."""
-
-    def propose(self, scenario: Scenario, charge: Charge | None = None) -> Layout:
-        return Placement.empty(scenario if charge is None else scenario.with_charge(charge)).cells
-
-
-def cases(count: int) -> list[Case]:
-    scenario = small_scenario()
-    evaluator = BlastEvaluator(scenario, "event")
-    return [Case(evaluator, threat, True) for threat in draw_threats(scenario, range(count))]
-
-
-def test_all_methods_meet_the_same_blasts() -> None:
-    shares: list[float] = []
-    comparison = compare(_Nothing(), cases(3), progress=shares.append)
-    assert shares == sorted(shares)
-    assert shares[-1] == 1.0
-    for entry in comparison.entries:
-        for own, other in zip(
-            entry.evaluation.outcomes, comparison.agent.evaluation.outcomes, strict=True
-        ):
-            assert own.case is other.case
-            assert own.outcome.unprotected_impulse_psi_s == other.outcome.unprotected_impulse_psi_s
-            assert Placement.of(small_scenario(), own.layout).cells == own.layout
-    layouts = [each.layout for each in comparison.random.evaluation.outcomes]
-    assert len(set(layouts)) == 3
-    assert comparison.agent.evaluation.reduction == (0.0, 0.0, 0.0)
-    assert not comparison.has_learnt
-    assert comparison.verdict.startswith("Not shown that the agent has learnt")
-
-
-def evaluation(impulses: list[float], own: list[Case]) -> CasesEvaluation:
-    """Loads by hand; without a barrier it is 10 psi s everywhere."""
-    outcomes = [
-        CaseOutcome(case, (), ThreatOutcome(case.threat, impulse, 10.0, True))
-        for case, impulse in zip(own, impulses, strict=True)
-    ]
-    return CasesEvaluation(tuple(outcomes), 0.8)
-
-
 def comparison_of(agent: list[float], random: list[float]) -> Comparison:
-    own = cases(len(agent))
+    """Loads by hand, a threat each; without a barrier it is 10 Pa s everywhere."""
     return Comparison(
-        (Entry(AGENT, evaluation(agent, own), 1.0), Entry(RANDOM, evaluation(random, own), 1.0))
+        standings(
+            [[10.0]] * len(agent),
+            result(RandomLayout.name, [[each] for each in random]),
+            result(AGENT, [[each] for each in agent], training=TRAINING),
+        )
     )
 
 
@@ -117,21 +88,19 @@ def test_the_verdict_needs_intervals_that_do_not_overlap() -> None:
     assert "takes off 50.0 percentage points more" in clear.verdict
     # Better in every case, so the paired difference is sure, but no more than the scatter.
     close = comparison_of([1.0, 4.0, 2.0, 8.0], [1.5, 4.5, 2.5, 8.5])
-    assert close.gain_over(close.random).low > 0.0
+    assert close.standings.difference(close.agent, close.random).low > 0.0
     assert not close.has_learnt
+    assert close.verdict.startswith("Not shown that the agent has learnt")
     worse = comparison_of([7.0, 7.2, 6.8, 7.0], [2.0, 2.1, 1.9, 2.0])
     assert not worse.has_learnt
     assert "takes off -50.0 percentage points more" in worse.verdict
     assert comparison_of([2.0], [7.0]).verdict.startswith("No verdict")
 
 
-def test_a_gain_is_the_paired_difference_of_the_reductions() -> None:
-    agent, random = [1.0, 4.0, 2.0, 8.0], [2.0, 6.0, 3.0, 9.0]
-    comparison = comparison_of(agent, random)
-    gain = comparison.gain_over(comparison.random)
-    difference = np.subtract(random, agent) / 10.0
-    assert gain.value == pytest.approx(difference.mean())
-    half = 3.182446 * difference.std(ddof=1) / 2.0  # Student's t with 3 degrees of freedom
-    assert (gain.low, gain.high) == pytest.approx((gain.value - half, gain.value + half), rel=1e-5)
-    with pytest.raises(BlastEnvError, match="must have the same ones"):
-        comparison.agent.evaluation.gain_over(evaluation(agent, cases(4)))
+def test_a_row_says_by_how_much_the_agent_is_ahead() -> None:
+    """Paired: 20 points in every case leave no spread, however much the cases differ."""
+    bare, random, agent = comparison_of([1.0, 4.0, 2.0, 6.0], [3.0, 6.0, 4.0, 8.0]).rows()
+    assert bare[:5] == ("no barrier", "10", "0.0 %", "0.0 % to 0.0 %", "67.5 %")
+    assert random[:3] == (RandomLayout.name, "5", "47.5 %")
+    assert random[4:6] == ("20.0 %", "20.0 % to 20.0 %")
+    assert agent[4:] == ("-", "-", "10.0")
