@@ -25,6 +25,8 @@ from blast_env.scenario import Charge, Placement, PointSource, Scenario
 
 _ARCHIVE: Final = ".zip"
 _ARCHIVES_HOLD_CODE: Final = "such archives may hold pickled code, which runs when they are read"
+_SCHEDULES: Final = ("learning_rate", "lr_schedule", "clip_range", "clip_range_vf")
+"""What only training needs; in RL Zoo's archives objects of classes that may not be installed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +172,7 @@ def load_archive(
     """Return the agent of an archive that stable-baselines3 or RL Zoo wrote.
 
     Such archives may hold pickled objects, and reading these runs whatever code their maker put
-    in. So it takes a flag.
+    in. So it takes a flag. RL Zoo need not be installed.
 
     Args:
         path: The archive, a `.zip` file.
@@ -185,9 +187,10 @@ def load_archive(
     if not trust_archive:
         raise BlastEnvError(f"{path}: {_ARCHIVES_HOLD_CODE}; trust_archive is False, must be True")
     model = PPO if algorithm == "ppo" else MaskablePPO
+    unread = dict.fromkeys(_SCHEDULES, 1.0)
     try:
-        policy = model.load(path, device="cpu").policy
-    except (OSError, ValueError, KeyError, RuntimeError, AttributeError) as error:
+        policy = model.load(path, device="cpu", custom_objects=unread).policy
+    except (OSError, ImportError, ValueError, KeyError, RuntimeError, AttributeError) as error:
         raise BlastEnvError(f"{path}: cannot be read: {error}") from error
     policy.set_training_mode(False)
     return TrainedAgent(policy, scenario, engine)

@@ -33,6 +33,8 @@ from blast_env.cli.output import make_table, print_line, progress_bar, result_co
 from blast_env.envs.scenario_source import ScenarioSource, SingleScenario
 from blast_env.evaluation import BlastEvaluator
 from blast_env.export import LayoutPlan, export_layouts
+from blast_env.rendering.cases_figure import ProtectedCase, cases_figure
+from blast_env.rendering.figures import save_figure
 from blast_env.scenario import save_scenario
 from blast_env.units import MS_PER_S
 
@@ -184,7 +186,13 @@ def _write(evaluation: CasesEvaluation, provenance: dict[str, Any], out: Path) -
     with write_atomically(path) as temporary:
         text = json.dumps(content, indent=2, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
-    return [path, write_table(evaluation.table, out / "cases.csv")]
+    table = write_table(evaluation.table, out / "cases.csv")
+    cases = [
+        ProtectedCase(each.case.evaluator.scenario, each.layout, each.outcome)
+        for each in evaluation.outcomes
+    ]
+    figure = cases_figure(cases, evaluation.reduction)
+    return [path, table, save_figure(figure, out / "evaluation.png")]
 
 
 def _plans(evaluation: CasesEvaluation, provenance: dict[str, Any]) -> dict[str, LayoutPlan]:

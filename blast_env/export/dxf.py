@@ -1,16 +1,23 @@
-"""A layout on its site as DXF, for CAD: units are metres, a layer a kind of feature."""
+"""A layout on its site as DXF, for CAD: units are metres, a layer a kind of feature.
 
+What has no place of its own is in notes above the site; how near modules may come to structures is
+a dashed line around each of these.
+"""
+
+from math import ceil
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from blast_env.atomic import write_atomically
 from blast_env.errors import BlastEnvError
+from blast_env.export.notes import clearance_outlines, note_lines
 from blast_env.export.plan import Feature, FeatureKind, LayoutPlan
+from blast_env.geometry import Rectangle
 
 try:
     from ezdxf import units
     from ezdxf.document import Drawing
-    from ezdxf.enums import TextEntityAlignment
+    from ezdxf.enums import MTextEntityAlignment, TextEntityAlignment
     from ezdxf.filemanagement import new
     from ezdxf.layouts.layout import Modelspace
 except ImportError as error:
@@ -22,8 +29,12 @@ VERSION: Final = "R2010"
 APPLICATION: Final = "BLAST_ENV"
 """Under this name the outline of a module has its identifier, as extended data."""
 
+CLEARANCE_LAYER: Final = "CLEARANCE"
+NOTES_LAYER: Final = "NOTES"
+
 _STRING: Final = 1000  # group code of a text in extended data
 _TEXT_HEIGHT_M: Final = 0.4
+_LINE_SPACING: Final = 5.0 / 3.0  # of lines of text, in heights of the text
 _POINT_SIZE_M: Final = 1.0
 _CROSS_IN_CIRCLE: Final = 35  # how points are drawn ($PDMODE)
 
@@ -46,6 +57,7 @@ _STYLES: Final = {
     FeatureKind.CHARGE: _Style(1),
     FeatureKind.BARRIER: _Style(140),
 }
+_OTHER_STYLES: Final = {CLEARANCE_LAYER: _Style(52, "DASHED"), NOTES_LAYER: _Style(7)}
 
 
 def layer_name(kind: FeatureKind) -> str:
@@ -54,7 +66,7 @@ def layer_name(kind: FeatureKind) -> str:
 
 
 def drawing(plan: LayoutPlan) -> Drawing:
-    """Return a drawing of everything on the site; the layers are those of all kinds."""
+    """Return a drawing of everything on the site, with notes; the layers are always the same."""
     document = new(VERSION, setup=["linetypes"], units=units.M)
     document.header["$PDMODE"] = _CROSS_IN_CIRCLE
     document.header["$PDSIZE"] = _POINT_SIZE_M
@@ -66,13 +78,15 @@ def drawing(plan: LayoutPlan) -> Drawing:
         ("coordinates", "local site metres, x to the right, y upwards from the lower left corner"),
     ):
         document.header.custom_vars.append(name, value)
-    for kind, style in _STYLES.items():
-        document.layers.add(layer_name(kind), color=style.colour, linetype=style.line_type)
+    styles = {layer_name(kind): style for kind, style in _STYLES.items()} | _OTHER_STYLES
+    for layer, style in styles.items():
+        document.layers.add(layer, color=style.colour, linetype=style.line_type)
     space = document.modelspace()
     for feature in plan.features:
         _draw(space, feature)
-    site = plan.scenario.site.rectangle_m
-    document.set_modelspace_vport(height=1.1 * max(site.right, site.top), center=site.centre)
+    _draw_clearance(space, plan)
+    shown = _write_notes(space, plan)
+    document.set_modelspace_vport(height=1.1 * max(shown.right, shown.top), center=shown.centre)
     return document
 
 
@@ -120,3 +134,31 @@ def _write_name(space: Modelspace, feature: Feature) -> None:
         # The charge is where one may be: its name goes below that of the place.
         up_m = -gap_m - _TEXT_HEIGHT_M if feature.kind is FeatureKind.CHARGE else gap_m
         text.set_placement((x_m + gap_m, y_m + up_m))
+
+
+def _draw_clearance(space: Modelspace, plan: LayoutPlan) -> None:
+    """Draw how near modules may come to the structures, if there is a bound."""
+    for outline in clearance_outlines(plan):
+        attributes = {"layer": CLEARANCE_LAYER}
+        space.add_lwpolyline(outline, format="xyb", close=True, dxfattribs=attributes)
+
+
+def _write_notes(space: Modelspace, plan: LayoutPlan) -> Rectangle:
+    """Write the notes above everything; return the site with them.
+
+    They are as high as fits the width of the site. Where that would be too small to read, lines
+    wrap; the text grows upwards, so it never covers the site.
+    """
+    lines = note_lines(plan)
+    site, width_m = plan.scenario.site.rectangle_m, plan.scenario.site.width_m
+    # Signs are at most as wide as high, whatever typeface a program has.
+    height_m = max(width_m / max(map(len, lines)), _TEXT_HEIGHT_M)
+    ends_m = [y for outline in clearance_outlines(plan) for _, y, _ in outline]
+    bottom_m = max([site.top, *ends_m]) + 2.0 * height_m
+    notes = space.add_mtext(
+        "\\P".join(lines),
+        {"layer": NOTES_LAYER, "char_height": height_m, "width": width_m},
+    )
+    notes.set_location((site.left, bottom_m), attachment_point=MTextEntityAlignment.BOTTOM_LEFT)
+    count = sum(ceil(len(line) * height_m / width_m) for line in lines)
+    return site._replace(top=bottom_m + count * _LINE_SPACING * height_m)

@@ -1,5 +1,6 @@
 """The site plan of an evaluation: the layout, and how well it does against each charge."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from blast_env.rendering.site_plan import (
     rectangle_patch,
 )
 from blast_env.rendering.style import BARRIER, EXPLOSIVE, INK, unit_interval
+from blast_env.scenario import BuildZone
 from blast_env.scene import Scene, StructureOutline
 
 with render_extra():
@@ -30,7 +32,14 @@ _PERCENT = 100.0
 
 def draw_plan(axes: Axes, evaluation: LayoutEvaluation, scene: Scene) -> None:
     """Draw the site, the layout, and the charges in the colours of their reductions."""
-    zone = evaluation.scenario.build_zone
+    draw_layout(axes, evaluation.scenario.build_zone, scene)
+    _draw_charges(axes, evaluation)
+    axes.add_line(_worst_ring(*evaluation.worst.threat.charge.position_m))
+    axes.set_title("Site, layout and charges", fontsize=11)
+
+
+def draw_layout(axes: Axes, zone: BuildZone | None, scene: Scene) -> None:
+    """Draw the site and what stands on it, the modules of the barrier as filled squares."""
     draw_site(axes, in_metres(scene.site))
     if zone is not None:
         draw_zone(axes, zone)
@@ -39,9 +48,6 @@ def draw_plan(axes: Axes, evaluation: LayoutEvaluation, scene: Scene) -> None:
         if outline.cells is not None:
             parts = [rectangle_patch(in_metres(part.rectangle)) for part in outline.build().parts]
             axes.add_collection(PatchCollection(parts, color=unit_interval(BARRIER), zorder=4))
-    _draw_charges(axes, evaluation)
-    axes.add_line(_worst_ring(*evaluation.worst.threat.charge.position_m))
-    axes.set_title("Site, layout and charges", fontsize=11)
 
 
 def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
@@ -78,11 +84,17 @@ def plan_legend(evaluation: LayoutEvaluation, scene: Scene) -> list[Artist]:
         label = "charge outside the calibration's range"
         handles.append(_charge_handle("s", label))
     handles.append(_worst_ring())
-    site = legend_handles(scene.structures, evaluation.scenario.build_zone)
-    for handle in site:
+    site = layout_legend(scene.structures, evaluation.scenario.build_zone)
+    return [*handles, *(handle for handle in site if handle.get_label() != "charge")]
+
+
+def layout_legend(structures: Sequence[StructureOutline], zone: BuildZone | None) -> list[Artist]:
+    """Return the legend entries for a charge and for what `draw_layout` shows."""
+    handles = legend_handles(structures, zone)
+    for handle in handles:
         if handle.get_label() == "barrier module":
             handle.set(fill=True, facecolor=unit_interval(BARRIER))
-    return [*handles, *(handle for handle in site if handle.get_label() != "charge")]
+    return handles
 
 
 def _charge_handle(marker: str, label: str) -> Line2D:

@@ -1,7 +1,9 @@
 """The YAML files fit the scenarios and RL Zoo, and a wrong value is refused with its bound."""
 
 import inspect
+import sys
 from importlib import import_module
+from pathlib import Path
 
 import gymnasium as gym
 import pytest
@@ -9,7 +11,7 @@ import yaml
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 
-import blast_env  # noqa: F401
+from agents.training import TrainedAgent, load_archive
 from agents.training.environments import environment_id, training_source
 from agents.training.hyperparameters import (
     ALGORITHMS,
@@ -20,6 +22,7 @@ from agents.training.hyperparameters import (
 )
 from agents.training.schedule import schedule
 from agents.training.set_options import parse_options
+from blast_env import load_scenario
 from blast_env.envs.registration import WITHOUT_BUILD_ZONE
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import bundled_scenarios
@@ -28,6 +31,19 @@ SCENARIOS = ("sites", *(name for name in bundled_scenarios() if name not in WITH
 MODELS = {"ppo": PPO, "maskable_ppo": MaskablePPO}
 OF_RL_ZOO = {"n_timesteps", "n_envs", "env_wrapper", "normalize"}
 """Keys that RL Zoo takes out before it hands the others to the algorithm."""
+
+
+ELSEWHERE = """
+from agents.policies.spatial import SpatialPolicy
+
+class Schedule:
+    def __call__(self, progress_remaining):
+        return 3e-3 * progress_remaining
+
+class Policy(SpatialPolicy):
+    pass
+"""
+"""A package that is installed where an archive is written, and missing where it is read."""
 
 
 def sections(algorithm: str) -> dict[str, dict]:
@@ -57,6 +73,54 @@ def test_rl_zoo_can_use_every_section(algorithm: str) -> None:
         for name in (section["policy"], *WRAPPERS):
             module, _, attribute = name.rpartition(".")
             assert hasattr(import_module(module), attribute)
+
+
+def archived(archive: Path, monkeypatch: pytest.MonkeyPatch, policy: str) -> PPO:
+    """Write an untrained model as RL Zoo does, whose schedules are objects of its own classes."""
+    (archive.parent / "elsewhere.py").write_text(ELSEWHERE)
+    environment = gym.make("BlastBarrier-v0")
+    with monkeypatch.context() as installed:
+        installed.syspath_prepend(archive.parent)
+        module, _, attribute = policy.rpartition(".")
+        schedule_there = import_module("elsewhere").Schedule()
+        model = PPO(
+            getattr(import_module(module), attribute),
+            environment,
+            learning_rate=schedule_there,
+            clip_range=schedule_there,
+            clip_range_vf=schedule_there,
+            policy_kwargs=sections("ppo")["BlastBarrier-v0"]["policy_kwargs"],
+            n_steps=16,
+            batch_size=16,
+            device="cpu",
+        )
+        model.save(archive)
+    environment.close()
+    del sys.modules["elsewhere"]
+    return model
+
+
+def test_an_archive_of_rl_zoo_is_read_where_rl_zoo_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    archive = tmp_path / "model.zip"
+    model = archived(archive, monkeypatch, sections("ppo")["BlastBarrier-v0"]["policy"])
+    with pytest.raises(ModuleNotFoundError, match="elsewhere"):
+        PPO.load(archive)  # so the archive does need what is missing
+    scenario = load_scenario("courtyard")
+    agent = load_archive(archive, "ppo", scenario, trust_archive=True)
+    layout = agent.propose(scenario)
+    assert layout
+    assert layout == TrainedAgent(model.policy, scenario, "event").propose(scenario)
+
+
+def test_an_archive_with_an_unknown_policy_is_refused_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    archive = tmp_path / "model.zip"
+    archived(archive, monkeypatch, "elsewhere.Policy")
+    with pytest.raises(BlastEnvError, match=r"cannot be read: No module named 'elsewhere'"):
+        load_archive(archive, "ppo", load_scenario("courtyard"), trust_archive=True)
 
 
 def test_options_are_read_as_yaml_and_reach_the_policy() -> None:

@@ -62,6 +62,13 @@ def test_a_visible_threat_gets_a_layout_for_each_charge(visible: Path, tmp_path:
     assert "MaskablePPO of" in result.stdout
     assert "ms each (median)" in result.stdout
     assert "note:" not in result.stdout
+    assert {path.name for path in out.iterdir()} == {
+        "evaluation.json",
+        "cases.csv",
+        "evaluation.png",
+    }
+    assert all(f"wrote {path}" in result.stdout for path in out.iterdir())
+    assert (out / "evaluation.png").stat().st_size > 10_000
     assert {path.suffix for path in export.iterdir()} == set(SUFFIXES)
     assert len(list(export.iterdir())) == 3 * len(SUFFIXES)
 
