@@ -21,7 +21,8 @@ class ZonePolicy(BasePolicy):
         lr_schedule: Learning rate by the share of the training that is left.
         rows: Rows of the build zone.
         columns: Its columns.
-        places: Places that stand for where the charge may be: 1 if it is visible, more if not.
+        places: Places that stand for where the charge may be: more than 1 if it is hidden; 1
+            unless given.
         width: Number of features of a cell.
         critic_width: Neurons of the critic's hidden layer.
         finish_bias: What the logit of finishing begins with; below 0, modules are placed first.

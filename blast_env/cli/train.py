@@ -30,15 +30,22 @@ def train(
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps, a module each; else as the YAML file says.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Decides everything.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Decides everything.", show_default="0")
+    ] = None,
     envs: Annotated[
         int | None, typer.Option(min=1, help="Parallel environments; else as the YAML file says.")
     ] = None,
     run: Annotated[Path | None, typer.Option(help="Folder for the run; new or empty.")] = None,
     threat: Annotated[
-        str | None, typer.Option(help="visible or hidden: whether the agent sees the charge.")
+        str | None,
+        typer.Option(
+            help="visible or hidden: whether the agent sees the charge.", show_default="visible"
+        ),
     ] = None,
-    engine: Annotated[str | None, typer.Option(help="Engine that runs the blasts.")] = None,
+    engine: Annotated[
+        str | None, typer.Option(help="Engine that runs the blasts.", show_default="event")
+    ] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", help="key=value, e.g. ent_coef=0.01; may be given again."),

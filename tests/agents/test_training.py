@@ -235,6 +235,8 @@ def test_other_algorithms_and_hidden_threats_train_too(
     )
     assert result.progress.counters.steps == STEPS
     assert np.isfinite(result.progress.counters.best_reduction)
+    places = result.configuration.hyperparameters.policy_kwargs.places
+    assert places == (1 if threat == "visible" else 9)  # a hidden charge may be in many
 
 
 def test_training_learns(tmp_path: Path) -> None:
