@@ -12,7 +12,6 @@ BEARINGS: Final = 96
 MOST_SHADE: Final = 4.0
 """They reach so many half widths of the facade to either side of its middle."""
 
-
 _MOST_DEPTH: Final = 3.0
 
 

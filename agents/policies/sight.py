@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 _LEAST_WAY: Final = 1e-3
+"""A way along an axis that is shorter, in squares, counts as so long: nothing is divided by 0."""
 
 
 class Spread(NamedTuple):
@@ -155,10 +156,7 @@ def _corner_tangents(
     x: Tensor, y: Tensor, along_x: Tensor, along_y: Tensor, target: Spread
 ) -> Tensor:
     """Return where the corners of a rectangle are seen (corners, batch, places)."""
-    half_x, half_y = (
-        (3.0 * target.xx.clamp(min=0.0)).sqrt(),
-        (3.0 * target.yy.clamp(min=0.0)).sqrt(),
-    )
+    half_x, half_y = target.half_extent(target.xx), target.half_extent(target.yy)
     tangents = []
     for side_x, side_y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
         from_x = (target.x + side_x * half_x)[:, None] - x
