@@ -5,8 +5,12 @@ import numpy as np
 import pytest
 
 import blast_env  # noqa: F401
+from agents.training import TrainingSettings, load_hyperparameters
+from agents.training.environments import SITES_ID, EnvironmentMaker
+from agents.training.settings import RunConfiguration
 from agents.training.wrappers import RelativeReward, ThreatPool
 from blast_env.errors import BlastEnvError
+from blast_env.sites import SiteSource
 from tests.agents.training_runs import small_scenario
 
 
@@ -41,6 +45,27 @@ def test_a_pool_repeats_its_threats_so_that_half_of_the_blasts_are_known() -> No
         charges.add(info["charges"])
     assert len(charges) == 2
     assert info["blasts"] == 2  # nothing was built, so there is one blast a charge
+
+
+def test_training_remembers_more_sites_than_an_environment_by_itself() -> None:
+    """The blast without a barrier is there when a site of the pool comes again, however late."""
+    hyperparameters = load_hyperparameters("maskable_ppo", SITES_ID)
+    pool = [{"agents.training.wrappers.ThreatPool": {"size": 6}}]
+    configuration = RunConfiguration(
+        settings=TrainingSettings(
+            algorithm="maskable_ppo", scenario="sites", steps=1, threat="hidden", hidden_threats=1
+        ),
+        hyperparameters=hyperparameters.model_copy(update={"env_wrapper": pool}),
+        scenario_hash="0" * 64,
+    )
+    env = EnvironmentMaker(configuration, SiteSource.training(), 0)()
+    scenarios, blasts = set(), 0
+    for seed in range(40):
+        env.reset(seed=seed)
+        *_, info = env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
+        scenarios.add(info["scenario_hash"])
+        blasts = info["blasts"]
+    assert len(scenarios) == blasts == 6
 
 
 def test_pools_of_other_seeds_are_other_threats_and_the_same_seed_the_same() -> None:
