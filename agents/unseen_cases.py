@@ -55,11 +55,6 @@ def unseen_cases(
     )
 
 
-def told_charge(case: Case) -> Charge | None:
-    """Return the charge, if the agent is told where it is."""
-    return case.threat.charge if case.is_visible else None
-
-
 def propose(agent: LayoutAgent, scenario: Scenario, charge: Charge | None) -> Proposal:
     """Return what an agent proposes, and how long it took."""
     return timed_proposal(partial(agent.propose, scenario, charge))

@@ -94,7 +94,7 @@ class ZoneGeometry(NamedTuple):
         shape = (len(planes), rows, columns)
         x, y = x.expand(shape).flatten(1), y.expand(shape).flatten(1)
         along, aside = lines.coordinates(x, y)
-        bearings = Bearings.of(lines, along, aside, stands_before(lines, x, y, target))
+        bearings = Bearings.of(lines, along, aside, stands_before(lines, along, x, y, target))
         distance = lines.distance[..., None]
         cells = (
             along.mean(dim=1) / _LENGTH,
@@ -147,7 +147,7 @@ def _measures(planes: Tensor, likely: Tensor, target: Spread) -> Tensor:
     return torch.cat(
         (
             line.distance / (2.0 * _LENGTH),
-            line.facade / _LENGTH,
+            target.half_width(-along_y, along_x).clamp(min=1.0) / _LENGTH,
             target.half_width(along_x, along_y) / _LENGTH,
             charge.half_width(along_x, along_y) / _LENGTH,
             charge.half_width(-along_y, along_x) / _LENGTH,

@@ -57,7 +57,6 @@ class LinesOfSight(NamedTuple):
         along_x: Its direction, of length 1.
         along_y: Likewise.
         distance: Its length, at least 1.
-        facade: Half the width of the structures across it, at least 1.
         left: How far aside of the line they reach to the left, over how far along it: the tangent
             of the angle at which they are seen.
         right: Likewise to the right, where it is negative.
@@ -68,7 +67,6 @@ class LinesOfSight(NamedTuple):
     along_x: Tensor
     along_y: Tensor
     distance: Tensor
-    facade: Tensor
     left: Tensor
     right: Tensor
 
@@ -81,11 +79,9 @@ class LinesOfSight(NamedTuple):
         towards_x, towards_y = target.x[:, None] - x, target.y[:, None] - y
         distance = torch.hypot(towards_x, towards_y).clamp(min=1.0)
         along_x, along_y = towards_x / distance, towards_y / distance
-        facade = target.half_width(-along_y, along_x).clamp(min=1.0)
         tangents = _corner_tangents(x, y, along_x, along_y, target)
-        return cls(
-            x, y, along_x, along_y, distance, facade, tangents.amax(dim=0), tangents.amin(dim=0)
-        )
+        left, right = tangents.amax(dim=0), tangents.amin(dim=0)
+        return cls(x, y, along_x, along_y, distance, left, right)
 
     def coordinates(self, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
         """Return how far points are along each line and aside of it, in squares.
@@ -102,11 +98,14 @@ class LinesOfSight(NamedTuple):
         return from_x * along_x + from_y * along_y, from_y * along_x - from_x * along_y
 
 
-def stands_before(lines: LinesOfSight, x: Tensor, y: Tensor, target: Spread) -> Tensor:
+def stands_before(
+    lines: LinesOfSight, along: Tensor, x: Tensor, y: Tensor, target: Spread
+) -> Tensor:
     """Return which points lie before the structures, neither in nor behind them, 0 or 1.
 
     Args:
         lines: From each place of the charge (batch, places).
+        along: How far the points are along each line, in squares (batch, places, points).
         x: Of the points, in squares (batch, points).
         y: Likewise.
         target: The structures.
@@ -118,7 +117,6 @@ def stands_before(lines: LinesOfSight, x: Tensor, y: Tensor, target: Spread) -> 
     enter_y, leave_y = _slab(lines.y, y, target.y, target.half_extent(target.yy))
     enter, leave = torch.maximum(enter_x, enter_y), torch.minimum(leave_x, leave_y)
     is_met = (enter < leave) & (leave > 0.0) & (enter < 1.0)
-    along, _ = lines.coordinates(x, y)
     return ((along > 0.0) & ~is_met).float()
 
 

@@ -9,6 +9,7 @@ from agents.training.environments import held_out_scenarios
 from agents.training.settings import TrainingSettings
 from blast_env.envs.scenario_source import ScenarioSource
 from blast_env.evaluation import BlastEvaluator, Estimate, Threat, draw_threats, reduction_estimate
+from blast_env.scenario import Charge
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +26,14 @@ class Case:
     threat: Threat
     is_visible: bool
 
+    @property
+    def told_charge(self) -> Charge | None:
+        """The charge, if the agent is told where it is."""
+        return self.threat.charge if self.is_visible else None
+
     def impulses_psi_s(self, agent: LayoutAgent) -> tuple[float, float]:
         """Return the impulse with the agent's layout, and without a barrier, psi*s."""
-        charge = self.threat.charge if self.is_visible else None
-        layout = agent.propose(self.evaluator.scenario, charge)
+        layout = agent.propose(self.evaluator.scenario, self.told_charge)
         pairs = [(layout, self.threat), ((), self.threat)]
         with_barrier, without = self.evaluator.loads_of_many(pairs)
         return with_barrier.protected_impulse_psi_s, without.protected_impulse_psi_s

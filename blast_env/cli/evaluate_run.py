@@ -18,7 +18,7 @@ from agents.training.environments import training_source
 from agents.training.held_out import Case
 from agents.training.run_folder import RunFolder
 from agents.training.settings import SITES
-from agents.unseen_cases import FIRST_SEED, propose, told_charge, unseen_cases
+from agents.unseen_cases import FIRST_SEED, propose, unseen_cases
 from blast_env.atomic import write_atomically
 from blast_env.cli.evaluate_layout import print_means, report_layout
 from blast_env.cli.evaluate_options import (
@@ -99,7 +99,7 @@ def _report_cases(
     """A layout for each charge, or each site."""
     options.prepare_files(len(seeds))
     cases = unseen_cases(settings, source, seeds, options.engine or agent.engine, options.cache)
-    proposals = [propose(agent, each.evaluator.scenario, told_charge(each)) for each in cases]
+    proposals = [propose(agent, each.evaluator.scenario, each.told_charge) for each in cases]
     with progress_bar(f"{2 * len(cases)} blasts in {_place(settings, cases)}") as progress:
         evaluation = evaluate_layouts(
             cases,
@@ -202,7 +202,7 @@ def _plans(evaluation: CasesEvaluation, provenance: dict[str, Any]) -> dict[str,
         f"layout_{number:0{digits}}": LayoutPlan(
             each.case.evaluator.scenario,
             each.layout,
-            told_charge(each.case),
+            each.case.told_charge,
             {**provenance, "seed": each.case.threat.seed},
         )
         for number, each in enumerate(evaluation.outcomes, start=1)

@@ -7,7 +7,7 @@ import pytest
 
 from agents.evaluation import evaluate_layouts
 from agents.training.settings import TrainingSettings
-from agents.unseen_cases import FIRST_SEED, told_charge, unseen_cases
+from agents.unseen_cases import FIRST_SEED, unseen_cases
 from blast_env.envs.scenario_source import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats, evaluate_layout
@@ -26,7 +26,7 @@ def test_each_layout_meets_the_threat_of_its_case_alone() -> None:
     for each, threat, layout in zip(evaluation.outcomes, threats, WALLS, strict=True):
         expected = evaluate_layout(small_scenario(), layout, threats=[threat])
         assert each.outcome.impulse_pa_s == pytest.approx(expected.impulse_pa_s.value)
-        assert told_charge(each.case) == threat.charge
+        assert each.case.told_charge == threat.charge
     assert evaluation.outcomes[1].outcome.reduction == 0.0
 
 
@@ -52,7 +52,7 @@ def test_generated_sites_are_held_out_and_not_those_that_the_weights_were_chosen
     sites = [case.evaluator.scenario for case in cases]
     assert sites == list(SiteSource.held_out(3))
     assert [case.threat.seed for case in cases] == [7, 8, 9]
-    assert all(told_charge(case) is None for case in cases)
+    assert all(case.told_charge is None for case in cases)
     with pytest.raises(BlastEnvError, match=f"must be 1 to {HELD_OUT_SITES - 16}, a site each"):
         unseen_cases(settings, SiteSource.training(), range(HELD_OUT_SITES), "event")
 
