@@ -41,11 +41,12 @@ def test_event_engine_is_many_times_faster(name: str, times: float) -> None:
 
 
 def test_a_shorter_step_makes_pymunk_slower() -> None:
-    figures = measure_engines(BenchmarkScene("courtyard", COURTYARD, 0.125), repeats=1)
+    # Medians: one blast out of three may be disturbed on a busy machine.
+    figures = measure_engines(BenchmarkScene("courtyard", COURTYARD, 0.125), repeats=3)
     assert figures.close_pymunk_s is not None
     assert figures.close_ratio is not None
     assert figures.close_pymunk_s > 2.0 * figures.pymunk_s
-    assert figures.close_ratio == pytest.approx(figures.close_pymunk_s / figures.event_s)
+    assert figures.close_ratio > 2.0 * figures.ratio
 
 
 def test_a_step_that_is_the_scenario_s_is_not_timed_twice() -> None:
