@@ -6,8 +6,8 @@ Importing the package registers its environments with Gymnasium.
 from importlib.metadata import version
 
 from blast_env.envs.registration import register_environments as _register_environments
+from blast_env.physics.scene import Charge
 from blast_env.scenario import (
-    Charge,
     Scenario,
     bundled_scenarios,
     load_layout,

@@ -1,6 +1,9 @@
-"""Axis-parallel rectangles, the only plane figure that sites are made of."""
+"""Axis-parallel rectangles, the only plane figure that sites are made of; cells of a grid."""
 
 from typing import NamedTuple
+
+Cell = tuple[int, int]
+"""(row, column) of a build-zone cell, from 0; rows count upwards, columns to the right."""
 
 
 class Rectangle(NamedTuple):
@@ -62,3 +65,7 @@ class Rectangle(NamedTuple):
             first, last = sorted(((low - begin) / step, (high - begin) / step))
             enter, leave = max(enter, first), min(leave, last)
         return enter < leave or (start == end and enter <= leave)
+
+
+Layout = tuple[Cell, ...]
+"""(row, column) of the modules in the order of their placing."""

@@ -9,16 +9,22 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from blast_env.calibration.model import Calibration, CalibrationError, ScaledImpulse
-from blast_env.calibration.stored import scenario_calibration
+from blast_env.calibration.model import (
+    Calibration,
+    CalibrationError,
+    ScaledImpulse,
+    scenario_calibration,
+)
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.geometry import Cell
 from blast_env.physics.collisions import CollisionArray
 from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, find_engine
+from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.recording.run_record import RunRecord, run_record
 from blast_env.recording.tables import collision_table, module_table, structure_table
-from blast_env.scenario import Cell, Charge, Scenario
-from blast_env.scene import Scene, build_scene, draw_charge
+from blast_env.scenario import Scenario
+from blast_env.scenario.build_scene import build_scene, draw_charge
 
 _PROGRESS_CALLS = 200
 

@@ -13,10 +13,9 @@ import numpy as np
 import typer
 
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.rendering.captions import write_heading
-from blast_env.rendering.extra import render_extra
 from blast_env.rendering.figures import save_figure
-from blast_env.rendering.style import count_of
+from blast_env.rendering.site_plan import write_heading
+from blast_env.rendering.style import count_of, render_extra
 from scripts.front_measurement import (
     SEDOV_GAS,
     FrontCase,

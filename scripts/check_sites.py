@@ -13,14 +13,14 @@ from typing import Annotated, Final
 import joblib
 import numpy as np
 import typer
-from numpy.typing import NDArray
+from blast_agents.rules import random_layout
 
-from agents.random_layouts import random_layout
+from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, progress_bar
 from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import BuildZone, Scenario, SegmentSource, usable_cells
-from blast_env.scenario.clearance import distance_m, source_bounds_m
+from blast_env.scenario.zone import distance_m, source_bounds_m
 from blast_env.sites import (
     SightLineCriterion,
     SightLines,
@@ -32,15 +32,20 @@ from blast_env.sites import (
 )
 from blast_env.sites.contact_sheet import contact_sheet
 
-Array = NDArray[np.float64]
-
 LEAST_REDUCTION: Final = 0.15
+
+
 MOST_REDUCTION: Final = 0.85
+
+
 LEAST_ADVANTAGE: Final = 0.1
 """A site is worth solving if blasts say so: the sight-line layout takes so much off the impulse,
 no layout takes more than that, and random layouts take so much less on average."""
 
+
 CRITERION: Final = SightLineCriterion()
+
+
 QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 
@@ -60,8 +65,8 @@ class Measured:
     accepted: bool
     shares: SiteMeasures
     unprotected_pa_s: float
-    cut: Array
-    reduction: Array
+    cut: FloatArray
+    reduction: FloatArray
 
     @property
     def advantage(self) -> float:
@@ -245,6 +250,7 @@ PROPERTIES: Final[Mapping[str, Callable[[Scenario], float]]] = {
     "clearance (m)": lambda site: zone_of(site).clearance_m,
 }
 
+
 CONDITIONS: Final[Mapping[str, Callable[[Scenario], bool]]] = {
     "threat on the left or right": is_threatened_along_x,
     "road, not parking area": lambda site: isinstance(site.charge[0], SegmentSource),
@@ -255,6 +261,7 @@ CONDITIONS: Final[Mapping[str, Callable[[Scenario], bool]]] = {
     "access way": lambda site: zone_of(site).access_way is not None,
     "duct and budget": lambda site: zone_of(site).budget is not None,
 }
+
 
 if __name__ == "__main__":
     typer.run(main)

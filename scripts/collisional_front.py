@@ -11,13 +11,13 @@ from typing import Annotated, Final
 import pandas as pd
 import typer
 
-from blast_env.atomic import write_atomically
 from blast_env.cli.output import print_line, user_errors
 from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
 from blast_env.physics.presets import preset
-from blast_env.rendering.captions import write_heading
-from blast_env.rendering.extra import render_extra
 from blast_env.rendering.figures import save_figure
+from blast_env.rendering.site_plan import write_heading
+from blast_env.rendering.style import render_extra
 from scripts.search_collisional import Store, candidate_table, front, score
 
 with render_extra():

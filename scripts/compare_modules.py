@@ -9,17 +9,17 @@ from typing import Annotated, Final, NamedTuple
 import joblib
 import numpy as np
 import typer
-from numpy.typing import NDArray
 from scipy.stats import ks_2samp
 
-from blast_env.benchmark import BenchmarkScene, benchmark_scenes
+from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.scenario import Scenario
 from blast_env.simulation import Blast
-
-Array = NDArray[np.float64]
+from blast_env.studies.benchmark.engines import BenchmarkScene, benchmark_scenes
 
 STRUCTURE: Final = "building"
+
+
 _SPLITS: Final = 200
 
 
@@ -73,7 +73,7 @@ def stepped(scene: BenchmarkScene) -> Iterator[tuple[float, Scenario]]:
         yield close.parameters.stepping.step_radii, close
 
 
-def module_impulses(scenario: Scenario, engine: str, seeds: int, processes: int) -> Array:
+def module_impulses(scenario: Scenario, engine: str, seeds: int, processes: int) -> FloatArray:
     """Return m |v| and the transferred impulse of every module of the building.
 
     Args:
@@ -103,7 +103,7 @@ def _of_one_blast(scenario: Scenario, engine: str, seed: int) -> list[tuple[floa
     return [(part.impulse, part.transferred_impulse) for part in building.parts]
 
 
-def distribution_distance(one: Array, other: Array) -> float:
+def distribution_distance(one: FloatArray, other: FloatArray) -> float:
     """Return the Kolmogorov-Smirnov distance of the impulses of single modules.
 
     Over all modules that any of these blasts hits.
@@ -116,7 +116,7 @@ def distribution_distance(one: Array, other: Array) -> float:
     return float(ks_2samp(one[:, hit].ravel(), other[:, hit].ravel(), method="asymp").statistic)
 
 
-def profile_distance(one: Array, other: Array) -> float:
+def profile_distance(one: FloatArray, other: FloatArray) -> float:
     """Return how far the mean impulses along the facade are apart.
 
     The root of the sum of the squares of their differences over that of the second ones.
@@ -129,7 +129,9 @@ def profile_distance(one: Array, other: Array) -> float:
     return float(np.linalg.norm(profile - other_profile) / np.linalg.norm(other_profile))
 
 
-def agreement(distance: Callable[[Array, Array], float], pymunk: Array, event: Array) -> Agreement:
+def agreement(
+    distance: Callable[[FloatArray, FloatArray], float], pymunk: FloatArray, event: FloatArray
+) -> Agreement:
     """Compare impulses of modules with a distance.
 
     Args:

@@ -13,19 +13,19 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Final
 
-from agents.league import Contest, ResultStore, known_track, standard_entries
-from agents.league.trained import TrainedRun
-from agents.training import TrainingSettings, load_hyperparameters, train
-from agents.training.environments import environment_id
-from agents.training.records import EvaluationRow, read_rows
-from agents.training.run_folder import RunFolder
-from agents.training.train import TrainingResult
-from blast_env.cli.evaluate_options import percent
+from blast_agents.league import Contest, ResultStore, known_track, standard_entries
+from blast_agents.league.trained import TrainedRun
+from blast_agents.training import TrainingSettings, load_hyperparameters, train
+from blast_agents.training.environments import environment_id
+from blast_agents.training.run_folder import EvaluationRow, RunFolder, read_rows
+from blast_agents.training.train import TrainingResult
+
+from blast_env.cli.evaluate import percent
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.rendering.figures import heat_map, save_figure
-from blast_env.rendering.side_by_side import FilmPanel, write_side_by_side
+from blast_env.rendering.film import FilmPanel, write_side_by_side
 from blast_env.simulation import Blast
 from scripts.demo_comparison import HEADERS, Comparison
 

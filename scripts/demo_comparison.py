@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from math import isnan
 from typing import Final
 
-from agents.league import RandomLayout, Result, Standings
-from blast_env.cli.evaluate_options import interval, percent
+from blast_agents.league import RandomLayout, Result, Standings
+
+from blast_env.cli.evaluate import interval, percent
 
 HEADERS: Final = (
     "layouts",

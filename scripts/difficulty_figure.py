@@ -6,9 +6,8 @@ from typing import Final
 import numpy as np
 
 from blast_env.evaluation import LayoutEvaluation
-from blast_env.rendering.captions import write_heading, write_names
-from blast_env.rendering.evaluation_plan import what_stands
-from blast_env.rendering.extra import render_extra
+from blast_env.physics.scene import Scene
+from blast_env.rendering.evaluation_figures import what_stands
 from blast_env.rendering.site_plan import (
     draw_loads,
     draw_outline,
@@ -17,6 +16,8 @@ from blast_env.rendering.site_plan import (
     in_metres,
     load_colours,
     rectangle_patch,
+    write_heading,
+    write_names,
 )
 from blast_env.rendering.style import (
     BARRIER,
@@ -27,10 +28,11 @@ from blast_env.rendering.style import (
     count_of,
     nice_ceiling,
     number_on_axis,
+    render_extra,
     unit_interval,
 )
 from blast_env.scenario import AnySource, BuildZone, Placement, RectangleSource, Scenario
-from blast_env.scene import Scene, build_scene
+from blast_env.scenario.build_scene import build_scene
 
 with render_extra():
     from matplotlib import patheffects

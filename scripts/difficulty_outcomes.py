@@ -4,19 +4,18 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from blast_env.evaluation import (
+from blast_env.arrays import FloatArray
+from blast_env.evaluation.comparison import CVAR_LEVEL
+from blast_env.geometry import Cell
+from blast_env.statistics import (
     Estimate,
     conditional_value_at_risk,
     mean_estimate,
     reduction_estimate,
 )
-from blast_env.evaluation.evaluate import CVAR_LEVEL
-from blast_env.scenario import Cell
 
 Layout = tuple[Cell, ...]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

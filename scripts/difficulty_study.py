@@ -12,12 +12,13 @@ from itertools import product
 from typing import Final
 
 import numpy as np
+from blast_agents.rules import expected_charge, line_of_sight_wall, random_layout
 
-from agents.random_layouts import random_layout
-from agents.rules import expected_charge, line_of_sight_wall
+from blast_env.arrays import FloatArray
 from blast_env.evaluation import BlastEvaluator, Threat, draw_threats
-from blast_env.scenario import Charge, Scenario
-from scripts.difficulty_outcomes import FloatArray, Layout, Outcome, TaskResult
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario
+from scripts.difficulty_outcomes import Layout, Outcome, TaskResult
 
 STAND_OFFS: Final = {0.0: "near the charge", 0.5: "in the middle", 1.0: "near the building"}
 """Shares of the way through the build zone at which the hand-made walls stand."""

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from blast_env.evaluation import Estimate
+from blast_env.statistics import Estimate
 from scripts.difficulty_outcomes import Outcome, TaskResult
 from scripts.measure_noise import Noise
 

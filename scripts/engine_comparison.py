@@ -7,11 +7,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 from scipy.stats import ks_2samp
 
-Array = NDArray[np.float64]
+from blast_env.arrays import FloatArray
 
 QUANTITIES: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -23,6 +22,7 @@ QUANTITIES: Final[Mapping[str, str]] = MappingProxyType(
     }
 )
 """What is compared, one value a blast: column of `totals` and words."""
+
 
 CLOSE: Final = 0.05
 """The engines count as agreeing when they differ by less than this share."""
@@ -72,7 +72,7 @@ def totals(collisions: pd.DataFrame, structure: str, seeds: int) -> pd.DataFrame
     return table[list(QUANTITIES)]
 
 
-def relative_difference(values: Array, event: Array) -> Difference:
+def relative_difference(values: FloatArray, event: FloatArray) -> Difference:
     """Return how far the mean of blasts on pymunk is from that on the event engine.
 
     The engines share charge and air of a seed, so their loads are correlated, though weakly: paths

@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.rendering.captions import write_heading
-from blast_env.rendering.extra import render_extra
+from blast_env.rendering.site_plan import write_heading
+from blast_env.rendering.style import render_extra
 from scripts.engine_comparison import CLOSE, QUANTITIES, Comparison
 
 with render_extra():

@@ -10,11 +10,13 @@ import numpy as np
 import pandas as pd
 
 from blast_env import load_scenario, simulate
-from blast_env.atomic import write_atomically
-from blast_env.benchmark import dense_courtyard
+from blast_env.files import write_atomically
+from blast_env.geometry import Cell
 from blast_env.physics.collisions import incidence_angle_rad
 from blast_env.physics.engine import find_engine
-from blast_env.scenario import Cell, Charge, Scenario
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario
+from blast_env.studies.benchmark.engines import dense_courtyard
 
 _WALL: Final = tuple((row, 0) for row in range(2, 18))
 _BEHIND_THE_WALL: Final = Charge((5.0, 8.0), 100.0)

@@ -16,15 +16,14 @@ import typer
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.physics.event.layout import world_of
-from blast_env.physics.event_engine import EventRun
+from blast_env.physics.event.engine import EventRun
+from blast_env.physics.event.state import world_of
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, CollisionType
+from blast_env.physics.scene import Charge, Scene, StructureOutline
 from blast_env.physics.structure import ModularObstacle
-from blast_env.rendering.extra import render_extra
 from blast_env.rendering.figures import save_figure
-from blast_env.scenario import Charge
-from blast_env.scene import Scene, StructureOutline
+from blast_env.rendering.style import render_extra
 from blast_env.units import MODULE_SIDE_UNITS
 
 with render_extra():

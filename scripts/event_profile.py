@@ -14,15 +14,15 @@ import typer
 from numba import njit
 from numpy.typing import NDArray
 
-from blast_env.benchmark import BenchmarkScene, benchmark_scenes
 from blast_env.cli.output import print_line
-from blast_env.physics.event.arrays import RECORD_COLUMNS, Record, RecordArray
-from blast_env.physics.event.compiled import run_world
-from blast_env.physics.event.layout import World, world_of
-from blast_env.physics.event.lookahead import look_ahead
-from blast_env.physics.event_engine import EventRun
-from blast_env.scene import Scene, build_scene
+from blast_env.physics.event.engine import EventRun
+from blast_env.physics.event.loop import run_world
+from blast_env.physics.event.prediction import look_ahead
+from blast_env.physics.event.state import RECORD_COLUMNS, Record, RecordArray, World, world_of
+from blast_env.physics.scene import Scene
+from blast_env.scenario.build_scene import build_scene
 from blast_env.simulation import Blast
+from blast_env.studies.benchmark.engines import BenchmarkScene, benchmark_scenes
 
 _HEADERS: Final = (
     "| scene | collisions | moves between cells | foreseen in vain | ns an event |",

@@ -17,31 +17,36 @@ from math import pi
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import brentq
 
+from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
 from blast_env.physics.engine import BallStates
-from blast_env.physics.event_engine import EventEngine
+from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
+from blast_env.physics.scene import Charge, Scene, StructureOutline
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scenario import Charge
-from blast_env.scene import Scene, StructureOutline
-
-FloatArray = NDArray[np.float64]
 
 SPACING_UNITS: Final = 10.0
+
+
 AIR_DENSITY: Final = 1.0 / SPACING_UNITS**2
 """Mass of the air per area; every ball has the mass 1."""
+
 
 SEDOV_GAS: Final = 0.3519
 """The constant for hard discs of no size; see `sedov_constant`."""
 
+
 _BIN: Final = 0.005  # of ln r, in which the density is counted
+
+
 _SMOOTHING: Final = 0.02  # of ln r; the front of so few balls is no sharper
+
+
 _INNERMOST_SPACINGS: Final = 15.0  # nearer by, a few balls make any density
 
 

@@ -14,14 +14,14 @@ import pandas as pd
 import typer
 
 from blast_env import load_scenario
-from blast_env.atomic import write_atomically
 from blast_env.calibration import fit_metrics, fit_power_law, kingery_bulmash, load_calibration
-from blast_env.calibration.study import FreeFieldStudy, summarise
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.rendering.captions import write_heading
-from blast_env.rendering.extra import render_extra
+from blast_env.files import write_atomically
 from blast_env.rendering.figures import save_figure
+from blast_env.rendering.site_plan import write_heading
+from blast_env.rendering.style import render_extra
 from blast_env.scenario import Scenario
+from blast_env.studies.calibration.study import FreeFieldStudy, summarise
 from blast_env.units import PA_PER_PSI
 
 with render_extra():

@@ -17,32 +17,48 @@ import typer
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
-from blast_env.calibration.shielding_scenes import BlockGeometry, structure_scenario
+from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.presets import preset as find_preset
-from blast_env.physics.resolution import with_resolution
+from blast_env.physics.presets import with_resolution
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import Scenario
 from blast_env.simulation import Blast
+from blast_env.studies.shielding.scenes import BlockGeometry, structure_scenario
 from blast_env.units import MODULE_SIDE_M, MS_PER_S, UNITS_PER_M
 from scripts.mach_stem_figure import mach_stem_figure
 
-FloatArray = NDArray[np.float64]
-
 CELL_M: Final = 0.25
+
+
 FRONT_DENSITY: Final = 1.25
 """Density at the front, in that of the air at rest: above what the noise of the mean reaches."""
 
+
 _LEAST_LEAD_M: Final = 0.5  # of a front that counts as ahead: two cells
+
+
 _CELLS_OF_A_MEAN: Final = 3  # along either side of a square, over which densities are averaged
+
+
 _ROWS_OF_A_MEAN: Final = 5  # over which the lead is averaged, against noise
+
+
 _HALF_WIDTH: Final = 5.0  # of the wall, in stand-offs
+
+
 _MARGIN: Final = 2.5  # open ground behind the charge, in stand-offs
+
+
 _OUTER_SHARE: Final = 5  # the last fifth of the columns is to be air at rest
+
+
 _MOST_NOISE: Final = 0.001  # share of cells there that noise may make denser than a front
+
+
 _MOST_OF_STAND_OFF: Final = 0.8  # a stem higher than this reaches what it is compared with
 
 

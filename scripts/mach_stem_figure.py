@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from blast_env.rendering.captions import write_heading
+from blast_env.rendering.site_plan import write_heading
 from blast_env.units import MS_PER_S
 
 if TYPE_CHECKING:

@@ -12,20 +12,25 @@ from typing import Annotated, Final
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
+from blast_agents.rules import random_layout
 
-from agents.random_layouts import random_layout
 from blast_env import load_scenario
+from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, progress_bar
+from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.threats import Threat
-from blast_env.scenario import Cell, Placement, Scenario
+from blast_env.geometry import Cell
+from blast_env.scenario import Placement, Scenario
 
-Array = NDArray[np.float64]
 Layout = tuple[Cell, ...]
 
+
 SCENARIOS: Final = ("courtyard", "perimeter_gate", "street_junction")
+
+
 AVERAGED: Final = (1, 2, 4, 8, 16)
+
+
 _STEPS: Final = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
@@ -48,7 +53,7 @@ class Noise:
     paired_noise: float
 
     @classmethod
-    def of(cls, impulses: Array, unprotected: Array) -> "Noise":
+    def of(cls, impulses: FloatArray, unprotected: FloatArray) -> "Noise":
         """Return the estimates.
 
         Args:
@@ -110,7 +115,7 @@ def main(
 
 def measured_impulses(
     evaluator: BlastEvaluator, layouts: list[Layout], draws: tuple[int, int], processes: int
-) -> Array:
+) -> FloatArray:
     """Return the impulse on the protected structures, psi*s (layouts, charges, seeds)."""
     charge_rng = np.random.default_rng(1)
     charges = [evaluator.scenario.sample_charge(charge_rng) for _ in range(draws[0])]
@@ -146,6 +151,7 @@ LAYOUTS: Final[Mapping[str, Callable[[Scenario, np.random.Generator], Layout]]] 
     "scattered": random_layout,
     "walls": walled_layout,
 }
+
 
 if __name__ == "__main__":
     typer.run(main)

@@ -13,22 +13,30 @@ import joblib
 import numpy as np
 import pandas as pd
 import typer
-from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 from blast_env import load_scenario
-from blast_env.atomic import write_atomically
+from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.scenario import Cell, Charge, Scenario
+from blast_env.files import write_atomically
+from blast_env.geometry import Cell
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario
 from blast_env.simulation import Blast
 from scripts.measure_noise import LAYOUTS
 
-Array = NDArray[np.float64]
 Layout = tuple[Cell, ...]
 
+
 ENGINES: Final = ("pymunk", "event")
+
+
 LOTS: Final = 2
+
+
 OUT: Final = Path("out/rank_layouts.csv")
+
+
 _RESAMPLES: Final = 2000
 
 
@@ -77,7 +85,7 @@ def random_layouts(scenario: Scenario, count: int, rng: np.random.Generator) -> 
 
 def measured_loads(
     scenario: Scenario, layouts: list[Layout], charges: list[Charge], processes: int
-) -> Array:
+) -> FloatArray:
     """Return m |v| on the building (engines, lots, layouts, charges)."""
     jobs = (
         joblib.delayed(_loads_of_layout)(scenario, layout, charges, engine, lot)
@@ -106,7 +114,7 @@ def _loads_of_layout(
     ]
 
 
-def spearman(one: Array, other: Array) -> float:
+def spearman(one: FloatArray, other: FloatArray) -> float:
     """Return the mean over the columns of the rank correlation of (layouts, columns)."""
     ranks = rankdata(one, axis=0), rankdata(other, axis=0)
     centred = [rank - rank.mean(axis=0) for rank in ranks]
@@ -114,29 +122,29 @@ def spearman(one: Array, other: Array) -> float:
     return float(((centred[0] * centred[1]).sum(axis=0) / (norms[0] * norms[1])).mean())
 
 
-def between_engines(loads: Array) -> float:
+def between_engines(loads: FloatArray) -> float:
     """Return the correlation of one engine with the other, on other seeds of fan and air."""
     pymunk, event = loads
     return (spearman(pymunk[0], event[1]) + spearman(pymunk[1], event[0])) / 2.0
 
 
-def on_same_seeds(loads: Array) -> float:
+def on_same_seeds(loads: FloatArray) -> float:
     """Return the correlation of one engine with the other, on the same seeds."""
     pymunk, event = loads
     return (spearman(pymunk[0], event[0]) + spearman(pymunk[1], event[1])) / 2.0
 
 
-def of_pymunk(loads: Array) -> float:
+def of_pymunk(loads: FloatArray) -> float:
     """Return the correlation of pymunk with itself, on other seeds."""
     return spearman(*loads[0])
 
 
-def of_event(loads: Array) -> float:
+def of_event(loads: FloatArray) -> float:
     """Return the correlation of the event engine with itself, on other seeds."""
     return spearman(*loads[1])
 
 
-def without_noise(loads: Array) -> float:
+def without_noise(loads: FloatArray) -> float:
     """Return the correlation between the engines over that of each with itself.
 
     Over the geometric mean of the two (Spearman's correction for attenuation): 1 where the
@@ -146,7 +154,7 @@ def without_noise(loads: Array) -> float:
     return between_engines(loads) / within
 
 
-STATISTICS: Final[dict[str, Callable[[Array], float]]] = {
+STATISTICS: Final[dict[str, Callable[[FloatArray], float]]] = {
     "pymunk with the event engine, other seeds": between_engines,
     "pymunk with the event engine, same seeds": on_same_seeds,
     "pymunk with itself, other seeds": of_pymunk,
@@ -156,7 +164,7 @@ STATISTICS: Final[dict[str, Callable[[Array], float]]] = {
 
 
 def correlation(
-    loads: Array, statistic: Callable[[Array], float], rng: np.random.Generator
+    loads: FloatArray, statistic: Callable[[FloatArray], float], rng: np.random.Generator
 ) -> Correlation:
     """Return a correlation with its bootstrap interval.
 
@@ -171,7 +179,7 @@ def correlation(
     return Correlation(statistic(loads), low, high)
 
 
-def _write_loads(layouts: list[Layout], loads: Array, path: Path) -> None:
+def _write_loads(layouts: list[Layout], loads: FloatArray, path: Path) -> None:
     """Write the mean loads of every layout."""
     rows = pd.DataFrame(
         {"layout": range(len(layouts)), "modules": [len(layout) for layout in layouts]}
@@ -181,7 +189,7 @@ def _write_loads(layouts: list[Layout], loads: Array, path: Path) -> None:
         rows.to_csv(temporary, index=False, lineterminator="\n")
 
 
-def _mean_columns(loads: Array) -> Iterator[tuple[str, Array]]:
+def _mean_columns(loads: FloatArray) -> Iterator[tuple[str, FloatArray]]:
     for engine, of_engine in zip(ENGINES, loads, strict=True):
         for lot, of_lot in enumerate(of_engine):
             yield f"{engine}_{lot}", of_lot.mean(axis=-1)

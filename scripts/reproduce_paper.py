@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from rich.table import Table
 
-from blast_env.atomic import write_atomically
 from blast_env.calibration import (
     PAPER_UFC_LABEL,
     LinearLaw,
@@ -32,6 +31,7 @@ from blast_env.calibration import (
 from blast_env.calibration.laws import Fit
 from blast_env.cli.output import make_table, result_console, user_errors
 from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.style import INK, unit_interval
 from blast_env.units import PA_PER_PSI

@@ -15,17 +15,17 @@ import joblib
 import numpy as np
 import pandas as pd
 import typer
+from blast_agents.rules import random_layout
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from agents.random_layouts import random_layout
 from blast_env import load_scenario, simulate
-from blast_env.atomic import write_atomically
 from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.files import write_atomically
+from blast_env.geometry import Cell
 from blast_env.physics.parameters import SimulationParameters
-from blast_env.physics.presets import preset
-from blast_env.physics.resolution import with_resolution
-from blast_env.scenario import Cell, Scenario
+from blast_env.physics.presets import preset, with_resolution
+from blast_env.scenario import Scenario
 from scripts.measure_noise import walled_layout
 
 FINER: Final = 1.5

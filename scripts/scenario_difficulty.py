@@ -14,10 +14,10 @@ from typing import Annotated, Final
 import typer
 
 from blast_env import load_scenario
-from blast_env.atomic import write_atomically
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import evaluate_against
+from blast_env.files import write_atomically
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import Scenario, bundled_scenarios
 from scripts.difficulty_figure import difficulty_figure

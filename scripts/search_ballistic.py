@@ -17,11 +17,11 @@ import numpy as np
 import typer
 from scipy.stats import qmc
 
-from blast_env.atomic import write_atomically
 from blast_env.calibration import fit_metrics, fit_power_law, paper_table, shape_rms_percent
-from blast_env.calibration.study import FreeFieldStudy, impulse_by_seed
 from blast_env.cli.output import print_line, user_errors
+from blast_env.files import write_atomically
 from blast_env.scenario import Scenario
+from blast_env.studies.calibration.study import FreeFieldStudy, impulse_by_seed
 from scripts.facade_width import free_field_with_facade
 
 MOST_MAPE_PERCENT, MOST_INTEGRAL_PERCENT, MOST_RMS_PERCENT = 8.0, 1.5, 20.0

@@ -28,17 +28,16 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
 from blast_env import load_scenario
-from blast_env.atomic import write_atomically
 from blast_env.calibration import fit_metrics, fit_power_law, kingery_bulmash
-from blast_env.calibration.shielding import ShieldingStudy
-from blast_env.calibration.shielding_report import EXPERIMENT
-from blast_env.calibration.study import FreeFieldStudy, impulse_by_seed
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.physics.event_engine import EventEngine
+from blast_env.files import write_atomically
+from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.parameters import SimulationParameters, with_overrides
-from blast_env.physics.resolution import with_resolution
+from blast_env.physics.presets import with_resolution
 from blast_env.scenario import Scenario
-from blast_env.scene import build_scene
+from blast_env.scenario.build_scene import build_scene
+from blast_env.studies.calibration.study import FreeFieldStudy, impulse_by_seed
+from blast_env.studies.shielding.report import EXPERIMENT, ShieldingStudy
 from scripts.facade_width import free_field_with_facade
 
 DISTANCES_M = (8.0, 14.0, 24.0, 40.0)

@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 import typer
 
-from blast_env.atomic import write_atomically
 from blast_env.calibration import kingery_bulmash
-from blast_env.calibration.shielding_ratios import draw_loads
-from blast_env.calibration.shielding_reflection import ReflectionReport, ReflectionStudy
 from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.files import write_atomically
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import preset as find_preset
-from blast_env.physics.resolution import with_resolution
+from blast_env.physics.presets import with_resolution
+from blast_env.studies.shielding.ratios import draw_loads
+from blast_env.studies.shielding.reflection import ReflectionReport, ReflectionStudy
 
 SHARES = (0.0, 0.25, 0.5, 0.75, 0.9)
 DISTANCES_M = (10.0, 25.0)

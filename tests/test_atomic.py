@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from blast_env.atomic import make_folder, write_atomically
 from blast_env.errors import BlastEnvError
+from blast_env.files import make_folder, write_atomically
 
 
 def test_file_appears_only_when_the_block_ends(tmp_path: Path) -> None:

@@ -2,9 +2,9 @@
 
 import pytest
 
-from blast_env.batch import simulate_many
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
+from blast_env.runner import simulate_many
 from blast_env.simulation import Blast
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 

@@ -4,7 +4,10 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from blast_env import Blast, load_scenario
-from blast_env.benchmark import (
+from blast_env.physics.pymunk.engine import PymunkEngine
+from blast_env.physics.pymunk.space import build_space
+from blast_env.scenario.build_scene import build_scene
+from blast_env.studies.benchmark.engines import (
     BenchmarkScene,
     benchmark_scenes,
     dense_courtyard,
@@ -12,9 +15,6 @@ from blast_env.benchmark import (
     measure_memory_mb,
     measure_speed,
 )
-from blast_env.physics.pymunk_engine import PymunkEngine
-from blast_env.physics.pymunk_space import build_space
-from blast_env.scene import build_scene
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 
 

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from blast_env import Scenario, load_scenario, simulate
-from blast_env.benchmark_env import (
+from blast_env.physics.event.engine import EventEngine
+from blast_env.studies.benchmark.environment import (
     TimedEngine,
     benchmark_engine,
     measure_environment,
     random_action,
 )
-from blast_env.benchmark_fleets import (
+from blast_env.studies.benchmark.parallel import (
     AsyncFleet,
     Fleet,
     OneEnvironment,
     SubprocFleet,
     measure_fleet,
 )
-from blast_env.physics.event_engine import EventEngine
 from tests.envs.small import small_document
 
 

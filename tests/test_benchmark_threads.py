@@ -2,8 +2,8 @@
 
 import pytest
 
-from blast_env.benchmark_threads import ThreadFigures, measure_threads
 from blast_env.errors import BlastEnvError
+from blast_env.studies.benchmark.parallel import ThreadFigures, measure_threads
 from tests.scenarios import BALLISTIC_COURTYARD
 
 SHORT = BALLISTIC_COURTYARD.with_simulation(

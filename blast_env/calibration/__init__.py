@@ -1,6 +1,5 @@
 """References, the laws that scale simulated impulses to them, and how well they agree."""
 
-from blast_env.calibration.friedlander import Friedlander
 from blast_env.calibration.laws import (
     FewDistancesWarning,
     LinearLaw,
@@ -20,17 +19,24 @@ from blast_env.calibration.metrics import (
     leave_one_out,
     shape_rms_percent,
 )
-from blast_env.calibration.model import Calibration, CalibrationError, ScaledImpulse
-from blast_env.calibration.pressure import PressureHistory, facade_history
+from blast_env.calibration.model import (
+    Calibration,
+    CalibrationError,
+    ScaledImpulse,
+    load_calibration,
+    save_calibration,
+    stored_calibrations,
+)
 from blast_env.calibration.references import (
     PAPER_COLUMNS,
     PAPER_UFC_LABEL,
+    Friedlander,
     kingery_bulmash,
     paper_table,
     paper_ufc_column,
     scaled_distance,
 )
-from blast_env.calibration.stored import load_calibration, save_calibration, stored_calibrations
+from blast_env.studies.pressure.pulses import PressureHistory, facade_history
 
 __all__ = [
     "PAPER_COLUMNS",

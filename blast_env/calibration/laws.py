@@ -14,14 +14,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 
-FloatArray = NDArray[np.float64]
 Numbers = Sequence[float] | NDArray[Any] | pd.Series
 """Several numbers; a lone one is a float."""
 
+
 LEAST_DISTANCES: Final = 4
 """A fit on fewer distances than this warns: two coefficients would pass through almost anything."""
+
 
 _CONSTANT: Final = 1e-12  # relative spread below which numbers count as equal
 

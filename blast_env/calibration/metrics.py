@@ -10,14 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blast_env.calibration.laws import (
-    FewDistancesWarning,
-    Fit,
-    FloatArray,
-    Numbers,
-    ScalingLaw,
-    checked_array,
-)
+from blast_env.arrays import FloatArray
+from blast_env.calibration.laws import FewDistancesWarning, Fit, Numbers, ScalingLaw, checked_array
 from blast_env.errors import BlastEnvError
 
 

@@ -1,9 +1,4 @@
-"""What simulated impulses are compared with: the paper's own table, and Kingery & Bulmash.
-
-Kingery and Bulmash's polynomials ("Airblast parameters from TNT spherical air burst and
-hemispherical surface burst", ARBRL-TR-02555, 1984) are the curves behind figures 2-7 and 2-15 of
-UFC 3-340-02. `data/README.md` says where the coefficients come from.
-"""
+"""What simulated loads are compared with: the paper's table, Kingery & Bulmash, Friedlander."""
 
 import json
 from collections.abc import Mapping
@@ -11,15 +6,17 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from io import StringIO
+from math import factorial, isfinite
 from types import MappingProxyType
 from typing import Final, Literal, get_args, overload
 
 import numpy as np
 import pandas as pd
 
-from blast_env.calibration.laws import FloatArray, Numbers, checked_array
+from blast_env.arrays import FloatArray
+from blast_env.calibration.laws import Numbers, checked_array
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.recording.tables import Column
+from blast_env.tables import Column
 
 Quantity = Literal[
     "incident_overpressure",
@@ -32,11 +29,14 @@ Quantity = Literal[
 ]
 """A quantity of `kingery_bulmash`."""
 
+
 Burst = Literal["hemispherical", "spherical"]
 """Hemispherical: the charge lies on rigid ground. Spherical: far from any surface."""
 
+
 PAPER_UFC_LABEL: Final = "the paper's UFC column"
 """What its i_ufc must be called: it matches no curve of UFC 3-340-02 at all distances."""
+
 
 PAPER_COLUMNS: Final = (
     Column("r_m", "m", "distance R"),
@@ -54,6 +54,7 @@ PAPER_COLUMNS: Final = (
 )
 """The columns of `paper_table`."""
 
+
 # A unit of the data file: its factor to SI, and whether W^(1/3) scales the value.
 _TO_SI: Final[Mapping[str, tuple[float, bool]]] = MappingProxyType(
     {
@@ -63,9 +64,13 @@ _TO_SI: Final[Mapping[str, tuple[float, bool]]] = MappingProxyType(
         "m/ms": (1e3, False),
     }
 )
+
+
 _BURST_KEYS: Final[Mapping[str, str]] = MappingProxyType(
     {"hemispherical": "hemispherical_surface_burst", "spherical": "spherical_free_air_burst"}
 )
+
+
 _ROUNDING: Final = 1e-9  # relative; R / W^(1/3) of a charge made for an end of the range
 
 
@@ -232,3 +237,226 @@ def _curves() -> Mapping[tuple[str, str], _Curve]:
 def _read(name: str) -> str:
     """Return the text of a file of the package's data."""
     return (files("blast_env.calibration") / "data" / name).read_text(encoding="utf-8")
+
+
+_SERIES_BELOW: Final = 0.5  # of b; the closed forms lose digits there
+
+
+_SERIES: Final = tuple((-1.0) ** order / factorial(order + 2) for order in range(16))
+
+
+_BISECTIONS: Final = 64
+
+
+_LARGEST_DECAY: Final = 50.0  # of a fit
+
+
+_LONGEST_SHARE: Final = 4.0  # duration of a fit, in times that the bins cover
+
+
+# Durations in multiples of impulse / peak, and decays, from which a fit starts.
+_FIT_STARTS: Final = ((2.0, 0.1), (3.0, 1.5), (10.0, 8.0))
+
+
+@dataclass(frozen=True)
+class Friedlander:
+    """p(t) = p_2 (1 - t / t_2) exp(-b t / t_2), with t from the arrival (equation 1).
+
+    Attributes:
+        peak: Peak overpressure p_2, Pa; or the unit of the history that it was fitted to.
+        positive_duration_s: Duration t_2 of the positive phase.
+        decay: The wave parameter b, no unit; 0 is a triangle.
+        arrival_s: Time at which the shock arrives.
+    """
+
+    peak: float
+    positive_duration_s: float
+    decay: float
+    arrival_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            BlastEnvError: If peak or duration is not above 0, decay or arrival below 0, or any of
+                them not a finite number.
+        """
+        for name in ("peak", "positive_duration_s"):
+            checked_array(name, getattr(self, name), above=0.0, dimensions=0)
+        for name in ("decay", "arrival_s"):
+            checked_array(name, getattr(self, name), least=0.0, dimensions=0)
+
+    @classmethod
+    def from_impulse(
+        cls, peak: float, positive_duration_s: float, impulse: float, arrival_s: float = 0.0
+    ) -> "Friedlander":
+        """Return the waveform with a given peak, duration and impulse.
+
+        A waveform that decays has an impulse below that of the triangle, peak * duration / 2. From
+        there on no decay coefficient of at least 0 solves for it; then the waveform is the
+        triangle with this peak and this impulse, so that equation (2) still holds, and its
+        duration is 2 impulse / peak, UFC 3-340-02's equivalent triangle. `is_triangular` says so.
+
+        Args:
+            peak: Peak overpressure, Pa.
+            positive_duration_s: Duration of the positive phase.
+            impulse: Impulse of the positive phase, Pa*s.
+            arrival_s: Time at which the shock arrives.
+
+        Raises:
+            BlastEnvError: If a number is not finite or out of bounds, or if the impulse is so far
+                below that of the triangle that the decay coefficient is no finite number.
+        """
+        for name, value in (
+            ("peak", peak),
+            ("positive_duration_s", positive_duration_s),
+            ("impulse", impulse),
+        ):
+            checked_array(name, value, above=0.0, dimensions=0)
+        share = impulse / peak / positive_duration_s
+        if share >= 0.5:
+            return cls(peak, 2.0 * impulse / peak, 0.0, arrival_s)
+        if share == 0.0 or not isfinite(1.0 / share):
+            raise BlastEnvError(
+                f"impulse is {impulse:g}, which is too small a share of peak * duration, "
+                f"{peak:g} * {positive_duration_s:g}, for a Friedlander waveform"
+            )
+        return cls(peak, positive_duration_s, _solve_decay(share), arrival_s)
+
+    @property
+    def is_triangular(self) -> bool:
+        """Whether the waveform is the triangular limit."""
+        return self.decay == 0.0
+
+    @overload
+    def pressure(self, time_s: float) -> float: ...
+
+    @overload
+    def pressure(self, time_s: Numbers) -> FloatArray: ...
+
+    def pressure(self, time_s: float | Numbers) -> float | FloatArray:
+        """Return the overpressure of the positive phase, unit of `peak`; 0 before and after it.
+
+        Args:
+            time_s: Times, from the detonation.
+
+        Raises:
+            BlastEnvError: If a time is not a finite number.
+        """
+        x = (checked_array("time_s", time_s) - self.arrival_s) / self.positive_duration_s
+        inside = np.clip(x, 0.0, 1.0)
+        wave = self.peak * (1.0 - inside) * np.exp(-self.decay * inside)
+        value = np.where(x >= 0.0, wave, 0.0)
+        return float(value) if value.ndim == 0 else value
+
+    def impulse(self) -> float:
+        """Return the impulse of the positive phase (equation 2), unit of `peak` times s."""
+        return float(self.peak * self.positive_duration_s * _impulse_share(self.decay))
+
+    @overload
+    def impulse_until(self, time_s: float) -> float: ...
+
+    @overload
+    def impulse_until(self, time_s: Numbers) -> FloatArray: ...
+
+    def impulse_until(self, time_s: float | Numbers) -> float | FloatArray:
+        """Return the impulse that has come by each time, unit of `peak` times s.
+
+        Args:
+            time_s: Times, from the detonation.
+
+        Raises:
+            BlastEnvError: If a time is not a finite number.
+        """
+        x = (checked_array("time_s", time_s) - self.arrival_s) / self.positive_duration_s
+        share = impulse_share_until(np.clip(x, 0.0, 1.0), self.decay)
+        value = self.peak * self.positive_duration_s * share
+        return float(value) if value.ndim == 0 else value
+
+
+def fit_friedlander(edges_s: FloatArray, pressure: FloatArray) -> Friedlander:
+    """Fit a waveform that arrives at the first edge to mean pressures in bins of time.
+
+    Least squares over peak, duration and decay, where all bins count alike and the mean of the
+    waveform over a bin is exact. The duration is at most four times the time that the bins cover,
+    the decay at most 50.
+
+    Args:
+        edges_s: Edges of the bins, from the arrival on (n + 1,).
+        pressure: Mean pressure in each bin, at least 0, some above (n,).
+    """
+    from scipy.optimize import least_squares
+
+    since_s, widths_s = edges_s - edges_s[0], np.diff(edges_s)
+    span_s, largest = float(since_s[-1]), float(pressure.max())
+
+    def residual(point: FloatArray) -> FloatArray:
+        wave = Friedlander(*_wave_at(point, largest))
+        means: FloatArray = np.diff(wave.impulse_until(since_s)) / widths_s
+        return (means - pressure) / largest
+
+    shortest_s, longest_s = float(widths_s.min()) / _LARGEST_DECAY, _LONGEST_SHARE * span_s
+    low = np.array([np.log(1e-3), np.log(shortest_s), 0.0])
+    high = np.array([np.log(1e3), np.log(longest_s), np.log1p(_LARGEST_DECAY)])
+    mean_s = float((pressure * widths_s).sum()) / largest
+    fits = [
+        least_squares(
+            residual,
+            np.clip([0.0, np.log(stretch * mean_s), np.log1p(decay)], low, high),
+            bounds=(low, high),
+            x_scale=0.1,
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
+        )
+        for stretch, decay in _FIT_STARTS
+    ]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    return Friedlander(*_wave_at(best.x, largest), arrival_s=float(edges_s[0]))
+
+
+def _wave_at(point: FloatArray, largest: float) -> tuple[float, float, float]:
+    """Return peak, duration and decay at a point of the search."""
+    peak, duration_s = (float(value) for value in np.exp(point[:2]))
+    return largest * peak, duration_s, max(float(np.expm1(point[2])), 0.0)
+
+
+def impulse_share_until(x: FloatArray, decay: float | FloatArray) -> FloatArray:
+    """Return the integral of (1 - s) exp(-b s) from 0 to x.
+
+    Args:
+        x: Times since the arrival in positive durations, 0 to 1.
+        decay: The coefficient b, at least 0; broadcast against `x`.
+    """
+    z = np.asarray(decay * x)
+    # (1 - s) = (1 - x) + (x - s), and the second part is the whole wave in a shorter time.
+    level = np.ones_like(z)
+    np.divide(-np.expm1(-z), z, out=level, where=z > 0.0)
+    share: FloatArray = x * ((1.0 - x) * level + x * _impulse_share(z))
+    return share
+
+
+def _impulse_share(decay: float | FloatArray) -> FloatArray:
+    """Return (b - 1 + exp(-b)) / b^2, the integral of (1 - x) exp(-b x) from 0 to 1."""
+    b = np.asarray(decay, dtype=np.float64)
+    large = np.maximum(b, _SERIES_BELOW)
+    closed = (large + np.expm1(-large)) / large / large
+    series = np.polynomial.polynomial.polyval(np.minimum(b, _SERIES_BELOW), _SERIES)
+    share: FloatArray = np.where(b < _SERIES_BELOW, series, closed)
+    return share
+
+
+def _solve_decay(share: float) -> float:
+    """Return the b > 0 with `_impulse_share(b) == share`, for a share between 0 and 1/2.
+
+    The share falls with b and lies between 1 / (b + 2) and 1 / b, so b lies in an interval of
+    width 2.
+    """
+    low, high = max(1.0 / share - 2.0, 0.0), 1.0 / share
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2.0
+        if _impulse_share(middle) > share:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2.0

@@ -5,7 +5,10 @@ from typing import Annotated, Final
 import typer
 from rich.table import Table
 
-from blast_env.benchmark import (
+from blast_env.cli.output import make_table, print_line, result_console, user_errors
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario.build_scene import build_scene
+from blast_env.studies.benchmark.engines import (
     BenchmarkScene,
     benchmark_scenes,
     hardware,
@@ -13,12 +16,8 @@ from blast_env.benchmark import (
     measure_memory_mb,
     measure_speed,
 )
-from blast_env.benchmark_env import measure_environment
-from blast_env.benchmark_fleets import measure_fleets
-from blast_env.benchmark_threads import measure_threads
-from blast_env.cli.output import make_table, print_line, result_console, user_errors
-from blast_env.scenario import Scenario, load_scenario
-from blast_env.scene import build_scene
+from blast_env.studies.benchmark.environment import measure_environment
+from blast_env.studies.benchmark.parallel import measure_fleets, measure_threads
 
 _MANY_BALLS: Final = {
     "air": {"spacing_units": 1.38, "radius_units": 0.5},

@@ -1,29 +1,395 @@
-"""`blast-env calibrate`: a free-field study, its three laws, and a stored calibration."""
+"""A free-field study from the command line: its three laws, and a stored calibration."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
-from typing import Annotated
+from types import MappingProxyType
+from typing import Annotated, Final, Literal
 
 import typer
 
-from blast_env.calibration.calibrate import LawName
-from blast_env.calibration.model import SimulatedQuantity
-from blast_env.cli.calibrate_free_field import (
-    Burst,
-    FreeFieldOptions,
-    ReferenceName,
-    calibrate_free_field,
+from blast_env.calibration.metrics import shape_rms_percent
+from blast_env.calibration.model import (
+    Calibration,
+    SimulatedQuantity,
+    load_calibration,
+    save_calibration,
 )
-from blast_env.cli.calibrate_shielding import (
-    DEFAULT_PRESET,
-    ShieldingOptions,
-    calibrate_shielding,
-)
-from blast_env.cli.output import user_errors
+from blast_env.calibration.references import paper_table
+from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
+from blast_env.files import make_folder, write_atomically
+from blast_env.physics.engine import find_engine
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.statistics import Estimate
+from blast_env.studies.calibration.study import (
+    CalibrationReport,
+    FreeFieldStudy,
+    LawName,
+    Reference,
+    kingery_bulmash_reference,
+    paper_reference,
+)
+from blast_env.studies.calibration.study import calibrate as fit_laws
+from blast_env.studies.shielding.ratios import check_exponent
+from blast_env.studies.shielding.reflection import ReflectionReport, ReflectionStudy
+from blast_env.studies.shielding.report import (
+    EXPERIMENT,
+    Region,
+    ShieldingReport,
+    ShieldingStudy,
+    scaled_ratio,
+)
+from blast_env.units import MS_PER_S
+
+ReferenceName = Literal["paper_ufc", "reflected_impulse", "incident_impulse"]
+
+
+Burst = Literal["hemispherical", "spherical"]
+
+
+@dataclass(frozen=True)
+class FreeFieldOptions:
+    """What the command was called with; see `blast-env calibrate --help`.
+
+    Attributes:
+        name: Name of the calibration and of its files.
+        reference: What to calibrate against.
+        distances: Distances, m, separated by commas.
+        seeds: Seeds at every distance.
+        scenario: A scenario with one point charge and one structure.
+        preset: Parameters, instead of the scenario's.
+        engine: Name of the engine.
+        tnt_kg: Mass of the charge, instead of the scenario's.
+        tnt_range: Masses "LOW,HIGH" for which the calibration is to hold by scaling.
+        law: The law to store.
+        simulated: Which sum over the collisions to convert.
+        burst: For Kingery-Bulmash.
+        processes: Worker processes.
+        out: Folder for all files.
+    """
+
+    name: str
+    reference: ReferenceName
+    distances: str
+    seeds: tuple[int, ...]
+    scenario: str
+    preset: str | None
+    engine: str
+    tnt_kg: float | None
+    tnt_range: str | None
+    law: LawName
+    simulated: SimulatedQuantity
+    burst: Burst
+    processes: int
+    out: Path
+
+    @property
+    def stem(self) -> str:
+        """Path of all files without their suffix."""
+        return str(self.out / f"{self.name}.{self.engine}")
+
+
+def calibrate_free_field(options: FreeFieldOptions) -> None:
+    """Run the study, write its files and print its tables.
+
+    Raises:
+        BlastEnvError: If an option is wrong.
+    """
+    distances_m = _parse_numbers("--distances", options.distances)
+    tnt_range_kg = _parse_range(options.tnt_range)
+    options.out.mkdir(parents=True, exist_ok=True)
+    engine = find_engine(options.engine).name
+    study = FreeFieldStudy(_scenario(options), distances_m, options.seeds, engine)
+    reference = _reference(options.reference, study, options.burst)
+    with progress_bar(f"{len(options.seeds) * len(distances_m)} blasts") as progress:
+        runs = study.run(options.processes, Path(f"{options.stem}.runs.jsonl"), progress)
+    report = fit_laws(study, runs, reference, options.simulated)
+    stored = report.calibration(options.name, options.law)
+    stored = stored.model_copy(update={"tnt_range_kg": tnt_range_kg})
+    _write(report, stored, options.stem)
+    _print(report, stored)
+    for suffix in (".json", ".csv", ".png", ".runs.jsonl"):
+        print_line(f"wrote {options.stem}{suffix}")
+
+
+def _scenario(options: FreeFieldOptions) -> Scenario:
+    scenario = load_scenario(options.scenario)
+    if options.preset is not None:
+        scenario = scenario.with_simulation(options.preset)
+    if options.tnt_kg is None:
+        return scenario
+    document = scenario.model_dump()
+    for source in document["charge"]:
+        source["tnt_kg"] = options.tnt_kg
+    return Scenario.from_document(document, f"{options.scenario} with --tnt-kg")
+
+
+def _parse_numbers(option: str, text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise BlastEnvError(
+            f"{option} is {text!r}, must be numbers separated by commas, e.g. 8,10,15"
+        ) from None
+
+
+def _parse_range(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    numbers = _parse_numbers("--tnt-range", text)
+    if len(numbers) != 2 or not 0.0 < numbers[0] <= numbers[1]:
+        raise BlastEnvError(f"--tnt-range is {text!r}, must be LOW,HIGH in kg, e.g. 20,1000")
+    return numbers[0], numbers[1]
+
+
+def _reference(name: ReferenceName, study: FreeFieldStudy, burst: Burst) -> Reference:
+    if name == "paper_ufc":
+        return paper_reference(study.distances_m)
+    charge_kg = study.scenario.charge[0].tnt_kg
+    return kingery_bulmash_reference(study.distances_m, charge_kg, name, burst)
+
+
+def _write(report: CalibrationReport, stored: Calibration, stem: str) -> None:
+    from blast_env.rendering.figures import save_figure
+    from blast_env.studies.calibration.figure import calibration_figure
+
+    save_calibration(stored, Path(f"{stem}.json"))
+    with write_atomically(Path(f"{stem}.csv")) as temporary:
+        report.table().to_csv(temporary, index=False)
+    save_figure(calibration_figure(report, stored.name), Path(f"{stem}.png"))
+
+
+def _print(report: CalibrationReport, stored: Calibration) -> None:
+    table = make_table(
+        f"{stored.name}: {len(stored.seeds)} seeds at each distance, reference "
+        f"{stored.reference.source}, {stored.reference.quantity.replace('_', ' ')}",
+        ("R (m)", "i_sim", "95 % +-", "reference (psi s)", *report.laws, "error of stored law"),
+        text_columns=0,
+    )
+    for row in report.table().to_dict("records"):
+        table.add_row(
+            f"{row['distance_m']:g}",
+            f"{row['i_sim']:,.0f}",
+            f"{row['ci95']:,.0f}",
+            f"{row['reference_psi_s']:.4f}",
+            *(f"{row[f'{name}_psi_s']:.4f}" for name in report.laws),
+            f"{row[f'{stored.law}_error_percent']:+.1f} %",
+        )
+    result_console().print(table)
+    for name, metrics in report.metrics.items():
+        coefficients = ", ".join(
+            f"{k} = {v:.5g}" for k, v in report.laws[name].coefficients.items()
+        )
+        print_line(
+            f"{name}: {coefficients}; MAPE {metrics.mape_percent:.2f} %, RMSE {metrics.rmse:.4f} "
+            f"psi s, integral error {metrics.integral_error_percent:.2f} %"
+        )
+    intervals = ", ".join(
+        f"{k} {low:.4g} to {high:.4g}" for k, (low, high) in stored.coefficient_intervals.items()
+    )
+    print_line(
+        f"stored: {stored.law}; 95 % intervals over seeds: {intervals}; leave-one-distance-out "
+        f"MAPE {stored.metrics.leave_one_out_mape_percent:.2f} %"
+    )
+    if stored.reference.source == "paper UFC column":
+        own = paper_table().set_index("r_m").i_sim.loc[list(stored.distances_m)].to_numpy()
+        rms = shape_rms_percent(stored.i_sim, own)
+        print_line(f"against the paper's own i_sim: {rms:.1f} % rms after one common factor")
+
+
+DEFAULT_PRESET: Final = "ballistic"
+
+
+_REGION_WORDS: Final[Mapping[Region, str]] = MappingProxyType(
+    {
+        "one_corner": "sides, one corner",
+        "one_corner_near": "  front third",
+        "one_corner_far": "  back third",
+        "two_corners": "back, two corners",
+    }
+)
+
+
+_MOST_LATE: Final = 0.02  # share of a load that may come in the last fifth of the time
+
+
+_PERCENT: Final = 100.0
+
+
+@dataclass(frozen=True)
+class ShieldingOptions:
+    """The options of the command.
+
+    Attributes:
+        preset: Name of the preset that is studied.
+        engine: Name of the engine.
+        seeds: Seeds of the blasts.
+        processes: Worker processes.
+        out: Folder for all files.
+        exponent: Exponent B of a power law, or None.
+        calibration: Name or file of a calibration with a power law, instead of the exponent.
+    """
+
+    preset: str
+    engine: str
+    seeds: tuple[int, ...]
+    processes: int
+    out: Path
+    exponent: float | None = None
+    calibration: str | None = None
+
+
+def calibrate_shielding(options: ShieldingOptions) -> None:
+    """Run the shielding study and the reflection study, print both, write the files.
+
+    Args:
+        options: The options.
+
+    Raises:
+        BlastEnvError: If an option is unusable, or a study cannot be done with the preset.
+    """
+    settings = (options.preset, options.seeds, options.engine)
+    study, reflection_study = ShieldingStudy(*settings), ReflectionStudy(*settings)
+    exponent = _exponent(options, study)
+    make_folder(options.out)
+    blasts = 2 * len(study.seeds)
+    with progress_bar(f"{blasts} blasts on a block and in the open") as progress:
+        report = study.run(options.processes, progress)
+    blasts = (len(reflection_study.distances_m) + 1) * len(study.seeds)
+    with progress_bar(f"{blasts} blasts on facades") as progress:
+        reflection = reflection_study.run(options.processes, progress)
+    written = _write_shielding(report, reflection, exponent, options)
+    _print_ratios(report, exponent)
+    _print_reflection(reflection)
+    for path in written:
+        print_line(f"wrote {path}")
+
+
+def _exponent(options: ShieldingOptions, study: ShieldingStudy) -> float | None:
+    """Return the exponent B that scales the ratios, if there is one.
+
+    Raises:
+        BlastEnvError: If both an exponent and a calibration are given, or the calibration does
+            not belong to the simulation, or has no exponent.
+    """
+    if options.calibration is None:
+        if options.exponent is not None:
+            check_exponent(options.exponent)
+        return options.exponent
+    if options.exponent is not None:
+        raise BlastEnvError("--exponent and --calibration: give one of them, not both")
+    calibration = load_calibration(options.calibration, options.engine)
+    calibration.check(study.parameters, options.engine)
+    if calibration.law != "power":
+        raise BlastEnvError(
+            f"calibration {calibration.name!r} has a {calibration.law} law, must have a power law: "
+            "only that one has an exponent"
+        )
+    return calibration.coefficients["B"]
+
+
+def _write_shielding(
+    report: ShieldingReport,
+    reflection: ReflectionReport,
+    exponent: float | None,
+    options: ShieldingOptions,
+) -> list[Path]:
+    from blast_env.rendering.figures import save_figure
+    from blast_env.studies.shielding.figure import shielding_figure
+
+    stem = f"shielding.{options.preset}.{options.engine}"
+    record, gauges = options.out / f"{stem}.json", options.out / f"{stem}.csv"
+    with write_atomically(record) as temporary:
+        temporary.write_text(report.to_json(exponent, reflection), encoding="utf-8")
+    with write_atomically(gauges) as temporary:
+        report.gauges.to_csv(temporary, index=False)
+    figure = save_figure(shielding_figure(report, exponent), options.out / f"{stem}.png")
+    return [record, gauges, figure]
+
+
+def _print_ratios(report: ShieldingReport, exponent: float | None) -> None:
+    study = report.study
+    scaled = () if exponent is None else (f"scaled, B = {exponent:.4g}", "95 %")
+    table = make_table(
+        f"{study.simulation}, engine {study.engine}: load on a block over the free field's at the "
+        f"same path length, {len(study.seeds)} seeds",
+        ("", "normal impulse", "95 %", *scaled, "m|v|", "experiments", ""),
+    )
+    for region, words in _REGION_WORDS.items():
+        ratio = report.ratio(region)
+        cells = [words, *_value_and_interval(ratio)]
+        if exponent is not None:
+            ratio = scaled_ratio(ratio, exponent)
+            cells += _value_and_interval(ratio)
+        cells.append(f"{report.ratio(region, 'impulse').value:.2f}")
+        table.add_row(*cells, *_target(region, ratio))
+    result_console().print(table)
+    print_line(
+        f"free field: side-on load on average as path^{report.free_field_slope.value:.2f}, "
+        f"Kingery-Bulmash's incident impulse as path^{report.reference_slope:.2f}"
+    )
+    for place, share in report.late_shares._asdict().items():
+        if share > _MOST_LATE:
+            print_line(
+                f"note: {place.replace('_', ' ')}: {_PERCENT * share:.1f} % of the impulse came in "
+                f"the last fifth of {study.time_limit_s:g} s: loads are not complete"
+            )
+
+
+def _value_and_interval(ratio: Estimate) -> tuple[str, str]:
+    interval = "-" if isnan(ratio.low) else f"{ratio.low:.2f} to {ratio.high:.2f}"
+    return f"{ratio.value:.2f}", interval
+
+
+def _target(region: Region, ratio: Estimate) -> tuple[str, str]:
+    """Return what the experiments gave, and how the ratio compares."""
+    band = EXPERIMENT.get(region)
+    if band is None:
+        return "", ""
+    low, high = band.bounds
+    verdict = "too low" if ratio.value < low else "too high" if ratio.value > high else "agrees"
+    return f"{band.value:.2f} +- {band.tolerance:.2f}", verdict
+
+
+def _print_reflection(report: ReflectionReport) -> None:
+    table = make_table(
+        "Reflection at normal incidence (head-on over side-on impulse) and arrival; no targets",
+        (
+            "R (m)",
+            "Z (m/kg^1/3)",
+            "ratio",
+            "95 %",
+            "Kingery-Bulmash",
+            "arrival (ms)",
+            "Kingery-Bulmash (ms)",
+            "residual",
+        ),
+        text_columns=0,
+    )
+    rows = report.reflection.merge(report.arrivals, on="distance_m").to_dict("records")
+    for row in rows:
+        ratio = Estimate(row["ratio"], row["ratio_low"], row["ratio_high"])
+        table.add_row(
+            f"{row['distance_m']:g}",
+            f"{row['scaled_distance']:.2f}",
+            *_value_and_interval(ratio),
+            f"{row['kingery_bulmash_ratio']:.2f}",
+            f"{MS_PER_S * row['scaled_s']:.1f}",
+            f"{MS_PER_S * row['kingery_bulmash_s']:.1f}",
+            f"{row['residual_percent']:+.0f} %",
+        )
+    result_console().print(table)
+    print_line(f"arrivals: simulated times {rows[0]['time_scale']:.3g}, the one free factor")
+
 
 PAPER_DISTANCES = "15,30,45,60,75,90,105,120"
+
+
 _SHIELDING_PANEL = "Shielding study"
+
+
 _FREE_FIELD_OPTIONS = (
     "name",
     "reference",
@@ -35,6 +401,8 @@ _FREE_FIELD_OPTIONS = (
     "simulated",
     "burst",
 )
+
+
 _SHIELDING_OPTIONS = ("exponent", "calibration")
 
 

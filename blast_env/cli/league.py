@@ -19,8 +19,8 @@ from blast_env.cli.output import (
 from blast_env.errors import BlastEnvError
 
 if TYPE_CHECKING:
-    from agents.league import Contest, ResultStore, Standings, Track
-    from agents.league.trained import TrainedRun
+    from blast_agents.league import Contest, ResultStore, Standings, Track
+    from blast_agents.league.trained import TrainedRun
 
 
 def league(
@@ -63,8 +63,8 @@ def league(
     An interrupted league goes on when it is called again with the same folder.
     """
     with user_errors(), agents_extra("a league"):
-        from agents.league import ResultStore, find_tracks
-        from agents.league.report import write_league
+        from blast_agents.league import ResultStore, find_tracks
+        from blast_agents.league.report import write_league
 
         tracks = find_tracks(track, cases, seeds, seed, scenario or ())
         runs = _load_runs(run or (), tracks)
@@ -83,7 +83,7 @@ def league(
 def _load_runs(runs: Sequence[Path], tracks: "Sequence[Track]") -> "list[TrainedRun]":
     if not runs:
         return []
-    from agents.league.trained import TrainedRun, check_runs  # these take torch with them
+    from blast_agents.league.trained import TrainedRun, check_runs  # these take torch with them
 
     loaded = [TrainedRun.load(run) for run in runs]
     check_runs(loaded, tracks)
@@ -98,7 +98,7 @@ def _contest(
     store: "ResultStore",
     engine: str,
 ) -> "Contest":
-    from agents.league import Contest, standard_entries
+    from blast_agents.league import Contest, standard_entries
 
     agents = tuple(run.entry for run in runs if run.is_for(track))
     return Contest(track, (*standard_entries(methods, budgets), *agents), store, engine)
@@ -119,7 +119,7 @@ def _print_outlook(contests: "Sequence[Contest]") -> None:
 
 
 def _play(contest: "Contest", processes: int) -> "Standings":
-    from agents.league.report import HEADERS, sample_text, table_rows, verdict_lines
+    from blast_agents.league.report import HEADERS, sample_text, table_rows, verdict_lines
 
     with progress_bar(contest.track.name) as progress:
         standings = contest.play(processes, progress)

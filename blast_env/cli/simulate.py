@@ -10,8 +10,9 @@ import typer
 
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Cell
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scenario import Cell, Scenario, load_layout, load_scenario
+from blast_env.scenario import Scenario, load_layout, load_scenario
 from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MS_PER_S
 

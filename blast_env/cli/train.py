@@ -10,7 +10,7 @@ from blast_env.cli.output import agents_extra, print_line, progress_bar, user_er
 from blast_env.errors import BlastEnvError
 
 if TYPE_CHECKING:
-    from agents.training.train import TrainingResult
+    from blast_agents.training.train import TrainingResult
 
 _DEFAULT_ALGORITHM: Final = "maskable_ppo"
 _DEFAULT_SCENARIO: Final = "courtyard"
@@ -77,7 +77,7 @@ def train(
 
 
 def _resume(folder: Path, scenario: str | None, given: Mapping[str, object]) -> "TrainingResult":
-    from agents.training import resume
+    from blast_agents.training import resume
 
     if given:
         raise BlastEnvError(
@@ -90,11 +90,10 @@ def _resume(folder: Path, scenario: str | None, given: Mapping[str, object]) -> 
 def _train(
     run: Path, scenario: str, given: Mapping[str, object], options: list[str], envs: int | None
 ) -> "TrainingResult":
-    from agents.training import load_hyperparameters, train
-    from agents.training.environments import environment_id
-    from agents.training.hyperparameters import HYPERPARAMETER_KEYS
-    from agents.training.set_options import parse_options
-    from agents.training.settings import SETTING_KEYS, settings_from
+    from blast_agents.training import load_hyperparameters, train
+    from blast_agents.training.environments import environment_id
+    from blast_agents.training.hyperparameters import HYPERPARAMETER_KEYS, parse_options
+    from blast_agents.training.run_folder import SETTING_KEYS, settings_from
 
     algorithm = str(given.get("algo", _DEFAULT_ALGORITHM))
     changes = parse_options(options, [*HYPERPARAMETER_KEYS, *SETTING_KEYS])

@@ -10,6 +10,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from blast_env.envs.arguments import (
+    ResetOptions,
     check_names,
     checked_keywords,
     real_number,
@@ -17,19 +18,32 @@ from blast_env.envs.arguments import (
     whole_number,
 )
 from blast_env.envs.display import Display
-from blast_env.envs.episode import Episode, IllegalActions, total
+from blast_env.envs.episode import (
+    OBSERVATIONS,
+    Episode,
+    IllegalActions,
+    Task,
+    find_realisations,
+    find_risk,
+    find_threat_model,
+    total,
+)
 from blast_env.envs.objective import Evaluators
-from blast_env.envs.observation import Array, Observation, Sight
-from blast_env.envs.reset_options import ResetOptions
-from blast_env.envs.reward import REWARDS, Reward
-from blast_env.envs.risk import Risk
-from blast_env.envs.scenario_source import ScenarioSource, scenario_source, zone_of
-from blast_env.envs.task import OBSERVATIONS, Task, find_realisations, find_risk, find_threat_model
-from blast_env.envs.threat_model import ThreatModel
-from blast_env.evaluation.cache import BlastCache
-from blast_env.evaluation.evaluate import CVAR_LEVEL
+from blast_env.envs.observations import Array, Observation, Sight
+from blast_env.envs.strategies import (
+    REWARDS,
+    Reward,
+    ScenarioSource,
+    ThreatModel,
+    scenario_source,
+    zone_of,
+)
+from blast_env.evaluation.comparison import CVAR_LEVEL
+from blast_env.evaluation.store import BlastCache
+from blast_env.geometry import Cell
 from blast_env.physics.engine import Engine
-from blast_env.scenario import Cell, Placement, Scenario
+from blast_env.scenario import Placement, Scenario
+from blast_env.statistics import Risk
 
 
 class BlastBarrierEnv(gym.Env[Array, np.int64]):
@@ -53,11 +67,11 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
 
     - `"grid"`: `Box(0, 255, (9, rows, columns), uint8)`, planes over the site with one square a
       module of 0.5 m, 255 for 1; channel by channel in
-      `blast_env.envs.grid_observation.GridObservation`;
+      `blast_env.envs.observations.GridObservation`;
     - `"grid_with_load"`: a tenth plane, the load on each module of the structures without a
       barrier (`GridWithLoadObservation`), for four more blasts a charge;
     - `"features"`: `Box(0, 1, (features,), float32)`, a flat vector, value by value in
-      `blast_env.envs.features_observation.FeaturesObservation`.
+      `blast_env.envs.observations.FeaturesObservation`.
 
     ## Rewards
     The sum of two terms, both in psi s and in `info["reward_terms"]`:
@@ -97,20 +111,20 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
 
     ## Arguments
     - `scenario`: bundled name, path of a scenario file, a `Scenario`, or a `ScenarioSource`
-      (`blast_env.envs.scenario_source`), which draws one at every `reset`.
-    - `reward`: `"terminal"`, `"incremental"`, or a `Reward` (`blast_env.envs.reward`).
-    - `observation`: see above, or an `Observation` (`blast_env.envs.observation`).
-    - `threat`: `"visible"`, `"hidden"`, or a `ThreatModel` (`blast_env.envs.threat_model`).
+      (`blast_env.envs.strategies`), which draws one at every `reset`.
+    - `reward`: `"terminal"`, `"incremental"`, or a `Reward` (`blast_env.envs.strategies`).
+    - `observation`: see above, or an `Observation` (`blast_env.envs.observations`).
+    - `threat`: `"visible"`, `"hidden"`, or a `ThreatModel` (`blast_env.envs.strategies`).
     - `threats`: how many charges are drawn when they are hidden; 16 unless given.
     - `realisations`: blasts for each charge; 2 unless given, and 1 where charges are hidden, since
       these differ anyway.
-    - `risk`: `"mean"`, `"cvar"`, or a `Risk` (`blast_env.envs.risk`).
+    - `risk`: `"mean"`, `"cvar"`, or a `Risk` (`blast_env.statistics`).
     - `cvar_level`: the worst share 1 - `cvar_level` of the charges makes the CVaR.
     - `illegal_action_cost`: psi s; 0.001, or 6.9 Pa s, unless given.
     - `illegal_action_limit`: illegal actions that end the episode; 100 unless given.
     - `engine`: name of an engine, or an engine.
     - `cache`: where blasts are remembered beside the memory of the environment: a folder, which
-      other processes and later runs may use too, or a cache (`blast_env.evaluation.cache`).
+      other processes and later runs may use too, or a cache (`blast_env.evaluation.store`).
     - `render_mode`: `None`, `"human"`, `"rgb_array"` or `"ansi"`.
 
     >>> import gymnasium as gym, blast_env

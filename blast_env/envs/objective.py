@@ -8,13 +8,13 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.envs.risk import Risk
-from blast_env.evaluation.cache import BlastCache
-from blast_env.evaluation.disk_cache import find_cache
+from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.threats import Threat
+from blast_env.evaluation.store import BlastCache, find_cache
+from blast_env.geometry import Cell
 from blast_env.physics.engine import Engine
-from blast_env.scenario import Cell, Scenario
+from blast_env.scenario import Scenario
+from blast_env.statistics import Risk
 from blast_env.units import PA_PER_PSI
 
 _MOST_EVALUATORS: Final = 4

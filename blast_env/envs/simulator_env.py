@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from blast_env.envs.arguments import check_names, checked_keywords
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Cell
 from blast_env.physics.engine import BlastRun, Engine
 from blast_env.physics.particles import CollisionType, lattice_capacity
+from blast_env.physics.scene import Charge
 from blast_env.physics.structure import BARRIER_NAME, ModularPart
 from blast_env.recording.tables import collision_table
-from blast_env.scenario import Cell, Charge, Scenario, load_scenario
+from blast_env.scenario import Scenario, load_scenario
 from blast_env.simulation import Blast, BlastResult
 
 if TYPE_CHECKING:  # drawing is an optional extra

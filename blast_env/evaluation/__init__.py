@@ -1,18 +1,21 @@
 """Evaluating layouts: loads under threats, and reductions with their uncertainty."""
 
-from blast_env.evaluation.cache import BlastCache, BlastKey, LoadsCache
-from blast_env.evaluation.disk_cache import DiskCache
-from blast_env.evaluation.evaluate import evaluate_against, evaluate_layout
+from blast_env.evaluation.cases import Threat, draw_threats
+from blast_env.evaluation.comparison import (
+    LayoutEvaluation,
+    ThreatOutcome,
+    evaluate_against,
+    evaluate_layout,
+)
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.layout_evaluation import LayoutEvaluation, ThreatOutcome
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
-from blast_env.evaluation.statistics import (
+from blast_env.evaluation.store import BlastCache, BlastKey, DiskCache, LoadsCache
+from blast_env.statistics import (
     Estimate,
     conditional_value_at_risk,
     mean_estimate,
     reduction_estimate,
 )
-from blast_env.evaluation.threats import Threat, draw_threats
 
 __all__ = [
     "BlastCache",

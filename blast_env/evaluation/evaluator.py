@@ -5,22 +5,23 @@ from pathlib import Path
 
 import joblib
 
-from blast_env.calibration.model import Calibration
-from blast_env.calibration.stored import scenario_calibration
+from blast_env.calibration.model import Calibration, scenario_calibration
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cache import (
+from blast_env.evaluation.cases import Threat
+from blast_env.evaluation.loads import BlastLoads, blast_loads
+from blast_env.evaluation.store import (
     BlastCache,
     BlastKey,
     LoadsCache,
     calibration_digest,
     code_version,
     engine_text,
+    find_cache,
 )
-from blast_env.evaluation.disk_cache import find_cache
-from blast_env.evaluation.loads import BlastLoads, blast_loads
-from blast_env.evaluation.threats import Threat
+from blast_env.geometry import Cell
 from blast_env.physics.engine import Engine, find_engine
-from blast_env.scenario import Cell, Charge, Scenario, check_layout
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario, check_layout
 from blast_env.simulation import Blast
 
 

@@ -1,17 +1,110 @@
-"""Which file a layout goes to, and in which form."""
+"""Layouts as CSV, GeoJSON, DXF and JSON."""
 
+import json
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
-from blast_env.atomic import make_folder
+import pandas as pd
+
 from blast_env.errors import BlastEnvError, suggestion
-from blast_env.export.csv_file import write_csv
-from blast_env.export.geojson import write_geojson
-from blast_env.export.plan import LayoutPlan
+from blast_env.export.plan import Feature, LayoutPlan
+from blast_env.files import make_folder, write_atomically
 from blast_env.scenario import write_layout
+from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+
+COLUMNS: Final = (
+    "module_id",
+    "row",
+    "column",
+    "corner_x_m",
+    "corner_y_m",
+    "centre_x_m",
+    "centre_y_m",
+    "side_m",
+)
+"""`corner` is a module's lower left corner; rows count upwards, columns to the right, from 0."""
+
+
+_DIGITS: Final = 9
+
+
+def module_table(plan: LayoutPlan) -> pd.DataFrame:
+    """Return one row a module in the order of the layout; see `COLUMNS`."""
+    rows = []
+    for part in plan.modules:
+        corner_m = (part.rectangle.left / UNITS_PER_M, part.rectangle.bottom / UNITS_PER_M)
+        centre_m = (part.x / UNITS_PER_M, part.y / UNITS_PER_M)
+        places_m = (round(value, _DIGITS) for value in (*corner_m, *centre_m))
+        rows.append((part.module_id, part.row, part.column, *places_m, MODULE_SIDE_M))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def write_csv(plan: LayoutPlan, path: Path) -> None:
+    """Write the modules.
+
+    Raises:
+        BlastEnvError: If the file cannot be written.
+    """
+    with write_atomically(path) as temporary:
+        module_table(plan).to_csv(temporary, index=False)
+
+
+COORDINATES: Final = (
+    "local site metres: x to the right and y upwards from the lower left corner of the site; "
+    "not longitude and latitude (not WGS 84)"
+)
+"""Stands in the collection and in every feature, because many programs read features alone."""
+
+
+def feature_collection(plan: LayoutPlan) -> dict[str, Any]:
+    """Return a FeatureCollection of everything on the site, as plain data."""
+    return {
+        "type": "FeatureCollection",
+        "name": plan.scenario.name,
+        "coordinate_system": COORDINATES,
+        "scenario_hash": plan.scenario.content_hash,
+        "features": [_feature(feature) for feature in plan.features],
+    }
+
+
+def write_geojson(plan: LayoutPlan, path: Path) -> None:
+    """Write the collection, a feature a line.
+
+    Raises:
+        BlastEnvError: If the file cannot be written.
+    """
+    collection = feature_collection(plan)
+    features = ",\n".join(json.dumps(each, allow_nan=False) for each in collection["features"])
+    others = {key: value for key, value in collection.items() if key != "features"}
+    head = json.dumps(others, indent=0, allow_nan=False).removesuffix("\n}")
+    with write_atomically(path) as temporary:
+        temporary.write_text(f'{head},\n"features": [\n{features}\n]\n}}\n', encoding="utf-8")
+
+
+def _feature(feature: Feature) -> dict[str, Any]:
+    return {
+        "type": "Feature",
+        "properties": {
+            "kind": feature.kind.value,
+            "name": feature.name,
+            **feature.properties,
+            "coordinate_system": COORDINATES,
+        },
+        "geometry": _geometry(feature),
+    }
+
+
+def _geometry(feature: Feature) -> dict[str, Any]:
+    """Return a point, a line or a polygon, its ring closed and counterclockwise."""
+    places = [list(place) for place in feature.places_m]
+    if len(places) == 1:
+        return {"type": "Point", "coordinates": places[0]}
+    if len(places) == 2:
+        return {"type": "LineString", "coordinates": places}
+    return {"type": "Polygon", "coordinates": [[*places, places[0]]]}
 
 
 def _write_json(plan: LayoutPlan, path: Path) -> None:
@@ -24,7 +117,7 @@ def _write_json(plan: LayoutPlan, path: Path) -> None:
 
 
 def _write_dxf(plan: LayoutPlan, path: Path) -> None:
-    from blast_env.export.dxf import write_dxf  # an extra
+    from blast_env.export.dxf import write_dxf
 
     write_dxf(plan, path)
 
@@ -32,6 +125,7 @@ def _write_dxf(plan: LayoutPlan, path: Path) -> None:
 _WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], None]]] = MappingProxyType(
     {".json": _write_json, ".csv": write_csv, ".geojson": write_geojson, ".dxf": _write_dxf}
 )
+
 
 SUFFIXES: Final = tuple(_WRITERS)
 """The forms in which a layout can be written."""

@@ -9,13 +9,12 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Cell, Rectangle
+from blast_env.physics.scene import Charge
 from blast_env.physics.structure import BARRIER_NAME, ModularObstacle, ModularPart
 from blast_env.scenario import (
     AnySource,
     BuildZone,
-    Cell,
-    Charge,
     RectangleSource,
     Scenario,
     SegmentSource,

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from blast_env.errors import UnknownNameError
 from blast_env.physics.collisions import CollisionLog
 from blast_env.physics.particles import distance_to_rectangle
+from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scene import Scene
 
 ENGINE_NAMES: Final = ("pymunk", "event")
 """The engines that come with the package; the first one is the reference."""
@@ -134,9 +134,9 @@ def find_engine(engine: str | Engine) -> Engine:
     if engine not in ENGINE_NAMES:
         raise UnknownNameError("engine", engine, ENGINE_NAMES)
     if engine == "event":
-        from blast_env.physics.event_engine import EventEngine
+        from blast_env.physics.event.engine import EventEngine
 
         return EventEngine()
-    from blast_env.physics.pymunk_engine import PymunkEngine
+    from blast_env.physics.pymunk.engine import PymunkEngine
 
     return PymunkEngine()

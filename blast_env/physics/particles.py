@@ -8,10 +8,9 @@ from math import ceil, prod
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import AirParameters, BallParameters, ExplosiveParameters
-
-FloatArray = NDArray[np.float64]
 
 
 class CollisionType(IntEnum):

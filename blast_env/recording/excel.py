@@ -1,52 +1,353 @@
-"""The tables of a blast as an Excel workbook."""
+"""The workbook of a blast."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import pandas as pd
 import xlsxwriter
+from pandas.api import types
 from xlsxwriter.exceptions import XlsxFileError
 
-from blast_env.atomic import write_atomically
 from blast_env.errors import BlastEnvError
-from blast_env.recording.excel_cells import (
-    CellStyle,
-    Heading,
-    cells,
-    header,
-    readable,
-    record_cells,
-)
-from blast_env.recording.excel_charts import add_charts, chart_data
-from blast_env.recording.tables import (
-    COLLISION_COLUMNS,
-    MODULE_COLUMNS,
-    STRUCTURE_COLUMNS,
-    Column,
-)
+from blast_env.files import write_atomically
+from blast_env.physics.structure import BARRIER_NAME
+from blast_env.recording.tables import COLLISION_COLUMNS, MODULE_COLUMNS, STRUCTURE_COLUMNS
+from blast_env.tables import Column
 
 if TYPE_CHECKING:
     from blast_env.simulation import BlastResult
 
+
+LONGEST_VALUE: Final = 400
+"""The most characters of the run record in one cell; the rest goes on in the next row."""
+
+
+_EXACT_INTEGER: Final = 10**15  # Excel rounds greater ones
+
+
+_BUTTON: Final = 4  # characters that the button of the filter takes
+
+
+_NUMBER_FORMATS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "s": "0.000000",
+        "m": "0.000",
+        "rad": "0.0000",
+        "deg": "0.0",
+        "sim": "#,##0.00",
+        "sim mass": "0.0000",
+        "sim units/s": "#,##0.0",
+    }
+)
+
+
+_LABELS: Final[Mapping[str, str]] = MappingProxyType({"impulse_sim": "impulse, m|v|"})
+
+
+def header(column: Column) -> str:
+    """Return the heading of a column, with its unit: `first hit (s)`."""
+    label = _LABELS.get(column.name)
+    if label is None:
+        label = column.name.removesuffix(f"_{column.unit}").replace("_", " ")
+    return f"{label} ({column.unit})" if column.unit else label
+
+
+class Heading(NamedTuple):
+    """The heading of a column of a sheet.
+
+    Attributes:
+        text: The text.
+        width: Width of the column, characters.
+        lines: Lines that the text takes in that width.
+        of_numbers: Whether there are numbers below.
+    """
+
+    text: str
+    width: int
+    lines: int = 1
+    of_numbers: bool = False
+
+
+class CellStyle(NamedTuple):
+    """How the values of a column are written.
+
+    Attributes:
+        method: Name of the method of XlsxWriter's worksheet.
+        number_format: The number format, in Excel's notation.
+    """
+
+    method: str
+    number_format: str
+
+    @classmethod
+    def of(cls, values: "pd.Series[Any]", unit: str) -> "CellStyle":
+        """Return the style for `readable` values of a unit."""
+        if types.is_float_dtype(values):
+            return cls("write_number", _NUMBER_FORMATS.get(unit, "0.000"))
+        if types.is_integer_dtype(values):
+            return cls("write_number", "0")
+        return cls("write_string", "@")
+
+    def heading(self, text: str, values: "pd.Series[Any]") -> Heading:
+        """Return the heading of a column with these values."""
+        text_width = _heading_width(text)
+        width = max(text_width, self._values_width(values)) + _BUTTON
+        lines = len(textwrap.wrap(text, width - _BUTTON))
+        return Heading(text, width, lines, of_numbers=self.method == "write_number")
+
+    def _values_width(self, values: "pd.Series[Any]") -> int:
+        """Return the characters that the longest value takes."""
+        present = values.dropna()
+        if present.empty:
+            return 0
+        if self.method == "write_string":
+            return int(present.str.len().max())
+        decimals = len(self.number_format.partition(".")[2])
+        return len(f"{present.abs().max():,.0f}") + len("-.") + decimals
+
+
+def readable(values: "pd.Series[Any]") -> "pd.Series[Any]":
+    """Return the values with words for booleans; programs differ in how they show those."""
+    if types.is_bool_dtype(values):
+        return values.map({True: "yes", False: "no"}).astype("str")
+    return values
+
+
+def cells(values: "pd.Series[Any]") -> list[Any]:
+    """Return the values as Python objects, None where there is none."""
+    return list(values.astype(object).where(values.notna(), None))
+
+
+def record_cells(value: str | int | float) -> list[str | int | float]:
+    """Return a value of the run record as it can stand in cells, one below the other.
+
+    Nothing is cut or rounded: long texts take several cells, great integers become texts.
+    """
+    if isinstance(value, bool):
+        return ["yes" if value else "no"]
+    if isinstance(value, int) and abs(value) > _EXACT_INTEGER:
+        return [str(value)]
+    if isinstance(value, str):
+        return list(textwrap.wrap(value, LONGEST_VALUE)) or [""]
+    return [value]
+
+
+def _heading_width(text: str) -> int:
+    """Return the fewest characters in which a heading takes two lines and no unit is broken."""
+    unit = text[text.find("(") :] if "(" in text else ""
+    width = max(len(word) for word in text.split())
+    while True:
+        lines = textwrap.wrap(text, width)
+        if len(lines) <= 2 and any(unit in line for line in lines):
+            return width
+        width += 1
+
+
+CHARTED_MODULES: Final = 30
+"""The most bars of a chart; the labels of more cannot be read."""
+
+
+_LABEL_COLUMNS: Final = tuple(
+    column for column in MODULE_COLUMNS if column.name in ("module_id", "structure", "hits")
+)
+
+
+_WIDTH: Final = 640  # pixels
+
+
+_HEIGHT_WITHOUT_BARS: Final = 150
+
+
+_BAR_HEIGHT: Final = 19
+
+
+_FEWEST_BARS: Final = 10  # what the height is at least made for; the axis's title needs it
+
+
+_COLOURS: Final = ("#7A042E", "#F08030", "#2F6690", "#5B8E7D", "#8E7DBE", "#8A8A8A")
+
+
+class Ranking(NamedTuple):
+    """The most loaded modules of some structures, for one chart.
+
+    Attributes:
+        title: Title of the chart.
+        modules: Rows of the module table, the highest impulse first.
+    """
+
+    title: str
+    modules: pd.DataFrame
+
+
+class ChartData(NamedTuple):
+    """What the charts of a workbook show.
+
+    Attributes:
+        rankings: One a chart.
+        structures: The structures of the ranked modules.
+        columns: The columns of the table; the last ones belong to the structures.
+        table: One row a module, chart after chart; its impulse is in its structure's column.
+    """
+
+    rankings: tuple[Ranking, ...]
+    structures: tuple[str, ...]
+    columns: tuple[Column, ...]
+    table: pd.DataFrame
+
+
+def chart_data(result: "BlastResult") -> ChartData:
+    """Return what there is to chart of a blast."""
+    rankings = tuple(_rankings(result))
+    # The empty head gives the columns when nothing was hit.
+    ranked = pd.concat([result.modules.head(0), *(ranking.modules for ranking in rankings)])
+    # In the order of the scenario, so that the colours do not depend on who is hit most.
+    present = result.structures["structure"].isin(ranked["structure"])
+    structures = tuple(result.structures.loc[present, "structure"])
+    impulses = tuple(
+        Column(f"impulse_on_{structure}_sim", "sim", "sum of m |v| over the collisions")
+        for structure in structures
+    )
+    table = ranked[[column.name for column in _LABEL_COLUMNS]].copy()
+    for structure, column in zip(structures, impulses, strict=True):
+        table[column.name] = ranked["impulse_sim"].where(ranked["structure"] == structure)
+    return ChartData(rankings, structures, _LABEL_COLUMNS + impulses, table)
+
+
+def add_charts(workbook: Any, sheet: Any, column: int, data_sheet: str, data: ChartData) -> None:
+    """Put the charts onto a sheet, side by side, or a note that there is nothing to chart.
+
+    Args:
+        workbook: The workbook.
+        sheet: The sheet that the charts are put onto.
+        column: The column of the sheet at which the first chart starts.
+        data_sheet: Name of the sheet that has the table of `data`, under one row of headings.
+        data: What to show.
+    """
+    if not data.rankings:
+        sheet.insert_textbox(1, column, "No module was hit.", {"x_offset": 20, "height": 40})
+    first = 0
+    for number, ranking in enumerate(data.rankings):
+        chart = workbook.add_chart({"type": "bar", "subtype": "stacked"})
+        _add_series(chart, data_sheet, data, slice(first, first + len(ranking.modules)))
+        _add_labels(chart, ranking)
+        place = {"object_position": 3, "x_offset": 20 + number * (_WIDTH + 20), "y_offset": 5}
+        sheet.insert_chart(1, column, chart, place)
+        first += len(ranking.modules)
+
+
+def _rankings(result: "BlastResult") -> Iterator[Ranking]:
+    """Yield a ranking of the protected structures and one of the barrier, as far as hit."""
+    structures = result.structures
+    is_barrier = structures["structure"] == BARRIER_NAME
+    protected = structures["protected"] & ~is_barrier
+    groups = {"protected structures": protected, "barrier": is_barrier}
+    if not protected.any():  # a study of the model, not of protection
+        groups = {"structures": ~is_barrier, "barrier": is_barrier}
+    for name, rows in groups.items():
+        in_group = result.modules["structure"].isin(structures.loc[rows, "structure"])
+        hit = result.modules[in_group & (result.modules["hits"] > 0)]
+        if len(hit):
+            yield _ranking(name, hit)
+
+
+def _ranking(name: str, hit: pd.DataFrame) -> Ranking:
+    """Return the ranking of the modules that were hit in a group of structures."""
+    # Stable, so that equal loads keep the order of the module table.
+    ranked = hit.sort_values("impulse_sim", ascending=False, kind="stable")
+    top = ranked.head(CHARTED_MODULES)
+    which = "" if len(top) == len(hit) else f"the {len(top)} most loaded of "
+    total = f"{hit['impulse_sim'].sum():,.0f}"
+    modules = "module" if len(hit) == 1 else "modules"
+    return Ranking(f"Impulse on the {name}: {total} (sim), {which}{len(hit)} {modules} hit", top)
+
+
+def _add_series(chart: Any, sheet: str, data: ChartData, rows: slice) -> None:
+    """Add one series a structure, for some rows of the table."""
+    part = data.table.iloc[rows]
+    first, last = rows.start + 1, rows.stop  # on the sheet, below the headings
+    label = data.columns.index(_LABEL_COLUMNS[0])
+    for index, structure in enumerate(data.structures):
+        column = len(_LABEL_COLUMNS) + index
+        impulse = part[data.columns[column].name]
+        if impulse.isna().all():
+            continue
+        chart.add_series(
+            {
+                "name": structure,
+                "categories": [sheet, first, label, last, label],
+                "values": [sheet, first, column, last, column],
+                # Constant memory keeps no cells from which XlsxWriter could fill its cache.
+                "categories_data": part[_LABEL_COLUMNS[0].name].tolist(),
+                "values_data": impulse.astype(object).where(impulse.notna(), None).tolist(),
+                "fill": {"color": _COLOURS[index % len(_COLOURS)]},
+                "gap": 40,
+            }
+        )
+
+
+def _add_labels(chart: Any, ranking: Ranking) -> None:
+    """Add the title, the titles of the axes and the legend, and set the size."""
+    chart.set_title({"name": ranking.title, "name_font": {"size": 12}})
+    chart.set_x_axis(
+        {
+            "name": "impulse, m|v| (sim)",
+            "num_format": "#,##0",
+            "major_gridlines": {"visible": True, "line": {"color": "#D9D9D9"}},
+        }
+    )
+    chart.set_y_axis(
+        {
+            "name": "module, by its centre (m)",
+            "reverse": True,  # the first row on top, and the impulse's axis still at the bottom
+            "crossing": "max",
+            "num_font": {"size": 8},
+            "interval_unit": 1,
+        }
+    )
+    chart.set_legend({"position": "bottom"})
+    chart.set_size(
+        {
+            "width": _WIDTH,
+            "height": _HEIGHT_WITHOUT_BARS + _BAR_HEIGHT * max(len(ranking.modules), _FEWEST_BARS),
+        }
+    )
+
+
 SUFFIX: Final = ".xlsx"
+
+
 EXCEL_ROWS: Final = 1_048_576
 """The most rows that Excel's format allows on a sheet."""
 
+
 _CREATED: Final = datetime(2000, 1, 1)
+
+
 _RECORD_WIDTH: Final = 44  # characters of a column of the run record
+
+
 _ROW_HEIGHT: Final = 15  # points
+
+
 _CHART_SHEET: Final = "Most loaded"
+
+
 _CHART_COLUMN: Final = 2  # of the sheet `Run`
+
+
 _EXPLANATION_COLUMNS: Final = (
     Column("sheet", "", ""),
     Column("column", "", ""),
     Column("unit", "", ""),
     Column("meaning", "", ""),
 )
+
+
 _UNITS: Final = (
     ("sim", "simulation unit of impulse: sim mass x sim unit / s"),
     ("sim mass", "simulation unit of mass"),

@@ -8,8 +8,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from blast_env.atomic import write_atomically
 from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
 from blast_env.recording.tables import COLLISION_COLUMNS
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """The tables of a blast as data frames, with the unit and the meaning of every column."""
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -9,23 +9,8 @@ import pandas as pd
 from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import ModularObstacle
+from blast_env.tables import Column
 from blast_env.units import UNITS_PER_M
-
-
-class Column(NamedTuple):
-    """A column of a table.
-
-    Attributes:
-        name: Name in the data frame.
-        unit: Unit; empty for counts, names and pure numbers. "sim" stands for the simulation's
-            own units: mass units, and 4 length units to the metre.
-        meaning: What it is.
-    """
-
-    name: str
-    unit: str
-    meaning: str
-
 
 COLLISION_COLUMNS: Final = (
     Column("time_s", "s", "time of the collision, from the detonation"),
@@ -47,6 +32,7 @@ COLLISION_COLUMNS: Final = (
     Column("first_contact", "", "whether this is the first hit on the module"),
 )
 
+
 MODULE_COLUMNS: Final = (
     Column("module_id", "", "name of the module, made from its centre in metres"),
     Column("structure", "", "structure that the module is part of"),
@@ -60,6 +46,7 @@ MODULE_COLUMNS: Final = (
     Column("first_hit_s", "s", "time of the first collision"),
     Column("destroyed", "", "whether the impulse passed the module's capacity"),
 )
+
 
 STRUCTURE_COLUMNS: Final = (
     Column("structure", "", "name of the structure"),

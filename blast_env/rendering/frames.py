@@ -9,16 +9,21 @@ from numpy.typing import NDArray
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import BallStates
 from blast_env.physics.particles import CollisionType
+from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
-from blast_env.rendering.extra import render_extra
-from blast_env.rendering.lettering import Lettering
-from blast_env.rendering.site_layer import (
+from blast_env.rendering.canvas import (
+    Lettering,
+    View,
+    colour_bar,
+    disc,
     draw_build_zone,
     draw_charge_mark,
     draw_obstacle,
+    flow,
+    legend,
     name_plates,
+    scale_bar,
 )
-from blast_env.rendering.strips import colour_bar, disc, flow, legend, scale_bar
 from blast_env.rendering.style import (
     AIR,
     BORDER,
@@ -30,10 +35,9 @@ from blast_env.rendering.style import (
     blast_title,
     free_flight_impulse,
     nice_ceiling,
+    render_extra,
 )
-from blast_env.rendering.view import View
 from blast_env.scenario.models import BuildZone
-from blast_env.scene import Scene
 from blast_env.simulation import Blast
 from blast_env.units import MS_PER_S, UNITS_PER_M
 

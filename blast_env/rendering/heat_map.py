@@ -3,8 +3,6 @@
 from math import isqrt
 
 from blast_env.physics.structure import ModularObstacle
-from blast_env.rendering.captions import write_heading, write_names
-from blast_env.rendering.extra import render_extra
 from blast_env.rendering.site_plan import (
     draw_charge,
     draw_loads,
@@ -14,6 +12,8 @@ from blast_env.rendering.site_plan import (
     in_metres,
     legend_handles,
     load_colours,
+    write_heading,
+    write_names,
 )
 from blast_env.rendering.style import (
     INK,
@@ -23,6 +23,7 @@ from blast_env.rendering.style import (
     count_of,
     nice_ceiling,
     number_on_axis,
+    render_extra,
     short_number,
     unit_interval,
 )

@@ -1,27 +1,75 @@
-"""What frames and figures have in common: colours, rules for numbers, wording."""
+"""Colours, fonts, and the extra that pictures need."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import ceil, floor, log10, pi
 from typing import Final
 
+import numpy as np
+
+from blast_env.errors import BlastEnvError
 from blast_env.physics.particles import CollisionType, distance_to_rectangle
+from blast_env.physics.scene import Scene
 from blast_env.physics.structure import Colour
-from blast_env.scene import Scene
-from blast_env.simulation import Blast
+from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MODULE_SIDE_UNITS
 
+
+@contextmanager
+def render_extra() -> Iterator[None]:
+    """Import packages of the extra `render` in this block.
+
+    Raises:
+        BlastEnvError: If one of them is not installed; the message says how to get it.
+    """
+    # pygame greets on standard output, which belongs to the program that imports us.
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    try:
+        yield
+    except ImportError as error:
+        missing = error.name or str(error)
+        raise BlastEnvError(
+            f"pictures and films need {missing!r}, which is not installed: "
+            "pip install blast-env[render]"
+        ) from error
+
+
 PAGE: Final[Colour] = (255, 255, 255)
+
+
 SITE: Final[Colour] = (245, 247, 250)
+
+
 INK: Final[Colour] = (30, 34, 42)
+
+
 QUIET_INK: Final[Colour] = (92, 99, 110)
+
+
 FAINT: Final[Colour] = (206, 211, 219)
+
+
 EXPLOSIVE: Final[Colour] = (226, 28, 36)
+
+
 AIR: Final[Colour] = (30, 46, 122)
+
+
 BORDER: Final[Colour] = (200, 20, 40)
+
+
 STRUCTURE: Final[Colour] = (104, 98, 88)
+
+
 PROTECTED: Final[Colour] = (0, 128, 112)
+
+
 BARRIER: Final[Colour] = (12, 12, 14)
 
+
 LOAD_LABEL: Final = "impulse per module (simulation units)"
+
 
 _NICE_STEPS: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
@@ -101,3 +149,29 @@ def unit_interval(colour: Colour) -> tuple[float, float, float]:
     """Return a colour with its parts between 0 and 1, as matplotlib wants them."""
     red, green, blue = (part / 255.0 for part in colour)
     return red, green, blue
+
+
+# The span ends at the earliest of these multiples of the time when that share of the impulse has
+# arrived: a single straggler must not squeeze the blast into the first tenth of a picture.
+_ENDS = ((0.999, 1.1), (0.95, 2.0))
+
+
+def shown_until_s(result: BlastResult) -> float:
+    """Return the simulated time at which a film or a history ends.
+
+    It is a little after 99.9 % of the impulse on the protected structures has arrived (on all
+    structures, if none is protected or hit), but not later than twice the time that 95 % took.
+    """
+    table = result.collisions
+    protected = [obstacle.name for obstacle in result.obstacles if obstacle.protected]
+    on_protected = table[table["structure"].isin(protected)]
+    chosen = on_protected if len(on_protected) else table
+    if not len(chosen):
+        return result.time_s
+    arrived = np.cumsum(chosen["impulse_sim"].to_numpy())
+    times_s = chosen["time_s"].to_numpy()
+    ends_s = (
+        factor * float(times_s[np.searchsorted(arrived, share * arrived[-1])])
+        for share, factor in _ENDS
+    )
+    return min(result.time_s, *ends_s)

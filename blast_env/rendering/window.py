@@ -3,8 +3,8 @@
 import os
 
 from blast_env.errors import BlastEnvError
-from blast_env.rendering.extra import render_extra
 from blast_env.rendering.frames import Frame
+from blast_env.rendering.style import render_extra
 
 with render_extra():
     import pygame

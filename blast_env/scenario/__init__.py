@@ -1,6 +1,7 @@
 """Scenario files: models, validation, loading and saving."""
 
-from blast_env.scenario.build_zone import AccessWay, BuildZone, CostArea, KeepOut
+from blast_env.geometry import Cell
+from blast_env.physics.scene import Charge
 from blast_env.scenario.files import (
     bundled_scenarios,
     find_problems,
@@ -9,14 +10,11 @@ from blast_env.scenario.files import (
     save_scenario,
     scenario_hash,
 )
-from blast_env.scenario.layout import check_layout, usable_cells
 from blast_env.scenario.layout_file import LayoutFile, load_layout, write_layout
 from blast_env.scenario.models import (
     SCHEMA_VERSION,
     AnySource,
     AnyStructure,
-    Cell,
-    Charge,
     ConcreteSquareSection,
     ModularObstacleSection,
     PointSource,
@@ -26,8 +24,9 @@ from blast_env.scenario.models import (
     SimulationSection,
     Site,
 )
-from blast_env.scenario.placement import Placement
+from blast_env.scenario.placement import Placement, check_layout, usable_cells
 from blast_env.scenario.problems import Problem, ScenarioError
+from blast_env.scenario.zone import AccessWay, BuildZone, CostArea, KeepOut
 
 __all__ = [
     "SCHEMA_VERSION",

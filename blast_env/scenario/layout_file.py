@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from blast_env.atomic import write_atomically
 from blast_env.errors import LayoutError, suggestion
-from blast_env.scenario.cells import cell_from
-from blast_env.scenario.layout import check_layout
-from blast_env.scenario.models import Cell, Scenario
-from blast_env.scenario.reading import MAX_BYTES, read_text
-from blast_env.scenario.wording import key_path, shortened, type_word, value_text
+from blast_env.files import write_atomically
+from blast_env.geometry import Cell
+from blast_env.scenario.files import MAX_BYTES, read_text
+from blast_env.scenario.models import Scenario
+from blast_env.scenario.placement import cell_from, check_layout
+from blast_env.scenario.problems import key_path, shortened, type_word, value_text
 
 MAX_DIGITS: Final = 1000
 """Digits of an integer in a layout file."""

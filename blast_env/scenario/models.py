@@ -12,15 +12,14 @@ import numpy as np
 from pydantic import AfterValidator, Field, StrictInt, ValidationError, model_validator
 
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Cell
 from blast_env.physics.parameters import SimulationParameters
-from blast_env.scenario.build_zone import BuildZone, KeepOut
+from blast_env.physics.scene import Charge
 from blast_env.scenario.checks import Parts, charge_radius_m, check_parts, sound_parts
 from blast_env.scenario.problems import ScenarioError, problems_from
 from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
-    Cell,
-    Charge,
     ChargeSource,
     ConcreteSquareSection,
     ModularObstacleSection,
@@ -30,11 +29,12 @@ from blast_env.scenario.sections import (
     RectangleSource,
     Section,
     SegmentSource,
+    SimulationSection,
     Site,
     SizeM,
     StructureSection,
 )
-from blast_env.scenario.simulation import SimulationSection
+from blast_env.scenario.zone import BuildZone, KeepOut
 from blast_env.units import MODULE_SIDE_M
 
 __all__ = [
@@ -60,8 +60,10 @@ __all__ = [
     "StructureSection",
 ]
 
+
 SCHEMA_VERSION: Final = 1
 """The version of the file format that this release reads and writes."""
+
 
 _LATER_KEYS: Final = ("clearance_m", "module_cost", "cost_areas", "budget", "access_way")
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""

@@ -1,23 +1,77 @@
-"""The modules placed so far, and where the next may stand."""
+"""Placing modules: which cells are free, and layouts that are legal."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import fsum
+from operator import index
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.arrays import BoolArray
 from blast_env.errors import LayoutError
-from blast_env.scenario.access_way import closing_cells, is_open
-from blast_env.scenario.build_zone import BuildZone
-from blast_env.scenario.cells import cell_from, cell_text, cells_from
+from blast_env.geometry import Cell
 from blast_env.scenario.models import Scenario
-from blast_env.scenario.sections import Cell
-from blast_env.scenario.usability import EmptyZone, Surroundings, empty_zone, reason_against
+from blast_env.scenario.problems import type_word, value_text
+from blast_env.scenario.zone import (
+    BuildZone,
+    EmptyZone,
+    Surroundings,
+    closing_cells,
+    empty_zone,
+    is_open,
+    reason_against,
+)
 
-BoolArray = NDArray[np.bool_]
+_PAIR: Final = "must be a pair of integers (row, column)"
+
+
+def cells_from(layout: Any) -> tuple[Cell, ...]:
+    """Return the cells of a layout as plain integers, in their order.
+
+    Args:
+        layout: A list of (row, column). NumPy integers and arrays are welcome.
+
+    Raises:
+        LayoutError: If it is anything else: a set has no order, and floats and truth values are
+            no integers.
+    """
+    is_array = isinstance(layout, np.ndarray) and layout.ndim > 0
+    if is_array or (isinstance(layout, Sequence) and not isinstance(layout, str | bytes)):
+        return tuple(cell_from(item, f"layout[{i}]") for i, item in enumerate(layout))
+    raise LayoutError(f"layout is {type_word(layout)}, must be a list of (row, column) pairs")
+
+
+def cell_from(item: Any, place: str) -> Cell:
+    """Return a pair of integers as a cell.
+
+    Args:
+        item: (row, column), as for `cells_from`.
+        place: Where it comes from, for the error.
+
+    Raises:
+        LayoutError: If it is anything else.
+    """
+    listed = item.tolist() if isinstance(item, np.ndarray | np.generic) else item
+    if not isinstance(listed, list | tuple):
+        raise LayoutError(f"{place}: is {type_word(listed)}, {_PAIR}")
+    if len(listed) != 2:
+        raise LayoutError(f"{place}: has {len(listed)} values, {_PAIR}")
+    if not all(_is_integer(number) for number in listed):
+        raise LayoutError(f"{place}: is ({', '.join(map(type_word, listed))}), {_PAIR}")
+    return index(listed[0]), index(listed[1])
+
+
+def cell_text(cell: Cell) -> str:
+    """Return a cell for a message: `cell (3, 4)`."""
+    return f"cell ({value_text(cell[0])}, {value_text(cell[1])})"
+
+
+def _is_integer(value: Any) -> bool:
+    """Whether the value is an integer; `True` and 1.0 are not."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True)
@@ -257,3 +311,28 @@ def _is_on_grid(zone: BuildZone, cell: Cell) -> bool:
 
 def _counted_modules(count: int) -> str:
     return "1 module" if count == 1 else f"{count} modules"
+
+
+def usable_cells(scenario: Scenario) -> NDArray[np.bool_]:
+    """Return which cells may hold a module as far as the site is concerned.
+
+    That leaves out keep-outs, structures, their clearance and the charge; what depends on the
+    modules already placed (stock, budget, access way) is for `Placement` to say.
+
+    Returns:
+        An array of shape (rows, columns), read-only; (0, 0) without a build zone.
+    """
+    return Placement.empty(scenario).usable
+
+
+def check_layout(scenario: Scenario, layout: Sequence[Cell]) -> tuple[Cell, ...]:
+    """Return the cells of a layout as plain integers, in their order.
+
+    Args:
+        scenario: The scenario that the layout is for.
+        layout: (row, column) of each module. NumPy integers and arrays are welcome.
+
+    Raises:
+        LayoutError: As `Placement.of` does, if a cell is not available.
+    """
+    return Placement.of(scenario, layout).cells

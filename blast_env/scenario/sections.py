@@ -4,7 +4,9 @@ All lengths are in metres, x to the right and y upwards from the lower left corn
 """
 
 import re
-from typing import Annotated, Literal, NamedTuple
+from collections.abc import Mapping
+from itertools import chain
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
@@ -15,17 +17,34 @@ from pydantic import (
     StrictBool,
     StrictFloat,
     StrictInt,
+    ValidationError,
 )
 
 from blast_env.geometry import Rectangle
+from blast_env.physics.parameters import SimulationParameters, with_overrides
+from blast_env.physics.presets import PRESETS, preset
+from blast_env.scenario.problems import (
+    Problem,
+    ScenarioError,
+    problems_from,
+    type_word,
+    unknown_key,
+    unknown_name,
+)
 from blast_env.units import MODULE_SIDE_M
 
 Coordinate = Annotated[StrictFloat, Field(ge=0.0, le=2000.0)]
+
+
 Length = Annotated[StrictFloat, Field(gt=0.0, le=2000.0)]
+
+
 PointM = tuple[Coordinate, Coordinate]
+
+
 SizeM = tuple[Length, Length]
-Cell = tuple[int, int]
-"""(row, column) of a build-zone cell, from 0; rows count upwards, columns to the right."""
+
+
 Count = Annotated[StrictInt, Field(ge=1, le=1000)]
 
 
@@ -37,13 +56,6 @@ def _check_name(name: str) -> str:
 
 
 Name = Annotated[str, AfterValidator(_check_name)]
-
-
-class Charge(NamedTuple):
-    """One charge: where it is and its TNT-equivalent mass."""
-
-    position_m: tuple[float, float]
-    tnt_kg: float
 
 
 class Section(BaseModel):
@@ -194,3 +206,57 @@ class ConcreteSquareSection(StructureSection):
 AnyStructure = Annotated[
     ModularObstacleSection | ConcreteSquareSection, Field(discriminator="kind")
 ]
+
+
+def _check_preset(name: str) -> str:
+    """Refuse the name of a preset that does not exist."""
+    if name not in PRESETS:
+        raise ScenarioError("preset", [Problem("", unknown_name("preset", name, PRESETS))])
+    return name
+
+
+def _check_overrides(overrides: dict[str, Any]) -> dict[str, Any]:
+    """Refuse overrides of parameters that do not exist and values out of bounds."""
+    groups = (_group_problems(group, values) for group, values in overrides.items())
+    problems = tuple(chain.from_iterable(groups))
+    if problems:
+        raise ScenarioError("overrides", problems)
+    return overrides
+
+
+def _group_problems(group: str, values: object) -> tuple[Problem, ...]:
+    """Return what is wrong with the overrides of one group of parameters."""
+    field = SimulationParameters.model_fields.get(group)
+    if field is None:
+        return (unknown_key((group,), SimulationParameters.model_fields),)
+    model = field.annotation
+    if not (isinstance(model, type) and issubclass(model, BaseModel)):
+        raise TypeError(f"SimulationParameters.{group} is not a group of parameters")
+    if not isinstance(values, Mapping):
+        return (Problem(group, f"is {type_word(values)}, must be a table"),)
+    try:
+        # A group's values are independent of each other and all have defaults, so the overrides
+        # can be checked alone and every complaint is about a key that was written.
+        model.model_validate(values, strict=True)
+    except ValidationError as error:
+        return problems_from(error, model, (group,))
+    return ()
+
+
+class SimulationSection(Section):
+    """The blast model's parameters: a preset by name, and what differs from it.
+
+    Attributes:
+        preset: Name of one of `blast_env.physics.presets.PRESETS`.
+        overrides: Nested like `SimulationParameters`: `{"air": {"spacing_units": 3.0}}`.
+    """
+
+    preset: Annotated[str, AfterValidator(_check_preset)] = "ballistic"
+    overrides: Annotated[dict[str, Any], AfterValidator(_check_overrides)] = Field(
+        default_factory=dict
+    )
+
+    @property
+    def parameters(self) -> SimulationParameters:
+        """The preset with the overrides applied."""
+        return with_overrides(preset(self.preset), self.overrides)

@@ -1,12 +1,17 @@
 """Generated sites: varied, valid, worth solving, and all of one size."""
 
-from blast_env.sites.criterion import Objection, SightLineCriterion, SiteCriterion
+from blast_env.sites.criterion import (
+    Objection,
+    SightLineCriterion,
+    SiteCriterion,
+    SiteMeasures,
+    sight_line_layout,
+)
 from blast_env.sites.generate import draw_site, generate_site
-from blast_env.sites.measures import SiteMeasures, sight_line_layout
 from blast_env.sites.ranges import SiteRanges
-from blast_env.sites.sight_lines import SightLines
 from blast_env.sites.source import HELD_OUT_SITES, SiteSource
 from blast_env.sites.turning import turned
+from blast_env.sites.visibility import SightLines
 
 __all__ = [
     "HELD_OUT_SITES",

@@ -7,7 +7,6 @@ from typing import Any, Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.rendering.extra import render_extra
 from blast_env.rendering.site_plan import rectangle_patch
 from blast_env.rendering.style import (
     EXPLOSIVE,
@@ -17,10 +16,11 @@ from blast_env.rendering.style import (
     SITE,
     STRUCTURE,
     count_of,
+    render_extra,
     unit_interval,
 )
 from blast_env.scenario import BuildZone, Scenario
-from blast_env.scenario.clearance import source_bounds_m
+from blast_env.scenario.zone import source_bounds_m
 
 with render_extra():
     from matplotlib.artist import Artist

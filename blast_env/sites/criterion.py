@@ -1,10 +1,114 @@
-"""Which sites are worth solving."""
+"""Which generated sites are worth solving, by measures that need no blast."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from blast_env.scenario import Scenario
-from blast_env.sites.measures import SiteMeasures
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Cell
+from blast_env.scenario import BuildZone, Placement, Scenario, usable_cells
+from blast_env.sites.visibility import SightLines
+
+
+@dataclass(frozen=True)
+class SiteMeasures:
+    """Shares of the sight lines; see `SightLines`.
+
+    Attributes:
+        open_share: Share that no other structure stops; the other shares are of these lines.
+        layout_share: Share that `sight_line_layout` cuts.
+        wall_share: Share that the best straight wall cuts, one row or column of the zone with as
+            many modules in a run as there are, budget and access way aside.
+        random_share: Share that as many modules cut on cells drawn at random, on average,
+            access way aside.
+    """
+
+    open_share: float
+    layout_share: float
+    wall_share: float
+    random_share: float
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "SiteMeasures":
+        """Return the measures of a scenario.
+
+        Raises:
+            BlastEnvError: If it has no build zone.
+        """
+        lines = SightLines.of(scenario)
+        return cls(
+            open_share=lines.open_share,
+            layout_share=lines.cut_share(sight_line_layout(scenario, lines)),
+            wall_share=_wall_share(scenario, lines),
+            random_share=_random_share(scenario, lines),
+        )
+
+
+def sight_line_layout(scenario: Scenario, lines: SightLines) -> tuple[Cell, ...]:
+    """Return a layout of which each module cuts as many lines by its cost as one more can.
+
+    It keeps every condition of the build zone, and ends where no module would cut another line.
+
+    Args:
+        scenario: The scenario.
+        lines: Its sight lines.
+    """
+    placement = Placement.empty(scenario)
+    left = lines.weight.copy()
+    cut = lines.cut.reshape(len(left), -1)
+    while not placement.is_full:
+        gain = (left @ cut).reshape(placement.free.shape)
+        worth = np.where(placement.free, gain / placement.module_costs, 0.0)
+        row, column = (int(index) for index in np.unravel_index(worth.argmax(), worth.shape))
+        if not worth[row, column] > 0.0:
+            break
+        placement = placement.place((row, column))
+        left[lines.cut[:, row, column]] = 0.0
+    return placement.cells
+
+
+def _wall_share(scenario: Scenario, lines: SightLines) -> float:
+    """Return the share of the lines that the best straight run of modules cuts."""
+    zone, usable = _zone(scenario), usable_cells(scenario)
+    cut = lines.cut & usable
+    best = 0.0
+    for along_rows in (cut, cut.transpose(0, 2, 1)):
+        run = min(zone.stock, along_rows.shape[1])
+        cut_by_run = _any_in_runs(along_rows, run).reshape(len(lines.weight), -1)
+        best = max(best, float((lines.weight @ cut_by_run).max(initial=0.0)))
+    return best / lines.weight.sum() if len(lines.weight) else 0.0
+
+
+def _any_in_runs(cut: BoolArray, run: int) -> BoolArray:
+    """Return whether any cell of each run along the second axis is true, (lines, runs, others)."""
+    counts = np.zeros((cut.shape[0], cut.shape[1] + 1, cut.shape[2]), dtype=np.int32)
+    np.cumsum(cut, axis=1, out=counts[:, 1:])
+    anything: BoolArray = counts[:, run:] > counts[:, :-run]
+    return anything
+
+
+def _random_share(scenario: Scenario, lines: SightLines) -> float:
+    """Return the expected share of the lines that modules on random usable cells cut."""
+    zone, usable = _zone(scenario), usable_cells(scenario)
+    cells = int(usable.sum())
+    modules = zone.stock
+    if zone.budget is not None:
+        mean_cost = Placement.empty(scenario).module_costs[usable].mean()
+        modules = min(modules, int(zone.budget / mean_cost))
+    # A line is missed if all modules stand on the cells that do not cut it.
+    harmless = cells - lines.cut[:, usable].sum(axis=1)
+    missed: FloatArray = np.ones(len(harmless))
+    for placed in range(modules):
+        missed *= np.maximum(harmless - placed, 0) / (cells - placed)
+    share = 1.0 - float(lines.weight @ missed) / max(float(lines.weight.sum()), 1e-300)
+    return round(share, 9)  # so that the last bit, which differs between machines, never decides
+
+
+def _zone(scenario: Scenario) -> BuildZone:
+    if scenario.build_zone is None:  # SightLines.of refuses a scenario without a zone
+        raise AssertionError("a scenario without a build zone has sight lines")
+    return scenario.build_zone
 
 
 class Objection(NamedTuple):

@@ -1,8 +1,10 @@
-"""From a seed to a site."""
+"""Drawing a site: ground, structures, charges and conditions."""
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Final
+from dataclasses import dataclass
+from math import floor
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -10,7 +12,11 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.scenario import (
     SCHEMA_VERSION,
+    AccessWay,
     AnySource,
+    BuildZone,
+    CostArea,
+    KeepOut,
     ModularObstacleSection,
     RectangleSource,
     Scenario,
@@ -19,27 +25,296 @@ from blast_env.scenario import (
     SimulationSection,
     Site,
 )
-from blast_env.sites.conditions import draw_build_zone
+from blast_env.scenario.zone import box_distances_m
 from blast_env.sites.criterion import Objection, SightLineCriterion, SiteCriterion
-from blast_env.sites.draws import Draws
-from blast_env.sites.ground import Ground, draw_ground
-from blast_env.sites.ranges import SiteRanges
+from blast_env.sites.ranges import MARGIN_M, SiteRanges, Span, WholeSpan, modules_within
 from blast_env.sites.turning import turned
 from blast_env.units import MODULE_SIDE_M
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Draws values; each method takes one number from the stream.
+
+    Attributes:
+        rng: The stream.
+    """
+
+    rng: np.random.Generator
+
+    def length_m(self, span_m: Span) -> float:
+        """Return a multiple of 0.5 m; the lowest one where the range has none."""
+        first, last = modules_within(span_m)
+        return int(self.rng.integers(first, max(first, last), endpoint=True)) * MODULE_SIDE_M
+
+    def amount(self, span: Span, digits: int) -> float:
+        """Return a number, rounded to so many decimal places where the range allows it."""
+        low, high = span
+        drawn = round(low + (high - low) * float(self.rng.random()), digits)
+        return min(max(drawn, low), high)
+
+    def count(self, span: WholeSpan) -> int:
+        """Return a whole number."""
+        return int(self.rng.integers(*span, endpoint=True))
+
+    def happens(self, probability: float) -> bool:
+        """Return true with this probability."""
+        return bool(self.rng.random() < probability)
+
+
+def on_grid(value_m: float) -> float:
+    """Return the largest multiple of 0.5 m that is not above a length."""
+    return floor(value_m / MODULE_SIDE_M + 1e-9) * MODULE_SIDE_M
+
+
+_TOLERANCE_M = 1e-9
+
+
+class Apart(NamedTuple):
+    """Something that a thing must not come near to.
+
+    Attributes:
+        rectangle: Where it is, m.
+        distance_m: How far away the thing must be; at 0 they may touch, but not overlap.
+    """
+
+    rectangle: Rectangle
+    distance_m: float
+
+
+def draw_place(
+    draws: Draws, area: Rectangle, size_m: tuple[float, float], others: Sequence[Apart]
+) -> Rectangle | None:
+    """Draw where a thing stands, all places on the 0.5 m grid as likely.
+
+    Args:
+        draws: Draws.
+        area: Where it must lie, m; its corner is on the grid.
+        size_m: Width and height.
+        others: What it must keep away from.
+
+    Returns:
+        `None` if there is no such place.
+    """
+    width_m, height_m = size_m
+    left = np.arange(area.left, area.right - width_m + _TOLERANCE_M, MODULE_SIDE_M)
+    bottom = np.arange(area.bottom, area.top - height_m + _TOLERANCE_M, MODULE_SIDE_M)
+    bottom = bottom[:, np.newaxis]
+    boxes = (left, bottom, left + width_m, bottom + height_m)
+    has_room = np.ones((len(bottom), len(left)), dtype=bool)
+    for rectangle, distance_m in others:
+        if distance_m > 0.0:
+            has_room &= box_distances_m(rectangle, boxes) >= distance_m - _TOLERANCE_M
+        else:
+            # Smaller by a little, so that what only touches is at a distance.
+            has_room &= box_distances_m(rectangle.grown(-_TOLERANCE_M), boxes) > 0.0
+    places = np.argwhere(has_room)
+    if not len(places):
+        return None
+    row, column = places[draws.count((0, len(places) - 1))].tolist()
+    corner_m = (float(left[column]), float(bottom[row, 0]))
+    return Rectangle.from_corner(corner_m, size_m)
+
+
+NEIGHBOUR_DISTANCE_M: Final = 2.0
+"""Least distance of the neighbouring building from the protected one and from the threat."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where things lie on a site, m.
+
+    Attributes:
+        threat: Where the centre of the charge may be; of no width if that is a line.
+        building: The protected building.
+        zone: The build zone.
+        neighbour: The unprotected building, if there is one.
+    """
+
+    threat: Rectangle
+    building: Rectangle
+    zone: Rectangle
+    neighbour: Rectangle | None
+
+
+def draw_ground(draws: Draws, ranges: SiteRanges) -> Ground:
+    """Draw where things lie."""
+    threat = _draw_threat(draws, ranges)
+    building = _draw_building(draws, ranges, threat)
+    zone = _draw_zone(draws, ranges, threat, building)
+    neighbour = None
+    if draws.happens(ranges.neighbour_probability):
+        neighbour = _draw_neighbour(draws, ranges, Ground(threat, building, zone, None))
+    return Ground(threat, building, zone, neighbour)
+
+
+def _draw_threat(draws: Draws, ranges: SiteRanges) -> Rectangle:
+    left = draws.length_m(ranges.road_from_border_m)
+    if draws.happens(ranges.parking_probability):
+        depth_m = draws.length_m(ranges.parking_depth_m)
+        length_m = draws.length_m(ranges.parking_length_m)
+    else:
+        depth_m = 0.0
+        length_m = draws.length_m(ranges.road_length_m)
+    bottom = _draw_bottom(draws, ranges, ranges.threat_shift_m, length_m)
+    return Rectangle.from_corner((left, bottom), (depth_m, length_m))
+
+
+def _draw_building(draws: Draws, ranges: SiteRanges, threat: Rectangle) -> Rectangle:
+    room_m = ranges.side_m - MARGIN_M - threat.right
+    stand_off_m = draws.length_m(_at_most(ranges.stand_off_m, room_m - ranges.depth_m[0]))
+    depth_m = draws.length_m(_at_most(ranges.depth_m, room_m - stand_off_m))
+    facade_m = draws.length_m(ranges.facade_m)
+    bottom = _draw_bottom(draws, ranges, ranges.building_shift_m, facade_m)
+    return Rectangle.from_corner((threat.right + stand_off_m, bottom), (depth_m, facade_m))
+
+
+def _draw_zone(
+    draws: Draws, ranges: SiteRanges, threat: Rectangle, building: Rectangle
+) -> Rectangle:
+    side_m = ranges.zone_side_m
+    left = threat.right + draws.length_m(ranges.zone_from_threat_m)
+    middle = (threat.centre[1] + building.centre[1]) / 2.0
+    bottom = on_grid(middle - side_m / 2.0) + draws.length_m(ranges.zone_shift_m)
+    bottom = min(max(bottom, 0.0), ranges.side_m - side_m)
+    return Rectangle.from_corner((left, bottom), (side_m, side_m))
+
+
+def _draw_neighbour(draws: Draws, ranges: SiteRanges, ground: Ground) -> Rectangle | None:
+    """Draw a building beside or before the protected one, outside the zone, if there is room."""
+    size_m = (draws.length_m(ranges.neighbour_side_m), draws.length_m(ranges.neighbour_side_m))
+    area = Rectangle(MARGIN_M, MARGIN_M, ground.building.right, ranges.side_m - MARGIN_M)
+    others = (
+        Apart(ground.building, NEIGHBOUR_DISTANCE_M),
+        Apart(ground.threat, NEIGHBOUR_DISTANCE_M),
+        Apart(ground.zone, 0.0),
+    )
+    return draw_place(draws, area, size_m, others)
+
+
+def _draw_bottom(draws: Draws, ranges: SiteRanges, shift_m: Span, length_m: float) -> float:
+    """Draw the lower end of a thing along the road from how far its middle is from the site's."""
+    lowest = on_grid((ranges.side_m - length_m) / 2.0)
+    bottom = lowest + draws.length_m(shift_m)
+    return min(max(bottom, MARGIN_M), ranges.side_m - MARGIN_M - length_m)
+
+
+def _at_most(span_m: Span, most_m: float) -> Span:
+    return span_m[0], min(span_m[1], most_m)
+
+
+HYDRANT_SIDE_M: Final = 1.5
+"""Side of the square around a hydrant that must stay free."""
+
+
+def draw_build_zone(draws: Draws, ranges: SiteRanges, ground: Ground) -> BuildZone:
+    """Draw the conditions of the build zone."""
+    stock = draws.count(ranges.stock)
+    clearance_m = draws.length_m(ranges.clearance_m)
+    keep_outs = _draw_keep_outs(draws, ranges, ground)
+    access_way = None
+    if draws.happens(ranges.access_way_probability):
+        access_way = _draw_access_way(draws, ranges, ground)
+    cost_areas: tuple[CostArea, ...] = ()
+    budget = None
+    if draws.happens(ranges.duct_probability):
+        cost_areas = (_draw_duct(draws, ranges, ground.zone),)
+        budget = round(draws.amount(ranges.budget_share, 2) * stock, 1)
+    return BuildZone(
+        corner_m=(ground.zone.left, ground.zone.bottom),
+        rows=ranges.zone_cells,
+        columns=ranges.zone_cells,
+        stock=stock,
+        keep_outs=keep_outs,
+        clearance_m=clearance_m,
+        cost_areas=cost_areas,
+        budget=budget,
+        access_way=access_way,
+    )
+
+
+def _draw_keep_outs(draws: Draws, ranges: SiteRanges, ground: Ground) -> tuple[KeepOut, ...]:
+    keep_outs: list[KeepOut] = []
+    if draws.happens(ranges.path_probability):
+        keep_outs += _draw_path(draws, ranges, ground)
+    squares = [("hydrant", HYDRANT_SIDE_M)] if draws.happens(ranges.hydrant_probability) else []
+    trees = draws.count(ranges.trees)
+    squares += [("tree", draws.length_m(ranges.tree_side_m)) for _ in range(trees)]
+    for reason, side_m in squares:
+        others = [Apart(each.rectangle_m, 0.0) for each in keep_outs]
+        place = draw_place(draws, _yard(ground), (side_m, side_m), others)
+        if place is not None:
+            keep_outs.append(
+                KeepOut(corner_m=(place.left, place.bottom), size_m=(side_m, side_m), reason=reason)
+            )
+    return tuple(keep_outs)
+
+
+def _draw_path(draws: Draws, ranges: SiteRanges, ground: Ground) -> list[KeepOut]:
+    """Draw the path to the door through the zone; none if no door leads there."""
+    zone, building = ground.zone, ground.building
+    width_m = draws.length_m(ranges.path_width_m)
+    lowest = max(zone.bottom, building.bottom)
+    highest = min(zone.top, building.top) - width_m
+    if highest < lowest:
+        return []
+    bottom = draws.length_m((lowest, highest))
+    return [
+        KeepOut(
+            corner_m=(zone.left, bottom),
+            size_m=(_yard(ground).right - zone.left, width_m),
+            reason="the path from the road to the door must stay open",
+        )
+    ]
+
+
+def _draw_access_way(draws: Draws, ranges: SiteRanges, ground: Ground) -> AccessWay:
+    """Draw a way along the facade, or, where the building leaves it room, one towards it."""
+    along = draws.happens(0.5) or ground.zone.overlaps(ground.building)
+    between: Literal["left_right", "bottom_top"] = "bottom_top" if along else "left_right"
+    return AccessWay(width_m=draws.length_m(ranges.access_way_width_m), between=between)
+
+
+def _draw_duct(draws: Draws, ranges: SiteRanges, zone: Rectangle) -> CostArea:
+    """Draw a strip across the zone, along the facade or towards it."""
+    width_m, side_m = draws.length_m(ranges.duct_width_m), ranges.zone_side_m
+    start_m = draws.length_m((0.0, on_grid(side_m - width_m)))
+    if draws.happens(0.5):
+        corner_m, size_m = (zone.left + start_m, zone.bottom), (width_m, side_m)
+    else:
+        corner_m, size_m = (zone.left, zone.bottom + start_m), (side_m, width_m)
+    return CostArea(
+        corner_m=corner_m,
+        size_m=size_m,
+        module_cost=draws.amount(ranges.duct_module_cost, 1),
+        reason="deep foundations over the duct",
+    )
+
+
+def _yard(ground: Ground) -> Rectangle:
+    """Return the part of the zone before the building."""
+    zone = ground.zone
+    return Rectangle(zone.left, zone.bottom, min(zone.right, ground.building.left), zone.top)
+
 
 RANGES: Final = SiteRanges()
 """The ranges that sites are drawn from unless others are given."""
 
+
 CRITERION: Final = SightLineCriterion()
 """The criterion that sites meet unless another one is given."""
+
 
 MOST_TRIES: Final = 200
 """Sites that are drawn for a seed before it is given up."""
 
+
 MOST_SEED: Final = 2**63 - 1
+
 
 PROTECTED: Final = "building"
 """Name of the protected structure."""
+
 
 _SIDES: Final = ("left", "lower", "right", "upper")
 

@@ -13,8 +13,8 @@ from blast_env.scenario import (
     Scenario,
     SegmentSource,
 )
-from blast_env.scenario.build_zone import Area
 from blast_env.scenario.sections import PointM
+from blast_env.scenario.zone import Area
 
 
 def turned(scenario: Scenario, quarter_turns: int) -> Scenario:

@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from blast_agents.league import Result, Standings, Track, Training, known_track
+from blast_agents.proposal import Proposal
+from blast_agents.rules import expected_charge, line_of_sight_wall
+from blast_agents.search import Layout
 
-from agents.league import Result, Standings, Track, Training, known_track
-from agents.proposal import Proposal
-from agents.rules import expected_charge, line_of_sight_wall
-from agents.search import Layout
-from blast_env.scenario import Charge, Scenario, SegmentSource
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario, SegmentSource
 from tests.agents.search_cases import small_scenario
 
 ROAD = SegmentSource(kind="segment", start_m=(5.0, 15.0), end_m=(5.0, 25.0), tnt_kg=100.0)

@@ -3,11 +3,12 @@
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
+from blast_agents.search import Layout, LayoutProblem, visible_threats
 
-from agents.search import Layout, LayoutProblem, visible_threats
 from blast_env import load_scenario
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
-from blast_env.scenario import Cell, Scenario
+from blast_env.geometry import Cell
+from blast_env.scenario import Scenario
 from tests.agents.sites import site
 
 CALIBRATION = "ballistic_kb_100kg"

@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from blast_agents.evaluation import evaluate_layouts
+from blast_agents.training.run_folder import TrainingSettings
+from blast_agents.unseen_cases import FIRST_SEED, unseen_cases
 
-from agents.evaluation import evaluate_layouts
-from agents.training.settings import TrainingSettings
-from agents.unseen_cases import FIRST_SEED, unseen_cases
-from blast_env.envs.scenario_source import SingleScenario
+from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats, evaluate_layout
 from blast_env.sites import HELD_OUT_SITES, SiteSource

@@ -8,20 +8,20 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 import yaml
-from sb3_contrib import MaskablePPO
-from stable_baselines3 import PPO
-
-from agents.training import TrainedAgent, load_archive
-from agents.training.environments import environment_id, training_source
-from agents.training.hyperparameters import (
+from blast_agents.training import TrainedAgent, load_archive
+from blast_agents.training.environments import environment_id, training_source
+from blast_agents.training.hyperparameters import (
     ALGORITHMS,
     HYPERPARAMETER_KEYS,
     WRAPPERS,
     hyperparameter_file,
     load_hyperparameters,
+    parse_options,
+    schedule,
 )
-from agents.training.schedule import schedule
-from agents.training.set_options import parse_options
+from sb3_contrib import MaskablePPO
+from stable_baselines3 import PPO
+
 from blast_env import load_scenario
 from blast_env.envs.registration import WITHOUT_BUILD_ZONE
 from blast_env.errors import BlastEnvError
@@ -34,7 +34,7 @@ OF_RL_ZOO = {"n_timesteps", "n_envs", "env_wrapper", "normalize"}
 
 
 ELSEWHERE = """
-from agents.policies.spatial import SpatialPolicy
+from blast_agents.policies.spatial import SpatialPolicy
 
 class Schedule:
     def __call__(self, progress_remaining):

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from blast_agents.league import find_tracks, hidden_track, known_track, sites_track
+from blast_agents.league.trained import TrainedRun, check_runs
+from blast_agents.training import train
 from typer.testing import CliRunner, Result
 
-from agents.league import find_tracks, hidden_track, known_track, sites_track
-from agents.league.trained import TrainedRun, check_runs
-from agents.training import train
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import BlastEvaluator

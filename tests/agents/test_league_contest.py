@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from agents.league import (
+from blast_agents.league import (
     Agent,
     Contest,
     NoBarrier,
@@ -18,13 +17,21 @@ from agents.league import (
     known_track,
     standard_entries,
 )
-from agents.league.store import search_key
-from agents.rules import wall_near_charge
-from agents.search import LayoutProblem, RandomSearch, Report, SearchResult, find_search_method
+from blast_agents.league.store import search_key
+from blast_agents.rules import wall_near_charge
+from blast_agents.search import (
+    LayoutProblem,
+    RandomSearch,
+    Report,
+    SearchResult,
+    find_search_method,
+)
+
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, evaluate_against
-from blast_env.scenario import Charge, PointSource
+from blast_env.physics.scene import Charge
+from blast_env.scenario import PointSource
 from blast_env.sites import SightLines
 from tests.agents.league_cases import TRAINING, WallAgent, road_scenario
 

@@ -6,15 +6,20 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from blast_agents.league import Standings, Verdict, hidden_track, verdicts
+from blast_agents.league.figure import league_figure
+from blast_agents.league.report import (
+    case_table,
+    markdown,
+    summary_table,
+    verdict_lines,
+    write_league,
+)
+from blast_agents.league.tracks import HIDDEN_SEEDS
 from matplotlib.figure import Figure
 
-from agents.league import Standings, Verdict, hidden_track, verdicts
-from agents.league.figure import league_figure
-from agents.league.report import markdown, verdict_lines, write_league
-from agents.league.tables import case_table, summary_table
-from agents.league.tracks import HIDDEN_SEEDS
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Estimate, reduction_estimate
+from blast_env.statistics import Estimate, reduction_estimate
 from tests.agents.league_cases import TRAINING, result, road_scenario, standings
 
 BARE = [[100.0, 300.0], [10.0, 30.0], [400.0, 400.0]]

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
+from blast_agents.league import Track, find_tracks, hidden_track, known_track, sites_track
+from blast_agents.league.tracks import MOST_CASES, MOST_LEAGUE_SEED, MOST_SEEDS
+from blast_agents.search.problem import SEED_SPAN
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.league import Track, find_tracks, hidden_track, known_track, sites_track
-from agents.league.tracks import MOST_CASES, MOST_LEAGUE_SEED, MOST_SEEDS
-from agents.search.problem import SEED_SPAN
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import save_scenario
 from blast_env.sites import HELD_OUT_SITES, SiteSource

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
+from blast_agents.rules import random_layout
 
-from agents.random_layouts import random_layout
 from blast_env import load_scenario
 from blast_env.scenario import Placement
 from tests.agents.sites import site

@@ -5,10 +5,7 @@ from math import atan2, pi
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
-
-from agents.rules import (
+from blast_agents.rules import (
     NEAR_BUILDING,
     NEAR_CHARGE,
     RULES,
@@ -18,9 +15,13 @@ from agents.rules import (
     wall_near_building,
     wall_near_charge,
 )
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Charge, Placement, PointSource, RectangleSource, Scenario
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Placement, PointSource, RectangleSource, Scenario
 from tests.agents.sites import site
 
 WEST = Charge((5.0, 20.0), 100.0)

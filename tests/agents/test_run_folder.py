@@ -5,9 +5,9 @@ from pathlib import Path
 from shutil import copytree
 
 import pytest
+from blast_agents.training import resume, train
+from blast_agents.training.agent import Checkpoint
 
-from agents.training import resume, train
-from agents.training.checkpoint import Checkpoint
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import save_scenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario

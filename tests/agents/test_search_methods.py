@@ -5,9 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-
-from agents.rules import wall_near_building, wall_near_charge
-from agents.search import (
+from blast_agents.rules import wall_near_building, wall_near_charge
+from blast_agents.search import (
     SEARCH_METHODS,
     GeneticSearch,
     Layout,
@@ -16,7 +15,8 @@ from agents.search import (
     find_search_method,
     hidden_threats,
 )
-from agents.search.exhaustive import every_layout
+from blast_agents.search.methods import every_layout
+
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.scenario import Placement, Scenario

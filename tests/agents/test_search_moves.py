@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from blast_agents.rules import random_layout
+from blast_agents.search import Layout
+from blast_agents.search.evolution import cut, individual, layout_of, mixed, repaired
+from blast_agents.search.moves import Moves, legal_part, random_part, random_walls
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.random_layouts import random_layout
-from agents.search import Layout
-from agents.search.moves import Moves, legal_part, random_part, random_walls
-from agents.search.pymoo_operators import cut, individual, layout_of, mixed, repaired
 from blast_env import load_scenario
 from blast_env.scenario import Placement, Scenario
 from tests.agents.search_cases import small_scenario

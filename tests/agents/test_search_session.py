@@ -4,18 +4,22 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from blast_agents.search.problem import (
+    LayoutProblem,
+    Plan,
+    Unprotected,
+    hidden_threats,
+    visible_threats,
+)
+from blast_agents.search.session import SearchEndedError, SearchSession
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.search.plan import Plan
-from agents.search.problem import LayoutProblem, hidden_threats, visible_threats
-from agents.search.session import SearchEndedError, SearchSession
-from agents.search.unprotected import Unprotected
 from blast_env.envs.objective import Objective
-from blast_env.envs.risk import ConditionalValueAtRisk, MeanRisk
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, Threat
-from blast_env.scenario import Charge
+from blast_env.physics.scene import Charge
+from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
 from tests.agents.search_cases import ballistic, small_problem, small_scenario
 
 LAYOUTS = [((row, column),) for row in range(4) for column in range(3)]

@@ -6,15 +6,16 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from blast_agents.policies.features import ZoneGeometry, ZoneView
+from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
+from blast_agents.rules import RULES
+from blast_agents.training.agent import logits_of
 
 import blast_env  # noqa: F401
-from agents.policies.geometry import ZoneGeometry, ZoneView
-from agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
-from agents.rules import RULES
-from agents.training.model import logits_of
 from blast_env import load_scenario
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.scenario import Charge, Scenario
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario
 from blast_env.sites import SightLines, generate_site
 from blast_env.sites.turning import turned
 

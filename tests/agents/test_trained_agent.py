@@ -8,20 +8,19 @@ from shutil import copytree
 import numpy as np
 import pytest
 import torch
+from blast_agents.proposal import LayoutAgent
+from blast_agents.training import TrainedAgent, load_agent, load_archive, train
+from blast_agents.training.agent import Checkpoint, make_model, make_policy
+from blast_agents.training.environments import make_environments, training_source
+from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from gymnasium import spaces
 from sb3_contrib import MaskablePPO
 
-from agents.proposal import LayoutAgent
-from agents.training import TrainedAgent, load_agent, load_archive, train
-from agents.training.checkpoint import Checkpoint
-from agents.training.environments import make_environments, training_source
-from agents.training.model import make_model, make_policy
-from agents.training.run_folder import RunFolder
-from agents.training.settings import RunConfiguration, TrainingSettings
 from blast_env import load_scenario
-from blast_env.envs.grid_observation import GridObservation
+from blast_env.envs.observations import GridObservation
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Charge, Placement, Scenario
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Placement, Scenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 
 CHARGES = (Charge((2.0, 5.5), 100.0), Charge((2.0, 8.5), 100.0), None)

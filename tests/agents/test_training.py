@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 import torch
 import yaml
+from blast_agents.training import resume, train
+from blast_agents.training.agent import Checkpoint
+from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunFolder, read_rows
+from blast_agents.training.train import TrainingResult
 
-from agents.training import resume, train
-from agents.training.checkpoint import Checkpoint
-from agents.training.records import EvaluationRow, RolloutRow, read_rows
-from agents.training.run_folder import RunFolder
-from agents.training.train import TrainingResult
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import load_scenario
 from tests.agents.training_runs import (
@@ -214,7 +213,7 @@ def test_an_unknown_engine_is_refused_before_anything_is_written(tmp_path: Path)
 
 
 def test_a_policy_for_the_other_algorithm_is_refused(tmp_path: Path) -> None:
-    chosen = hyperparameters({"policy": "agents.policies.spatial.SpatialPolicy"})
+    chosen = hyperparameters({"policy": "blast_agents.policies.spatial.SpatialPolicy"})
     with pytest.raises(BlastEnvError, match="for maskable_ppo"):
         train(settings(scenario_file(tmp_path)), chosen, tmp_path / "run")
 
@@ -222,8 +221,8 @@ def test_a_policy_for_the_other_algorithm_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("algorithm", "threat", "policy"),
     [
-        ("ppo", "visible", "agents.policies.spatial.SpatialPolicy"),
-        ("maskable_ppo", "hidden", "agents.policies.spatial.SpatialMaskablePolicy"),
+        ("ppo", "visible", "blast_agents.policies.spatial.SpatialPolicy"),
+        ("maskable_ppo", "hidden", "blast_agents.policies.spatial.SpatialMaskablePolicy"),
     ],
 )
 def test_other_algorithms_and_hidden_threats_train_too(

@@ -3,12 +3,16 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from blast_agents.training import TrainingSettings, load_hyperparameters
+from blast_agents.training.environments import (
+    SITES_ID,
+    EnvironmentMaker,
+    RelativeReward,
+    ThreatPool,
+)
+from blast_agents.training.run_folder import RunConfiguration
 
 import blast_env  # noqa: F401
-from agents.training import TrainingSettings, load_hyperparameters
-from agents.training.environments import SITES_ID, EnvironmentMaker
-from agents.training.settings import RunConfiguration
-from agents.training.wrappers import RelativeReward, ThreatPool
 from blast_env.errors import BlastEnvError
 from blast_env.sites import SiteSource
 from tests.agents.training_runs import small_scenario
@@ -50,7 +54,7 @@ def test_a_pool_repeats_its_threats_so_that_half_of_the_blasts_are_known() -> No
 def test_training_remembers_more_sites_than_an_environment_by_itself() -> None:
     """The blast without a barrier is there when a site of the pool comes again, however late."""
     hyperparameters = load_hyperparameters("maskable_ppo", SITES_ID)
-    pool = [{"agents.training.wrappers.ThreatPool": {"size": 6}}]
+    pool = [{"blast_agents.training.environments.ThreatPool": {"size": 6}}]
     configuration = RunConfiguration(
         settings=TrainingSettings(
             algorithm="maskable_ppo", scenario="sites", steps=1, threat="hidden", hidden_threats=1

@@ -5,7 +5,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from agents.training import Hyperparameters, TrainingSettings, load_hyperparameters
+from blast_agents.training import Hyperparameters, TrainingSettings, load_hyperparameters
+
 from blast_env.scenario import Scenario, save_scenario
 
 SMALL: dict[str, Any] = {

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from blast_env.calibration.shielding import BlockGeometry, ShieldingReport, ShieldingStudy
-from blast_env.calibration.shielding_loads import LoadKind
 from blast_env.physics.parameters import SimulationParameters, with_overrides
+from blast_env.studies.shielding.ratios import LoadKind
+from blast_env.studies.shielding.report import BlockGeometry, ShieldingReport, ShieldingStudy
 
 NARROW = BlockGeometry(margin_m=10.0)
 SMALL = BlockGeometry(side_modules=9, stand_off_m=3.0, margin_m=6.0)

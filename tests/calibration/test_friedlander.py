@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from blast_env.calibration import Friedlander, kingery_bulmash
-from blast_env.calibration.friedlander import fit_friedlander
+from blast_env.calibration.references import fit_friedlander
 from blast_env.errors import BlastEnvError
 
 peaks = st.floats(1e2, 1e8)

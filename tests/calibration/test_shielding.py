@@ -5,14 +5,15 @@ import json
 import numpy as np
 import pytest
 
-from blast_env.calibration.shielding import BlockGeometry, ShieldingReport, ShieldingStudy
-from blast_env.calibration.shielding_loads import Face, LoadKind, face_loads, faces_hit
-from blast_env.calibration.shielding_scenes import FloatArray, block_scenario, wall_scenario
+from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import preset
-from blast_env.scene import draw_charge
+from blast_env.scenario.build_scene import draw_charge
 from blast_env.simulation import simulate
+from blast_env.studies.shielding.ratios import Face, LoadKind, face_loads, faces_hit
+from blast_env.studies.shielding.report import BlockGeometry, ShieldingReport, ShieldingStudy
+from blast_env.studies.shielding.scenes import block_scenario, wall_scenario
 from tests.calibration.shielding_cases import DENSE, NARROW, SMALL
 
 

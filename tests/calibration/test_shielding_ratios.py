@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blast_env.calibration.shielding import ShieldingReport, scaled_ratio
-from blast_env.calibration.shielding_fit import fit_log_quadratic
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.statistics import Estimate
+from blast_env.statistics import Estimate
+from blast_env.studies.shielding.ratios import fit_log_quadratic
+from blast_env.studies.shielding.report import ShieldingReport, scaled_ratio
 from tests.calibration.shielding_cases import NARROW, made_up
 
 # The ratios

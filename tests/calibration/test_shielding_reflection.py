@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from blast_env.calibration import kingery_bulmash
-from blast_env.calibration.shielding import BlockGeometry
-from blast_env.calibration.shielding_loads import LoadKind
-from blast_env.calibration.shielding_reflection import (
+from blast_env.errors import BlastEnvError
+from blast_env.simulation import simulate
+from blast_env.studies.shielding.ratios import LoadKind
+from blast_env.studies.shielding.reflection import (
     ARRIVAL_SHARE,
     ReflectionReport,
     ReflectionStudy,
     head_on_load,
 )
-from blast_env.calibration.shielding_scenes import facade_scenario
-from blast_env.errors import BlastEnvError
-from blast_env.simulation import simulate
+from blast_env.studies.shielding.report import BlockGeometry
+from blast_env.studies.shielding.scenes import facade_scenario
 from tests.calibration.shielding_cases import DENSE
 
 GEOMETRY = BlockGeometry(margin_m=8.0)
@@ -119,7 +119,7 @@ def test_bad_distances_are_refused(distances: tuple[float, ...], words: str) -> 
 
 def test_side_on_loads_are_the_transferred_ones(report: ReflectionReport) -> None:
     """The same blasts in the open as the shielding study's, so that the two can be compared."""
-    from blast_env.calibration.shielding import ShieldingStudy
+    from blast_env.studies.shielding.report import ShieldingStudy
 
     study = report.study
     shielding = ShieldingStudy(DENSE, seeds=study.seeds, geometry=GEOMETRY).run()

@@ -8,21 +8,27 @@ import pytest
 
 from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import PowerLaw, paper_table, shape_rms_percent
-from blast_env.calibration.calibrate import calibrate, kingery_bulmash_reference, paper_reference
-from blast_env.calibration.model import Calibration, CalibrationError, seen_width_m
-from blast_env.calibration.stored import (
+from blast_env.calibration.model import (
+    Calibration,
+    CalibrationError,
     calibrated_engines,
     load_calibration,
     save_calibration,
+    seen_width_m,
     stored_calibrations,
 )
-from blast_env.calibration.study import FreeFieldStudy
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.engine import ENGINE_NAMES
 from blast_env.physics.parameters import with_overrides
 from blast_env.physics.presets import preset
 from blast_env.scenario import Scenario
+from blast_env.studies.calibration.study import (
+    FreeFieldStudy,
+    calibrate,
+    kingery_bulmash_reference,
+    paper_reference,
+)
 from scripts.facade_width import free_field_with_facade
 from scripts.hopkinson_cranz import free_field
 from tests.scenarios import BALLISTIC_COURTYARD

@@ -7,8 +7,9 @@ import pytest
 from scipy import stats
 
 from blast_env import load_scenario, simulate
-from blast_env.calibration import study as study_module
-from blast_env.calibration.study import (
+from blast_env.errors import BlastEnvError
+from blast_env.studies.calibration import study as study_module
+from blast_env.studies.calibration.study import (
     FreeFieldRun,
     FreeFieldStudy,
     append_to_store,
@@ -16,7 +17,6 @@ from blast_env.calibration.study import (
     read_store,
     summarise,
 )
-from blast_env.errors import BlastEnvError
 
 SMALL = load_scenario("free_field").with_simulation(
     overrides={"explosive": {"ball_count": 120}, "stepping": {"time_limit_s": 0.1}}

@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
-from blast_env.calibration.shielding import ShieldingStudy
-from blast_env.calibration.stored import load_calibration, save_calibration
+from blast_env.calibration.model import load_calibration, save_calibration
 from blast_env.cli import app
-from blast_env.physics.event_engine import EventRun
+from blast_env.physics.event.engine import EventRun
+from blast_env.studies.shielding.report import ShieldingStudy
 
 
 def calibrate(*arguments: str | Path) -> Result:

@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario, simulate
-from blast_env.calibration.stored import load_calibration
+from blast_env.calibration.model import load_calibration
 from blast_env.cli import app
-from blast_env.physics.pymunk_engine import PymunkRun
+from blast_env.physics.pymunk.engine import PymunkRun
 from tests.scenarios import BALLISTIC_COURTYARD
 
 COMMANDS = ("simulate", "validate", "calibrate", "bench")

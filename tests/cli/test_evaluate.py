@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 from blast_env import Charge, load_scenario, save_scenario
 from blast_env.cli import app
 from blast_env.evaluation import evaluate_layout
-from blast_env.physics.event_engine import EventRun
+from blast_env.physics.event.engine import EventRun
 
 CELLS = [(9, 0), (10, 0), (11, 0)]
 

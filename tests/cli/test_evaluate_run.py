@@ -6,11 +6,11 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from blast_agents.training import load_agent, train
+from blast_agents.unseen_cases import FIRST_SEED
 from ezdxf.filemanagement import readfile
 from typer.testing import CliRunner, Result
 
-from agents.training import load_agent, train
-from agents.unseen_cases import FIRST_SEED
 from blast_env import load_scenario
 from blast_env.cli import app
 from blast_env.evaluation import draw_threats, evaluate_layout

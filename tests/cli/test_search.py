@@ -6,14 +6,15 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from blast_agents.search import LayoutProblem, find_search_method, hidden_threats, visible_threats
 from typer.testing import CliRunner, Result
 
-from agents.search import LayoutProblem, find_search_method, hidden_threats, visible_threats
 from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
 from blast_env.evaluation import BlastEvaluator
-from blast_env.physics.event_engine import EventRun
-from blast_env.scenario import Charge, LayoutFile, SegmentSource, load_layout
+from blast_env.physics.event.engine import EventRun
+from blast_env.physics.scene import Charge
+from blast_env.scenario import LayoutFile, SegmentSource, load_layout
 from tests.agents.search_cases import small_scenario
 
 CHARGE = Charge((5.0, 20.5), 100.0)
@@ -136,7 +137,7 @@ def test_bad_input_is_one_clear_message(
 
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in [name for name in sys.modules if name.startswith("agents.search")]:
+    for name in [name for name in sys.modules if name.startswith("blast_agents.search")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "pymoo.algorithms.soo.nonconvex.ga", None)
     result = search("--budget", 4)

@@ -8,12 +8,12 @@ import numpy as np
 from gymnasium.utils.env_checker import data_equivalence
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.scenario_source import ScenarioSource
+from blast_env.envs.strategies import ScenarioSource
 from blast_env.physics.engine import BlastRun
-from blast_env.physics.event_engine import EventEngine
+from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.particles import Balls, CollisionType
+from blast_env.physics.scene import Scene
 from blast_env.scenario import Scenario, load_scenario
-from blast_env.scene import Scene
 
 # Whatever the bundled scenarios use: other parameters would have no calibration.
 _MODEL = load_scenario("courtyard")

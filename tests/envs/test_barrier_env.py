@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 import blast_env
-from blast_env.envs.reward import Transition
+from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.threats import Threat
 from blast_env.units import PA_PER_PSI
 from tests.envs.small import ThinEngine, make, play, same, small_scenario
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blast_env.envs.features_observation import FeaturesObservation
+from blast_env.envs.observations import FeaturesObservation
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
 from tests.envs.small import make, restricted_scenario, small_document, small_scenario

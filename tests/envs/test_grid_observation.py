@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.envs.grid_observation import GridObservation, GridWithLoadObservation
+from blast_env.envs.observations import GridObservation, GridWithLoadObservation
+from blast_env.evaluation.cases import draw_threats
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.threats import draw_threats
 from blast_env.scenario import Scenario
 from tests.envs.small import ThinEngine, make, restricted_scenario, small_document, small_scenario
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from blast_env import Charge
-from blast_env.calibration.stored import scenario_calibration
+from blast_env.calibration.model import scenario_calibration
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastLoads
-from blast_env.evaluation.cache import (
+from blast_env.evaluation.store import (
     BlastKey,
     LoadsCache,
     calibration_digest,
@@ -17,9 +17,9 @@ from blast_env.evaluation.cache import (
     engine_text,
 )
 from blast_env.physics.engine import BlastRun
-from blast_env.physics.event_engine import EventEngine
-from blast_env.physics.pymunk_engine import PymunkEngine
-from blast_env.scene import Scene
+from blast_env.physics.event.engine import EventEngine
+from blast_env.physics.pymunk.engine import PymunkEngine
+from blast_env.physics.scene import Scene
 from tests.evaluation.cases import COURTYARD, FEW, THREATS
 
 

@@ -9,13 +9,14 @@ import pytest
 
 from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import Calibration, CalibrationError
-from blast_env.calibration import stored as stored_module
+from blast_env.calibration import model as stored_module
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, StructureLoad, Threat
+from blast_env.geometry import Cell
 from blast_env.physics.engine import BlastRun
-from blast_env.physics.event_engine import EventEngine
-from blast_env.scenario import Cell, Scenario, ScenarioError
-from blast_env.scene import Scene
+from blast_env.physics.event.engine import EventEngine
+from blast_env.physics.scene import Scene
+from blast_env.scenario import Scenario, ScenarioError
 from tests.evaluation.cases import COURTYARD, FEW, THREATS, WALL
 from tests.scenarios import BALLISTIC_COURTYARD
 

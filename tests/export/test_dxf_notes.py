@@ -14,9 +14,10 @@ from ezdxf.math import bulge_to_arc
 
 from blast_env import load_scenario
 from blast_env.export import LayoutPlan, export_layout
-from blast_env.export.notes import note_lines
+from blast_env.export.dxf import note_lines
 from blast_env.geometry import Rectangle
-from blast_env.scenario import Charge, Placement, Scenario
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Placement, Scenario
 
 GATE = load_scenario("perimeter_gate")  # a clearance and an access way
 JUNCTION = load_scenario("street_junction")  # a budget

@@ -16,9 +16,10 @@ from ezdxf.layouts.layout import Modelspace
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.export import SUFFIXES, FeatureKind, LayoutPlan, export_layout, export_layouts
-from blast_env.export.csv_file import COLUMNS
-from blast_env.scenario import BuildZone, Charge, LayoutFile, Scenario, load_layout
-from blast_env.scene import build_scene
+from blast_env.export.files import COLUMNS
+from blast_env.physics.scene import Charge
+from blast_env.scenario import BuildZone, LayoutFile, Scenario, load_layout
+from blast_env.scenario.build_scene import build_scene
 
 COURTYARD = load_scenario("courtyard")
 LAYOUT = ((12, 3), (10, 0), (11, 0))  # not sorted: the order of placing is kept

@@ -7,12 +7,11 @@ from numpy.typing import ArrayLike
 
 from blast_env.geometry import Rectangle
 from blast_env.physics.engine import BallStates, BlastRun, Engine
-from blast_env.physics.event_engine import EventEngine
+from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, CollisionType
+from blast_env.physics.scene import Charge, Scene, StructureOutline
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scenario import Charge
-from blast_env.scene import Scene, StructureOutline
 
 EXPLOSIVE, AIR = CollisionType.ExplosionBall, CollisionType.AirBall
 KEEP_MASS: dict[str, object] = {"air_shrink": 1.0, "module_shrink": 1.0}

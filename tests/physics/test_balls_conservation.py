@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from blast_env.physics.engine import Engine
-from blast_env.physics.pymunk_engine import PymunkEngine
-from blast_env.scene import Scene
+from blast_env.physics.pymunk.engine import PymunkEngine
+from blast_env.physics.scene import Scene
 from tests.physics.scenes import (
     AIR,
     EXPLOSIVE,

@@ -7,12 +7,11 @@ from hypothesis import strategies as st
 
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
-from blast_env.physics.charge_scaling import for_charge
 from blast_env.physics.parameters import SimulationParameters, with_overrides
-from blast_env.physics.presets import preset
-from blast_env.physics.resolution import with_resolution
-from blast_env.scenario import Charge, Scenario, ScenarioError
-from blast_env.scene import build_scene
+from blast_env.physics.presets import for_charge, preset, with_resolution
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario, ScenarioError
+from blast_env.scenario.build_scene import build_scene
 
 # With a base impulse, which the presets leave out.
 DENSE = with_overrides(preset("collisional"), {"contact": {"base_impulse": 0.01}})

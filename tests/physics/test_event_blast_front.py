@@ -7,7 +7,7 @@ the elastic front follows its law within 1 % from 50 spacings on.
 import numpy as np
 import pytest
 
-from blast_env.physics.event_engine import EventEngine
+from blast_env.physics.event.engine import EventEngine
 from scripts.front_measurement import (
     SEDOV_GAS,
     FrontCase,

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from blast_env import load_scenario, simulate
-from blast_env.physics import event_engine
 from blast_env.physics.engine import EndReason
+from blast_env.physics.event import engine as event_engine
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.particles import Balls
-from blast_env.scene import StructureOutline
+from blast_env.physics.scene import StructureOutline
 from tests.physics.scenes import (
     AIR,
     EVENT,

@@ -16,9 +16,9 @@ from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.physics.engine import BlastRun, Engine
-from blast_env.physics.event_engine import EventEngine
+from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
-from blast_env.scene import Scene
+from blast_env.physics.scene import Scene
 from tests.physics.scenes import AIR, EVENT, EXPLOSIVE, balls, finished, parameters, scene, wall
 
 LAYOUT = ((4, 0), (5, 0), (6, 1))

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.physics.event.arrays import BALL, HEAP_ENTRY, NOBODY, RecordArray
-from blast_env.physics.event.heap import schedule, unschedule
+from blast_env.physics.event.queue import schedule, unschedule
+from blast_env.physics.event.state import BALL, HEAP_ENTRY, NOBODY, RecordArray
 
 BALLS = 24
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from blast_env.physics.engine import BallStates, EndReason
 from blast_env.physics.particles import Balls, distance_to_rectangle
-from blast_env.scene import Scene, StructureOutline
+from blast_env.physics.scene import Scene, StructureOutline
 from tests.physics.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, wall
 
 MOST_COLLISIONS = 20_000

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from blast_env.physics.parameters import SimulationParameters
-from blast_env.scene import Scene
+from blast_env.physics.scene import Scene
 from tests.physics.scenes import (
     AIR,
     EVENT,

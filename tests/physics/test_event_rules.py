@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.physics.engine import EndReason
 from blast_env.physics.parameters import SimulationParameters
-from blast_env.scene import Scene
+from blast_env.physics.scene import Scene
 from tests.physics.scenes import (
     AIR,
     EVENT,

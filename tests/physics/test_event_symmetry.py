@@ -7,8 +7,8 @@ import pytest
 
 from blast_env.geometry import Rectangle
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
+from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scene import Scene
 from blast_env.units import MODULE_SIDE_UNITS
 from tests.physics.scenes import finished, parameters, scene, wall
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.physics.event.walls import walls_of
-from blast_env.scene import Scene, StructureOutline
+from blast_env.physics.event.state import walls_of
+from blast_env.physics.scene import Scene, StructureOutline
 from tests.physics.scenes import EVENT, EXPLOSIVE, KEEP_MASS, balls, parameters, scene, wall
 
 RAYS = 150

@@ -6,7 +6,7 @@ import pytest
 from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
 from blast_env.physics.engine import Engine
 from blast_env.physics.particles import CollisionType
-from blast_env.physics.pymunk_engine import PymunkEngine
+from blast_env.physics.pymunk.engine import PymunkEngine
 from tests.physics.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, wall
 
 FACADE = wall((100.0, 90.0), 10, 1)

@@ -5,8 +5,7 @@ import pytest
 
 from blast_env import load_scenario, simulate
 from blast_env.physics.parameters import SimulationParameters
-from blast_env.physics.presets import preset
-from blast_env.physics.resolution import with_resolution
+from blast_env.physics.presets import preset, with_resolution
 
 
 def air_density(parameters: SimulationParameters) -> float:

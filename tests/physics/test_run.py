@@ -22,8 +22,8 @@ from blast_env.physics.particles import (
     explosion_fan,
     lattice_capacity,
 )
-from blast_env.physics.pymunk_engine import PymunkEngine, PymunkRun
-from blast_env.scene import Scene
+from blast_env.physics.pymunk.engine import PymunkEngine, PymunkRun
+from blast_env.physics.scene import Scene
 from tests.physics.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, wall
 
 

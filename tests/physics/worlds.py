@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from blast_env.physics.event.arrays import RECORD_COLUMNS, RecordArray
-from blast_env.physics.event.compiled import run_world
-from blast_env.physics.event.layout import World, world_of
-from blast_env.scene import Scene
+from blast_env.physics.event.loop import run_world
+from blast_env.physics.event.state import RECORD_COLUMNS, RecordArray, World, world_of
+from blast_env.physics.scene import Scene
 
 
 class WorldRun:

@@ -6,8 +6,7 @@ from zipfile import ZipFile
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.recording.excel import EXCEL_ROWS, write_workbook
-from blast_env.recording.excel_cells import record_cells
+from blast_env.recording.excel import EXCEL_ROWS, record_cells, write_workbook
 from blast_env.recording.tables import COLLISION_COLUMNS, MODULE_COLUMNS, STRUCTURE_COLUMNS
 from blast_env.simulation import BlastResult
 from tests.recording import workbooks

@@ -11,12 +11,12 @@ from blast_env.recording.tables import (
     COLLISION_COLUMNS,
     MODULE_COLUMNS,
     STRUCTURE_COLUMNS,
-    Column,
     collision_table,
     module_table,
     structure_table,
 )
 from blast_env.simulation import BlastResult
+from blast_env.tables import Column
 
 
 def record(**values: object) -> CollisionArray:

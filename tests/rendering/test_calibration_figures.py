@@ -5,14 +5,14 @@ import pytest
 
 from blast_env import load_scenario, simulate
 from blast_env.calibration import Friedlander, facade_history
-from blast_env.calibration.calibrate import (
+from blast_env.studies.calibration.figure import calibration_figure
+from blast_env.studies.calibration.study import (
     CalibrationReport,
+    FreeFieldStudy,
     calibrate,
     kingery_bulmash_reference,
 )
-from blast_env.calibration.study import FreeFieldStudy
-from blast_env.rendering.calibration_figure import calibration_figure
-from blast_env.rendering.pressure_figure import PressureCase, pressure_figure
+from blast_env.studies.pressure.figure import PressureCase, pressure_figure
 
 SMALL = load_scenario("free_field").with_simulation(
     overrides={"explosive": {"ball_count": 180}, "stepping": {"time_limit_s": 0.12}}

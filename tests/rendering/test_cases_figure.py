@@ -12,11 +12,12 @@ from matplotlib.text import Text
 
 from blast_env import Charge, load_scenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Estimate, Threat, ThreatOutcome
-from blast_env.rendering.cases_figure import MOST_SHOWN, ProtectedCase, cases_figure
+from blast_env.evaluation import Threat, ThreatOutcome
+from blast_env.rendering.evaluation_figures import MOST_SHOWN, ProtectedCase, cases_figure
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import Scenario
 from blast_env.sites import generate_site
+from blast_env.statistics import Estimate
 from blast_env.units import UNITS_PER_M
 
 COURTYARD = load_scenario("courtyard")

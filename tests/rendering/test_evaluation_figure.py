@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from blast_env import Charge, load_scenario
 from blast_env.evaluation import LayoutEvaluation, Threat, evaluate_layout
-from blast_env.rendering.evaluation_figure import evaluation_figure
+from blast_env.rendering.evaluation_figures import evaluation_figure
 
 WALL = [(row, 0) for row in range(22, 32)]
 THREATS = (

@@ -8,7 +8,7 @@ from PIL import Image
 
 from blast_env.errors import BlastEnvError
 from blast_env.rendering.film import FilmPlan, plan_film, write_film
-from blast_env.rendering.span import shown_until_s
+from blast_env.rendering.style import shown_until_s
 from blast_env.simulation import Blast, BlastResult
 
 

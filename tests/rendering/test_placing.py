@@ -5,11 +5,10 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.rendering.frames import FramePainter
-from blast_env.rendering.placing import PlacingPainter, sources_text
-from blast_env.rendering.placing_signs import FREE
+from blast_env.rendering.placing import FREE, PlacingPainter, sources_text
 from blast_env.rendering.style import EXPLOSIVE
 from blast_env.scenario import Placement, RectangleSource, SegmentSource
-from blast_env.scene import build_scene
+from blast_env.scenario.build_scene import build_scene
 from tests.rendering.scenes import LAYOUT, small_scenario
 
 SCENARIO = small_scenario()

@@ -7,10 +7,9 @@ import pytest
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 
-from blast_env.calibration.shielding import BlockGeometry, ShieldingReport, ShieldingStudy
 from blast_env.rendering.figures import save_figure
-from blast_env.rendering.shielding_figure import shielding_figure
-from blast_env.rendering.shielding_plan import gauge_rectangles
+from blast_env.studies.shielding.figure import gauge_rectangles, shielding_figure
+from blast_env.studies.shielding.report import BlockGeometry, ShieldingReport, ShieldingStudy
 from tests.calibration.shielding_cases import DENSE
 
 GEOMETRY = BlockGeometry(side_modules=9, stand_off_m=3.0, margin_m=8.0)

@@ -10,9 +10,8 @@ import pytest
 from imageio.plugins import ffmpeg
 
 from blast_env.errors import BlastEnvError
-from blast_env.rendering.film import plan_film
+from blast_env.rendering.film import FilmPanel, plan_film, write_side_by_side
 from blast_env.rendering.frames import FramePainter
-from blast_env.rendering.side_by_side import FilmPanel, write_side_by_side
 from blast_env.simulation import Blast
 
 WIDTH_PX = 1280

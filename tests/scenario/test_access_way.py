@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.scenario import AccessWay
-from blast_env.scenario.access_way import closing_cells, is_open
+from blast_env.scenario.zone import closing_cells, is_open
 from tests.scenario.zones import can_cross
 
 

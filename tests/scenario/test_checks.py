@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle
 from blast_env.scenario import PointSource, RectangleSource, SegmentSource
-from blast_env.scenario.clearance import distance_m
+from blast_env.scenario.zone import distance_m
 from tests.scenario.documents import (
     Document,
     KeyPath,

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from blast_env.errors import LayoutError
-from blast_env.scenario import Cell, Placement, Scenario, usable_cells
+from blast_env.geometry import Cell
+from blast_env.scenario import Placement, Scenario, usable_cells
 from tests.scenario.documents import minimal_document
 from tests.scenario.zones import area, filled, structure, zone_scenario
 

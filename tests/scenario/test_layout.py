@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from blast_env.errors import LayoutError
+from blast_env.geometry import Cell
 from blast_env.scenario import (
-    Cell,
     Scenario,
     bundled_scenarios,
     check_layout,

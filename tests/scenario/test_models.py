@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.presets import preset
+from blast_env.physics.scene import Charge
 from blast_env.scenario import (
-    Charge,
     PointSource,
     RectangleSource,
     Scenario,

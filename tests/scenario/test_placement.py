@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import LayoutError
+from blast_env.geometry import Cell
 from blast_env.scenario import (
-    Cell,
     Placement,
     Scenario,
     bundled_scenarios,

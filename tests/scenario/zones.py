@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from blast_env.geometry import Rectangle
-from blast_env.scenario import BuildZone, Cell, Placement, Scenario, ScenarioError
+from blast_env.geometry import Cell, Rectangle
+from blast_env.scenario import BuildZone, Placement, Scenario, ScenarioError
 from tests.scenario.documents import Document
 
 CORNER_M = (10.0, 10.0)

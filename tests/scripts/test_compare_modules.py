@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from blast_env import simulate
-from blast_env.benchmark import BenchmarkScene
+from blast_env.arrays import FloatArray
+from blast_env.studies.benchmark.engines import BenchmarkScene
 from scripts.compare_modules import (
-    Array,
     agreement,
     distribution_distance,
     module_impulses,
@@ -27,7 +27,7 @@ def loads(seed: int, blasts: int, factor: float = 1.0) -> np.ndarray:
 
 @pytest.mark.parametrize("distance", [distribution_distance, profile_distance])
 def test_equal_engines_differ_by_no_more_than_chance(
-    distance: Callable[[Array, Array], float],
+    distance: Callable[[FloatArray, FloatArray], float],
 ) -> None:
     """In most draws; these five are fixed."""
     within = [agreement(distance, loads(k, 40), loads(100 + k, 300)) for k in range(5)]
@@ -35,7 +35,9 @@ def test_equal_engines_differ_by_no_more_than_chance(
 
 
 @pytest.mark.parametrize("distance", [distribution_distance, profile_distance])
-def test_a_fifth_more_is_more_than_chance(distance: Callable[[Array, Array], float]) -> None:
+def test_a_fifth_more_is_more_than_chance(
+    distance: Callable[[FloatArray, FloatArray], float],
+) -> None:
     found = agreement(distance, loads(1, 200, 1.2), loads(2, 400))
     assert found.value > 1.3 * found.chance
 

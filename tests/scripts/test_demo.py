@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
+from blast_agents.league import RandomLayout
+from blast_agents.training.run_folder import RunFolder
+from blast_agents.unseen_cases import FIRST_SEED
 
-from agents.league import RandomLayout
-from agents.training.run_folder import RunFolder
-from agents.unseen_cases import FIRST_SEED
 from blast_env.errors import BlastEnvError
 from blast_env.export import SUFFIXES
 from blast_env.scenario import Placement

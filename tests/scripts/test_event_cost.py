@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
-from blast_env.physics.event_engine import EventRun
+from blast_env.physics.event.engine import EventRun
 from scripts.event_cost import Cost, cost_figure, gas, log_fit, measure, measure_once
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 from blast_env import simulate
-from blast_env.benchmark import BenchmarkScene
-from blast_env.scene import build_scene
+from blast_env.scenario.build_scene import build_scene
+from blast_env.studies.benchmark.engines import BenchmarkScene
 from scripts.event_profile import Profile, look_aheads, profile
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 

@@ -5,7 +5,8 @@ import pytest
 from scipy.stats import spearmanr
 
 from blast_env import simulate
-from blast_env.scenario import Charge, check_layout
+from blast_env.physics.scene import Charge
+from blast_env.scenario import check_layout
 from scripts.rank_layouts import (
     ENGINES,
     STATISTICS,

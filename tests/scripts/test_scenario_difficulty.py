@@ -9,11 +9,12 @@ from typer import Typer
 from typer.testing import CliRunner
 
 from blast_env import load_scenario
+from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import evaluate_against
 from scripts import scenario_difficulty
 from scripts.difficulty_figure import difficulty_figure
-from scripts.difficulty_outcomes import FloatArray, Outcome, TaskResult
+from scripts.difficulty_outcomes import Outcome, TaskResult
 from scripts.difficulty_study import FIRST_HELD_OUT_SEED, Effort, Study
 from scripts.difficulty_verdict import difficulty_criteria
 from scripts.scenario_difficulty import (

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from blast_agents.rules import random_layout
 
-from agents.random_layouts import random_layout
 from blast_env.scenario import Placement, Scenario
 from blast_env.sites import SiteMeasures, SiteRanges
 from scripts.check_sites import (

@@ -8,7 +8,7 @@ import pytest
 
 from blast_env.sites import HELD_OUT_SITES, SightLineCriterion, SiteRanges
 from blast_env.sites.generate import MOST_TRIES
-from blast_env.sites.sight_lines import DIRECTIONS
+from blast_env.sites.visibility import DIRECTIONS
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "sites.md").read_text(encoding="utf-8")
 ROWS = dict(re.findall(r"^\| `(\w+)` \| (.*?) \|", DOCUMENT, re.MULTILINE))

@@ -14,12 +14,11 @@ from hypothesis import strategies as st
 
 from blast_env import load_scenario, save_scenario
 from blast_env.calibration import load_calibration
-from blast_env.envs.features_observation import FeaturesObservation
-from blast_env.envs.grid_observation import GridObservation
+from blast_env.envs.observations import FeaturesObservation, GridObservation
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.scenario import BuildZone, Placement, Scenario, SegmentSource
-from blast_env.scenario.clearance import distance_m, source_bounds_m
+from blast_env.scenario.zone import distance_m, source_bounds_m
 from blast_env.sites import Objection, SightLineCriterion, SiteRanges, draw_site, generate_site
 
 RANGES = SiteRanges()

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle
-from blast_env.scenario.clearance import box_distances_m
-from blast_env.sites.draws import Draws
-from blast_env.sites.places import Apart, draw_place
+from blast_env.scenario.zone import box_distances_m
+from blast_env.sites.generate import Apart, Draws, draw_place
 
 AREA = Rectangle(1.0, 2.0, 9.0, 8.0)
 HALVES = st.integers(0, 20).map(lambda count: count / 2.0)

@@ -1,0 +1,51 @@
+"""The league: what searches, rules and trained agents do on the same cases and held-out seeds."""
+
+from blast_agents.league.contest import Contest, Outlook
+from blast_agents.league.entries import (
+    Agent,
+    Entry,
+    NoBarrier,
+    RandomLayout,
+    Rule,
+    Search,
+    SightLineLayout,
+    Training,
+    standard_entries,
+)
+from blast_agents.league.standings import Result, Standings, Verdict, verdicts
+from blast_agents.league.store import ResultStore
+from blast_agents.league.tracks import (
+    TRACKS,
+    Track,
+    TrackCase,
+    find_tracks,
+    hidden_track,
+    known_track,
+    sites_track,
+)
+
+__all__ = [
+    "TRACKS",
+    "Agent",
+    "Contest",
+    "Entry",
+    "NoBarrier",
+    "Outlook",
+    "RandomLayout",
+    "Result",
+    "ResultStore",
+    "Rule",
+    "Search",
+    "SightLineLayout",
+    "Standings",
+    "Track",
+    "TrackCase",
+    "Training",
+    "Verdict",
+    "find_tracks",
+    "hidden_track",
+    "known_track",
+    "sites_track",
+    "standard_entries",
+    "verdicts",
+]

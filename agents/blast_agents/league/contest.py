@@ -1,0 +1,300 @@
+"""What a league has to simulate, in pieces that any process can do."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from time import perf_counter
+from typing import TypeVar
+
+import joblib
+import numpy as np
+
+from blast_agents.league.entries import Agent, Entry, Instant, NoBarrier, Search
+from blast_agents.league.standings import Result, Standings
+from blast_agents.league.store import ResultStore, evaluation_key, search_key
+from blast_agents.league.tracks import Track, TrackCase
+from blast_agents.proposal import Proposal, timed_proposal
+from blast_agents.search import LayoutProblem
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator
+from blast_env.geometry import Layout
+
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True, eq=False)
+class SearchJob:
+    """Lets a search find its layout for a case.
+
+    Attributes:
+        case: The case.
+        search: The search.
+        engine: Name of the engine.
+    """
+
+    case: TrackCase
+    search: Search
+    engine: str
+
+    @property
+    def blasts(self) -> int:
+        """Most blasts that it takes."""
+        return self.search.budget
+
+    def __call__(self) -> Proposal:
+        """Return what the search proposes; it shares no blast with any other.
+
+        Raises:
+            KeyboardInterrupt: If the search was interrupted: what it has by then is not its
+                answer.
+        """
+        # What the first blast of a process has to load is no part of the search's time.
+        BlastEvaluator(self.case.scenario, self.engine).loads((), self.case.search_threats[0])
+        began_s = perf_counter()
+        problem = LayoutProblem(
+            BlastEvaluator(self.case.scenario, self.engine), self.case.search_threats
+        )
+        result = self.search.method.search(problem, self.search.budget, self.case.seed)
+        seconds = perf_counter() - began_s
+        if result.interrupted:
+            raise KeyboardInterrupt
+        return Proposal(tuple(sorted(result.layout)), seconds, result.blasts)
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluationJob:
+    """Lets a layout meet the held-out threats of a case.
+
+    Attributes:
+        case: The case.
+        layout: The layout.
+        engine: Name of the engine.
+    """
+
+    case: TrackCase
+    layout: Layout
+    engine: str
+
+    @property
+    def blasts(self) -> int:
+        """Blasts that it takes."""
+        return len(self.case.held_out)
+
+    def __call__(self) -> tuple[float, ...]:
+        """Return the impulses on the protected structures, Pa*s, one a held-out threat."""
+        evaluator = BlastEvaluator(self.case.scenario, self.engine)
+        loads = evaluator.loads_of_many([(self.layout, threat) for threat in self.case.held_out])
+        return tuple(load.protected_impulse_pa_s for load in loads)
+
+
+def run_jobs(jobs: Sequence[Callable[[], Found]], processes: int) -> Iterator[tuple[int, Found]]:
+    """Run jobs; each result comes with the job's index, as soon as it is there.
+
+    Args:
+        jobs: They can be pickled.
+        processes: Worker processes.
+    """
+    if processes == 1 or len(jobs) < 2:
+        yield from (_numbered(index, job) for index, job in enumerate(jobs))
+        return
+    calls = (joblib.delayed(_numbered)(index, job) for index, job in enumerate(jobs))
+    workers = joblib.Parallel(min(processes, len(jobs)), return_as="generator_unordered")
+    yield from workers(calls)
+
+
+def propose_at_once(entry: Instant, cases: Sequence[TrackCase]) -> tuple[Proposal, ...]:
+    """Return an entry's proposals, none of which takes a blast.
+
+    The time of one more proposal before these is not counted: it loads what has to be loaded.
+    """
+    entry.propose(cases[0])
+    proposals = [timed_proposal(partial(entry.propose, case)) for case in cases]
+    return tuple(replace(each, layout=tuple(sorted(each.layout))) for each in proposals)
+
+
+def _numbered(index: int, job: Callable[[], Found]) -> tuple[int, Found]:
+    return index, job()
+
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What a contest has still to simulate.
+
+    Attributes:
+        search_blasts: Most blasts that the searches will spend.
+        held_out_blasts: Most blasts on held-out threats.
+        searches: How many searches there are.
+        kept_searches: How many of them are through already.
+    """
+
+    search_blasts: int
+    held_out_blasts: int
+    searches: int
+    kept_searches: int
+
+    @property
+    def blasts(self) -> int:
+        """All blasts."""
+        return self.search_blasts + self.held_out_blasts
+
+
+@dataclass(frozen=True, eq=False)
+class Contest:
+    """Entries on a track.
+
+    Proposals that take no blast are made first, in this process, where nothing disturbs their
+    time; then the searches; then all layouts meet the held-out threats. Searches and impulses are
+    kept as soon as they are there, and not done again.
+
+    Attributes:
+        track: The cases.
+        entries: No barrier among them; their names differ.
+        store: Keeps the results.
+        engine: Name of the engine.
+
+    Raises:
+        BlastEnvError: If two entries have one name, or no barrier is not among them.
+    """
+
+    track: Track
+    entries: tuple[Entry, ...]
+    store: ResultStore
+    engine: str = "event"
+
+    def __post_init__(self) -> None:
+        """Check the entries."""
+        names = [entry.name for entry in self.entries]
+        for name in names:
+            if names.count(name) > 1:
+                raise BlastEnvError(f"entry {name!r} is there twice, must be none twice")
+        if not any(isinstance(entry, NoBarrier) for entry in self.entries):
+            raise BlastEnvError("no barrier is not among the entries: it is what others refer to")
+
+    @cached_property
+    def _instant(self) -> Mapping[str, tuple[Proposal, ...]]:
+        """The proposals, one a case, of the entries that spend no blast, by name."""
+        return {
+            entry.name: propose_at_once(entry, self.track.cases)
+            for entry in self.entries
+            if not isinstance(entry, Search)
+        }
+
+    def outlook(self) -> Outlook:
+        """Return what is still to be simulated.
+
+        Raises:
+            CalibrationError: If a scenario has no calibration for the engine.
+            UnknownNameError: If there is no such engine.
+        """
+        searches = [entry for entry in self.entries if isinstance(entry, Search)]
+        missing = self._missing_searches()
+        held_out = sum(len(job.case.held_out) for job in missing)
+        return Outlook(
+            search_blasts=sum(job.blasts for job in missing),
+            held_out_blasts=held_out + sum(job.blasts for job in self._missing_evaluations()),
+            searches=len(searches) * len(self.track.cases),
+            kept_searches=len(searches) * len(self.track.cases) - len(missing),
+        )
+
+    def play(self, processes: int = 1, progress: Progress | None = None) -> Standings:
+        """Return how the entries did.
+
+        Args:
+            processes: Worker processes; they change nothing but the times.
+            progress: Called with the share of the blasts that is done.
+
+        Raises:
+            BlastEnvError: If `processes` is below 1, or nothing arrives at the protected
+                structures of a case even without a barrier.
+        """
+        if processes < 1:
+            raise BlastEnvError(f"processes is {processes}, must be at least 1")
+        meter = _Meter(self.outlook().blasts, progress)
+        searches = self._missing_searches()
+        for index, proposal in run_jobs(searches, processes):
+            job = searches[index]
+            self.store.keep_proposal(search_key(job.case, job.search, self.engine), proposal)
+            meter.add(job.blasts)
+        evaluations = self._missing_evaluations()
+        for index, impulses_pa_s in run_jobs(evaluations, processes):
+            asked = evaluations[index]
+            key = evaluation_key(asked.case, asked.layout, self.engine)
+            self.store.keep_impulses(key, impulses_pa_s)
+            meter.add(asked.blasts)
+        return self._standings()
+
+    def _missing_searches(self) -> list[SearchJob]:
+        """Return the searches that are not through, the longest first."""
+        jobs = [
+            SearchJob(case, entry, self.engine)
+            for entry in self.entries
+            if isinstance(entry, Search)
+            for case in self.track.cases
+            if self.store.proposal(search_key(case, entry, self.engine)) is None
+        ]
+        return sorted(jobs, key=lambda job: -job.blasts)
+
+    def _missing_evaluations(self) -> list[EvaluationJob]:
+        """Return the layouts proposed so far whose impulses are not known, each once."""
+        asked = dict.fromkeys(
+            (index, proposal.layout)
+            for entry in self.entries
+            for index, proposal in enumerate(self._proposals(entry))
+            if proposal is not None
+        )
+        cases = self.track.cases
+        return [
+            EvaluationJob(cases[index], layout, self.engine)
+            for index, layout in asked
+            if self._impulses_pa_s(cases[index], layout) is None
+        ]
+
+    def _proposals(self, entry: Entry) -> Sequence[Proposal | None]:
+        """Return what an entry proposes, one a case; `None` where it has not searched yet."""
+        if not isinstance(entry, Search):
+            return self._instant[entry.name]
+        cases = self.track.cases
+        return [self.store.proposal(search_key(case, entry, self.engine)) for case in cases]
+
+    def _impulses_pa_s(self, case: TrackCase, layout: Layout) -> tuple[float, ...] | None:
+        return self.store.impulses_pa_s(evaluation_key(case, layout, self.engine))
+
+    def _standings(self) -> Standings:
+        results = tuple(self._results())
+        bare = next(
+            result
+            for entry, result in zip(self.entries, results, strict=True)
+            if isinstance(entry, NoBarrier)
+        )
+        return Standings(self.track, results, bare.impulse_pa_s, self.engine)
+
+    def _results(self) -> Iterator[Result]:
+        for entry in self.entries:
+            proposals = tuple(each for each in self._proposals(entry) if each is not None)
+            impulses_pa_s = [
+                self._impulses_pa_s(case, proposal.layout)
+                for case, proposal in zip(self.track.cases, proposals, strict=True)
+            ]
+            yield Result(
+                name=entry.name,
+                method=entry.method.name if isinstance(entry, Search) else entry.name,
+                budget=entry.budget if isinstance(entry, Search) else 0,
+                training=entry.training if isinstance(entry, Agent) else None,
+                proposals=proposals,
+                impulse_pa_s=np.array(impulses_pa_s, dtype=np.float64),
+            )
+
+
+class _Meter:
+    """Says which share of the blasts is done."""
+
+    def __init__(self, blasts: int, show: Progress | None) -> None:
+        self._blasts, self._show, self._done = blasts, show, 0
+
+    def add(self, blasts: int) -> None:
+        self._done += blasts
+        if self._show is not None:
+            self._show(min(self._done / max(self._blasts, 1), 1.0))

@@ -1,0 +1,166 @@
+"""What takes part in a league."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from blast_agents.league.tracks import TrackCase
+from blast_agents.proposal import LayoutAgent
+from blast_agents.rules import RULES, expected_charge, random_layout
+from blast_agents.search import SearchMethod, find_search_method
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout
+from blast_env.physics.scene import Charge
+from blast_env.scenario import PointSource, Scenario
+from blast_env.sites import SightLines, sight_line_layout
+
+
+@dataclass(frozen=True)
+class Training:
+    """What an agent cost before its first case.
+
+    Attributes:
+        blasts: Blasts simulated, with those that its best weights were chosen by.
+        seconds: Time that it took.
+    """
+
+    blasts: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class NoBarrier:
+    """Builds nothing: what all others are compared with."""
+
+    name: str = "no barrier"
+
+    def propose(self, case: TrackCase) -> Layout:  # noqa: ARG002
+        """Return the empty layout."""
+        return ()
+
+
+@dataclass(frozen=True)
+class RandomLayout:
+    """Puts every module on a random cell, a layout a case."""
+
+    name: str = "random layout"
+
+    def propose(self, case: TrackCase) -> Layout:
+        """Return a layout that the case's seed decides."""
+        return random_layout(case.scenario, np.random.default_rng(case.seed))
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Follows a rule of thumb; against a hidden charge for the middle of where it may be.
+
+    Attributes:
+        rule: Gives the layout for a charge.
+        name: In tables.
+    """
+
+    rule: Callable[[Scenario, Charge], Layout]
+    name: str
+
+    def propose(self, case: TrackCase) -> Layout:
+        """Return the rule's layout.
+
+        Raises:
+            BlastEnvError: If there is no line of sight; see `line_of_sight_wall`.
+        """
+        return self.rule(case.scenario, case.charge or expected_charge(case.scenario.charge))
+
+
+@dataclass(frozen=True)
+class SightLineLayout:
+    """Cuts as many lines of sight as it can; see `blast_env.sites.sight_line_layout`.
+
+    Attributes:
+        name: In tables.
+    """
+
+    name: str = "most sight lines cut"
+
+    def propose(self, case: TrackCase) -> Layout:
+        """Return the layout for the charge, or for all the places where a hidden one may be."""
+        scenario = case.scenario
+        if case.charge is not None:
+            at_it = PointSource(position_m=case.charge.position_m, tnt_kg=case.charge.tnt_kg)
+            scenario = scenario.model_copy(update={"charge": (at_it,)})
+        return sight_line_layout(scenario, SightLines.of(scenario))
+
+
+@dataclass(frozen=True)
+class Agent:
+    """A trained agent.
+
+    Attributes:
+        agent: The agent.
+        name: In tables.
+        training: What it cost.
+    """
+
+    agent: LayoutAgent
+    name: str
+    training: Training
+
+    def propose(self, case: TrackCase) -> Layout:
+        """Return the agent's layout; it is told the charge unless that is hidden."""
+        return self.agent.propose(case.scenario, case.charge)
+
+
+@dataclass(frozen=True)
+class Search:
+    """A search that spends blasts on every case.
+
+    Attributes:
+        method: The method.
+        budget: Most blasts a case.
+    """
+
+    method: SearchMethod
+    budget: int
+
+    def __post_init__(self) -> None:
+        """Check the budget.
+
+        Raises:
+            BlastEnvError: If it is below 1.
+        """
+        if self.budget < 1:
+            raise BlastEnvError(f"budget is {self.budget} blasts, must be at least 1")
+
+    @property
+    def name(self) -> str:
+        """Name in tables."""
+        return search_name(self.method.name, self.budget)
+
+
+Instant = NoBarrier | RandomLayout | Rule | SightLineLayout | Agent
+"""Entries that spend no blast on a case."""
+
+Entry = Instant | Search
+"""All entries."""
+
+
+def search_name(method: str, budget: int) -> str:
+    """Return the name of a search with a budget."""
+    return f"{method}, {budget:,} blasts"
+
+
+def standard_entries(methods: Sequence[str], budgets: Sequence[int]) -> tuple[Entry, ...]:
+    """Return all entries but agents: no barrier, a random layout, rules, sight lines, searches.
+
+    Args:
+        methods: Names of search methods.
+        budgets: Blasts a case; each method enters with each.
+
+    Raises:
+        UnknownNameError: If there is no such method; the message names the nearest one.
+        BlastEnvError: If a budget is below 1.
+    """
+    rules = (Rule(rule, name) for name, rule in RULES.items())
+    found = [find_search_method(name) for name in methods]
+    searches = (Search(method, budget) for method in found for budget in budgets)
+    return (NoBarrier(), RandomLayout(), *rules, SightLineLayout(), *searches)

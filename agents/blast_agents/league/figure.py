@@ -1,0 +1,146 @@
+"""A track as a figure: reduction over the blasts spent on a case."""
+
+from typing import Final
+
+import numpy as np
+
+from blast_agents.league.standings import Result, Standings
+from blast_env.rendering.site_plan import write_heading
+from blast_env.rendering.style import INK, QUIET_INK, count_of, render_extra, unit_interval
+
+with render_extra():
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import NullLocator, PercentFormatter
+
+# Okabe and Ito's colours, which people with any colour vision can tell apart.
+_SEARCHES: Final = ("#0072B2", "#E69F00", "#009E73", "#56B4E9", "#F0E442")
+_AGENTS: Final = ("#D55E00", "#CC79A7", "#000000")
+_SEARCH_MARKERS: Final = "osD^v"
+_NOTHING_MARKERS: Final = "xP*X"
+_APART: Final = 1.05
+"""What stands at the same number of blasts is this factor apart, so that all of it is seen."""
+
+
+def league_figure(standings: Standings) -> Figure:
+    """Return the reductions with their 95 % intervals over the blasts spent on a case.
+
+    Agents are lines: they spend none, whatever the others do.
+    """
+    figure = Figure(figsize=(9.6, 6.4), layout="constrained")
+    axes = figure.add_subplot()
+    searches, agents, others = _kinds(standings)
+    spent = sorted({result.budget for each in searches.values() for result in each}) or [1]
+    zero = spent[0] / 4.0
+    for index, result in enumerate(agents):
+        _draw_agent(axes, standings, result, _AGENTS[index % len(_AGENTS)])
+    for index, result in enumerate(others):
+        _draw_other(axes, standings, result, index, zero * _aside(index, len(others)))
+    for index, (method, results) in enumerate(searches.items()):
+        _draw_search(axes, standings, method, results, index, _aside(index, len(searches)))
+    axes.set_xscale("log")
+    axes.set_xlim(zero / 1.5, 1.5 * spent[-1])
+    axes.set_xticks([zero, *spent], ["0", *(f"{each:,}" for each in spent)])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.axvline(zero * 2.0, color=unit_interval(QUIET_INK), linewidth=0.8, linestyle=":")
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    axes.set_xlabel("blasts spent on a case (logarithmic from the dotted line on)")
+    axes.set_ylabel("reduction of the impulse on held-out threats")
+    axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+    axes.grid(alpha=0.3)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_axisbelow(True)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=9, frameon=False)
+    write_heading(figure, standings.track.title, _subtitle(standings))
+    return figure
+
+
+def _kinds(standings: Standings) -> tuple[dict[str, list[Result]], list[Result], list[Result]]:
+    """Return the searches by method, the agents, and what is left but no barrier."""
+    searches: dict[str, list[Result]] = {}
+    agents, others = [], []
+    for result in standings.results:
+        if result.budget:
+            searches.setdefault(result.method, []).append(result)
+        elif result.training is not None:
+            agents.append(result)
+        elif any(proposal.layout for proposal in result.proposals):
+            others.append(result)
+    return searches, agents, others
+
+
+def _aside(index: int, count: int) -> float:
+    return float(_APART ** (2.0 * index - (count - 1)))
+
+
+def _draw_agent(axes: Axes, standings: Standings, result: Result, colour: str) -> None:
+    value, low, high = standings.reduction(result)
+    trained = 0 if result.training is None else result.training.blasts
+    label = f"{result.name}: no blast a case, {trained:,} in training"
+    axes.axhline(value, color=colour, linewidth=2.2, label=label, zorder=2)
+    if not np.isnan(low):
+        axes.axhspan(low, high, color=colour, alpha=0.13, linewidth=0.0, zorder=1)
+        for end in (low, high):  # where bands lie over each other, their ends are still seen
+            axes.axhline(end, color=colour, linewidth=0.7, linestyle="--", alpha=0.7, zorder=1)
+
+
+def _draw_other(
+    axes: Axes, standings: Standings, result: Result, index: int, blasts: float
+) -> None:
+    axes.errorbar(
+        [blasts],
+        [standings.reduction(result).value],
+        yerr=_error_bars(standings, [result]),
+        color=unit_interval(INK),
+        marker=_NOTHING_MARKERS[index % len(_NOTHING_MARKERS)],
+        markersize=8,
+        capsize=3,
+        linestyle="",
+        linewidth=1.2,
+        label=result.name,
+        zorder=3,
+    )
+
+
+def _draw_search(
+    axes: Axes,
+    standings: Standings,
+    method: str,
+    results: list[Result],
+    index: int,
+    aside: float,
+) -> None:
+    results = sorted(results, key=lambda result: result.budget)
+    axes.errorbar(
+        [result.budget * aside for result in results],
+        [standings.reduction(result).value for result in results],
+        yerr=_error_bars(standings, results),
+        color=_SEARCHES[index % len(_SEARCHES)],
+        marker=_SEARCH_MARKERS[index % len(_SEARCH_MARKERS)],
+        markersize=6,
+        capsize=3,
+        linewidth=1.6,
+        label=f"{method} search",
+        zorder=4,
+    )
+
+
+def _error_bars(standings: Standings, results: list[Result]) -> "np.ndarray[tuple[int, int]]":
+    """Return how far the intervals reach down and up (2, results); 0 where there is none."""
+    estimates = np.array([standings.reduction(result) for result in results])
+    value, low, high = estimates.T
+    return np.nan_to_num(np.maximum([value - low, high - value], 0.0))
+
+
+def _subtitle(standings: Standings) -> str:
+    count, threats = standings.unprotected_pa_s.shape
+    if standings.has_one_case:
+        return f"one case, 95 % intervals over its {threats} held-out threats; " + _engine(
+            standings
+        )
+    over = count_of("held-out seed", threats)
+    return f"95 % intervals over {count} cases, {over} each; {_engine(standings)}"
+
+
+def _engine(standings: Standings) -> str:
+    return f"engine {standings.engine}"

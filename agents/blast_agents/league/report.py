@@ -1,0 +1,217 @@
+"""The tables of a track: one row an entry, and one row an entry and case."""
+
+from collections.abc import Sequence
+from importlib.metadata import version
+from math import isnan
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from blast_agents.league.entries import Training
+from blast_agents.league.figure import league_figure
+from blast_agents.league.standings import REFERENCE_METHOD, Result, Standings, verdicts
+from blast_agents.league.tracks import TrackCase
+from blast_agents.proposal import Proposal
+from blast_env.arrays import FloatArray
+from blast_env.files import write_atomically
+from blast_env.geometry import Layout
+from blast_env.rendering.figures import save_figure
+from blast_env.rendering.style import count_of
+
+
+def summary_table(standings: Standings) -> pd.DataFrame:
+    """Return one row an entry, in the order of entering.
+
+    `minus_reference` is the difference to genetic search with the track's reference budget; the
+    columns are missing if that did not enter.
+    """
+    return pd.DataFrame([_summary(standings, result) for result in standings.results])
+
+
+def case_table(standings: Standings) -> pd.DataFrame:
+    """Return one row an entry and case; impulses are means over the held-out threats."""
+    return pd.DataFrame(
+        [
+            {"entry": result.name, "method": result.method, "budget": result.budget}
+            | _case(case, proposal, impulses_pa_s, bare_pa_s)
+            for result in standings.results
+            for case, proposal, impulses_pa_s, bare_pa_s in zip(
+                standings.track.cases,
+                result.proposals,
+                result.impulse_pa_s,
+                standings.unprotected_pa_s,
+                strict=True,
+            )
+        ]
+    )
+
+
+def _summary(standings: Standings, result: Result) -> dict[str, Any]:
+    reduction, training = standings.reduction(result), result.training or Training(0, 0.0)
+    row = {
+        "entry": result.name,
+        "method": result.method,
+        "budget": result.budget,
+        "cases": len(standings.track.cases),
+        "held_out_threats": standings.unprotected_pa_s.shape[1],
+        "reduction": reduction.value,
+        "reduction_low": reduction.low,
+        "reduction_high": reduction.high,
+        "worst_reduction": standings.worst(result),
+        "blasts": result.blasts,
+        "blasts_per_case": result.blasts_per_case,
+        "training_blasts": training.blasts,
+        "wall_time_s": result.seconds,
+        "training_time_s": training.seconds,
+        "proposal_ms": result.proposal_ms,
+    }
+    if standings.reference is None:
+        return row
+    difference = standings.difference(result, standings.reference)
+    return row | {
+        "minus_reference": difference.value,
+        "minus_reference_low": difference.low,
+        "minus_reference_high": difference.high,
+    }
+
+
+def _case(
+    case: TrackCase, proposal: Proposal, impulses_pa_s: FloatArray, bare_pa_s: FloatArray
+) -> dict[str, Any]:
+    x_m, y_m = (np.nan, np.nan) if case.charge is None else case.charge.position_m
+    return {
+        "case": case.name,
+        "scenario_hash": case.scenario.content_hash,
+        "charge_x_m": x_m,
+        "charge_y_m": y_m,
+        "first_held_out_seed": case.held_out[0].seed,
+        "impulse_pa_s": float(impulses_pa_s.mean()),
+        "unprotected_impulse_pa_s": float(bare_pa_s.mean()),
+        "reduction": 1.0 - float(impulses_pa_s.mean() / bare_pa_s.mean()),
+        "blasts": proposal.blasts,
+        "seconds": proposal.seconds,
+        "modules": len(proposal.layout),
+        "layout": _cells_text(proposal.layout),
+    }
+
+
+def _cells_text(layout: Layout) -> str:
+    """Return the cells of a layout for one field of a table: `3,4 3,5`."""
+    return " ".join(f"{row},{column}" for row, column in layout)
+
+
+HEADERS: Final = (
+    "method",
+    "reduction",
+    "95 % interval",
+    "worst case",
+    "blasts a case",
+    "blasts in total",
+    "wall time (s)",
+    "proposal (ms)",
+)
+"""Columns of the printed table."""
+
+
+PAGE: Final = "league.md"
+
+
+def table_rows(standings: Standings) -> list[tuple[str, ...]]:
+    """Return the printed table, a row an entry; see `HEADERS`."""
+    return [_row(standings, result) for result in standings.results]
+
+
+def verdict_lines(standings: Standings) -> list[str]:
+    """Return what may be said of the agents, or why nothing can be."""
+    if not any(result.training is not None for result in standings.results):
+        return ["No verdict: no trained agent has entered this track."]
+    if standings.reference is None:
+        budget = standings.track.reference_budget
+        return [f"No verdict: {REFERENCE_METHOD} search with {budget} blasts has not entered."]
+    return [verdict.text for verdict in verdicts(standings)]
+
+
+def sample_text(standings: Standings) -> str:
+    """Return what the numbers are means over."""
+    count, threats = standings.unprotected_pa_s.shape
+    held_out = count_of("held-out threat", threats)
+    if standings.has_one_case:
+        return f"One case; intervals and worst case are over its {held_out}"
+    return f"{count} cases, {held_out} each; intervals and worst case are over the cases"
+
+
+def write_league(all_standings: Sequence[Standings], folder: Path, command: str) -> list[Path]:
+    """Write tables and figure of each track, and the page.
+
+    Args:
+        all_standings: One a track.
+        folder: It exists.
+        command: What started the league.
+
+    Returns:
+        The paths.
+
+    Raises:
+        BlastEnvError: If a file cannot be written, or the extra `render` is missing.
+    """
+    written = []
+    for standings in all_standings:
+        name = standings.track.name
+        written += [
+            _write_table(summary_table(standings), folder / f"{name}_summary.csv"),
+            _write_table(case_table(standings), folder / f"{name}_cases.csv"),
+            save_figure(league_figure(standings), folder / f"{name}.png"),
+        ]
+    page = folder / PAGE
+    with write_atomically(page) as temporary:
+        temporary.write_text(markdown(all_standings, command), encoding="utf-8")
+    return [*written, page]
+
+
+def markdown(all_standings: Sequence[Standings], command: str) -> str:
+    """Return the page: a table, verdicts and the figure of each track."""
+    lines = ["# League", ""]
+    for standings in all_standings:
+        lines += [f"## {standings.track.title}", "", f"{sample_text(standings)}.", ""]
+        lines += [_line(HEADERS), "|---|" + "---:|" * (len(HEADERS) - 1)]
+        lines += [_line(row) for row in table_rows(standings)]
+        lines += ["", *(f"- {line}" for line in verdict_lines(standings)), ""]
+        lines += [f"![Reduction over blasts spent]({standings.track.name}.png)", ""]
+    engines = ", ".join(dict.fromkeys(standings.engine for standings in all_standings))
+    lines += [
+        "Blasts in total and wall time include the training of an agent; blasts on held-out "
+        "threats count nowhere. Wall time adds up what each search took in one process.",
+        "",
+        f"Engine {engines}, blast-env {version('blast-env')}: `{command}`",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _row(standings: Standings, result: Result) -> tuple[str, ...]:
+    value, low, high = standings.reduction(result)
+    return (
+        result.name,
+        _percent(value),
+        "-" if isnan(low) else f"{100.0 * low:.1f} to {_percent(high)}",
+        _percent(standings.worst(result)),
+        f"{result.blasts_per_case:,.0f}",
+        f"{result.blasts:,}",
+        f"{result.seconds:,.1f}",
+        f"{result.proposal_ms:,.1f}",
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _write_table(table: pd.DataFrame, path: Path) -> Path:
+    with write_atomically(path) as temporary:
+        table.to_csv(temporary, index=False)
+    return path

@@ -1,0 +1,200 @@
+"""How the entries of a track did: means with their uncertainty, and cost."""
+
+from dataclasses import dataclass
+from math import isnan
+from statistics import median
+from typing import Final
+
+from blast_agents.league.entries import Training, search_name
+from blast_agents.league.tracks import Track
+from blast_agents.proposal import Proposal
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.statistics import Estimate, mean_estimate, reduction_estimate
+
+REFERENCE_METHOD: Final = "genetic"
+"""Agents are held against this search."""
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What an entry did on all cases.
+
+    Attributes:
+        name: Of the entry.
+        method: Of the search; else the name.
+        budget: Most blasts of a search for a case; else 0.
+        training: What an agent cost before; `None` for all others.
+        proposals: One a case; the cells are sorted.
+        impulse_pa_s: With the layouts, Pa*s (cases, held-out threats).
+    """
+
+    name: str
+    method: str
+    budget: int
+    training: Training | None
+    proposals: tuple[Proposal, ...]
+    impulse_pa_s: FloatArray
+
+    @property
+    def blasts_per_case(self) -> float:
+        """Blasts spent on a case, mean."""
+        return sum(each.blasts for each in self.proposals) / len(self.proposals)
+
+    @property
+    def blasts(self) -> int:
+        """All blasts spent, those of a training among them; held-out ones are for the reader."""
+        training = 0 if self.training is None else self.training.blasts
+        return training + sum(each.blasts for each in self.proposals)
+
+    @property
+    def seconds(self) -> float:
+        """Time that training and proposals took together, each in one process."""
+        training = 0.0 if self.training is None else self.training.seconds
+        return training + sum(each.seconds for each in self.proposals)
+
+    @property
+    def proposal_ms(self) -> float:
+        """Time from a case to its layout, median, ms."""
+        return 1000.0 * median(each.seconds for each in self.proposals)
+
+
+@dataclass(frozen=True, eq=False)
+class Standings:
+    """The results of a track; barrier and no barrier met the same threats.
+
+    Where there are several cases, each counts alike: a case's reduction is 1 - mean impulse with
+    the barrier / without it over its held-out threats, and the intervals are those of the mean
+    over cases. With a single case they are those over its held-out threats.
+
+    Attributes:
+        track: The track.
+        results: One an entry.
+        unprotected_pa_s: Impulse without a barrier, Pa*s (cases, held-out threats).
+        engine: Name of the engine.
+
+    Raises:
+        BlastEnvError: If nothing arrives at the protected structures of a case without a barrier.
+    """
+
+    track: Track
+    results: tuple[Result, ...]
+    unprotected_pa_s: FloatArray
+    engine: str
+
+    def __post_init__(self) -> None:
+        """Check that there is something to reduce."""
+        for case, mean_pa_s in zip(
+            self.track.cases, self.unprotected_pa_s.mean(axis=1), strict=True
+        ):
+            if not mean_pa_s > 0.0:
+                raise BlastEnvError(
+                    f"case {case.name!r}: nothing arrives at the protected structures without a "
+                    f"barrier ({len(case.held_out)} threats): there is nothing to reduce"
+                )
+
+    @property
+    def has_one_case(self) -> bool:
+        """Whether there is but one case, so that intervals and worst are over its threats."""
+        return len(self.track.cases) == 1
+
+    @property
+    def reference(self) -> Result | None:
+        """Genetic search with the track's budget; `None` if it did not enter."""
+        name = search_name(REFERENCE_METHOD, self.track.reference_budget)
+        return next((result for result in self.results if result.name == name), None)
+
+    def case_reductions(self, result: Result) -> FloatArray:
+        """Return the reduction in each case (cases,)."""
+        ratio: FloatArray = result.impulse_pa_s.mean(axis=1) / self.unprotected_pa_s.mean(axis=1)
+        return 1.0 - ratio
+
+    def reduction(self, result: Result) -> Estimate:
+        """Return the mean reduction with its 95 % interval."""
+        if self.has_one_case:
+            return reduction_estimate(result.impulse_pa_s[0], self.unprotected_pa_s[0])
+        value, low, high = mean_estimate(self.case_reductions(result))
+        return Estimate(value, low, min(high, 1.0))  # no reduction is above 1
+
+    def difference(self, result: Result, other: Result) -> Estimate:
+        """Return by how much the mean reduction is above another's, with its paired interval."""
+        if self.has_one_case:
+            # As a reduction: of what is left if all that the result takes off more is taken off.
+            bare = self.unprotected_pa_s[0]
+            left = bare + result.impulse_pa_s[0] - other.impulse_pa_s[0]
+            return reduction_estimate(left, bare)
+        return mean_estimate(self.case_reductions(result) - self.case_reductions(other))
+
+    def worst(self, result: Result) -> float:
+        """Return the least reduction in any case; with a single one, under any threat.
+
+        Threats that do nothing without a barrier are left out.
+        """
+        if not self.has_one_case:
+            return float(self.case_reductions(result).min())
+        bare = self.unprotected_pa_s[0]
+        arrives = bare > 0.0
+        return float((1.0 - result.impulse_pa_s[0][arrives] / bare[arrives]).min())
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A trained agent against the reference, case by case.
+
+    Attributes:
+        agent: Name of the agent.
+        reference: Name of the search.
+        difference: Mean reduction of the agent minus that of the search.
+        sample: What the interval is over, e.g. `"16 cases"`.
+        proposal_ms: Time from a case to the agent's layout, median, ms.
+    """
+
+    agent: str
+    reference: str
+    difference: Estimate
+    sample: str
+    proposal_ms: float
+
+    @property
+    def conclusion(self) -> str:
+        """What may be said: the interval decides."""
+        if isnan(self.difference.low):
+            return "one threat says nothing about the others"
+        if self.difference.low > 0.0:
+            return "the agent protects better"
+        if self.difference.high < 0.0:
+            return "the agent protects worse"
+        return "no difference shown: the interval contains 0"
+
+    @property
+    def text(self) -> str:
+        """The verdict as a sentence."""
+        value, low, high = (100.0 * each for each in self.difference)
+        interval = "-" if isnan(low) else f"{low:+.1f} to {high:+.1f}"
+        return (
+            f"{self.agent} minus {self.reference}: {value:+.1f} percentage points of reduction "
+            f"(95 % interval {interval}, paired over {self.sample}); {self.conclusion}. "
+            f"It proposes in {self.proposal_ms:.1f} ms (median)."
+        )
+
+
+def verdicts(standings: Standings) -> tuple[Verdict, ...]:
+    """Return a verdict for each agent; none if the search to compare with did not enter."""
+    reference = standings.reference
+    if reference is None:
+        return ()
+    count = len(standings.track.cases)
+    sample = f"{count} cases"
+    if standings.has_one_case:
+        sample = f"{standings.unprotected_pa_s.shape[1]} held-out threats of one case"
+    return tuple(
+        Verdict(
+            agent=result.name,
+            reference=reference.name,
+            difference=standings.difference(result, reference),
+            sample=sample,
+            proposal_ms=result.proposal_ms,
+        )
+        for result in standings.results
+        if result.training is not None
+    )

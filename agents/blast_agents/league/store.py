@@ -1,0 +1,211 @@
+"""What a league has found out, kept in a folder so that an interrupted one goes on.
+
+One file a result, named after all that the result depends on: a change of the code, the versions,
+the scenario or the case makes it another result.
+"""
+
+import json
+import re
+from dataclasses import asdict
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final, Generic, NamedTuple, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+import blast_agents
+from blast_agents.league.entries import Search
+from blast_agents.league.tracks import TrackCase
+from blast_agents.proposal import Proposal
+from blast_env.calibration.model import scenario_calibration
+from blast_env.evaluation import Threat
+from blast_env.evaluation.store import calibration_digest, code_version, engine_text
+from blast_env.files import make_folder, write_atomically
+from blast_env.geometry import Layout
+from blast_env.physics.engine import find_engine
+
+_PACKAGES: Final = ("numpy", "pymoo")
+"""What a search draws its numbers with."""
+_NO_INFLUENCE: Final = ("figure.py",)
+_ADDRESS: Final = re.compile(r" at 0x[0-9a-f]+")
+
+Value = TypeVar("Value", Proposal, tuple[float, ...])
+
+
+class Model(NamedTuple):
+    """What the blasts of a case depend on beside layout and threat.
+
+    Attributes:
+        scenario_hash: Content hash of the scenario.
+        engine: The engine with its version.
+        calibration: Digest of the calibration.
+        code: Version of the package.
+    """
+
+    scenario_hash: str
+    engine: str
+    calibration: str
+    code: str
+
+
+class SearchKey(NamedTuple):
+    """What a search's proposal depends on.
+
+    Attributes:
+        model: Of the blasts.
+        threats: What the search meets.
+        method: The method with its settings.
+        budget: Most blasts.
+        seed: Of the search.
+        code: Digest of the searches' code, with the versions of what they draw with.
+    """
+
+    model: Model
+    threats: tuple[Threat, ...]
+    method: str
+    budget: int
+    seed: int
+    code: str
+
+
+class EvaluationKey(NamedTuple):
+    """What the impulses with a layout depend on.
+
+    Attributes:
+        model: Of the blasts.
+        threats: What the layout meets.
+        layout: Its cells, sorted.
+    """
+
+    model: Model
+    threats: tuple[Threat, ...]
+    layout: Layout
+
+
+def search_key(case: TrackCase, search: Search, engine: str) -> SearchKey:
+    """Return the key of a search for a case.
+
+    Raises:
+        CalibrationError: If the scenario has no calibration for the engine.
+        UnknownNameError: If there is no such engine.
+    """
+    return SearchKey(
+        model=_model(case, engine),
+        threats=case.search_threats,
+        # Functions among the settings: their names, and not where this process has them.
+        method=_ADDRESS.sub("", repr(search.method)),
+        budget=search.budget,
+        seed=case.seed,
+        code=_search_code(),
+    )
+
+
+def evaluation_key(case: TrackCase, layout: Layout, engine: str) -> EvaluationKey:
+    """Return the key of the impulses with a layout on a case's held-out threats.
+
+    Raises:
+        CalibrationError: If the scenario has no calibration for the engine.
+        UnknownNameError: If there is no such engine.
+    """
+    return EvaluationKey(_model(case, engine), case.held_out, tuple(sorted(layout)))
+
+
+@dataclass(frozen=True)
+class _Record(Generic[Value]):
+    """The content of a file."""
+
+    key: str
+    value: Value
+
+
+_PROPOSAL: Final = TypeAdapter(_Record[Proposal])
+_IMPULSES: Final = TypeAdapter(_Record[tuple[float, ...]])
+
+
+class ResultStore:
+    """Keeps results in the files of a folder.
+
+    Several processes may use one folder. A file that is damaged, or is not what its name says,
+    counts as not there and is written anew.
+
+    Args:
+        folder: The folder; it is made if need be.
+
+    Raises:
+        BlastEnvError: If the folder cannot be made.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        make_folder(self.folder)
+
+    def proposal(self, key: SearchKey) -> Proposal | None:
+        """Return what a search proposed, or `None` if that is not known."""
+        return self._read(_text(key), _PROPOSAL)
+
+    def keep_proposal(self, key: SearchKey, proposal: Proposal) -> None:
+        """Keep what a search proposed.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        self._write(_text(key), asdict(proposal))
+
+    def impulses_pa_s(self, key: EvaluationKey) -> tuple[float, ...] | None:
+        """Return the impulses under the threats, Pa*s, or `None` if they are not known."""
+        return self._read(_text(key), _IMPULSES)
+
+    def keep_impulses(self, key: EvaluationKey, impulses_pa_s: tuple[float, ...]) -> None:
+        """Keep the impulses under the threats, Pa*s.
+
+        Raises:
+            BlastEnvError: If they cannot be written.
+        """
+        self._write(_text(key), impulses_pa_s)
+
+    def _read(self, key: str, adapter: TypeAdapter[_Record[Value]]) -> Value | None:
+        try:
+            record = adapter.validate_json(self._path(key).read_bytes())
+        except (OSError, ValidationError):
+            return None
+        return record.value if record.key == key else None
+
+    def _write(self, key: str, value: object) -> None:
+        content = json.dumps({"key": key, "value": value}, allow_nan=False)
+        with write_atomically(self._path(key)) as temporary:
+            temporary.write_text(f"{content}\n", encoding="utf-8")
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{sha256(key.encode()).hexdigest()}.json"
+
+
+def _text(key: SearchKey | EvaluationKey) -> str:
+    threats = [(each.charge, each.seed) for each in key.threats]
+    return json.dumps([type(key).__name__, key._replace(threats=()), threats])
+
+
+@cache
+def _search_code() -> str:
+    """Return a digest of the code that searches depend on, with versions."""
+    folder = Path(blast_agents.__file__).parent
+    paths = sorted((folder / "search").glob("*.py"))
+    digest = sha256()
+    for path in (*paths, folder / "rules.py", folder / "random_layouts.py"):
+        if path.name not in _NO_INFLUENCE:
+            digest.update(f"{path.name}\n".encode() + path.read_bytes())
+    versions = " ".join(f"{name} {version(name)}" for name in _PACKAGES)
+    return f"{digest.hexdigest()[:16]} {versions}"
+
+
+def _model(case: TrackCase, engine: str) -> Model:
+    found = find_engine(engine)
+    calibration = scenario_calibration(case.scenario, found.name)
+    return Model(
+        case.scenario.content_hash,
+        engine_text(found),
+        calibration_digest(calibration),
+        code_version(),
+    )

@@ -1,0 +1,221 @@
+"""What the entries of a league are asked: cases, and the blasts that their layouts meet."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from blast_agents.search import hidden_threats, visible_threats
+from blast_agents.search.problem import SEED_SPAN
+from blast_env.envs.arguments import check_names, whole_number
+from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
+from blast_env.envs.strategies import zone_of
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import Threat, draw_threats
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario.build_scene import draw_charge
+from blast_env.sites import SiteSource
+
+TRACKS: Final = ("known", "hidden", "sites")
+"""The tracks by name."""
+
+KNOWN_SCENARIOS: Final = ("courtyard", "perimeter_gate")
+HIDDEN_SCENARIOS: Final = ("courtyard",)
+
+MOST_CASES: Final = 1000
+MOST_SEEDS: Final = 1000
+MOST_LEAGUE_SEED: Final = 1000
+HIDDEN_SEEDS: Final = 4
+"""On a known site a hidden threat is one case, which meets so many times more held-out threats."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrackCase:
+    """One layout that is asked for.
+
+    Attributes:
+        name: Of the case.
+        scenario: The scenario.
+        charge: Where the charge is; `None` where it is hidden.
+        search_threats: What a search may spend its blasts on.
+        held_out: What the layouts are judged on. Their seeds are `SEED_SPAN` and more, those of
+            training and search less: no blast is ever met before.
+        seed: Decides what a search or a random layout draws.
+    """
+
+    name: str
+    scenario: Scenario
+    charge: Charge | None
+    search_threats: tuple[Threat, ...]
+    held_out: tuple[Threat, ...]
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Cases of one kind; each of them meets as many held-out threats.
+
+    Attributes:
+        name: Of the track's files.
+        title: What is asked, for people.
+        threat: `"visible"` or `"hidden"`, as in training.
+        scenario_hash: Content hash of the scenario; `None` for generated sites.
+        cases: At least one.
+        reference_budget: An agent is held against genetic search with so many blasts a case.
+    """
+
+    name: str
+    title: str
+    threat: Literal["visible", "hidden"]
+    scenario_hash: str | None
+    cases: tuple[TrackCase, ...]
+    reference_budget: int
+
+
+def known_track(scenario: Scenario, cases: int, seeds: int, seed: int = 0) -> Track:
+    """Return the track of a known threat at unseen positions.
+
+    A search meets `VISIBLE_REALISATIONS` fans and airs of the case's own charge.
+
+    Args:
+        scenario: The scenario; it has a build zone.
+        cases: How many charges are drawn, at most 1,000.
+        seeds: Held-out fans and airs of each, at most 1,000.
+        seed: Decides everything, at most 1,000.
+
+    Raises:
+        BlastEnvError: If a number is out of bounds, or there is no build zone.
+    """
+    zone_of(scenario)
+    drawn = []
+    for index, first in enumerate(_first_seeds(cases, seeds, seed)):
+        charge, search_seed = draw_charge(scenario, first), seed * MOST_CASES + index
+        case = TrackCase(
+            name=f"{scenario.name} {index}",
+            scenario=scenario,
+            charge=charge,
+            search_threats=visible_threats(charge, VISIBLE_REALISATIONS, search_seed),
+            held_out=tuple(Threat(charge, each) for each in range(first, first + seeds)),
+            seed=search_seed,
+        )
+        drawn.append(case)
+    return Track(
+        name=f"known_{scenario.name}",
+        title=f"Known threat at an unseen position: {scenario.name}",
+        threat="visible",
+        scenario_hash=scenario.content_hash,
+        cases=tuple(drawn),
+        reference_budget=200,
+    )
+
+
+def hidden_track(scenario: Scenario, seeds: int, seed: int = 0) -> Track:
+    """Return the track of a hidden threat on a known site: one case.
+
+    A search meets `HIDDEN_THREATS` charges, one fan and air each.
+
+    Args:
+        scenario: As for `known_track`.
+        seeds: The case meets `HIDDEN_SEEDS` times as many held-out threats.
+        seed: As for `known_track`.
+
+    Raises:
+        BlastEnvError: As for `known_track`.
+    """
+    zone_of(scenario)
+    (first,) = _first_seeds(1, seeds, seed)
+    return Track(
+        name=f"hidden_{scenario.name}",
+        title=f"Hidden threat on a known site: {scenario.name}",
+        threat="hidden",
+        scenario_hash=scenario.content_hash,
+        cases=(
+            _hidden_case(scenario.name, scenario, first, HIDDEN_SEEDS * seeds, seed * MOST_CASES),
+        ),
+        reference_budget=200,
+    )
+
+
+def sites_track(sites: Sequence[Scenario], seeds: int, seed: int = 0) -> Track:
+    """Return the track of a hidden threat on generated sites, each of them a case.
+
+    Args:
+        sites: Sites that no training has seen, at most 1,000.
+        seeds: Held-out threats of each, at most 1,000.
+        seed: As for `known_track`.
+
+    Raises:
+        BlastEnvError: As for `known_track`.
+    """
+    firsts = _first_seeds(len(sites), seeds, seed)
+    return Track(
+        name="sites",
+        title="Hidden threat on unseen generated sites",
+        threat="hidden",
+        scenario_hash=None,
+        cases=tuple(
+            _hidden_case(site.name, site, first, seeds, seed * MOST_CASES + index)
+            for index, (site, first) in enumerate(zip(sites, firsts, strict=True))
+        ),
+        reference_budget=50,
+    )
+
+
+def find_tracks(
+    name: str, cases: int, seeds: int, seed: int = 0, scenarios: Sequence[str] = ()
+) -> tuple[Track, ...]:
+    """Return the tracks of a name.
+
+    Args:
+        name: One of `TRACKS`, or `"all"`.
+        cases: Cases of each track; the hidden threat on a known site is one.
+        seeds: Held-out seeds of each case.
+        seed: Decides everything.
+        scenarios: Bundled names or files for the tracks with a known site; `KNOWN_SCENARIOS` and
+            `HIDDEN_SCENARIOS` unless given.
+
+    Raises:
+        UnknownNameError: If there is no such track; the message names the nearest one.
+        BlastEnvError: If a number is out of bounds, a scenario is given twice, or there is one of
+            no use, or one for the generated sites.
+    """
+    check_names("track", [name], [*TRACKS, "all"])
+    if name == "sites" and scenarios:
+        raise BlastEnvError(f"scenario is {scenarios[0]!r}: the track 'sites' generates its own")
+    tracks: list[Track] = []
+    if name in ("known", "all"):
+        known = [load_scenario(each) for each in scenarios or KNOWN_SCENARIOS]
+        tracks += [known_track(scenario, cases, seeds, seed) for scenario in known]
+    if name in ("hidden", "all"):
+        known = [load_scenario(each) for each in scenarios or HIDDEN_SCENARIOS]
+        tracks += [hidden_track(scenario, seeds, seed) for scenario in known]
+    if name in ("sites", "all"):
+        count = whole_number("cases", cases, 1, MOST_CASES)
+        tracks.append(sites_track(tuple(SiteSource.held_out(count)), seeds, seed))
+    names = [track.name for track in tracks]
+    for each in names:
+        if names.count(each) > 1:
+            raise BlastEnvError(f"track {each!r} is there twice: scenarios need different names")
+    return tuple(tracks)
+
+
+def _hidden_case(
+    name: str, scenario: Scenario, first: int, seeds: int, search_seed: int
+) -> TrackCase:
+    return TrackCase(
+        name=name,
+        scenario=scenario,
+        charge=None,
+        search_threats=hidden_threats(scenario, HIDDEN_THREATS, 1, search_seed),
+        held_out=draw_threats(scenario, range(first, first + seeds)),
+        seed=search_seed,
+    )
+
+
+def _first_seeds(cases: int, seeds: int, seed: int) -> list[int]:
+    """Return the first held-out seed of each case; the others follow it."""
+    whole_number("cases", cases, 1, MOST_CASES)
+    whole_number("seeds", seeds, 1, MOST_SEEDS)
+    whole_number("seed", seed, 0, MOST_LEAGUE_SEED)
+    stride = HIDDEN_SEEDS * MOST_SEEDS
+    return [SEED_SPAN + (seed * MOST_CASES + index) * stride for index in range(cases)]

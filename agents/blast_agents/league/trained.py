@@ -1,0 +1,85 @@
+"""Agents of run folders as entries of a league."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from blast_agents.league.entries import Agent, Training
+from blast_agents.league.tracks import Track
+from blast_agents.training import load_agent
+from blast_agents.training.agent import Checkpoint
+from blast_agents.training.run_folder import SITES, EvaluationRow, RunFolder, read_rows
+from blast_env.errors import BlastEnvError
+
+_ALGORITHMS: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedRun:
+    """The agent of a run folder, and what it was trained for.
+
+    Attributes:
+        run: The folder.
+        entry: The agent.
+        threat: `"visible"` or `"hidden"`.
+        scenario: Name of the scenario, for people.
+        scenario_hash: Content hash of the scenario; `None` if it was trained on generated sites.
+    """
+
+    run: Path
+    entry: Agent
+    threat: Literal["visible", "hidden"]
+    scenario: str
+    scenario_hash: str | None
+
+    @classmethod
+    def load(cls, run: Path) -> "TrainedRun":
+        """Load the agent with the weights of its best evaluation.
+
+        Raises:
+            BlastEnvError: If it is no run folder, or damaged.
+        """
+        folder = RunFolder(run)
+        configuration = folder.configuration()
+        settings = configuration.settings
+        name = f"{_ALGORITHMS[settings.algorithm]} ({run.resolve().name})"
+        return cls(
+            run=run,
+            entry=Agent(load_agent(run), name, _training(folder, settings.evaluation_cases)),
+            threat=settings.threat,
+            scenario=settings.scenario,
+            scenario_hash=None if settings.scenario == SITES else configuration.scenario_hash,
+        )
+
+    def is_for(self, track: Track) -> bool:
+        """Return whether a track asks what the agent was trained for."""
+        return self.threat == track.threat and self.scenario_hash == track.scenario_hash
+
+
+def check_runs(runs: Sequence[TrainedRun], tracks: Sequence[Track]) -> None:
+    """Refuse an agent that was trained for none of the tracks.
+
+    Raises:
+        BlastEnvError: If there is one; the message says what it was trained for.
+    """
+    for run in runs:
+        if not any(run.is_for(track) for track in tracks):
+            names = ", ".join(track.name for track in tracks)
+            raise BlastEnvError(
+                f"{run.run}: was trained for a {run.threat} threat on {run.scenario!r} (scenario "
+                f"hash {(run.scenario_hash or 'of many')[:12]}), which is none of the tracks "
+                f"({names}) as they are now"
+            )
+
+
+def _training(folder: RunFolder, evaluation_cases: int) -> Training:
+    """Return what a run cost.
+
+    Each evaluation counts with a blast a case, and the cases without a barrier once: the most that
+    it can have been, because a layout that comes again needs no blast.
+    """
+    counters = Checkpoint.load(folder.last).counters
+    evaluations = read_rows(folder.evaluations, EvaluationRow, counters.steps)
+    selection = (len(evaluations) + 1) * evaluation_cases
+    return Training(counters.blasts + selection, counters.seconds)

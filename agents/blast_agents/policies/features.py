@@ -1,0 +1,479 @@
+"""What the policy looks at on each cell."""
+
+from typing import Final, NamedTuple
+
+import torch
+from torch import Tensor
+
+from blast_env.envs.observations import GridObservation
+
+_LEAST_WAY: Final = 1e-3
+"""A way along an axis that is shorter, in squares, counts as so long: nothing is divided by 0."""
+
+
+class Spread(NamedTuple):
+    """Mean place of a plane's values, in squares, and how far they spread about it (batch,)."""
+
+    x: Tensor
+    y: Tensor
+    xx: Tensor
+    xy: Tensor
+    yy: Tensor
+
+    @classmethod
+    def of(cls, plane: Tensor) -> "Spread":
+        """Measure a plane (batch, rows, columns)."""
+        over_y, over_x = plane.sum(dim=2), plane.sum(dim=1)
+        total = over_x.sum(dim=1).clamp(min=1e-6)
+        y_of = torch.arange(plane.shape[1], dtype=plane.dtype, device=plane.device) + 0.5
+        x_of = torch.arange(plane.shape[2], dtype=plane.dtype, device=plane.device) + 0.5
+        x, y = over_x @ x_of / total, over_y @ y_of / total
+        xx = over_x @ x_of.square() / total - x.square()
+        yy = over_y @ y_of.square() / total - y.square()
+        xy = (plane @ x_of) @ y_of / total - x * y
+        return cls(x, y, xx, xy, yy)
+
+    @staticmethod
+    def half_extent(variance: Tensor) -> Tensor:
+        """Return half the width of an even spread from its variance."""
+        return (3.0 * variance.clamp(min=0.0)).sqrt()
+
+    def half_width(self, along_x: Tensor, along_y: Tensor) -> Tensor:
+        """Return half the width of an even spread in directions, in squares (batch, directions)."""
+        variance = (
+            self.xx[:, None] * along_x.square()
+            + 2.0 * self.xy[:, None] * along_x * along_y
+            + self.yy[:, None] * along_y.square()
+        )
+        return self.half_extent(variance)
+
+
+class LinesOfSight(NamedTuple):
+    """A line from each of some places of the charge to the middle of the protected structures.
+
+    All attributes are (batch, places), lengths in squares.
+
+    Attributes:
+        x: Where it begins.
+        y: Likewise.
+        along_x: Its direction, of length 1.
+        along_y: Likewise.
+        distance: Its length, at least 1.
+        left: How far aside of the line they reach to the left, over how far along it: the tangent
+            of the angle at which they are seen.
+        right: Likewise to the right, where it is negative.
+    """
+
+    x: Tensor
+    y: Tensor
+    along_x: Tensor
+    along_y: Tensor
+    distance: Tensor
+    left: Tensor
+    right: Tensor
+
+    @classmethod
+    def between(cls, x: Tensor, y: Tensor, target: Spread) -> "LinesOfSight":
+        """Return the lines from places (batch, places) to the structures.
+
+        Several structures count as one rectangle that is spread as far as they are.
+        """
+        towards_x, towards_y = target.x[:, None] - x, target.y[:, None] - y
+        distance = torch.hypot(towards_x, towards_y).clamp(min=1.0)
+        along_x, along_y = towards_x / distance, towards_y / distance
+        tangents = _corner_tangents(x, y, along_x, along_y, target)
+        left, right = tangents.amax(dim=0), tangents.amin(dim=0)
+        return cls(x, y, along_x, along_y, distance, left, right)
+
+    def coordinates(self, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
+        """Return how far points are along each line and aside of it, in squares.
+
+        Args:
+            x: In squares (batch, points).
+            y: Likewise.
+
+        Returns:
+            Two tensors (batch, places, points); to the left of the line is positive.
+        """
+        from_x, from_y = x[:, None] - self.x[..., None], y[:, None] - self.y[..., None]
+        along_x, along_y = self.along_x[..., None], self.along_y[..., None]
+        return from_x * along_x + from_y * along_y, from_y * along_x - from_x * along_y
+
+
+def stands_before(
+    lines: LinesOfSight, along: Tensor, x: Tensor, y: Tensor, target: Spread
+) -> Tensor:
+    """Return which points lie before the structures, neither in nor behind them, 0 or 1.
+
+    Args:
+        lines: From each place of the charge (batch, places).
+        along: How far the points are along each line, in squares (batch, places, points).
+        x: Of the points, in squares (batch, points).
+        y: Likewise.
+        target: The structures.
+
+    Returns:
+        (batch, places, points); 0 also for what lies on the other side of the charge.
+    """
+    enter_x, leave_x = _slab(lines.x, x, target.x, target.half_extent(target.xx))
+    enter_y, leave_y = _slab(lines.y, y, target.y, target.half_extent(target.yy))
+    enter, leave = torch.maximum(enter_x, enter_y), torch.minimum(leave_x, leave_y)
+    is_met = (enter < leave) & (leave > 0.0) & (enter < 1.0)
+    return ((along > 0.0) & ~is_met).float()
+
+
+def likely_places(likely: Tensor, places: int) -> tuple[Tensor, Tensor]:
+    """Return places that stand for a distribution, each for as large a part of it.
+
+    Args:
+        likely: How likely the charge is in a square (batch, rows, columns).
+        places: How many; 1 gives the mean.
+
+    Returns:
+        x and y in squares (batch, places).
+    """
+    if places == 1:
+        middle = Spread.of(likely)
+        return middle.x[:, None], middle.y[:, None]
+    columns = likely.shape[2]
+    up_to = likely.flatten(1).cumsum(dim=1)
+    parts = (torch.arange(places, dtype=up_to.dtype, device=up_to.device) + 0.5) / places
+    wanted = parts * up_to[:, -1:]
+    square = torch.searchsorted(up_to, wanted).clamp(max=up_to.shape[1] - 1)
+    return square % columns + 0.5, square.div(columns, rounding_mode="floor") + 0.5
+
+
+def _slab(start: Tensor, end: Tensor, middle: Tensor, half: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the shares of the ways to the points at which they enter and leave a slab."""
+    way = end[:, None] - start[..., None]
+    way = torch.where(way.abs() < _LEAST_WAY, _LEAST_WAY, way)
+    one = ((middle - half)[:, None] - start)[..., None] / way
+    other = ((middle + half)[:, None] - start)[..., None] / way
+    return torch.minimum(one, other), torch.maximum(one, other)
+
+
+def _corner_tangents(
+    x: Tensor, y: Tensor, along_x: Tensor, along_y: Tensor, target: Spread
+) -> Tensor:
+    """Return where the corners of a rectangle are seen (corners, batch, places)."""
+    half_x, half_y = target.half_extent(target.xx), target.half_extent(target.yy)
+    tangents = []
+    for side_x, side_y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        from_x = (target.x + side_x * half_x)[:, None] - x
+        from_y = (target.y + side_y * half_y)[:, None] - y
+        along = (from_x * along_x + from_y * along_y).clamp(min=1.0)
+        tangents.append((from_y * along_x - from_x * along_y) / along)
+    return torch.stack(tangents)
+
+
+BEARINGS: Final = 96
+"""Bearings that are told apart from each place of the charge."""
+
+
+MOST_SHADE: Final = 4.0
+"""They reach so many half widths of the facade to either side of its middle."""
+
+
+_MOST_DEPTH: Final = 3.0
+
+
+class Bearings(NamedTuple):
+    """On which bearings the cells and the structures are seen from each place of the charge.
+
+    From a place that sees the facade under a wider angle, more of a blast meets it: shares of the
+    facade are weighted by that.
+
+    Attributes:
+        first: The first bearing of each cell (batch, places, cells).
+        last: The one after its last, likewise.
+        before: Which cells lie before the structures, 0 or 1, likewise.
+        of_facade: Share of the facade on each bearing (batch, places, BEARINGS).
+        shade: How far from the facade's middle a cell is seen from the charge, in half widths of
+            the facade; mean over the places (batch, cells).
+        shade_size: The same without its sign, place by place (batch, cells).
+        cut: Share of the facade that a module on a cell hides (batch, cells).
+    """
+
+    first: Tensor
+    last: Tensor
+    before: Tensor
+    of_facade: Tensor
+    shade: Tensor
+    shade_size: Tensor
+    cut: Tensor
+
+    @classmethod
+    def of(cls, lines: LinesOfSight, along: Tensor, aside: Tensor, before: Tensor) -> "Bearings":
+        """Find them.
+
+        A module hides the bearings between its two outermost corners, in whole steps of `2 *
+        MOST_SHADE / BEARINGS` half widths of the facade. What does not stand before the structures
+        hides nothing.
+
+        Args:
+            lines: From each place of the charge (batch, places).
+            along: How far the cells are along each line, in squares (batch, places, cells).
+            aside: How far they are aside of it, likewise.
+            before: Which of them lie before the structures, 0 or 1, likewise.
+        """
+        half_facade = (lines.left - lines.right).clamp(min=1e-3)[..., None] / 2.0
+        middle = (lines.left + lines.right)[..., None] / 2.0
+        half_module = 0.5 * (lines.along_x.abs() + lines.along_y.abs())[..., None]
+        nearest = along.clamp(min=1.0)
+        shade = (aside / nearest - middle) / half_facade
+        half = half_module / nearest / half_facade
+        first, last = _edge(shade - half), _edge(shade + half)
+        last = torch.maximum(last, (first + 1).clamp(max=BEARINGS))
+        weight = half_facade / half_facade.sum(dim=1, keepdim=True)
+        centres = (torch.arange(BEARINGS, device=along.device) + 0.5) / BEARINGS * 2.0 - 1.0
+        of_facade = centres.abs().mul(MOST_SHADE).le(1.0).float()
+        of_facade = (of_facade / of_facade.sum()) * weight
+        return cls(
+            first=first,
+            last=last,
+            before=before,
+            of_facade=of_facade,
+            shade=shade.clamp(-MOST_SHADE, MOST_SHADE).mean(dim=1),
+            shade_size=shade.abs().clamp(max=MOST_SHADE).mean(dim=1),
+            cut=(_sums(of_facade, first, last) * before).sum(dim=1),
+        )
+
+
+class Shadow(NamedTuple):
+    """What modules do to the bearings; means over the places of the charge.
+
+    Attributes:
+        open_cut: Share of the facade that a module on a cell would hide and that nothing hides
+            yet (batch, cells).
+        covered: Share of a cell's bearings on which a module stands (batch, cells).
+        depth: How many modules stand on a bearing of a cell, at most 3, divided by 3
+            (batch, cells).
+        hidden: Share of the places from which a module stands on a bearing (batch, BEARINGS).
+        open_facade: Share of the facade that nothing hides yet (batch,).
+    """
+
+    open_cut: Tensor
+    covered: Tensor
+    depth: Tensor
+    hidden: Tensor
+    open_facade: Tensor
+
+    @classmethod
+    def of(cls, bearings: Bearings, barrier: Tensor) -> "Shadow":
+        """Return what the modules of a barrier hide, and what one more on each cell would.
+
+        Args:
+            bearings: Of the cells.
+            barrier: Which cells hold a module, 0 or 1 (batch, cells).
+        """
+        first, last, before = bearings.first, bearings.last, bearings.before
+        depth = _depth(first, last, barrier[:, None] * before)
+        covered = depth.gt(0.0).float()
+        open_facade = bearings.of_facade * (1.0 - covered)
+        wide = (last - first).clamp(min=1).float()
+        modules = _sums(depth.clamp(max=_MOST_DEPTH), first, last) / wide
+        return cls(
+            open_cut=(_sums(open_facade, first, last) * before).sum(dim=1),
+            covered=(_sums(covered, first, last) / wide).mean(dim=1),
+            depth=modules.mean(dim=1) / _MOST_DEPTH,
+            hidden=covered.mean(dim=1),
+            open_facade=open_facade.sum(dim=(1, 2)),
+        )
+
+
+def _edge(shade: Tensor) -> Tensor:
+    """Return the boundary between two bearings that is nearest, from 0 to BEARINGS."""
+    share = (shade / MOST_SHADE + 1.0) / 2.0
+    return (share * BEARINGS).round().clamp(0, BEARINGS).long()
+
+
+def _depth(first: Tensor, last: Tensor, modules: Tensor) -> Tensor:
+    """Return how many modules stand on each bearing (batch, places, BEARINGS)."""
+    steps = torch.zeros(*first.shape[:2], BEARINGS + 1, device=first.device)
+    steps.scatter_add_(2, first, modules).scatter_add_(2, last, -modules)
+    return steps.cumsum(dim=2)[..., :BEARINGS]
+
+
+def _sums(values: Tensor, first: Tensor, last: Tensor) -> Tensor:
+    """Return the sum of values (batch, places, BEARINGS) over the bearings of each cell."""
+    up_to = torch.nn.functional.pad(values.cumsum(dim=2), (1, 0))
+    return up_to.gather(2, last) - up_to.gather(2, first)
+
+
+CHANNELS: Final = GridObservation.channels
+
+
+PROTECTED, CHARGE, COST, BARRIER, FREE = (
+    CHANNELS.index(name) for name in ("protected", "charge", "cost", "barrier", "free")
+)
+
+
+SHARES: Final = tuple(CHANNELS.index(name) for name in ("stock_share", "stock", "budget_share"))
+
+
+STATIC: Final = tuple(CHANNELS.index(name) for name in ("protected", "cost", "charge"))
+"""The planes of which `ZoneGeometry` is made."""
+
+
+CELL_FEATURES: Final = 13
+
+
+SITE_FEATURES: Final = 7 + len(SHARES) + BEARINGS
+
+
+_LEVELS: Final = 255.0
+
+
+_LENGTH: Final = 20.0
+"""Lengths are divided by so many squares, 10 m, to be of the order of 1."""
+
+
+_SHARE_GAIN: Final = 10.0
+"""A module hides some tenth of a facade; times this it is of the order of 1."""
+
+
+class ZoneView(NamedTuple):
+    """What a policy knows of the cells of the build zone, and of the site as a whole.
+
+    Attributes:
+        cells: Features of each cell (batch, rows, columns, CELL_FEATURES).
+        barrier: Which cells hold a module, 0 or 1 (batch, rows, columns).
+        free: Which may take one, 0 or 1 (batch, rows, columns).
+        site: Features of the whole (batch, SITE_FEATURES).
+    """
+
+    cells: Tensor
+    barrier: Tensor
+    free: Tensor
+    site: Tensor
+
+
+class ZoneGeometry(NamedTuple):
+    """What stays the same while modules are placed.
+
+    Attributes:
+        row: First row of the build zone in the planes (batch,).
+        column: First column (batch,).
+        rows: Rows of the zone.
+        columns: Its columns.
+        bearings: On which bearings the cells are seen.
+        cells: Features of each cell (batch, cells, 8).
+        cost: Cost of a module, from 0 to 1 (batch, cells).
+        site: Features of the whole (batch, 6).
+    """
+
+    row: Tensor
+    column: Tensor
+    rows: int
+    columns: int
+    bearings: Bearings
+    cells: Tensor
+    cost: Tensor
+    site: Tensor
+
+    @classmethod
+    def of(cls, planes: Tensor, rows: int, columns: int, places: int = 1) -> "ZoneGeometry":
+        """Read the build zone off as seen along the lines of sight from charge to structures.
+
+        The features of a cell turn with the site: how far it is along the line of sight and aside
+        of it, in metres and as shares of the whole way and of the facade, and how much of the
+        facade a module hides there. So what is learnt at one place of the charge holds at the
+        others, and on a turned site. Where the charge is hidden, they are means over places that
+        it may be at.
+
+        Args:
+            planes: A `"grid"` observation, from 0 to 255 (batch, channels, height, width).
+            rows: Rows of the build zone.
+            columns: Its columns.
+            places: Places that stand for where the charge may be; 1 takes the middle.
+        """
+        row, column = _corner(planes[:, COST])
+        cost = _crop(planes[:, COST], row, column, rows, columns).float() / _LEVELS
+        # The plane shows the root of how likely the charge is in a square.
+        likely = planes[:, CHARGE].float().square()
+        target = Spread.of(planes[:, PROTECTED].float())
+        lines = LinesOfSight.between(*likely_places(likely, places), target)
+        x = (column[:, None, None] + torch.arange(columns, device=planes.device) + 0.5).float()
+        y = (row[:, None, None] + torch.arange(rows, device=planes.device)[:, None] + 0.5).float()
+        shape = (len(planes), rows, columns)
+        x, y = x.expand(shape).flatten(1), y.expand(shape).flatten(1)
+        along, aside = lines.coordinates(x, y)
+        bearings = Bearings.of(lines, along, aside, stands_before(lines, along, x, y, target))
+        distance = lines.distance[..., None]
+        cells = (
+            along.mean(dim=1) / _LENGTH,
+            (distance - along).mean(dim=1) / _LENGTH,
+            (along / distance).mean(dim=1),
+            aside.mean(dim=1) / _LENGTH,
+            aside.abs().mean(dim=1) / _LENGTH,
+            bearings.shade,
+            bearings.shade_size,
+            bearings.cut * _SHARE_GAIN,
+        )
+        return cls(
+            row=row,
+            column=column,
+            rows=rows,
+            columns=columns,
+            bearings=bearings,
+            cells=torch.stack(cells, dim=-1),
+            cost=cost.flatten(1),
+            site=_measures(planes, likely, target),
+        )
+
+    def view(self, planes: Tensor) -> ZoneView:
+        """Return what the policy sees now.
+
+        For each cell there is more to say once modules stand: how much of the facade a module
+        would hide there that nothing hides yet, and what stands on its bearing already.
+
+        Args:
+            planes: The observation of these sites (batch, channels, height, width).
+        """
+        barrier, free = (
+            _crop(planes[:, channel], self.row, self.column, self.rows, self.columns).float()
+            / _LEVELS
+            for channel in (BARRIER, FREE)
+        )
+        seen = Shadow.of(self.bearings, barrier.flatten(1))
+        shaded = (seen.open_cut * _SHARE_GAIN, seen.covered, seen.depth, self.cost, free.flatten(1))
+        cells = torch.cat((self.cells, torch.stack(shaded, dim=-1)), dim=-1)
+        shares = planes[:, SHARES, 0, 0].float() / _LEVELS
+        site = (self.site, seen.open_facade[:, None], shares, seen.hidden)
+        return ZoneView(cells.view(*barrier.shape, -1), barrier, free, torch.cat(site, dim=1))
+
+
+def _measures(planes: Tensor, likely: Tensor, target: Spread) -> Tensor:
+    """Return what there is to say of charge and structures, of the order of 1 (batch, 6)."""
+    charge = Spread.of(likely)
+    line = LinesOfSight.between(charge.x[:, None], charge.y[:, None], target)
+    along_x, along_y = line.along_x, line.along_y
+    return torch.cat(
+        (
+            line.distance / (2.0 * _LENGTH),
+            target.half_width(-along_y, along_x).clamp(min=1.0) / _LENGTH,
+            target.half_width(along_x, along_y) / _LENGTH,
+            charge.half_width(along_x, along_y) / _LENGTH,
+            charge.half_width(-along_y, along_x) / _LENGTH,
+            planes[:, CHARGE].float().amax(dim=(1, 2))[:, None] / _LEVELS,
+        ),
+        dim=1,
+    )
+
+
+def _corner(cost: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the first row and column of the build zone (batch,): only there cells have a cost."""
+    inside_y, inside_x = cost.amax(dim=2).gt(0), cost.amax(dim=1).gt(0)
+    return inside_y.int().argmax(dim=1), inside_x.int().argmax(dim=1)
+
+
+def _crop(plane: Tensor, row: Tensor, column: Tensor, rows: int, columns: int) -> Tensor:
+    """Return a rectangle of a plane (batch, rows, columns)."""
+    batch = torch.arange(len(plane), device=plane.device)[:, None, None]
+    row_of = row[:, None] + torch.arange(rows, device=plane.device)
+    column_of = column[:, None] + torch.arange(columns, device=plane.device)
+    row_of, column_of = (
+        row_of.clamp(max=plane.shape[1] - 1),
+        column_of.clamp(max=plane.shape[2] - 1),
+    )
+    return plane[batch, row_of[:, :, None], column_of[:, None, :]]

@@ -1,0 +1,220 @@
+"""The policy that looks at every cell with the same small network."""
+
+from typing import Any, Final
+
+import torch
+from gymnasium import spaces
+from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
+from stable_baselines3.common.policies import ActorCriticPolicy, BasePolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, MlpExtractor
+from stable_baselines3.common.type_aliases import PyTorchObs, Schedule
+from torch import Tensor, nn
+
+from blast_agents.policies.features import (
+    CELL_FEATURES,
+    CHANNELS,
+    SITE_FEATURES,
+    STATIC,
+    ZoneGeometry,
+)
+
+_LOGIT_GAIN: Final = 0.01
+
+
+_OVERVIEW: Final = tuple(
+    CHANNELS.index(name) for name in ("protected", "other_structures", "charge", "barrier")
+)
+
+
+class ZoneExtractor(BaseFeaturesExtractor):
+    """Convolutions over the build zone and over the site: features of every cell and of the whole.
+
+    A cell's features come from where it lies on the line of sight (`geometry.zone_view`), from the
+    25 cells around it, and from an overview of the site. The result is flat: `width` features of
+    each cell, cell by cell, then `width` features of the whole.
+
+    Args:
+        observation_space: Of a `"grid"` observation.
+        rows: Rows of the build zone.
+        columns: Its columns.
+        places: Places that stand for where the charge may be.
+        width: Number of features.
+    """
+
+    def __init__(
+        self,
+        observation_space: spaces.Space[Any],
+        rows: int,
+        columns: int,
+        places: int,
+        width: int,
+    ) -> None:
+        super().__init__(observation_space, width * (rows * columns + 1))
+        self.rows, self.columns, self.places, self.width = rows, columns, places, width
+        self._known: tuple[Tensor, ZoneGeometry] | None = None
+        self.near = nn.Conv2d(2, width, 5, padding=2)
+        self.overview = nn.Sequential(
+            nn.AvgPool2d(4, ceil_mode=True),
+            nn.Conv2d(len(_OVERVIEW), 16, 3, stride=2, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(16, width, 3, stride=2, padding=1),
+            nn.ReLU(),
+            nn.AdaptiveAvgPool2d(1),
+            nn.Flatten(),
+        )
+        self.cells = nn.Linear(CELL_FEATURES, width)
+        self.site = nn.Linear(SITE_FEATURES + width, width)
+        self.mixed = nn.Linear(width, width)
+        self.whole = nn.Linear(3 * width, width)
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """Return the features (batch, width * (rows * columns + 1)).
+
+        Args:
+            observations: From 0 to 255 (batch, channels, height, width).
+        """
+        with torch.no_grad():  # nothing in here has weights
+            view = self._geometry(observations).view(observations)
+            planes = observations[:, _OVERVIEW].float() / 255.0
+            around = torch.stack((view.barrier, view.free), dim=1)
+        site = self.site(torch.cat((view.site, self.overview(planes)), dim=1))
+        near = self.near(around).permute(0, 2, 3, 1)
+        cells = torch.relu(self.cells(view.cells) + near + site[:, None, None, :])
+        cells = torch.relu(self.mixed(cells)).flatten(1, 2)
+        whole = torch.cat((torch.relu(site), cells.mean(dim=1), cells.amax(dim=1)), dim=1)
+        return torch.cat((cells.flatten(1), torch.relu(self.whole(whole))), dim=1)
+
+    def _geometry(self, observations: Tensor) -> ZoneGeometry:
+        """Return the geometry; while sites and charges stay the same, it is not worked out anew."""
+        static = observations[:, STATIC]
+        if self._known is None or not torch.equal(self._known[0], static):
+            geometry = ZoneGeometry.of(observations, self.rows, self.columns, self.places)
+            self._known = static, geometry
+        return self._known[1]
+
+
+class ZoneLatents(MlpExtractor):
+    """Hands the features of `ZoneExtractor` on: all to the actor, those of the whole to the critic.
+
+    Args:
+        width: Number of features of a cell, and of the whole.
+        critic_width: Neurons of the critic's hidden layer.
+    """
+
+    def __init__(self, width: int, critic_width: int) -> None:
+        super().__init__(width, {"pi": [], "vf": [critic_width]}, nn.ReLU)
+        self.width = width
+
+    def forward_actor(self, features: Tensor) -> Tensor:
+        """Return all features."""
+        return features
+
+    def forward_critic(self, features: Tensor) -> Tensor:
+        """Return the critic's hidden layer (batch, critic_width)."""
+        return super().forward_critic(features[:, -self.width :])
+
+
+class CellLogits(nn.Module):
+    """A logit of each cell from its own features, and one of finishing from those of the whole.
+
+    Args:
+        width: Number of features of a cell, and of the whole.
+        finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
+    """
+
+    def __init__(self, width: int, finish_bias: float) -> None:
+        super().__init__()
+        self.width = width
+        self.cell = nn.Linear(width, 1)
+        self.finish = nn.Linear(width, 1)
+        nn.init.orthogonal_(self.cell.weight, gain=_LOGIT_GAIN)
+        nn.init.orthogonal_(self.finish.weight, gain=_LOGIT_GAIN)
+        nn.init.constant_(self.cell.bias, 0.0)
+        nn.init.constant_(self.finish.bias, finish_bias)
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Return the logits (batch, cells + 1)."""
+        cells = features[:, : -self.width].reshape(len(features), -1, self.width)
+        finish = self.finish(features[:, -self.width :])
+        return torch.cat((self.cell(cells).flatten(1), finish), dim=1)
+
+
+class ZonePolicy(BasePolicy):
+    """What the spatial policies of both algorithms have in common.
+
+    Args:
+        observation_space: Of a `"grid"` observation.
+        action_space: Of the environment.
+        lr_schedule: Learning rate by the share of the training that is left.
+        rows: Rows of the build zone.
+        columns: Its columns.
+        places: Places that stand for where the charge may be: more than 1 if it is hidden; 1
+            unless given.
+        width: Number of features of a cell.
+        critic_width: Neurons of the critic's hidden layer.
+        finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
+        **others: For stable-baselines3's policy.
+    """
+
+    mlp_extractor: MlpExtractor
+
+    def __init__(
+        self,
+        observation_space: spaces.Space[Any],
+        action_space: spaces.Space[Any],
+        lr_schedule: Schedule,
+        rows: int,
+        columns: int,
+        places: int | None = None,
+        width: int = 24,
+        critic_width: int = 64,
+        finish_bias: float = -3.0,
+        **others: Any,
+    ) -> None:
+        self.width, self.critic_width, self.finish_bias = width, critic_width, finish_bias
+        arguments: dict[str, Any] = {
+            "lr_schedule": lr_schedule,
+            "features_extractor_class": ZoneExtractor,
+            "features_extractor_kwargs": {
+                "rows": rows,
+                "columns": columns,
+                "places": places or 1,
+                "width": width,
+            },
+            "normalize_images": False,  # the extractor does it, for the planes that it needs
+        }
+        super().__init__(observation_space, action_space, **arguments, **others)
+
+    def extract_features(
+        self,
+        obs: PyTorchObs,
+        features_extractor: BaseFeaturesExtractor | None = None,  # noqa: ARG002
+    ) -> Tensor:
+        """Return the features, without a conversion of all the planes."""
+        features: Tensor = self.features_extractor(obs)
+        return features
+
+    def _build_mlp_extractor(self) -> None:
+        self.mlp_extractor = ZoneLatents(self.width, self.critic_width)
+
+    def _replace_action_net(self, learning_rate: float) -> None:
+        """Put the logits by cell in the place of the dense layer; the optimizer has to know."""
+        self.action_net: nn.Module = CellLogits(self.width, self.finish_bias)
+        arguments = {"lr": learning_rate} | self.optimizer_kwargs
+        self.optimizer = self.optimizer_class(self.parameters(), **arguments)
+
+
+class SpatialPolicy(ZonePolicy, ActorCriticPolicy):
+    """For stable-baselines3's `PPO`; see `ZonePolicy` for the arguments."""
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        super()._build(lr_schedule)
+        self._replace_action_net(lr_schedule(1.0))
+
+
+class SpatialMaskablePolicy(ZonePolicy, MaskableActorCriticPolicy):
+    """For sb3-contrib's `MaskablePPO`; see `ZonePolicy` for the arguments."""
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        super()._build(lr_schedule)
+        self._replace_action_net(lr_schedule(1.0))

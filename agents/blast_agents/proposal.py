@@ -1,0 +1,45 @@
+"""Layouts that are proposed, and what proposes them without a blast: trained agents."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Protocol
+
+from blast_env.geometry import Layout
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A layout that a method proposes, and what that took.
+
+    Attributes:
+        layout: (row, column) of the modules.
+        seconds: Time until the layout was there.
+        blasts: Blasts spent on it.
+    """
+
+    layout: Layout
+    seconds: float
+    blasts: int = 0
+
+
+class LayoutAgent(Protocol):
+    """Proposes a layout for a site, at once: no blast is simulated."""
+
+    def propose(self, scenario: Scenario, charge: Charge | None = None) -> Layout:
+        """Return a layout that keeps every condition of the build zone; always the same one.
+
+        Args:
+            scenario: The scenario; it has a build zone.
+            charge: Where the charge is, if that is known; otherwise the layout is for all the
+                places where the scenario may have one.
+        """
+
+
+def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
+    """Return a layout that takes no blast, and how long it took."""
+    began_s = perf_counter()
+    layout = propose()
+    return Proposal(layout, perf_counter() - began_s)

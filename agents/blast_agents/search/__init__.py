@@ -1,0 +1,43 @@
+"""Classical search for layouts: what a trained agent has to beat at equal cost in blasts."""
+
+from blast_agents.search.evolution import GeneticSearch, Nsga2Search
+from blast_agents.search.methods import (
+    AnnealingSearch,
+    ExhaustiveSearch,
+    GreedySearch,
+    RandomSearch,
+    RuleSearch,
+)
+from blast_agents.search.problem import (
+    Candidate,
+    LayoutProblem,
+    Progress,
+    Report,
+    SearchMethod,
+    SearchResult,
+    hidden_threats,
+    visible_threats,
+)
+from blast_agents.search.registry import SEARCH_METHODS, find_search_method
+from blast_env.geometry import Layout
+
+__all__ = [
+    "SEARCH_METHODS",
+    "AnnealingSearch",
+    "Candidate",
+    "ExhaustiveSearch",
+    "GeneticSearch",
+    "GreedySearch",
+    "Layout",
+    "LayoutProblem",
+    "Nsga2Search",
+    "Progress",
+    "RandomSearch",
+    "Report",
+    "RuleSearch",
+    "SearchMethod",
+    "SearchResult",
+    "find_search_method",
+    "hidden_threats",
+    "visible_threats",
+]

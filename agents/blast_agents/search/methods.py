@@ -1,0 +1,279 @@
+"""Search methods that need no further library."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import combinations, islice
+from math import comb, exp
+
+import numpy as np
+
+from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
+from blast_agents.search.moves import Draw, Moves, random_walls
+from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
+from blast_agents.search.session import SearchSession
+from blast_env.errors import BlastEnvError, LayoutError
+from blast_env.geometry import Cell, Layout
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Placement, Scenario
+
+
+@dataclass(frozen=True)
+class RandomSearch:
+    """Tries layouts with every module on a random cell, each independent of the others.
+
+    Attributes:
+        initial: Layouts to try first.
+        batch: Layouts that are assessed at a time.
+    """
+
+    initial: tuple[Layout, ...] = ()
+    batch: int = 16
+    name: str = "random"
+
+    def search(
+        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
+    ) -> SearchResult:
+        """Return the best of as many random layouts as the budget pays for."""
+        rng = np.random.default_rng(seed)
+        session = SearchSession(problem, budget, Plan.of(problem, budget), report)
+
+        def explore() -> None:
+            if self.initial:
+                session.assess(self.initial)
+            while True:
+                session.assess([random_layout(problem.scenario, rng) for _ in range(self.batch)])
+
+        return session.result(self.name, seed, session.run(explore))
+
+
+@dataclass(frozen=True)
+class RuleSearch:
+    """Proposes the layout of a rule; no blast is simulated.
+
+    For a hidden charge the rule stands in the way of the middle of where one may be.
+
+    Attributes:
+        rule: Gives the layout for a charge.
+        name: Name in tables and on the command line.
+    """
+
+    rule: Callable[[Scenario, Charge], Layout]
+    name: str
+
+    def search(
+        self,
+        problem: LayoutProblem,
+        budget: int,
+        seed: int,
+        report: Report | None = None,  # noqa: ARG002
+    ) -> SearchResult:
+        """Return the rule's layout; budget and seed change nothing.
+
+        Raises:
+            BlastEnvError: If there is no line of sight; see `line_of_sight_wall`.
+        """
+        return SearchResult(
+            method=self.name,
+            layout=tuple(sorted(self.rule(problem.scenario, problem.charge))),
+            impulse_pa_s=None,
+            threats=0,
+            blasts=0,
+            budget=budget,
+            seed=seed,
+            history=(),
+            interrupted=False,
+        )
+
+
+WALL_NEAR_CHARGE = RuleSearch(wall_near_charge, "wall_near_charge")
+
+
+WALL_NEAR_BUILDING = RuleSearch(wall_near_building, "wall_near_building")
+
+
+@dataclass(frozen=True)
+class GreedySearch:
+    """Places every module on the best of the cells that it tries for it, and never moves one.
+
+    With enough blasts it tries every cell. With fewer it divides what is left evenly among the
+    modules that are left to place. Half of the cells that it tries are those that took off most
+    when they were tried last: what a cell takes off rarely becomes more when others are taken. The
+    others are drawn among those that were never tried.
+
+    A module is placed even if none of the tried cells takes anything off: two may help where one
+    does not. What was best on the way is kept all the same.
+
+    Attributes:
+        promising_share: Share of the tried cells that were good before.
+    """
+
+    promising_share: float = 0.5
+    name: str = "greedy"
+
+    def search(
+        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
+    ) -> SearchResult:
+        """Return the best layout that was met on the way."""
+        rng = np.random.default_rng(seed)
+        plan = Plan.of(problem, budget)
+        session = SearchSession(problem, budget, plan, report)
+
+        def explore() -> None:
+            placement = Placement.empty(problem.scenario)
+            (impulse_pa_s,) = session.assess([()]).tolist()
+            gains_pa_s: dict[Cell, float] = {}
+            while not placement.is_full:
+                blasts = session.exploring_left // placement.stock_left
+                tried = self._cells(placement, gains_pa_s, max(1, blasts // plan.threats), rng)
+                impulses = session.assess([(*placement.cells, cell) for cell in tried])
+                gains_pa_s.update(zip(tried, (impulse_pa_s - impulses).tolist(), strict=True))
+                best = int(np.argmin(impulses))
+                placement = placement.place(tried[best])
+                impulse_pa_s = float(impulses[best])
+
+        return session.result(self.name, seed, session.run(explore))
+
+    def _cells(
+        self,
+        placement: Placement,
+        gains_pa_s: dict[Cell, float],
+        count: int,
+        rng: np.random.Generator,
+    ) -> list[Cell]:
+        """Return cells to try for the next module, at least one and at most `count`."""
+        free = [(int(row), int(column)) for row, column in np.argwhere(placement.free)]
+        known = sorted((cell for cell in free if cell in gains_pa_s), key=lambda c: -gains_pa_s[c])
+        new = [cell for cell in free if cell not in gains_pa_s]
+        promising = known[: max(round(count * self.promising_share), count - len(new))]
+        fresh = rng.permutation(len(new))[: count - len(promising)]
+        return [*promising, *(new[index] for index in fresh)]
+
+
+@dataclass(frozen=True)
+class AnnealingSearch:
+    """Accepts every better neighbour, and a worse one the less likely the later and the worse.
+
+    It begins with the best of the layouts that the first few blasts show. The temperature falls
+    geometrically over the blasts for exploring, so that it is as cold at the end of a small budget
+    as of a large one.
+
+    Attributes:
+        initial: Layouts to begin with, beside those that are drawn.
+        draw: Draws the layouts to begin with.
+        starting_share: Share of the exploration that goes into them.
+        hot: Temperature at first, as a share of the impulse that it begins with.
+        cold: Temperature at the end, likewise.
+    """
+
+    initial: tuple[Layout, ...] = ()
+    draw: Draw = random_walls
+    starting_share: float = 0.15
+    hot: float = 0.02
+    cold: float = 0.001
+    name: str = "annealing"
+
+    def search(
+        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
+    ) -> SearchResult:
+        """Return the best layout that was met on the way."""
+        rng = np.random.default_rng(seed)
+        plan = Plan.of(problem, budget)
+        session = SearchSession(problem, budget, plan, report)
+
+        def explore() -> None:
+            layouts = int(plan.exploring_layouts * self.starting_share)
+            drawn = [self.draw(problem.scenario, rng) for _ in range(max(1, layouts))]
+            starts = [*self.initial, *drawn]
+            impulses = session.assess(starts)
+            best = int(np.argmin(impulses))
+            self._anneal(session, starts[best], float(impulses[best]), rng)
+
+        return session.result(self.name, seed, session.run(explore))
+
+    def _anneal(
+        self, session: SearchSession, layout: Layout, impulse_pa_s: float, rng: np.random.Generator
+    ) -> None:
+        """Go from neighbour to neighbour until the session ends it."""
+        moves = Moves(session.problem.scenario)
+        scale_pa_s, begun = impulse_pa_s, session.exploring_share
+        while True:
+            share = (session.exploring_share - begun) / max(1.0 - begun, 1e-9)
+            temperature_pa_s = scale_pa_s * self.hot * (self.cold / self.hot) ** share
+            neighbour = moves.neighbour(layout, rng)
+            (neighbour_pa_s,) = session.assess([neighbour]).tolist()
+            worse_pa_s = neighbour_pa_s - impulse_pa_s
+            if worse_pa_s <= 0.0 or rng.random() < _likelihood(worse_pa_s, temperature_pa_s):
+                layout, impulse_pa_s = neighbour, neighbour_pa_s
+
+
+def _likelihood(worse_pa_s: float, temperature_pa_s: float) -> float:
+    """Return how likely a worse layout is accepted (Metropolis); never when all is cold."""
+    return exp(-worse_pa_s / temperature_pa_s) if temperature_pa_s > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class ExhaustiveSearch:
+    """Tries every layout under every threat, the empty one among them; nothing is drawn.
+
+    Attributes:
+        batch: Layouts that are assessed at a time.
+    """
+
+    batch: int = 64
+    name: str = "exhaustive"
+
+    def search(
+        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
+    ) -> SearchResult:
+        """Return the optimum.
+
+        Raises:
+            BlastEnvError: If the budget does not pay for all layouts; none is tried then.
+        """
+        self._check(problem, budget)
+        session = SearchSession(problem, budget, Plan.thorough(problem, budget), report)
+
+        def explore() -> None:
+            layouts = every_layout(problem)
+            while batch := list(islice(layouts, self.batch)):
+                session.assess(batch)
+
+        return session.result(self.name, seed, session.run(explore))
+
+    def _check(self, problem: LayoutProblem, budget: int) -> None:
+        cells = len(_usable(problem))
+        layouts = sum(comb(cells, modules) for modules in range(min(problem.stock, cells) + 1))
+        blasts = layouts * len(problem.threats)
+        if blasts > budget:
+            raise BlastEnvError(
+                f"{problem.scenario.name} has up to {_count_text(layouts)} layouts ({cells} usable "
+                f"cells, stock {problem.stock}), which take {_count_text(blasts)} blasts; the "
+                f"budget is {budget}: exhaustive search is for small instances"
+            )
+
+
+def every_layout(problem: LayoutProblem) -> Iterator[Layout]:
+    """Yield every legal layout, those with few modules first."""
+    cells = _usable(problem)
+    for modules in range(min(problem.stock, len(cells)) + 1):
+        for layout in combinations(cells, modules):
+            if _is_legal(problem, layout):
+                yield layout
+
+
+def _is_legal(problem: LayoutProblem, layout: Layout) -> bool:
+    try:
+        Placement.of(problem.scenario, layout)
+    except LayoutError:
+        return False
+    return True
+
+
+def _usable(problem: LayoutProblem) -> list[Cell]:
+    cells = np.argwhere(Placement.empty(problem.scenario).usable)
+    return [(int(row), int(column)) for row, column in cells]
+
+
+def _count_text(count: int) -> str:
+    """Return a count, of which a few digits are enough when it is large."""
+    return f"{count:,}" if count < 1_000_000 else f"{count:.3g}"

@@ -1,0 +1,237 @@
+"""The account of one search: blasts spent, what they showed, and the best layout so far."""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from blast_agents.search.problem import (
+    Candidate,
+    LayoutProblem,
+    Plan,
+    Progress,
+    Report,
+    SearchResult,
+)
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout
+
+_MOST_REPEATS: Final = 300
+"""Questions in a row without a new blast after which there is nothing new to be found."""
+
+
+class SearchEndedError(Exception):
+    """The blasts that a search may spend are spent, or it finds nothing new to spend them on."""
+
+
+class SearchSession:
+    """Lets a method ask what layouts are worth, within its budget.
+
+    A layout meets the threats in their order: first some of them, later perhaps more, never one
+    twice. Of two layouts the one that has met more threats counts as the better known one and
+    goes before; with as many threats, the one with less impulse.
+
+    Args:
+        problem: What is minimised.
+        budget: Most blasts that may be spent.
+        plan: How many threats a layout meets at first, and what is held back for the others.
+        report: Is told after every batch how far the search has come.
+
+    Attributes:
+        problem: As given.
+        plan: As given.
+        blasts: Blasts spent: distinct pairs of layout and threat that were asked for.
+
+    Raises:
+        BlastEnvError: If the budget is below 1.
+    """
+
+    def __init__(
+        self, problem: LayoutProblem, budget: int, plan: Plan, report: Report | None = None
+    ) -> None:
+        if budget < 1:
+            raise BlastEnvError(f"budget is {budget} blasts, must be at least 1")
+        self.problem = problem
+        self.plan = plan
+        self.blasts = 0
+        self._budget = budget
+        self._limit = min(plan.exploring_blasts, budget)
+        self._report = report
+        self._known: dict[Layout, tuple[float, ...]] = {}
+        self._history: list[Candidate] = []
+        self._repeats = 0
+
+    @property
+    def best(self) -> Candidate | None:
+        """The best layout so far."""
+        return self._history[-1] if self._history else None
+
+    @property
+    def exploring_left(self) -> int:
+        """How many of the blasts for exploring are left."""
+        return max(0, self._limit - self.blasts)
+
+    @property
+    def exploring_share(self) -> float:
+        """Share of the blasts for exploring that is spent."""
+        return self.blasts / self._limit
+
+    def run(self, explore: Callable[[], None], choose: Callable[[], None] | None = None) -> bool:
+        """Explore until the blasts for it are spent, then let the best meet more threats.
+
+        Args:
+            explore: Asks `assess` until it is through or `SearchEndedError` comes.
+            choose: Does the same with what was held back; `confirm_best` unless given.
+
+        Returns:
+            Whether it was interrupted.
+        """
+        try:
+            self._until_ended(explore)
+            self._limit = self._budget
+            self._until_ended(choose or self.confirm_best)
+        except KeyboardInterrupt:
+            return True
+        return False
+
+    def assess(self, layouts: Sequence[Layout], threats: int | None = None) -> FloatArray:
+        """Return the impulse of layouts, Pa*s (layouts,), under the first threats.
+
+        Args:
+            layouts: Legal layouts.
+            threats: How many threats; what the plan says for exploring unless given.
+
+        Raises:
+            SearchEndedError: If there are not enough blasts left for all of them; the first ones,
+                as many as can be paid for, are assessed all the same.
+        """
+        count = self.plan.threats if threats is None else threats
+        keys = [tuple(sorted(layout)) for layout in layouts]
+        distinct = list(dict.fromkeys(keys))
+        affordable = self._affordable(distinct, count)
+        self._simulate(affordable, count)
+        if len(affordable) < len(distinct) or self._repeats > _MOST_REPEATS:
+            raise SearchEndedError
+        return np.array([self._impulse_pa_s(key, count) for key in keys])
+
+    def confirm_best(self) -> None:
+        """Let the best layouts meet more threats, fewer and fewer of them (successive halving).
+
+        A layout that was lucky under the first threats is found out before it is chosen.
+        """
+        count, most = self.plan.threats, len(self.problem.threats)
+        candidates = self.ranked(count)
+        while count < most:
+            rounds = int(np.ceil(np.log2(most / count)))
+            more = min(2 * count, most)
+            affordable = (self._budget - self.blasts) // (rounds * (more - count))
+            candidates = candidates[: max(affordable, 1)]
+            impulses = self.assess(candidates, more)
+            candidates = [candidates[index] for index in np.argsort(impulses, kind="stable")]
+            count = more
+
+    def confirm_front(self) -> None:
+        """Let the front meet more threats, and with it, as far as they go, the fronts behind it.
+
+        All threats, if what is left pays for it; else as many as it does.
+        """
+        met, most = self.plan.threats, len(self.problem.threats)
+        left, rest = self._budget - self.blasts, self.ranked(met)
+        front = self._front_of(rest, met)
+        more = min(met + left // max(len(front), 1), most)
+        confirmed: list[Layout] = []
+        while front and more > met and (len(confirmed) + len(front)) * (more - met) <= left:
+            confirmed += front
+            taken = set(front)
+            rest = [key for key in rest if key not in taken]
+            front = self._front_of(rest, met)
+        self.assess(confirmed, more)
+
+    def ranked(self, threats: int) -> list[Layout]:
+        """Return the layouts that have met so many threats, least impulse first."""
+        met = [key for key, values in self._known.items() if len(values) >= threats]
+        return sorted(met, key=lambda key: self._impulse_pa_s(key, threats))
+
+    def front(self) -> tuple[Candidate, ...]:
+        """Return the layouts of which none has both less impulse and fewer modules.
+
+        Among those that have met as many threats as any has, by number of modules.
+        """
+        most = max(map(len, self._known.values()), default=0)
+        return tuple(
+            Candidate(self.blasts, key, self._impulse_pa_s(key, most), most)
+            for key in self._front_of(self.ranked(most), most)
+        )
+
+    def result(self, method: str, seed: int, interrupted: bool) -> SearchResult:
+        """Return what was found."""
+        best = self.best
+        return SearchResult(
+            method=method,
+            layout=() if best is None else best.layout,
+            impulse_pa_s=None if best is None else best.impulse_pa_s,
+            threats=0 if best is None else best.threats,
+            blasts=self.blasts,
+            budget=self._budget,
+            seed=seed,
+            history=tuple(self._history),
+            interrupted=interrupted,
+        )
+
+    def _front_of(self, ranked: Sequence[Layout], threats: int) -> list[Layout]:
+        """Return the front of layouts that come with the least impulse first, by modules."""
+        front: list[Layout] = []
+        for key in sorted(ranked, key=len):  # stable: of as many modules, least impulse first
+            impulse_pa_s = self._impulse_pa_s(key, threats)
+            if not front or impulse_pa_s < self._impulse_pa_s(front[-1], threats):
+                front.append(key)
+        return front
+
+    def _until_ended(self, phase: Callable[[], None]) -> None:
+        try:
+            phase()
+        except SearchEndedError:
+            self._repeats = 0
+
+    def _affordable(self, layouts: Sequence[Layout], threats: int) -> list[Layout]:
+        """Return the first layouts, as many as can meet so many threats with what is left."""
+        left, affordable = self._limit - self.blasts, []
+        for key in layouts:
+            left -= max(0, threats - len(self._known.get(key, ())))
+            if left < 0:
+                break
+            affordable.append(key)
+        return affordable
+
+    def _simulate(self, layouts: Sequence[Layout], threats: int) -> None:
+        """Let layouts meet the threats up to a count that they have not met yet."""
+        pairs = [
+            (key, threat)
+            for key in layouts
+            for threat in self.problem.threats[len(self._known.get(key, ())) : threats]
+        ]
+        if not pairs:
+            self._repeats += 1
+            return
+        self._repeats = 0
+        for (key, _), impulse_pa_s in zip(pairs, self.problem.loads_pa_s(pairs), strict=True):
+            self._known[key] = (*self._known.get(key, ()), impulse_pa_s)
+        self.blasts += len(pairs)
+        for key in layouts:
+            self._consider(key)
+        if self._report is not None:
+            self._report(Progress(self.blasts, self._budget, self.best))
+
+    def _consider(self, key: Layout) -> None:
+        """Make a layout the best one if it is."""
+        threats = len(self._known[key])
+        candidate = Candidate(self.blasts, key, self._impulse_pa_s(key, threats), threats)
+        best = self.best
+        if best is None or (-threats, candidate.impulse_pa_s) < (-best.threats, best.impulse_pa_s):
+            if best is not None and best.blasts == self.blasts:
+                self._history.pop()  # one entry a batch
+            self._history.append(candidate)
+
+    def _impulse_pa_s(self, key: Layout, threats: int) -> float:
+        return self.problem.combined_pa_s(self._known[key][:threats])

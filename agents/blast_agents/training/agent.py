@@ -1,0 +1,411 @@
+"""Agents: the model, its files, and what it proposes."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, Literal
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from numpy.typing import NDArray
+from sb3_contrib import MaskablePPO
+from sb3_contrib.common.maskable.policies import (
+    MaskableActorCriticCnnPolicy,
+    MaskableActorCriticPolicy,
+)
+from stable_baselines3 import PPO
+from stable_baselines3.common.policies import ActorCriticCnnPolicy, ActorCriticPolicy
+from stable_baselines3.common.vec_env import VecEnv
+from torch import nn
+
+from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
+from blast_agents.training.hyperparameters import Hyperparameters, schedule
+from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
+from blast_env.envs.objective import Evaluators
+from blast_env.envs.observations import Array, GridEpisode, GridObservation, Sight
+from blast_env.envs.strategies import check_size, zone_of
+from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.geometry import Layout
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Placement, PointSource, Scenario
+
+CHECKPOINT_FORMAT: Final = 1
+
+
+@dataclass(frozen=True)
+class Counters:
+    """How far a training run is.
+
+    Attributes:
+        steps: Steps of all environments.
+        rollouts: Rollouts with their updates.
+        updates: Passes over rollouts.
+        episodes: Episodes that ended.
+        blasts: Blasts simulated.
+        cache_hits: Loads that needed no blast.
+        seconds: Time that the training has taken.
+        best_reduction: Of the best evaluation; minus infinity before the first.
+        best_steps: Steps at that evaluation.
+    """
+
+    steps: int = 0
+    rollouts: int = 0
+    updates: int = 0
+    episodes: int = 0
+    blasts: int = 0
+    cache_hits: int = 0
+    seconds: float = 0.0
+    best_reduction: float = float("-inf")
+    best_steps: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """What training goes on from.
+
+    There is no state of random numbers: each rollout has seeds of its own.
+
+    Attributes:
+        policy: Weights of the policy, by name.
+        optimizer: State of the optimiser.
+        counters: How far the run is.
+    """
+
+    policy: dict[str, Any]
+    optimizer: dict[str, Any]
+    counters: Counters
+
+    def save(self, path: Path) -> None:
+        """Write the checkpoint; the file is complete or as it was.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        content = {
+            "format": CHECKPOINT_FORMAT,
+            "policy": self.policy,
+            "optimizer": self.optimizer,
+            "counters": asdict(self.counters),
+        }
+        with write_atomically(path) as temporary:
+            torch.save(content, temporary)
+
+    @classmethod
+    def load(cls, path: Path) -> "Checkpoint":
+        """Read a checkpoint; nothing but tensors and plain data is accepted.
+
+        Raises:
+            BlastEnvError: If there is none, or it is damaged.
+        """
+        if not path.is_file():
+            raise BlastEnvError(f"{path}: there is no such checkpoint")
+        try:
+            _check_sums(path)
+            content = torch.load(path, map_location="cpu", weights_only=True)
+            if content["format"] != CHECKPOINT_FORMAT:
+                raise BlastEnvError(
+                    f"{path}: is of format {content['format']}, must be {CHECKPOINT_FORMAT}"
+                )
+            return cls(content["policy"], content["optimizer"], Counters(**content["counters"]))
+        except BlastEnvError:
+            raise
+        # torch says what is wrong with a file in errors of many kinds.
+        except Exception as error:
+            first_line = str(error).partition("\n")[0]
+            raise BlastEnvError(f"{path}: is damaged, or no checkpoint: {first_line}") from error
+
+    def load_policy(self, policy: nn.Module, place: Path) -> None:
+        """Give a policy the weights.
+
+        Args:
+            policy: The policy.
+            place: Where they come from, for the error.
+
+        Raises:
+            BlastEnvError: If they are those of another policy.
+        """
+        try:
+            policy.load_state_dict(self.policy)
+        except RuntimeError as error:
+            problem = " ".join(str(error).split())
+            raise BlastEnvError(f"{place}: weights and configuration differ: {problem}") from error
+
+
+def _check_sums(path: Path) -> None:
+    """Refuse a file with wrong checksums, which torch itself does not look at."""
+    with ZipFile(path) as archive:
+        wrong = archive.testzip()
+    if wrong is not None:
+        raise BadZipFile(f"{wrong} has a wrong checksum")
+
+
+Model = PPO | MaskablePPO
+
+
+Policy = ActorCriticPolicy | MaskableActorCriticPolicy
+
+
+_SPATIAL = {"ppo": SpatialPolicy, "maskable_ppo": SpatialMaskablePolicy}
+
+
+_FLAT = {"ppo": ActorCriticCnnPolicy, "maskable_ppo": MaskableActorCriticCnnPolicy}
+
+
+_PLACES: Final = {"visible": 1, "hidden": 9}
+
+
+def fitted(
+    hyperparameters: Hyperparameters, settings: TrainingSettings, scenario: Scenario
+) -> Hyperparameters:
+    """Return hyperparameters with what follows from the scenario's build zone and the threat.
+
+    Raises:
+        BlastEnvError: If the policy is not one for the algorithm.
+    """
+    zone = zone_of(scenario)
+    places = hyperparameters.policy_kwargs.places or _PLACES[settings.threat]
+    changes = {"rows": zone.rows, "columns": zone.columns, "places": places}
+    spatial = _SPATIAL[settings.algorithm]
+    names = (f"{spatial.__module__}.{spatial.__name__}", "CnnPolicy")
+    if hyperparameters.policy not in names:
+        raise BlastEnvError(
+            f"policy is {hyperparameters.policy}, must be one of {', '.join(names)} for "
+            f"{settings.algorithm}"
+        )
+    arguments = hyperparameters.policy_kwargs.model_copy(update=changes)
+    return hyperparameters.model_copy(update={"policy_kwargs": arguments})
+
+
+def make_model(configuration: RunConfiguration, environments: VecEnv) -> Model:
+    """Return a model with fresh weights, which the seed decides."""
+    hyperparameters = configuration.hyperparameters
+    arguments = hyperparameters.model_arguments()
+    for name in ("learning_rate", "clip_range"):
+        arguments[name] = schedule(arguments[name])
+    policy_class, policy_arguments = _policy_class(configuration)
+    seed = configuration.settings.seed % 2**32
+    common: dict[str, Any] = {"policy_kwargs": policy_arguments, "seed": seed, "device": "cpu"}
+    if configuration.settings.algorithm == "ppo":
+        return PPO(policy_class, environments, **arguments, **common)
+    return MaskablePPO(policy_class, environments, **arguments, **common)
+
+
+def make_policy(
+    configuration: RunConfiguration,
+    observation_space: spaces.Space[Any],
+    action_space: spaces.Space[Any],
+) -> Policy:
+    """Return the policy of a run without its weights."""
+    policy_class, arguments = _policy_class(configuration)
+    policy: Policy = policy_class(observation_space, action_space, lambda _: 0.0, **arguments)
+    return policy
+
+
+def logits_of(policy: Policy, observations: torch.Tensor) -> torch.Tensor:
+    """Return the logit of each action, legal or not (batch, actions)."""
+    distribution = policy.get_distribution(observations).distribution
+    if not isinstance(distribution, torch.distributions.Categorical):
+        raise TypeError(f"the actions of a placement are discrete, not {distribution}")
+    logits: torch.Tensor = distribution.logits
+    return logits
+
+
+@contextmanager
+def torch_threads(count: int) -> Iterator[None]:
+    """Let torch work with so many threads in this block."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def _policy_class(configuration: RunConfiguration) -> tuple[type[Any], dict[str, Any]]:
+    """Return the class of the policy, and the arguments beside spaces and schedule."""
+    algorithm = configuration.settings.algorithm
+    if configuration.hyperparameters.policy == "CnnPolicy":
+        return _FLAT[algorithm], {}
+    return _SPATIAL[algorithm], configuration.hyperparameters.policy_kwargs.model_dump()
+
+
+_ARCHIVE: Final = ".zip"
+
+
+_ARCHIVES_HOLD_CODE: Final = "such archives may hold pickled code, which runs when they are read"
+
+
+_SCHEDULES: Final = ("learning_rate", "lr_schedule", "clip_range", "clip_range_vf")
+"""What only training needs; in RL Zoo's archives objects of classes that may not be installed."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedAgent:
+    """Places modules one after the other as a policy says; a `LayoutAgent`.
+
+    Attributes:
+        policy: The policy, of PPO or MaskablePPO, on `"grid"` observations.
+        representative: A scenario of the size that the policy is for.
+        engine: Engine of the training; no blast is run with it.
+    """
+
+    policy: Policy
+    representative: Scenario
+    engine: str
+
+    @cached_property
+    def _evaluators(self) -> Evaluators:
+        return Evaluators(self.engine)
+
+    def propose(self, scenario: Scenario, charge: Charge | None = None) -> Layout:
+        """Return the layout of the most likely legal actions.
+
+        Args:
+            scenario: A scenario of the size of the one that the agent was trained on.
+            charge: Where the charge is, one that the scenario may draw; `None` where it is
+                hidden.
+
+        Raises:
+            BlastEnvError: If the scenario has another size, or no build zone.
+        """
+        return self._layouts(scenario, charge, None, 1)[0]
+
+    def sample(
+        self, scenario: Scenario, charge: Charge | None = None, count: int = 8, seed: int = 0
+    ) -> tuple[Layout, ...]:
+        """Return layouts of actions drawn as the policy would draw them in training.
+
+        Args:
+            scenario: As for `propose`.
+            charge: As for `propose`.
+            count: How many; some may be equal.
+            seed: Decides them.
+
+        Raises:
+            BlastEnvError: As for `propose`, or if there are to be none.
+        """
+        if count < 1:
+            raise BlastEnvError(f"count is {count}, must be at least 1")
+        generator = torch.Generator().manual_seed(seed)
+        return self._layouts(scenario, charge, generator, count)
+
+    def _layouts(
+        self, scenario: Scenario, charge: Charge | None, draw: torch.Generator | None, count: int
+    ) -> tuple[Layout, ...]:
+        check_size(scenario, self.representative)
+        with torch_threads(1):  # for a few small sums more of them only wait
+            return self._placed(scenario, charge, draw, count)
+
+    def _placed(
+        self, scenario: Scenario, charge: Charge | None, draw: torch.Generator | None, count: int
+    ) -> tuple[Layout, ...]:
+        episode = self._episode(scenario, charge)
+        columns = zone_of(scenario).columns
+        placements = [Placement.empty(scenario)] * count
+        open_ones = [index for index in range(count) if not placements[index].is_full]
+        while open_ones:
+            observations = np.stack([episode.observe(placements[index]) for index in open_ones])
+            free = np.stack([placements[index].free.ravel() for index in open_ones])
+            going_on = []
+            for index, action in zip(
+                open_ones, self._actions(observations, free, draw), strict=True
+            ):
+                if action == free.shape[1]:
+                    continue
+                placements[index] = placements[index].place(divmod(action, columns))
+                if not placements[index].is_full:
+                    going_on.append(index)
+            open_ones = going_on
+        return tuple(placement.cells for placement in placements)
+
+    def _episode(self, scenario: Scenario, charge: Charge | None) -> GridEpisode:
+        sources = scenario.charge
+        if charge is not None:
+            sources = (PointSource(position_m=charge.position_m, tnt_kg=charge.tnt_kg),)
+        return GridObservation().episode(Sight(scenario, sources, self._evaluators.of(scenario)))
+
+    def _actions(
+        self, observations: Array, free: NDArray[np.bool_], draw: torch.Generator | None
+    ) -> list[int]:
+        """Return the action for each observation; the last one, to finish, is always legal."""
+        legal = torch.as_tensor(np.pad(free, ((0, 0), (0, 1)), constant_values=True))
+        with torch.no_grad():
+            logits = logits_of(self.policy, torch.as_tensor(observations))
+            logits = logits.masked_fill(~legal, -torch.inf)
+            if draw is None:
+                chosen = logits.argmax(dim=1)
+            else:
+                chosen = torch.multinomial(logits.softmax(dim=1), 1, generator=draw)[:, 0]
+        actions: list[int] = chosen.tolist()
+        return actions
+
+
+def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> TrainedAgent:
+    """Return the agent of a run folder.
+
+    The policy is rebuilt from the run's configuration, and nothing but weights is read: no file
+    of a run folder can hold code.
+
+    Args:
+        run: A run folder.
+        weights: Those of the best evaluation, or the last ones.
+
+    Raises:
+        BlastEnvError: If it is no run folder, or damaged; also for an archive of
+            stable-baselines3, which is for `load_archive`.
+    """
+    if Path(run).suffix == _ARCHIVE:
+        raise BlastEnvError(
+            f"{run}: is an archive of stable-baselines3 and no run folder; {_ARCHIVES_HOLD_CODE}: "
+            "load_archive(..., trust_archive=True) reads it, if you trust its maker"
+        )
+    folder = RunFolder(Path(run))
+    configuration = folder.configuration()
+    scenario = folder.scenario(configuration)
+    checkpoint = Checkpoint.load(folder.best if weights == "best" else folder.last)
+    zone = zone_of(scenario)
+    actions = spaces.Discrete(zone.rows * zone.columns + 1)
+    policy = make_policy(configuration, GridObservation().space(scenario), actions)
+    checkpoint.load_policy(policy, folder.path)
+    policy.set_training_mode(False)
+    return TrainedAgent(policy, scenario, configuration.settings.engine)
+
+
+def load_archive(
+    path: str | Path,
+    algorithm: Literal["ppo", "maskable_ppo"],
+    scenario: Scenario,
+    *,
+    trust_archive: bool = False,
+    engine: str = "event",
+) -> TrainedAgent:
+    """Return the agent of an archive that stable-baselines3 or RL Zoo wrote.
+
+    Such archives may hold pickled objects, and reading these runs whatever code their maker put
+    in. So it takes a flag. RL Zoo need not be installed.
+
+    Args:
+        path: The archive, a `.zip` file.
+        algorithm: Of the archive.
+        scenario: A scenario of the size that the policy is for.
+        trust_archive: Whether the archive may run code: only for one whose maker you trust.
+        engine: An engine that the scenario's calibration knows; no blast is run with it.
+
+    Raises:
+        BlastEnvError: If the archive is not trusted, or cannot be read.
+    """
+    if not trust_archive:
+        raise BlastEnvError(f"{path}: {_ARCHIVES_HOLD_CODE}; trust_archive is False, must be True")
+    model = PPO if algorithm == "ppo" else MaskablePPO
+    unread = dict.fromkeys(_SCHEDULES, 1.0)
+    try:
+        policy = model.load(path, device="cpu", custom_objects=unread).policy
+    except (OSError, ImportError, ValueError, KeyError, RuntimeError, AttributeError) as error:
+        raise BlastEnvError(f"{path}: cannot be read: {error}") from error
+    policy.set_training_mode(False)
+    return TrainedAgent(policy, scenario, engine)

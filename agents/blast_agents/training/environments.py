@@ -1,0 +1,193 @@
+"""The environments of a training, with their wrappers."""
+
+from dataclasses import dataclass
+from multiprocessing import get_all_start_methods, get_context
+from typing import Any, Final, SupportsFloat
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
+
+from blast_agents.training.hyperparameters import DEFAULT_SECTION
+from blast_agents.training.run_folder import SITES, RunConfiguration, TrainingSettings
+from blast_env.envs.arguments import real_number, whole_number
+from blast_env.envs.episode import ILLEGAL_TERM
+from blast_env.envs.observations import Array
+from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
+from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
+from blast_env.evaluation.store import LoadsCache
+from blast_env.scenario import Scenario, bundled_scenarios
+from blast_env.sites import HELD_OUT_SITES, SiteSource
+
+_Env = gym.Env[Array, np.int64]
+
+
+_Wrapper = gym.Wrapper[Array, np.int64, Array, np.int64]
+
+
+class RelativeReward(_Wrapper):
+    """Pays the reduction when the charge goes off: the share of the impulse that is gone.
+
+    Minus the impulse, the environment's own reward, depends most of all on where the charge is.
+    The reduction compares with the same blast without a barrier, so that what remains is due to
+    the layout; it is of the order of 1 in every scenario.
+
+    Args:
+        env: A `BlastBarrier` environment with `reward="terminal"`.
+        illegal_action_cost: What an illegal action costs.
+
+    Raises:
+        BlastEnvError: If the cost is out of bounds.
+    """
+
+    def __init__(self, env: _Env, illegal_action_cost: float = 0.01) -> None:
+        super().__init__(env)
+        self.illegal_action_cost = real_number("illegal_action_cost", illegal_action_cost, 0.0, 1.0)
+
+    def step(self, action: np.int64) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Place a module or finish."""
+        observation, _, ended, truncated, info = self.env.step(action)
+        reward = info["reduction"] if ended else 0.0
+        if info["reward_terms"][ILLEGAL_TERM] < 0.0:
+            reward -= self.illegal_action_cost
+        return observation, reward, ended, truncated, info
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are legal now, (actions,)."""
+        masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
+        return masks
+
+
+class ThreatPool(_Wrapper):
+    """Draws the episodes, with their sites and charges, from a set that is fixed once for all.
+
+    The blast without a barrier is then the same again and again, and the environment remembers
+    it: an episode costs half the blasts. By itself an environment remembers a thousand loads of
+    each of four sites; for more of either give it a `cache`.
+
+    Args:
+        env: A `BlastBarrier` environment.
+        size: Number of episodes in the set.
+        seed: Decides which; another one for each of parallel environments.
+
+    Raises:
+        BlastEnvError: If the size or the seed is out of bounds.
+    """
+
+    def __init__(self, env: _Env, size: int, seed: int = 0) -> None:
+        super().__init__(env)
+        sequence = np.random.SeedSequence(whole_number("seed", seed, 0, 2**63))
+        self.seeds = sequence.generate_state(whole_number("size", size, 1, 100_000)).tolist()
+        self._rng = np.random.default_rng(sequence)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode of the set; the seed decides which ones follow each other."""
+        if seed is not None:
+            self._rng = np.random.default_rng(seed)
+        return self.env.reset(seed=self.seeds[self._rng.integers(len(self.seeds))], options=options)
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are legal now, (actions,)."""
+        masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
+        return masks
+
+
+SITES_ID: Final = "BlastBarrierSites-v0"
+
+
+_LOADS: Final = 8192
+"""Loads that an environment remembers, so that a site that comes again costs no blast twice."""
+
+
+_FORK_SERVER: Final = "forkserver"
+"""How stable-baselines3 starts processes where the system can."""
+
+
+def environment_id(scenario: str) -> str:
+    """Return the section of the hyperparameters for a scenario's name or path."""
+    if scenario == SITES:
+        return SITES_ID
+    if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE:
+        return barrier_id(scenario)
+    return DEFAULT_SECTION
+
+
+def training_source(scenario: str) -> ScenarioSource:
+    """Return where the episodes of training get their scenario from.
+
+    Args:
+        scenario: Bundled name, path of a scenario file, or `"sites"`.
+
+    Raises:
+        ScenarioError: If there is no such scenario, or anything is wrong with it.
+        BlastEnvError: If it has no build zone.
+    """
+    return SiteSource.training() if scenario == SITES else scenario_source(scenario)
+
+
+def held_out_scenarios(source: ScenarioSource, count: int) -> tuple[Scenario, ...]:
+    """Return scenarios to evaluate on: of sites, the last of those that training never sees."""
+    if isinstance(source, SingleScenario):
+        return (source.scenario,) * count
+    return tuple(SiteSource(HELD_OUT_SITES - count, count))
+
+
+@dataclass(frozen=True)
+class EnvironmentMaker:
+    """Makes one of the parallel environments; can be sent to another process.
+
+    Attributes:
+        configuration: Of the run.
+        source: Gives the episodes their scenario.
+        index: Which one it is.
+    """
+
+    configuration: RunConfiguration
+    source: ScenarioSource
+    index: int
+
+    def __call__(self) -> gym.Env[Any, Any]:
+        """Return the environment with its wrappers."""
+        settings = self.configuration.settings
+        env: gym.Env[Any, Any] = gym.make(
+            "blast_env:BlastBarrier-v0",
+            disable_env_checker=True,
+            scenario=self.source,
+            realisations=1,
+            engine=settings.engine,
+            cache=LoadsCache(_LOADS),
+            **_threat_arguments(settings),
+        )
+        for name, arguments in self.configuration.hyperparameters.wrappers():
+            if name.endswith(RelativeReward.__name__):
+                env = RelativeReward(env, **arguments)
+            else:
+                env = ThreatPool(env, **{"seed": self._pool_seed, **arguments})
+        return Monitor(env)
+
+    @property
+    def _pool_seed(self) -> int:
+        sequence = np.random.SeedSequence((self.configuration.settings.seed, self.index))
+        return int(sequence.generate_state(1)[0])
+
+
+def make_environments(configuration: RunConfiguration, source: ScenarioSource) -> VecEnv:
+    """Return the parallel environments, each in a process of its own unless there is but one."""
+    count = configuration.hyperparameters.n_envs
+    makers = [EnvironmentMaker(configuration, source, index) for index in range(count)]
+    if count == 1:
+        return DummyVecEnv([*makers])
+    if _FORK_SERVER in get_all_start_methods():
+        # The processes are forks of one that has imported all this: once, not once each.
+        get_context(_FORK_SERVER).set_forkserver_preload([__name__])
+    return SubprocVecEnv([*makers])
+
+
+def _threat_arguments(settings: TrainingSettings) -> dict[str, Any]:
+    if settings.threat == "visible":
+        return {"threat": "visible"}
+    return {"threat": "hidden", "threats": settings.hidden_threats}

@@ -1,0 +1,311 @@
+"""Options `key=value` of a command line: names checked, values read as YAML."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Literal
+
+import yaml
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from blast_env.envs.arguments import check_names
+from blast_env.errors import BlastEnvError, UnknownNameError
+
+
+def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
+    """Return the values of options.
+
+    Args:
+        options: `"key=value"` each; values are read as YAML.
+        known: The keys that there are.
+
+    Raises:
+        UnknownNameError: If there is no such key; the message names the nearest one.
+        BlastEnvError: If an option has no `=`, or its value is not YAML.
+    """
+    values = {}
+    for option in options:
+        key, separator, text = option.partition("=")
+        if not separator:
+            raise BlastEnvError(f"--set {option}: must be key=value")
+        if key not in known:
+            raise UnknownNameError("setting", key, known)
+        values[key] = _value(option, text)
+    return values
+
+
+def with_changes(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with changes in their places; `"group.key"` is for a mapping within."""
+    result = dict(values)
+    for key, value in changes.items():
+        group, _, name = key.rpartition(".")
+        if group:
+            result[group] = {**result.get(group, {}), name: value}
+        else:
+            result[name] = value
+    return result
+
+
+def described(error: ValidationError, place: str) -> str:
+    """Return what is wrong with values, a clause each: where, what it is, and the bound."""
+    clauses = []
+    for each in error.errors():
+        where = ".".join(str(part) for part in each["loc"])
+        what = each["msg"].removeprefix("Value error, ")
+        clauses.append(f"{where} is {each['input']!r}: {what}" if where else what)
+    return f"{place}: {'; '.join(clauses)}"
+
+
+def option_names(model: type[BaseModel]) -> list[str]:
+    """Return the keys for the fields of a model, `"group.key"` for those of a model within."""
+    names = []
+    for name, field in model.model_fields.items():
+        inner = field.annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            names += [f"{name}.{each}" for each in inner.model_fields]
+        else:
+            names.append(name)
+    return names
+
+
+def _value(option: str, text: str) -> Any:
+    """Return a value; `3e-4` is a number, though YAML wants `3.0e-4`."""
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise BlastEnvError(f"--set {option}: the value is not YAML") from error
+    if isinstance(value, str):
+        try:
+            return float(value)
+        except ValueError:
+            return value
+    return value
+
+
+LINEAR: Final = "lin_"
+
+
+def _checked(value: float | str) -> float | str:
+    number = value
+    if isinstance(value, str):
+        if not value.startswith(LINEAR):
+            raise ValueError("must be a number, or 'lin_' and a number")
+        try:
+            number = float(value.removeprefix(LINEAR))
+        except ValueError:
+            raise ValueError("must be a number, or 'lin_' and a number") from None
+    if not 0.0 < float(number) <= 1.0:
+        raise ValueError("must be above 0 and at most 1")
+    return value
+
+
+Amount = Annotated[float | str, AfterValidator(_checked)]
+"""A number from 0 to 1, or `"lin_"` and a number: from that to 0 at the end of training."""
+
+
+@dataclass(frozen=True)
+class Falling:
+    """Falls in a straight line to 0.
+
+    Attributes:
+        start: What it begins with.
+    """
+
+    start: float
+
+    def __call__(self, share_left: float) -> float:
+        """Return the amount when a share of the training is left."""
+        return self.start * share_left
+
+
+def schedule(amount: float | str) -> float | Callable[[float], float]:
+    """Return an amount as stable-baselines3 takes it: a number, or a function."""
+    if isinstance(amount, str):
+        return Falling(float(amount.removeprefix(LINEAR)))
+    return amount
+
+
+ALGORITHMS: Final = ("ppo", "maskable_ppo")
+
+
+DEFAULT_SECTION: Final = "BlastBarrier-v0"
+"""The section for scenarios that have none of their own."""
+
+
+_FOLDER: Final = Path(__file__).parents[1] / "hyperparameters"
+
+
+PolicyName = Literal[
+    "blast_agents.policies.spatial.SpatialPolicy",
+    "blast_agents.policies.spatial.SpatialMaskablePolicy",
+    "CnnPolicy",
+]
+"""Policies by the names that RL Zoo imports them by."""
+
+
+WRAPPERS: Final = (
+    "blast_agents.training.environments.RelativeReward",
+    "blast_agents.training.environments.ThreatPool",
+)
+
+
+WrapperName = Literal[
+    "blast_agents.training.environments.RelativeReward",
+    "blast_agents.training.environments.ThreatPool",
+]
+"""Wrappers of the environment, likewise."""
+
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class PolicyArguments(BaseModel):
+    """Arguments of the spatial policies; `None` and a `CnnPolicy` leave stable-baselines3's.
+
+    Attributes:
+        rows: Rows of the build zone; the scenario decides.
+        columns: Its columns; likewise.
+        places: Places that stand for where the charge may be; unless given, 1 for a visible charge
+            and 9 for a hidden one.
+        width: Number of features of a cell.
+        critic_width: Neurons of the critic's hidden layer.
+        finish_bias: What the logit of finishing begins with.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    rows: Annotated[int, Field(ge=1)] = 1
+    columns: Annotated[int, Field(ge=1)] = 1
+    places: Annotated[int, Field(ge=1, le=64)] | None = None
+    width: Annotated[int, Field(ge=1, le=512)] = 24
+    critic_width: Annotated[int, Field(ge=1, le=4096)] = 64
+    finish_bias: Annotated[float, Field(ge=-50.0, le=50.0)] = -3.0
+
+
+class Hyperparameters(BaseModel):
+    """Hyperparameters of PPO and MaskablePPO, named as there and in RL Zoo.
+
+    Attributes:
+        n_timesteps: Steps of training unless others are asked for.
+        n_envs: Parallel environments unless others are asked for.
+        policy: The policy.
+        policy_kwargs: Its arguments.
+        env_wrapper: Wrappers of the environment, the innermost first: a name, or a name with
+            arguments.
+        learning_rate: A number, or `"lin_"` and a number for one that falls to 0 at the end.
+        n_steps: Steps of each environment between two updates.
+        batch_size: Steps in a minibatch.
+        n_epochs: Passes over the steps in an update.
+        gamma: Discount; 1 for none.
+        gae_lambda: Trade-off between bias and variance of the advantages.
+        clip_range: How far an update may move a probability; as `learning_rate`.
+        ent_coef: Weight of the entropy, which keeps the agent exploring.
+        vf_coef: Weight of the critic's error.
+        max_grad_norm: Largest gradient.
+        normalize_advantage: Whether advantages are normalised by minibatch.
+        target_kl: An update ends where the policy has moved further; `None` for no limit.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    n_timesteps: Annotated[int, Field(ge=1)]
+    n_envs: Annotated[int, Field(ge=1, le=256)]
+    policy: PolicyName
+    policy_kwargs: PolicyArguments = PolicyArguments()
+    env_wrapper: tuple[WrapperName | dict[WrapperName, dict[str, Any]], ...] = ()
+    learning_rate: Amount
+    n_steps: Annotated[int, Field(ge=2, le=100_000)]
+    batch_size: Annotated[int, Field(ge=2)]
+    n_epochs: Annotated[int, Field(ge=1, le=100)]
+    gamma: Share = 1.0
+    gae_lambda: Share = 0.95
+    clip_range: Amount = 0.2
+    ent_coef: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    vf_coef: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
+    max_grad_norm: Annotated[float, Field(gt=0.0, le=1000.0)] = 0.5
+    normalize_advantage: bool = True
+    target_kl: Annotated[float, Field(gt=0.0)] | None = None
+
+    @model_validator(mode="after")
+    def _check_batches(self) -> "Hyperparameters":
+        """Refuse batches that do not divide a rollout: stable-baselines3 would only warn."""
+        steps = self.n_steps * self.n_envs
+        if steps % self.batch_size:
+            raise ValueError(
+                f"batch_size is {self.batch_size}, must divide n_steps * n_envs = {steps}"
+            )
+        return self
+
+    def model_arguments(self) -> dict[str, Any]:
+        """Return the arguments of PPO and MaskablePPO but for the policy and its own."""
+        others = {"n_timesteps", "n_envs", "policy", "policy_kwargs", "env_wrapper"}
+        return self.model_dump(exclude=others)
+
+    def wrappers(self) -> tuple[tuple[str, dict[str, Any]], ...]:
+        """Return name and arguments of each wrapper, the innermost first."""
+        wrappers: list[tuple[str, dict[str, Any]]] = []
+        for each in self.env_wrapper:
+            if isinstance(each, str):
+                wrappers.append((each, {}))
+            else:
+                wrappers += [(name, dict(arguments)) for name, arguments in each.items()]
+        return tuple(wrappers)
+
+
+HYPERPARAMETER_KEYS: Final = tuple(option_names(Hyperparameters))
+"""Names that changes can have: `"policy_kwargs.width"` for an argument of the policy."""
+
+
+def hyperparameter_file(algorithm: str) -> Path:
+    """Return the YAML file of an algorithm, which comes with the package.
+
+    Raises:
+        UnknownNameError: If there is no such algorithm; the message names the nearest one.
+    """
+    if algorithm not in ALGORITHMS:
+        raise UnknownNameError("algorithm", algorithm, ALGORITHMS)
+    return _FOLDER / f"{algorithm}.yml"
+
+
+def load_hyperparameters(
+    algorithm: str,
+    env_id: str,
+    changes: Mapping[str, Any] = MappingProxyType({}),
+    envs: int | None = None,
+) -> Hyperparameters:
+    """Return the hyperparameters of an algorithm for an environment.
+
+    Args:
+        algorithm: `"ppo"` or `"maskable_ppo"`.
+        env_id: Section of the file; one that it does not have gets that of `BlastBarrier-v0`.
+        changes: Values in the place of those of the file, by name; see `HYPERPARAMETER_KEYS`.
+        envs: Parallel environments, in the place of `n_envs`.
+
+    Raises:
+        UnknownNameError: If there is no such algorithm or key; the message names the nearest one.
+        BlastEnvError: If a value is of no use; the message names its bound.
+    """
+    path = hyperparameter_file(algorithm)
+    sections = yaml.safe_load(path.read_text(encoding="utf-8"))
+    check_names("hyperparameter", changes, HYPERPARAMETER_KEYS)
+    values = with_changes(sections.get(env_id, sections[DEFAULT_SECTION]), changes)
+    if envs is not None:
+        values["n_envs"] = envs
+    return checked(values, "hyperparameters")
+
+
+def checked(values: Mapping[str, Any], place: str) -> Hyperparameters:
+    """Return hyperparameters from plain values.
+
+    Args:
+        values: By name.
+        place: Where they come from, for the error.
+
+    Raises:
+        BlastEnvError: If a value is of no use; the message names its bound.
+    """
+    try:
+        return Hyperparameters.model_validate(values)
+    except ValidationError as error:
+        raise BlastEnvError(described(error, place)) from error

@@ -1,0 +1,359 @@
+"""What a training run is about, as its run folder keeps it."""
+
+import csv
+import json
+import os
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from blast_agents.training.hyperparameters import ALGORITHMS, Hyperparameters, described
+from blast_env.envs.arguments import check_names
+from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
+
+CONFIGURATION_FORMAT: Final = 1
+
+
+SITES: Final = "sites"
+"""Name of the generated sites, where a scenario is asked for."""
+
+
+THREATS: Final = ("visible", "hidden")
+
+
+SETTING_KEYS: Final = (
+    "hidden_threats",
+    "evaluation_interval",
+    "evaluation_cases",
+    "evaluation_first_seed",
+    "torch_threads",
+)
+"""Settings that `--set` changes, beside the hyperparameters."""
+
+
+class TrainingSettings(BaseModel):
+    """What is trained on what; how is for the hyperparameters.
+
+    Attributes:
+        algorithm: `"ppo"` or `"maskable_ppo"`.
+        scenario: Bundled name, path of a scenario file, or `"sites"` for generated ones.
+        steps: Steps to train for; a rollout is always finished.
+        seed: Decides everything: weights, episodes, actions, minibatches.
+        threat: `"visible"`: the agent sees the charge; `"hidden"`: it sees where it may be.
+        engine: Engine that runs the blasts.
+        hidden_threats: Charges in an episode where they are hidden. The mean over episodes is the
+            same for any number; with few, more layouts are tried for the same number of blasts.
+        evaluation_interval: Rollouts from one evaluation to the next.
+        evaluation_cases: Held-out threats that the layouts are evaluated on.
+        evaluation_first_seed: The seeds of these threats count from here.
+        torch_threads: Threads for the network.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    algorithm: Literal["ppo", "maskable_ppo"]
+    scenario: str
+    steps: Annotated[int, Field(ge=1, le=10**10)]
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    threat: Literal["visible", "hidden"] = "visible"
+    engine: str = "event"
+    hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
+    evaluation_interval: Annotated[int, Field(ge=1)] = 5
+    evaluation_cases: Annotated[int, Field(ge=2, le=100)] = 16
+    evaluation_first_seed: Annotated[int, Field(ge=0)] = 1_000_000
+    torch_threads: Annotated[int, Field(ge=1, le=256)] = 1
+
+
+class RunConfiguration(BaseModel):
+    """All that a run needs to be repeated, with the file of its scenario.
+
+    Attributes:
+        format: Version of this form.
+        settings: What is trained on what.
+        hyperparameters: How.
+        scenario_hash: Content hash of the scenario; of sites, that of the first one.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: Literal[1] = CONFIGURATION_FORMAT
+    settings: TrainingSettings
+    hyperparameters: Hyperparameters
+    scenario_hash: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+    def document(self) -> dict[str, Any]:
+        """Return plain data."""
+        return self.model_dump(mode="json")
+
+
+def settings_from(values: Mapping[str, Any]) -> TrainingSettings:
+    """Return settings from plain values.
+
+    Raises:
+        UnknownNameError: If there is no such algorithm or threat; the message names the nearest.
+        BlastEnvError: If a value is of no use; the message names its bound.
+    """
+    check_names("algorithm", [values.get("algorithm", ALGORITHMS[0])], ALGORITHMS)
+    check_names("threat", [values.get("threat", THREATS[0])], THREATS)
+    try:
+        return TrainingSettings.model_validate(values)
+    except ValidationError as error:
+        raise BlastEnvError(described(error, "training")) from error
+
+
+@dataclass(frozen=True)
+class RolloutRow:
+    """What a rollout brought.
+
+    Attributes:
+        steps: Steps of training at its end.
+        episodes: Episodes that ended in it.
+        reward: Mean over these episodes.
+        reduction: Mean over these episodes.
+        modules: Mean number of modules of their layouts.
+        blasts: Blasts simulated since training began.
+        cache_hits: Loads that needed no blast, likewise.
+        seconds: Time since training began.
+    """
+
+    steps: int
+    episodes: int
+    reward: float
+    reduction: float
+    modules: float
+    blasts: int
+    cache_hits: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class EvaluationRow:
+    """An evaluation on held-out threats.
+
+    Attributes:
+        steps: Steps of training.
+        episodes: Episodes of training.
+        reduction: On the held-out threats.
+        low: Lower end of its 95 % interval.
+        high: Upper end.
+        blasts: Blasts of training, without those of the evaluations.
+        seconds: Time since training began.
+    """
+
+    steps: int
+    episodes: int
+    reduction: float
+    low: float
+    high: float
+    blasts: int
+    seconds: float
+
+
+Row = TypeVar("Row", RolloutRow, EvaluationRow)
+
+
+def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
+    """Write rows as CSV; the file is complete or as it was.
+
+    Raises:
+        BlastEnvError: If it cannot be written.
+    """
+    with (
+        write_atomically(path) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.DictWriter(file, [field.name for field in fields(kind)])
+        writer.writeheader()
+        writer.writerows(asdict(row) for row in rows)
+
+
+def read_rows(path: Path, kind: type[Row], most_steps: int) -> list[Row]:
+    """Read rows up to a number of steps; those after it belong to what was lost.
+
+    Raises:
+        BlastEnvError: If there is no such file, or it is damaged.
+    """
+    types: dict[str, Callable[[str], Any]] = {
+        field.name: int if field.type is int else float for field in fields(kind)
+    }
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = [
+                kind(**{name: convert(row[name]) for name, convert in types.items()})
+                for row in csv.DictReader(file)
+            ]
+    except (OSError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+        raise BlastEnvError(f"{path}: is missing or damaged: {error}") from error
+    return [row for row in rows if row.steps <= most_steps]
+
+
+_PACKAGES: Final = (
+    "blast-env",
+    "gymnasium",
+    "numba",
+    "numpy",
+    "pymunk",
+    "sb3-contrib",
+    "stable-baselines3",
+    "torch",
+)
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The files of a run.
+
+    Attributes:
+        path: The folder.
+    """
+
+    path: Path
+
+    @property
+    def last(self) -> Path:
+        """Checkpoint after the last rollout: weights, optimiser and counters."""
+        return self.path / "last.pt"
+
+    @property
+    def best(self) -> Path:
+        """Checkpoint of the best evaluation on held-out threats."""
+        return self.path / "best.pt"
+
+    @property
+    def rollouts(self) -> Path:
+        """What each rollout brought, a row each."""
+        return self.path / "rollouts.csv"
+
+    @property
+    def evaluations(self) -> Path:
+        """The evaluations on held-out threats, a row each."""
+        return self.path / "evaluations.csv"
+
+    @property
+    def learning_curve(self) -> Path:
+        """The learning curve as a picture."""
+        return self.path / "learning_curve.png"
+
+    @property
+    def tensorboard(self) -> Path:
+        """The folder for TensorBoard."""
+        return self.path / "tensorboard"
+
+    @property
+    def _configuration(self) -> Path:
+        return self.path / "config.yaml"
+
+    @property
+    def _scenario(self) -> Path:
+        return self.path / "scenario.toml"
+
+    def create(self, configuration: RunConfiguration, scenario: Scenario, command: str) -> None:
+        """Make the folder and write what does not change.
+
+        Args:
+            configuration: Of the run.
+            scenario: The scenario; of sites, the first one.
+            command: What started the run.
+
+        Raises:
+            BlastEnvError: If the folder cannot be made, or there is anything in it.
+        """
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            taken = sorted(os.listdir(self.path))
+        except OSError as error:
+            raise BlastEnvError(
+                f"{self.path}: cannot be a folder: {error.strerror or error}"
+            ) from error
+        if taken:
+            raise BlastEnvError(
+                f"{self.path}: has {taken[0]!r} in it, must be empty; --resume goes on with a run"
+            )
+        save_scenario(scenario, self._scenario)
+        _write(self.path / "command.txt", f"{command}\n")
+        _write(self.path / "versions.json", json.dumps(_versions(), indent=2) + "\n")
+        text = yaml.safe_dump(configuration.document(), sort_keys=False)
+        _write(self._configuration, text)  # the last one: with it, the folder is a run's
+
+    def configuration(self) -> RunConfiguration:
+        """Return the configuration of the run.
+
+        Raises:
+            BlastEnvError: If there is none, or it is damaged.
+        """
+        try:
+            document = yaml.safe_load(self._configuration.read_text(encoding="utf-8"))
+        except FileNotFoundError as error:
+            raise BlastEnvError(
+                f"{self.path}: is no run folder: there is no {self._configuration.name} in it"
+            ) from error
+        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+            raise BlastEnvError(f"{self._configuration}: is damaged: {error}") from error
+        found = document.get("format") if isinstance(document, dict) else None
+        if found != CONFIGURATION_FORMAT:
+            raise BlastEnvError(
+                f"{self._configuration}: format is {found!r}, must be {CONFIGURATION_FORMAT}"
+            )
+        try:
+            return RunConfiguration.model_validate(document)
+        except ValidationError as error:
+            raise BlastEnvError(described(error, f"{self._configuration}: is damaged")) from error
+
+    def scenario(self, configuration: RunConfiguration) -> Scenario:
+        """Return the scenario of the run.
+
+        Args:
+            configuration: Of the run.
+
+        Raises:
+            BlastEnvError: If there is none, it is damaged, or it is another one than that of the
+                configuration.
+        """
+        try:
+            scenario = load_scenario(self._scenario)
+        except ScenarioError as error:
+            raise BlastEnvError(f"{self.path}: the run folder is damaged: {error}") from error
+        check_scenario(scenario, configuration, str(self._scenario))
+        return scenario
+
+
+def check_scenario(scenario: Scenario, configuration: RunConfiguration, place: str) -> None:
+    """Refuse a scenario that is not the one of a run.
+
+    Args:
+        scenario: The scenario.
+        configuration: Of the run.
+        place: Where the scenario comes from, for the error.
+
+    Raises:
+        BlastEnvError: If the hashes differ.
+    """
+    if scenario.content_hash != configuration.scenario_hash:
+        raise BlastEnvError(
+            f"{place}: the scenario's hash is {scenario.content_hash[:12]}..., must be "
+            f"{configuration.scenario_hash[:12]}..., that of the run: it is another scenario"
+        )
+
+
+def _versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    versions = {"python": platform.python_version(), "platform": platform.platform()}
+    for name in _PACKAGES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions
+
+
+def _write(path: Path, text: str) -> None:
+    with write_atomically(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -1,0 +1,12 @@
+"""Names of NumPy array types."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+BoolArray = NDArray[np.bool_]
+
+
+IntArray = NDArray[np.int64]

@@ -1,0 +1,491 @@
+"""What an agent sees: the observations and what they are made of."""
+
+from dataclasses import dataclass
+from math import ceil
+from typing import Any, ClassVar, Final, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from blast_env.envs.strategies import zone_of
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.cases import draw_threats
+from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.geometry import Rectangle
+from blast_env.scenario import AnySource, Placement, RectangleSource, Scenario, Site
+from blast_env.scenario.models import AnyStructure
+from blast_env.scenario.zone import Surroundings, empty_zone, source_bounds_m
+from blast_env.units import MODULE_SIDE_M
+
+Array = NDArray[Any]
+"""An observation; its data type is that of the space."""
+
+
+FULL_CHARGE_KG: Final = 1000.0
+"""TNT-equivalent mass that is shown as 1; larger ones as well."""
+
+
+FULL_STOCK: Final = 100
+"""Number of modules in stock that is shown as 1; larger ones as well."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What may be known of an episode before the charge goes off.
+
+    Observations are made from this and from the modules placed so far, so that nothing else can
+    slip into them: with a hidden threat, `sources` are those of the scenario.
+
+    Attributes:
+        scenario: The scenario.
+        sources: Where the charge is, or may be.
+        evaluator: Runs blasts of the scenario.
+    """
+
+    scenario: Scenario
+    sources: tuple[AnySource, ...]
+    evaluator: BlastEvaluator
+
+    def unprotected_module_impulse_sim(self, blasts: int) -> NDArray[np.float64]:
+        """Return the load on each module of the structures without a barrier.
+
+        The mean over blasts of charges from `sources`, with seeds from 0 on: not those that the
+        layout is assessed with.
+
+        Args:
+            blasts: Number of blasts.
+
+        Returns:
+            Simulation units (modules,), in the order of the scenario's structures, row by row.
+        """
+        shown = self.scenario.model_copy(update={"charge": self.sources})
+        threats = draw_threats(shown, range(blasts))
+        loads = self.evaluator.loads_of_many([((), threat) for threat in threats])
+        mean: NDArray[np.float64] = np.mean([each.module_impulse_sim for each in loads], axis=0)
+        return mean
+
+
+class EpisodeObservation(Protocol):
+    """Observes one episode."""
+
+    def observe(self, placement: Placement) -> Array:
+        """Return a fresh array in the space, for the modules placed so far."""
+
+
+class Observation(Protocol):
+    """A kind of observation."""
+
+    def space(self, scenario: Scenario) -> spaces.Space[Array]:
+        """Return the space, a `Box` that depends on the sizes of site and build zone alone."""
+
+    def episode(self, sight: Sight) -> EpisodeObservation:
+        """Prepare the observations of an episode; what does not change is worked out here."""
+
+
+def charge_share(tnt_kg: float) -> float:
+    """Return a charge's mass as it is shown: (mass / 1000 kg)^(1/3), at most 1.
+
+    The cube root, because distances scale with it (Hopkinson and Cranz): a charge of eight times
+    the mass acts as one of the same mass at half the distance.
+    """
+    return float(min((tnt_kg / FULL_CHARGE_KG) ** (1.0 / 3.0), 1.0))
+
+
+def stock_shares(placement: Placement) -> tuple[float, float, float]:
+    """Return what there is left to build with, each from 0 to 1.
+
+    Returns:
+        The share of the stock, the number of modules as a share of 100 (at most 1), and the share
+        of the budget (1 without a budget).
+    """
+    zone = placement.scenario.build_zone
+    if zone is None:
+        return 0.0, 0.0, 0.0
+    left, budget_left = placement.stock_left, placement.budget_left
+    of_budget = 1.0 if zone.budget is None or budget_left is None else budget_left / zone.budget
+    return left / zone.stock, min(left / FULL_STOCK, 1.0), of_budget
+
+
+def occupied_cells(placement: Placement) -> NDArray[np.bool_]:
+    """Return which cells of the build zone hold a module, shape (rows, columns)."""
+    occupied = np.zeros(placement.free.shape, dtype=bool)
+    if placement.cells:
+        occupied[tuple(np.array(placement.cells).T)] = True
+    return occupied
+
+
+def cost_shares(scenario: Scenario) -> NDArray[np.float64]:
+    """Return the cost of a module on each cell as a share of the highest, (rows, columns)."""
+    zone = scenario.build_zone
+    if zone is None:
+        return np.zeros((0, 0))
+    radius_m = scenario.charge_radius_m
+    costs = empty_zone(
+        Surroundings(zone, scenario.structures, scenario.charge, radius_m)
+    ).module_costs
+    shares: NDArray[np.float64] = costs / costs.max()
+    return shares
+
+
+Plane = NDArray[np.float32]
+
+
+_POINTS_PER_MODULE: Final = 8  # along a segment where a charge may be
+
+
+@dataclass(frozen=True)
+class SiteGrid:
+    """Planes of (rows, columns) squares of 0.5 m; row 0 is the lower edge of the site.
+
+    Attributes:
+        rows: Squares upwards.
+        columns: Squares to the right.
+    """
+
+    rows: int
+    columns: int
+
+    @classmethod
+    def of(cls, site: Site) -> "SiteGrid":
+        """Return the grid of a site; the last squares jut out of one that is no whole number."""
+        rows, columns = (ceil(m / MODULE_SIDE_M - 1e-9) for m in (site.height_m, site.width_m))
+        return cls(rows, columns)
+
+    def lattice(self, corner_m: tuple[float, float], rows: int, columns: int) -> "Lattice":
+        """Return where a lattice of modules lies on the grid.
+
+        Args:
+            corner_m: Its lower left corner.
+            rows: Modules upwards.
+            columns: Modules to the right.
+        """
+        return Lattice(
+            _shares(self.rows, corner_m[1], rows), _shares(self.columns, corner_m[0], columns)
+        )
+
+    def rectangle(self, rectangle_m: Rectangle) -> Plane:
+        """Return the share of each square that a rectangle covers, (rows, columns)."""
+        left, bottom, right, top = rectangle_m
+        along_y = _covered(self.rows, np.array([bottom]), np.array([top]))
+        along_x = _covered(self.columns, np.array([left]), np.array([right]))
+        return (along_y @ along_x.T).astype(np.float32)
+
+    def source(self, source: AnySource) -> Plane:
+        """Return how likely the charge of a source is in each square, (rows, columns).
+
+        The plane adds up to 1. A point is shared between the four squares around it such that
+        their mean place is the point's.
+        """
+        if isinstance(source, RectangleSource):
+            plane = self.rectangle(source.rectangle_m)
+        else:
+            start, end = (np.array(point) for point in source.segment_m)
+            length_m = float(np.hypot(*(end - start)))
+            count = 1 + _POINTS_PER_MODULE * ceil(length_m / MODULE_SIDE_M)
+            share = (np.arange(count) + 0.5) / count
+            plane = self._points(start + share[:, np.newaxis] * (end - start))
+        # A narrow rectangle covers next to nothing of its squares, which rounding must not lose.
+        return plane / np.float32(plane.sum(dtype=np.float64))
+
+    def _points(self, points_m: NDArray[np.float64]) -> Plane:
+        """Return points (n, 2), each shared between the four squares around it."""
+        plane = np.zeros((self.rows, self.columns), dtype=np.float32)
+        places = points_m[:, ::-1] / MODULE_SIDE_M - 0.5
+        low = np.floor(places).astype(int)
+        beyond = places - low
+        for up in (0, 1):
+            for right in (0, 1):
+                row = np.clip(low[:, 0] + up, 0, self.rows - 1)
+                column = np.clip(low[:, 1] + right, 0, self.columns - 1)
+                along_y = beyond[:, 0] if up else 1.0 - beyond[:, 0]
+                along_x = beyond[:, 1] if right else 1.0 - beyond[:, 1]
+                np.add.at(plane, (row, column), along_y * along_x)
+        return plane
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Where a lattice of modules lies on the grid; modules on the 0.5 m grid fill one square each.
+
+    Attributes:
+        along_y: Share of each row of squares that each row of modules covers (grid rows, rows).
+        along_x: The same for columns (grid columns, columns).
+    """
+
+    along_y: Plane
+    along_x: Plane
+
+    def plane(self, values: NDArray[np.generic]) -> Plane:
+        """Return values of the modules (..., rows, columns) on the grid, by the area covered."""
+        plane: Plane = self.along_y @ values.astype(np.float32) @ self.along_x.T
+        return plane
+
+
+def _shares(squares: int, start_m: float, modules: int) -> Plane:
+    low_m = np.asarray(start_m + MODULE_SIDE_M * np.arange(modules), dtype=np.float64)
+    return _covered(squares, low_m, low_m + MODULE_SIDE_M).astype(np.float32)
+
+
+def _covered(
+    squares: int, low_m: NDArray[np.float64], high_m: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the share of each square that each interval covers (squares, intervals)."""
+    first = np.arange(squares)[:, np.newaxis]
+    low, high = low_m / MODULE_SIDE_M, high_m / MODULE_SIDE_M
+    common = np.minimum(first + 1, high) - np.maximum(first, low)
+    # Rounded, so that what lies on the grid but for the last bit fills whole squares.
+    covered: NDArray[np.float64] = np.round(np.clip(common, 0.0, 1.0), 9)
+    return covered
+
+
+_PROTECTED, _OTHER, _COST, _CHARGE = 0, 1, 2, 3
+
+
+_FIRST_CHANGING: Final = 4  # barrier, free, stock share, stock, budget
+
+
+@dataclass(frozen=True)
+class GridObservation:
+    """Planes of (rows, columns) squares of 0.5 m over the site, uint8: 255 stands for 1.
+
+    Row 0 is the lower edge of the site and column 0 the left one, as in the build zone. Whatever
+    lies on the 0.5 m grid fills whole squares; what does not is shown by the share of a square
+    that it covers.
+
+    | channel | plane | value, from 0 to 1 |
+    |---|---|---|
+    | 0 | `protected` | weight of the protected structure here / the largest weight |
+    | 1 | `other_structures` | 1 where another structure stands |
+    | 2 | `cost` | cost of a module on this cell of the build zone / the highest; 0 outside |
+    | 3 | `charge` | see below |
+    | 4 | `barrier` | 1 where a module stands |
+    | 5 | `free` | 1 where a module may be placed now |
+    | 6 | `stock_share` | modules left / modules at first, the same everywhere |
+    | 7 | `stock` | modules left / 100, at most 1, the same everywhere |
+    | 8 | `budget_share` | budget left / budget, 1 without a budget, the same everywhere |
+
+    `charge`: the square root of (how likely the charge is in a square / the largest such value),
+    times (mass / 1000 kg)^(1/3), at most 1. A visible charge fills the squares around its centre,
+    up to four, and the largest value tells its mass. A hidden one fills all squares where it may
+    be, and where it may have different masses, their mean counts; the root lets wide areas be
+    seen beside single points.
+
+    Whole numbers up to 255 are how stable-baselines3 knows an image: its `CnnPolicy` takes the
+    planes as they are and divides by 255 itself. Its network wants sites of 18 m x 18 m or more.
+    """
+
+    channels: ClassVar[tuple[str, ...]] = (
+        "protected",
+        "other_structures",
+        "cost",
+        "charge",
+        "barrier",
+        "free",
+        "stock_share",
+        "stock",
+        "budget_share",
+    )
+
+    def space(self, scenario: Scenario) -> spaces.Space[Array]:
+        """Return the space: (channels, rows, columns)."""
+        grid = SiteGrid.of(scenario.site)
+        return spaces.Box(0, 255, (len(self.channels), grid.rows, grid.columns), np.uint8)
+
+    def episode(self, sight: Sight) -> "GridEpisode":
+        """Draw the planes that do not change."""
+        grid = SiteGrid.of(sight.scenario.site)
+        planes = np.zeros((len(self.channels), grid.rows, grid.columns), dtype=np.float32)
+        _draw_structures(planes, grid, sight.scenario)
+        zone = zone_of(sight.scenario)
+        lattice = grid.lattice(zone.corner_m, zone.rows, zone.columns)
+        planes[_COST] = lattice.plane(cost_shares(sight.scenario))
+        planes[_CHARGE] = _charge_plane(grid, sight.sources)
+        return GridEpisode(_levels(planes), lattice)
+
+
+@dataclass(frozen=True)
+class GridWithLoadObservation(GridObservation):
+    """`GridObservation` with one more plane: the loads on the structures without a barrier.
+
+    Channel 9, `unprotected_load`, has the impulse on each module divided by the largest one: the
+    mean of blasts with seeds of their own, of the charge that is visible or of charges drawn from
+    where a hidden one may be. The blasts are run at `reset`, once a charge, or once a scenario
+    where the charge is hidden.
+
+    Attributes:
+        blasts: How many blasts the loads are the mean of.
+    """
+
+    blasts: int = 4
+    channels: ClassVar[tuple[str, ...]] = (*GridObservation.channels, "unprotected_load")
+
+    def episode(self, sight: Sight) -> "GridEpisode":
+        """Draw the planes that do not change, with the loads."""
+        episode = super().episode(sight)
+        grid = SiteGrid.of(sight.scenario.site)
+        impulses = sight.unprotected_module_impulse_sim(self.blasts)
+        shares = impulses / max(impulses.max(), np.finfo(float).tiny)
+        plane = np.zeros((grid.rows, grid.columns), dtype=np.float32)
+        first = 0
+        for structure in sight.scenario.structures:
+            modules = structure.rows * structure.columns
+            values = shares[first : first + modules].reshape(structure.rows, structure.columns)
+            plane += grid.lattice(structure.corner_m, structure.rows, structure.columns).plane(
+                values
+            )
+            first += modules
+        episode.static[-1] = _levels(plane)
+        return episode
+
+
+@dataclass(frozen=True, eq=False)
+class GridEpisode:
+    """The planes of one episode.
+
+    Attributes:
+        static: What does not change (channels, rows, columns); the rest is 0.
+        zone: Where the build zone lies on the grid.
+    """
+
+    static: NDArray[np.uint8]
+    zone: Lattice
+
+    def observe(self, placement: Placement) -> NDArray[np.uint8]:
+        """Return all planes for the modules placed so far, (channels, rows, columns)."""
+        planes = self.static.copy()
+        first = _FIRST_CHANGING
+        cells = np.stack((occupied_cells(placement), placement.free))
+        planes[first : first + 2] = _levels(self.zone.plane(cells))
+        shares = np.array(stock_shares(placement), dtype=np.float32)
+        planes[first + 2 : first + 5] = _levels(shares)[:, np.newaxis, np.newaxis]
+        return planes
+
+
+def _levels(values: Plane) -> NDArray[np.uint8]:
+    """Return values from 0 to 1 as whole numbers from 0 to 255."""
+    return np.rint(255.0 * np.minimum(values, 1.0)).astype(np.uint8)
+
+
+def _draw_structures(planes: Plane, grid: SiteGrid, scenario: Scenario) -> None:
+    weights = [structure.weight for structure in scenario.structures if structure.protected]
+    for structure in scenario.structures:
+        covered = grid.rectangle(structure.rectangle_m)
+        if structure.protected:
+            planes[_PROTECTED] += np.float32(structure.weight / max(weights)) * covered
+        else:
+            planes[_OTHER] += covered
+
+
+def _charge_plane(grid: SiteGrid, sources: tuple[AnySource, ...]) -> Plane:
+    total_weight = sum(source.weight for source in sources)
+    likely = np.zeros((grid.rows, grid.columns), dtype=np.float32)
+    heavy = np.zeros_like(likely)
+    for source in sources:
+        share = np.float32(source.weight / total_weight) * grid.source(source)
+        likely += share
+        heavy += np.float32(charge_share(source.tnt_kg)) * share
+    mean_share = np.divide(heavy, likely, out=np.zeros_like(heavy), where=likely > 0.0)
+    plane: Plane = np.sqrt(likely / likely.max()) * mean_share
+    return plane
+
+
+MOST_STRUCTURES: Final = 8
+"""Structures that the vector has room for."""
+
+
+_PER_STRUCTURE: Final = 6
+
+
+_FIXED: Final = 3 + 6 + 2 + MOST_STRUCTURES * _PER_STRUCTURE
+
+
+@dataclass(frozen=True)
+class FeaturesObservation:
+    """A vector of float32 from 0 to 1; x is divided by the site's width, y by its height.
+
+    | from | length | what |
+    |---|---|---|
+    | 0 | 3 | modules left / modules at first; modules left / 100, at most 1; budget left / budget |
+    | 3 | 4 | left, bottom, right, top of the smallest box around where the charge is or may be |
+    | 7 | 2 | least and largest mass that the charge may have, (mass / 1000 kg)^(1/3), at most 1 |
+    | 9 | 2 | x and y of the lower left corner of the build zone |
+    | 11 | 8 x 6 | of each structure: left, bottom, right, top; 1; its weight / the largest weight |
+    | 59 | cells | 1 where a module stands, row by row |
+    | 59 + cells | cells | 1 where a module may be placed now, row by row |
+    | 59 + 2 cells | cells | cost of a module / the highest, row by row |
+
+    Protected structures come first, in the order of the scenario. The weight of another structure
+    is 0, and all six values are 0 where there is no structure.
+    """
+
+    def space(self, scenario: Scenario) -> spaces.Space[Array]:
+        """Return the space: (features,)."""
+        zone = zone_of(scenario)
+        return spaces.Box(0.0, 1.0, (_FIXED + 3 * zone.rows * zone.columns,), np.float32)
+
+    def episode(self, sight: Sight) -> "FeaturesEpisode":
+        """Work out the values that do not change.
+
+        Raises:
+            BlastEnvError: If the scenario has more structures than there is room for.
+        """
+        scenario, zone = sight.scenario, zone_of(sight.scenario)
+        size = np.array([scenario.site.width_m, scenario.site.height_m])
+        boxes = np.array([source_bounds_m(source) for source in sight.sources])
+        charges = [charge_share(source.tnt_kg) for source in sight.sources]
+        fixed = [
+            np.zeros(3),
+            boxes[:, :2].min(axis=0) / size,
+            boxes[:, 2:].max(axis=0) / size,
+            [min(charges), max(charges)],
+            np.array(zone.corner_m) / size,
+            _structures(scenario).ravel(),
+            np.zeros(2 * zone.rows * zone.columns),
+            cost_shares(scenario).ravel(),
+        ]
+        values = np.concatenate(fixed).astype(np.float32)
+        return FeaturesEpisode(np.clip(values, 0.0, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class FeaturesEpisode:
+    """The vector of one episode.
+
+    Attributes:
+        static: What does not change (features,); the rest is 0.
+    """
+
+    static: Array
+
+    def observe(self, placement: Placement) -> Array:
+        """Return all values for the modules placed so far, (features,)."""
+        values = self.static.copy()
+        values[:3] = stock_shares(placement)
+        cells = placement.free.size
+        values[_FIXED : _FIXED + cells] = occupied_cells(placement).ravel()
+        values[_FIXED + cells : _FIXED + 2 * cells] = placement.free.ravel()
+        return values
+
+
+def _structures(scenario: Scenario) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Return the features of the structures, (MOST_STRUCTURES, 6)."""
+    structures = sorted(scenario.structures, key=lambda structure: not structure.protected)
+    if len(structures) > MOST_STRUCTURES:
+        raise BlastEnvError(
+            f"scenario {scenario.name!r} has {len(structures)} structures, the observation"
+            f" 'features' has room for {MOST_STRUCTURES}: use 'grid'"
+        )
+    largest = max((each.weight for each in structures if each.protected), default=1.0)
+    site = Rectangle(0.0, 0.0, scenario.site.width_m, scenario.site.height_m)
+    rows = np.zeros((MOST_STRUCTURES, _PER_STRUCTURE))
+    for row, structure in zip(rows, structures, strict=False):
+        row[:] = _structure(structure, site, largest)
+    return rows
+
+
+def _structure(structure: AnyStructure, site: Rectangle, largest_weight: float) -> list[float]:
+    left, bottom, right, top = structure.rectangle_m
+    weight = structure.weight / largest_weight if structure.protected else 0.0
+    sides = [left / site.right, bottom / site.top, right / site.right, top / site.top]
+    return [*sides, 1.0, weight]

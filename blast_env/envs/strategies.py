@@ -1,0 +1,231 @@
+"""What is chosen by name: threat models, sources of scenarios, rewards."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final, Protocol
+
+import numpy as np
+
+from blast_env.envs.objective import Objective
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Cell
+from blast_env.physics.scene import Charge
+from blast_env.scenario import AnySource, BuildZone, PointSource, Scenario, load_scenario
+
+
+class ThreatModel(Protocol):
+    """Draws the charges of an episode and decides what may be seen of them."""
+
+    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[Charge, ...]:
+        """Draw the charges that the layout is assessed against, with nothing but `rng`."""
+
+    def shown(self, scenario: Scenario, charges: tuple[Charge, ...]) -> tuple[AnySource, ...]:
+        """Return where the charge is, or may be, as far as the agent may know."""
+
+
+@dataclass(frozen=True)
+class VisibleThreat:
+    """One charge, and the agent sees where it is: a layout for each charge."""
+
+    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[Charge, ...]:
+        """Draw one charge."""
+        return (scenario.sample_charge(rng),)
+
+    def shown(
+        self,
+        scenario: Scenario,  # noqa: ARG002
+        charges: tuple[Charge, ...],
+    ) -> tuple[AnySource, ...]:
+        """Return the charge itself."""
+        return tuple(
+            PointSource(position_m=each.position_m, tnt_kg=each.tnt_kg) for each in charges
+        )
+
+
+@dataclass(frozen=True)
+class HiddenThreat:
+    """Several charges, of which the agent sees only where they may be: one layout for all.
+
+    Attributes:
+        threats: How many charges are drawn for an episode.
+    """
+
+    threats: int
+
+    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[Charge, ...]:
+        """Draw the charges, independently of each other."""
+        return tuple(scenario.sample_charge(rng) for _ in range(self.threats))
+
+    def shown(
+        self,
+        scenario: Scenario,
+        charges: tuple[Charge, ...],  # noqa: ARG002
+    ) -> tuple[AnySource, ...]:
+        """Return the places of the scenario; nothing of the charges."""
+        return scenario.charge
+
+
+class ScenarioSource(Protocol):
+    """Gives each episode its scenario.
+
+    All scenarios of a source have sites of one size and build zones of as many rows and columns,
+    so that they share the observation and the action space.
+    """
+
+    @property
+    def representative(self) -> Scenario:
+        """A scenario of the size that all have; always the same one."""
+
+    def sample(self, rng: np.random.Generator) -> Scenario:
+        """Draw the scenario of an episode, with nothing but `rng`."""
+
+
+@dataclass(frozen=True)
+class SingleScenario:
+    """Gives every episode the same scenario.
+
+    Attributes:
+        scenario: The scenario.
+    """
+
+    scenario: Scenario
+
+    @property
+    def representative(self) -> Scenario:
+        """The scenario."""
+        return self.scenario
+
+    def sample(self, rng: np.random.Generator) -> Scenario:  # noqa: ARG002
+        """Return the scenario; nothing is drawn."""
+        return self.scenario
+
+
+def scenario_source(scenario: str | Path | Scenario | ScenarioSource) -> ScenarioSource:
+    """Return the source for what a user calls a scenario.
+
+    Args:
+        scenario: Bundled name, path of a scenario file, a scenario, or a source.
+
+    Raises:
+        ScenarioError: If there is no such scenario, or anything is wrong with it.
+        BlastEnvError: If it has no build zone, or is anything else.
+    """
+    if isinstance(scenario, str | Path):
+        scenario = load_scenario(scenario)
+    source = SingleScenario(scenario) if isinstance(scenario, Scenario) else scenario
+    if not (hasattr(source, "sample") and hasattr(source, "representative")):
+        raise BlastEnvError(
+            f"scenario is {source!r}, must be a name, a path, a Scenario or a ScenarioSource"
+        )
+    zone_of(source.representative)
+    return source
+
+
+def zone_of(scenario: Scenario) -> BuildZone:
+    """Return the build zone of a scenario.
+
+    Raises:
+        BlastEnvError: If it has none.
+    """
+    if scenario.build_zone is None:
+        raise BlastEnvError(
+            f"scenario {scenario.name!r} has no build zone, so nothing can be placed in it"
+        )
+    return scenario.build_zone
+
+
+def check_size(scenario: Scenario, representative: Scenario) -> None:
+    """Refuse a scenario of another size than the one that the spaces were made for.
+
+    Args:
+        scenario: The scenario that was drawn.
+        representative: The scenario that the spaces were made for.
+
+    Raises:
+        BlastEnvError: If site or build zone have another size, or there is no build zone.
+    """
+    for what, size, expected in zip(
+        ("site (width, height in m)", "build zone (rows, columns)"),
+        _sizes(scenario),
+        _sizes(representative),
+        strict=True,
+    ):
+        if size != expected:
+            raise BlastEnvError(
+                f"scenario {scenario.name!r}: the {what} is {size}, must be {expected} as in"
+                f" {representative.name!r}: the spaces of an environment do not change"
+            )
+
+
+def _sizes(scenario: Scenario) -> tuple[tuple[float, float], tuple[int, int]]:
+    zone = zone_of(scenario)
+    return (scenario.site.width_m, scenario.site.height_m), (zone.rows, zone.columns)
+
+
+@dataclass(frozen=True)
+class Transition:
+    """What one action changed.
+
+    Attributes:
+        initial: The layout at `reset`.
+        before: The layout before the action.
+        after: The layout after it; the same, unless the action placed a module.
+        ended: Whether the charge goes off now.
+        objective: Assesses layouts under the threats of the episode.
+    """
+
+    initial: tuple[Cell, ...]
+    before: tuple[Cell, ...]
+    after: tuple[Cell, ...]
+    ended: bool
+    objective: Objective
+
+
+class Reward(Protocol):
+    """Pays for an action, in named terms."""
+
+    def __call__(self, transition: Transition) -> Mapping[str, float]:
+        """Return the terms; the reward is their sum.
+
+        Always the same names, and none that the environment uses itself (`illegal_actions`).
+        """
+
+
+@dataclass(frozen=True)
+class TerminalReward:
+    """Minus the impulse of the whole layout, paid when the charge goes off."""
+
+    def __call__(self, transition: Transition) -> Mapping[str, float]:
+        """Return the term `impulse`, psi*s; 0 before the end."""
+        if not transition.ended:
+            return {"impulse": 0.0}
+        return {"impulse": -transition.objective.assess(transition.after).impulse_psi_s}
+
+
+@dataclass(frozen=True)
+class IncrementalReward:
+    """What each module takes off the impulse, paid at once; a set of blasts per module.
+
+    A placement earns I(before) - I(after). The last step also pays -I(initial), the impulse of the
+    layout at `reset`, which is the one without a barrier unless an option says otherwise. So the
+    sum over an episode is that of `TerminalReward`.
+    """
+
+    def __call__(self, transition: Transition) -> Mapping[str, float]:
+        """Return the term `impulse`, psi*s."""
+        impulse = 0.0
+        assess = transition.objective.assess
+        if transition.after != transition.before:
+            before, after = assess(transition.before), assess(transition.after)
+            impulse += before.impulse_psi_s - after.impulse_psi_s
+        if transition.ended:
+            impulse -= assess(transition.initial).impulse_psi_s
+        return {"impulse": impulse}
+
+
+REWARDS: Final[Mapping[str, Reward]] = MappingProxyType(
+    {"terminal": TerminalReward(), "incremental": IncrementalReward()}
+)
+"""The rewards that have names."""

@@ -1,0 +1,247 @@
+"""When a ball collides next, and with what."""
+
+from math import inf, sqrt
+from typing import Final
+
+from numba import njit
+
+from blast_env.physics.event.queue import schedule
+from blast_env.physics.event.state import (
+    BORDER,
+    CORNER,
+    FACE_X,
+    FIRST_SURFACE,
+    NOBODY,
+    Record,
+    RecordArray,
+)
+
+_GRAZING: Final = 1e-12
+"""Balls in touch that approach each other by less than this share of their speed do not collide.
+
+Nor do they below `rest_speed`. Rounding decides whether such balls approach at all, and they could
+collide without end.
+"""
+
+
+@njit(error_model="numpy", inline="always")
+def balls_touch_s(one: Record, other: Record, rules: Record) -> float:
+    """Return when two balls touch; inf if never."""
+    start = max(one.since_s, other.since_s)
+    before, before_other = start - one.since_s, start - other.since_s
+    x = (other.x + other.vx * before_other) - (one.x + one.vx * before)
+    y = (other.y + other.vy * before_other) - (one.y + one.vy * before)
+    vx, vy = other.vx - one.vx, other.vy - one.vy
+    return start + _until_distance(x, y, vx, vy, one.radius + other.radius, rules)
+
+
+@njit(error_model="numpy", inline="always")
+def surface_touch_s(ball: Record, surface: Record, rules: Record) -> float:
+    """Return when a ball touches a face or a corner of a wall; inf if never."""
+    if surface.kind == CORNER:
+        to_x, to_y = surface.a - ball.x, surface.b - ball.y
+        return ball.since_s + _until_distance(to_x, to_y, -ball.vx, -ball.vy, ball.radius, rules)
+    if surface.kind == FACE_X:
+        distance, approach = surface.a * (ball.x - surface.b), -surface.a * ball.vx
+        along, speed_along = ball.y, ball.vy
+    else:
+        distance, approach = surface.a * (ball.y - surface.b), -surface.a * ball.vy
+        along, speed_along = ball.x, ball.vx
+    if approach <= 0.0 or distance <= 0.0:
+        return inf
+    gap = distance - ball.radius
+    if gap <= 0.0:
+        if approach < max(_GRAZING * (approach + abs(speed_along)), rules.rest_speed):
+            return inf
+        gap = 0.0
+    wait = gap / approach
+    at = along + speed_along * wait
+    if at < surface.low or at > surface.high:
+        return inf
+    return ball.since_s + wait
+
+
+@njit(error_model="numpy", inline="always")
+def border_touch_s(ball: Record, rules: Record) -> float:
+    """Return when the edge of a ball reaches the border of the site; inf if never."""
+    wait = inf
+    if ball.vx > 0.0:
+        wait = (rules.right - ball.radius - ball.x) / ball.vx
+    elif ball.vx < 0.0:
+        wait = (rules.left + ball.radius - ball.x) / ball.vx
+    if ball.vy > 0.0:
+        wait = min(wait, (rules.top - ball.radius - ball.y) / ball.vy)
+    elif ball.vy < 0.0:
+        wait = min(wait, (rules.bottom + ball.radius - ball.y) / ball.vy)
+    return ball.since_s + max(wait, 0.0)
+
+
+@njit(error_model="numpy", inline="always")
+def _until_distance(
+    x: float, y: float, vx: float, vy: float, distance: float, rules: Record
+) -> float:
+    """Return how long until the length of (x, y) + (vx, vy) t has fallen to a distance."""
+    falling = x * vx + y * vy
+    if falling >= 0.0:
+        return inf
+    speed2 = vx * vx + vy * vy
+    excess = x * x + y * y - distance * distance
+    if excess <= 0.0:
+        slow = max(_GRAZING * _GRAZING * speed2, rules.rest_speed * rules.rest_speed)
+        return inf if falling * falling < slow * distance * distance else 0.0
+    discriminant = falling * falling - speed2 * excess
+    if discriminant <= 0.0:  # 0: it touches in passing, and nothing happens
+        return inf
+    # This form of the root does not cancel when the balls almost touch.
+    return excess / (sqrt(discriminant) - falling)
+
+
+@njit(error_model="numpy")
+def cell_at(rules: Record, x: float, y: float) -> int:
+    """Return the cell of a point on the site."""
+    column = int((x - rules.left) / rules.cell_units) + 1
+    row = int((y - rules.bottom) / rules.cell_units) + 1
+    return row * rules.columns + column
+
+
+@njit(error_model="numpy")
+def enter_cell(balls: RecordArray, cells: RecordArray, ball: int, cell: int) -> None:
+    """Put a ball, which is in no list, at the head of its list of a cell."""
+    if balls[ball].explosive:
+        follower = cells[cell].first_explosive
+        cells[cell].first_explosive = ball
+    else:
+        follower = cells[cell].first_air
+        cells[cell].first_air = ball
+    balls[ball].following = follower
+    balls[ball].previous = -1
+    balls[ball].cell = cell
+    if follower >= 0:
+        balls[follower].previous = ball
+
+
+@njit(error_model="numpy")
+def leave_cell(balls: RecordArray, cells: RecordArray, ball: int) -> None:
+    """Take a ball out of the list that it is in."""
+    before, after = balls[ball].previous, balls[ball].following
+    if before >= 0:
+        balls[before].following = after
+    elif balls[ball].explosive:
+        cells[balls[ball].cell].first_explosive = after
+    else:
+        cells[balls[ball].cell].first_air = after
+    if after >= 0:
+        balls[after].previous = before
+
+
+@njit(error_model="numpy")
+def look_ahead(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+    ball: int,
+) -> None:
+    """Find a ball's next event among all that it can touch, and schedule it."""
+    balls[ball].contact_s = border_touch_s(balls[ball], rules)
+    balls[ball].partner = BORDER if balls[ball].contact_s < inf else NOBODY
+    cell = balls[ball].cell
+    _look_at_surfaces(balls, cells, surfaces, rules, ball)
+    for row in range(-1, 2):
+        middle = cell + row * rules.columns
+        for place in range(middle - 1, middle + 2):
+            _look_at_balls(balls, cells, rules, ball, place)
+    _find_crossing(balls, cells, rules, ball)
+    schedule(heap, balls, ball, min(balls[ball].contact_s, balls[ball].crossing_s))
+
+
+@njit(error_model="numpy")
+def cross(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+    ball: int,
+) -> None:
+    """Move a ball on to the next cell, and look at what has come into its neighbourhood."""
+    step = balls[ball].crossing
+    leave_cell(balls, cells, ball)
+    cell = balls[ball].cell + step
+    enter_cell(balls, cells, ball, cell)
+    _look_at_surfaces(balls, cells, surfaces, rules, ball)
+    aside = rules.columns if abs(step) == 1 else 1
+    for place in range(-1, 2):
+        _look_at_balls(balls, cells, rules, ball, cell + step + place * aside)
+    _find_crossing(balls, cells, rules, ball)
+    schedule(heap, balls, ball, min(balls[ball].contact_s, balls[ball].crossing_s))
+
+
+@njit(error_model="numpy", inline="always")
+def _look_at_surfaces(
+    balls: RecordArray, cells: RecordArray, surfaces: RecordArray, rules: Record, ball: int
+) -> None:
+    cell = cells[balls[ball].cell]
+    for surface in range(cell.surfaces_from, cell.surfaces_to):
+        time_s = surface_touch_s(balls[ball], surfaces[surface], rules)
+        if time_s < balls[ball].contact_s or (
+            time_s == balls[ball].contact_s and _wins_tie(surfaces, surface, balls[ball].partner)
+        ):
+            balls[ball].contact_s = time_s
+            balls[ball].partner = FIRST_SURFACE - surface
+
+
+@njit(error_model="numpy")
+def _wins_tie(surfaces: RecordArray, surface: int, partner: int) -> bool:
+    """Whether a surface goes before the partner that is touched at the same time.
+
+    Neither the order in which they were found nor the numbers of the surfaces, which both depend
+    on the cells, may decide.
+    """
+    if partner > FIRST_SURFACE:
+        return partner >= 0
+    return surfaces[surface].modules_from < surfaces[FIRST_SURFACE - partner].modules_from
+
+
+@njit(error_model="numpy", inline="always")
+def _look_at_balls(
+    balls: RecordArray, cells: RecordArray, rules: Record, ball: int, cell: int
+) -> None:
+    _look_along_list(balls, rules, ball, cells[cell].first_air)
+    if rules.charge_collides or not balls[ball].explosive:
+        _look_along_list(balls, rules, ball, cells[cell].first_explosive)
+
+
+@njit(error_model="numpy", inline="always")
+def _look_along_list(balls: RecordArray, rules: Record, ball: int, other: int) -> None:
+    while other >= 0:
+        if other != ball:
+            time_s = balls_touch_s(balls[ball], balls[other], rules)
+            if time_s < balls[ball].contact_s or (
+                time_s == balls[ball].contact_s and other < balls[ball].partner
+            ):
+                balls[ball].contact_s = time_s
+                balls[ball].partner = other
+                balls[ball].partner_collisions = balls[other].collisions
+        other = balls[other].following
+
+
+@njit(error_model="numpy", inline="always")
+def _find_crossing(balls: RecordArray, cells: RecordArray, rules: Record, ball: int) -> None:
+    """Find when a ball's centre leaves its cell, and into which one."""
+    here = cells[balls[ball].cell]
+    side, wait, step = rules.cell_units, inf, 0
+    vx, vy = balls[ball].vx, balls[ball].vy
+    if vx != 0.0:
+        edge = here.left + side if vx > 0.0 else here.left
+        wait = (edge - balls[ball].x) / vx
+        step = 1 if vx > 0.0 else -1
+    if vy != 0.0:
+        edge = here.bottom + side if vy > 0.0 else here.bottom
+        wait_y = (edge - balls[ball].y) / vy
+        if wait_y < wait:
+            wait = wait_y
+            step = rules.columns if vy > 0.0 else -rules.columns
+    balls[ball].crossing_s = balls[ball].since_s + wait
+    balls[ball].crossing = step

@@ -1,0 +1,398 @@
+"""The site in pixels: view, lettering, strips and the layer that does not move."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.geometry import Rectangle
+from blast_env.physics.scene import Scene, StructureOutline
+from blast_env.physics.structure import Colour, ModularObstacle, ModularPart, load_colour
+from blast_env.rendering.style import (
+    AIR,
+    BARRIER,
+    EXPLOSIVE,
+    FAINT,
+    INK,
+    LOAD_LABEL,
+    PROTECTED,
+    QUIET_INK,
+    SITE,
+    STRUCTURE,
+    nice_floor,
+    render_extra,
+    short_number,
+)
+from blast_env.scenario.models import BuildZone
+from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
+
+with render_extra():
+    import matplotlib
+    import pygame
+
+
+@dataclass(frozen=True)
+class View:
+    """The site to scale, y upwards, in a frame whose y points down.
+
+    Attributes:
+        site: The simulated area, units.
+        left_px: Left border of the site in the frame.
+        top_px: Upper border of the site in the frame.
+        pixels_per_unit: Scale.
+    """
+
+    site: Rectangle
+    left_px: int
+    top_px: int
+    pixels_per_unit: float
+
+    @property
+    def pixels_per_m(self) -> float:
+        """The scale in pixels per metre."""
+        return self.pixels_per_unit * UNITS_PER_M
+
+    def pixels(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pixel coordinates (n, 2), x and y, of places in units (n, 2)."""
+        origin = np.array([self.site.left, self.site.top])
+        scale = np.array([self.pixels_per_unit, -self.pixels_per_unit])
+        pixels: NDArray[np.float64] = (position - origin) * scale + (self.left_px, self.top_px)
+        return pixels
+
+    def pixel(self, x: float, y: float) -> tuple[int, int]:
+        """Return the pixel, x and y, that shows a place in units."""
+        across, down = np.floor(self.pixels(np.array([[x, y]])))[0].tolist()
+        return int(across), int(down)
+
+    def rectangle(self, rectangle: Rectangle) -> pygame.Rect:
+        """Return the pixels that show a rectangle in units; neighbours share no pixel."""
+        corners = np.array([[rectangle.left, rectangle.top], [rectangle.right, rectangle.bottom]])
+        (left, top), (right, bottom) = np.rint(self.pixels(corners)).astype(int).tolist()
+        return pygame.Rect(left, top, max(right - left, 1), max(bottom - top, 1))
+
+
+@dataclass(frozen=True)
+class Lettering:
+    """Writes text of one size.
+
+    Attributes:
+        size_px: Height of a line, about.
+    """
+
+    size_px: int
+
+    def write(self, text: str, colour: Colour = INK, bold: bool = False) -> pygame.Surface:
+        """Return a line of text on a transparent ground."""
+        # Loaded anew for every text: pygame's fonts die with any `pygame.quit()`, and another
+        # environment in this process may call it.
+        pygame.font.init()
+        name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+        folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+        return pygame.font.Font(folder / name, self.size_px).render(text, True, colour)
+
+    def write_within(
+        self, text: str, width_px: int, colour: Colour = INK, bold: bool = False
+    ) -> pygame.Surface:
+        """Return a line of text, cut short with an ellipsis if it is wider than `width_px`."""
+        line = self.write(text, colour, bold)
+        while line.get_width() > width_px and text:
+            text = text[:-1]
+            line = self.write(text.rstrip(" ,") + "…", colour, bold)
+        return line
+
+
+Point = tuple[int, int]
+
+
+_SMOOTHING = 4
+
+
+_SMALLEST_RIMMED_PX = 3.5
+
+
+def empty_surface(width: int, height: int) -> pygame.Surface:
+    """Return a transparent surface."""
+    return pygame.Surface((max(width, 1), max(height, 1)), pygame.SRCALPHA, 32)
+
+
+def disc(radius_px: float, colour: Colour) -> pygame.Surface:
+    """Return a ball: a filled circle with a smooth edge and, if it is not tiny, a darker rim."""
+    side = 2 * int(radius_px + 1.5)
+    large = pygame.Surface((side * _SMOOTHING, side * _SMOOTHING), pygame.SRCALPHA, 32)
+    # The clear ground has the colour too, or the edge would turn dark when it is scaled down.
+    large.fill((*colour, 0))
+    centre = side * _SMOOTHING / 2
+    pygame.draw.circle(large, colour, (centre, centre), radius_px * _SMOOTHING)
+    if radius_px >= _SMALLEST_RIMMED_PX:
+        rim = tuple(round(0.72 * channel) for channel in colour)
+        pygame.draw.circle(large, rim, (centre, centre), radius_px * _SMOOTHING, _SMOOTHING)
+    return pygame.transform.smoothscale(large, (side, side))
+
+
+def dashed_rectangle(
+    surface: pygame.Surface, rectangle: pygame.Rect, colour: Colour, dash_px: int = 6
+) -> None:
+    """Draw the outline of a rectangle as a dashed line of one pixel."""
+    right, bottom = rectangle.right - 1, rectangle.bottom - 1
+    for x in range(rectangle.left, right, 2 * dash_px):
+        for y in (rectangle.top, bottom):
+            pygame.draw.line(surface, colour, (x, y), (min(x + dash_px - 1, right), y))
+    for y in range(rectangle.top, bottom, 2 * dash_px):
+        for x in (rectangle.left, right):
+            pygame.draw.line(surface, colour, (x, y), (x, min(y + dash_px - 1, bottom)))
+
+
+def hatch(surface: pygame.Surface, rectangle: pygame.Rect, colour: Colour) -> None:
+    """Fill a rectangle with slanted lines."""
+    clip = surface.get_clip()
+    surface.set_clip(rectangle.clip(clip))
+    for shift in range(0, rectangle.width + rectangle.height, 6):
+        start = (rectangle.left + shift, rectangle.top)
+        end = (rectangle.left + shift - rectangle.height, rectangle.bottom)
+        pygame.draw.line(surface, colour, start, end)
+    surface.set_clip(clip)
+    pygame.draw.rect(surface, colour, rectangle, 1)
+
+
+def scale_bar(lettering: Lettering, pixels_per_m: float, longest_px: int) -> pygame.Surface:
+    """Return a bar of a round number of metres, with the number."""
+    length_m = nice_floor(longest_px / pixels_per_m)
+    length = round(length_m * pixels_per_m)
+    text = lettering.write(f"{length_m:g} m")
+    gap, tick = lettering.size_px // 3, lettering.size_px // 2
+    surface = empty_surface(max(length + 2, text.get_width()), text.get_height() + gap + tick)
+    surface.blit(text, ((surface.get_width() - text.get_width()) // 2, 0))
+    left = (surface.get_width() - length) // 2
+    y = text.get_height() + gap + tick // 2
+    pygame.draw.line(surface, INK, (left, y), (left + length, y), 2)
+    for x in (left, left + length - 1):
+        pygame.draw.line(surface, INK, (x, y - tick // 2), (x, y + tick // 2), 2)
+    return surface
+
+
+def colour_bar(lettering: Lettering, full_impulse: float, length: int) -> pygame.Surface:
+    """Return the colours from no load to the full load, with three numbers and the unit."""
+    line, thickness = lettering.write(LOAD_LABEL), lettering.size_px
+    texts = ("0", short_number(full_impulse / 2.0, 4), f"≥ {short_number(full_impulse, 4)}")
+    numbers = [lettering.write(text) for text in texts]
+    margin = numbers[-1].get_width() // 2 + 1
+    width = max(line.get_width(), length + 2 * margin)
+    height = 2 * line.get_height() + thickness + lettering.size_px // 2
+    surface = empty_surface(width, height)
+    surface.blit(line, ((width - line.get_width()) // 2, 0))
+    left, top = (width - length) // 2, line.get_height() + lettering.size_px // 5
+    for x in range(length):
+        colour = load_colour(x / (length - 1))
+        pygame.draw.line(surface, colour, (left + x, top), (left + x, top + thickness))
+    pygame.draw.rect(surface, QUIET_INK, (left - 1, top - 1, length + 2, thickness + 3), 1)
+    for share, number in zip((0.0, 0.5, 1.0), numbers, strict=True):
+        x = left + round(share * (length - 1))
+        pygame.draw.line(surface, QUIET_INK, (x, top + thickness), (x, top + thickness + 4))
+        surface.blit(number, (x - number.get_width() // 2, top + thickness + 4))
+    return surface
+
+
+def legend(
+    lettering: Lettering, scene: Scene, build_zone: Rectangle | None, widest_px: int
+) -> pygame.Surface:
+    """Return what the signs of the site mean, in as many columns as `widest_px` allows."""
+    entries = [(lettering.write(text), draw) for text, draw in _legend_entries(scene, build_zone)]
+    sign, gap = lettering.size_px, lettering.size_px // 2
+    cell_width = sign + gap + max(text.get_width() for text, _ in entries) + 2 * gap
+    columns = max(1, min(widest_px // cell_width, 2 if len(entries) > 3 else 1))
+    rows = -(-len(entries) // columns)
+    pitch = round(1.45 * lettering.size_px)
+    surface = empty_surface(columns * cell_width - 2 * gap, rows * pitch)
+    for index, (text, draw) in enumerate(entries):
+        left, top = (index // rows) * cell_width, (index % rows) * pitch
+        draw(surface, pygame.Rect(left, top + (pitch - sign) // 2, sign, sign))
+        surface.blit(text, (left + sign + gap, top + (pitch - text.get_height()) // 2))
+    return surface
+
+
+Draw = Callable[[pygame.Surface, pygame.Rect], None]
+
+
+def _legend_entries(scene: Scene, build_zone: Rectangle | None) -> list[tuple[str, Draw]]:
+    """Return the text and the sign of everything that the scene has."""
+    outlines = scene.structures
+    entries: list[tuple[str, Draw]] = [("explosive ball", _ball_sign(EXPLOSIVE))]
+    if scene.parameters.air.spacing_units > 0.0:
+        entries.append(("air ball", _ball_sign(AIR)))
+    if any(outline.protected for outline in outlines):
+        entries.append(("protected structure", _module_sign(PROTECTED, 3)))
+    if any(not outline.protected and outline.cells is None for outline in outlines):
+        entries.append(("other structure", _module_sign(STRUCTURE, 2)))
+    if any(outline.cells is not None for outline in outlines):
+        entries.append(("barrier module", _module_sign(BARRIER, 2)))
+    if any(outline.capacity is not None for outline in outlines):
+        entries.append(("destroyed module", draw_destroyed))
+    if build_zone is not None:
+        entries.append(("build zone", lambda s, r: dashed_rectangle(s, r, QUIET_INK, 3)))
+    return entries
+
+
+def draw_destroyed(surface: pygame.Surface, place: pygame.Rect) -> None:
+    """Draw a crossed square: a module that the blast has removed."""
+    right, bottom = place.right - 1, place.bottom - 1
+    pygame.draw.rect(surface, SITE, place)
+    pygame.draw.line(surface, INK, place.topleft, (right, bottom))
+    pygame.draw.line(surface, INK, (right, place.top), (place.left, bottom))
+
+
+def _ball_sign(colour: Colour) -> Draw:
+    def draw(surface: pygame.Surface, place: pygame.Rect) -> None:
+        ball = disc(place.width * 0.36, colour)
+        surface.blit(ball, ball.get_rect(center=place.center))
+
+    return draw
+
+
+def _module_sign(outline: Colour, width: int) -> Draw:
+    def draw(surface: pygame.Surface, place: pygame.Rect) -> None:
+        pygame.draw.rect(surface, load_colour(0.0), place)
+        pygame.draw.rect(surface, outline, place, width)
+
+    return draw
+
+
+def flow(
+    blocks: Sequence[pygame.Surface], width: int, gap: int
+) -> tuple[list[tuple[pygame.Surface, Point]], int]:
+    """Put blocks side by side, in as many rows as the width needs.
+
+    Returns:
+        The blocks with the places of their upper left corners, and the height of all rows.
+    """
+    rows: list[list[pygame.Surface]] = [[]]
+    for block in blocks:
+        used = sum(other.get_width() + gap for other in rows[-1])
+        if rows[-1] and used + block.get_width() > width:
+            rows.append([])
+        rows[-1].append(block)
+    placed: list[tuple[pygame.Surface, Point]] = []
+    top = 0
+    for row in rows:
+        height = max(block.get_height() for block in row)
+        free = width - sum(block.get_width() for block in row)
+        between = free // (len(row) - 1) if len(row) > 1 else 0
+        left = 0 if len(row) > 1 else free // 2
+        for block in row:
+            placed.append((block, (left, top + (height - block.get_height()) // 2)))
+            left += block.get_width() + between
+        top += height + gap
+    return placed, top - gap
+
+
+_SMALLEST_GRID_PX = 6
+
+
+def draw_obstacle(
+    surface: pygame.Surface, view: View, obstacle: ModularObstacle, full_impulse: float
+) -> None:
+    """Draw the modules in the colours of their loads, and the outline that tells the role."""
+    is_barrier = obstacle.cells is not None
+    grid = not is_barrier and view.pixels_per_unit * MODULE_SIDE_UNITS >= _SMALLEST_GRID_PX
+    for part in obstacle.parts:
+        _draw_module(surface, view, part, full_impulse, grid)
+    if is_barrier:
+        for part in obstacle.parts:
+            place = view.rectangle(part.rectangle)
+            pygame.draw.rect(surface, BARRIER, place, 2 if place.width >= 7 else 1)
+        return
+    width = 3 if obstacle.protected else 2
+    around = view.rectangle(obstacle.rectangle).inflate(2 * width - 2, 2 * width - 2)
+    pygame.draw.rect(surface, PROTECTED if obstacle.protected else STRUCTURE, around, width)
+
+
+def _draw_module(
+    surface: pygame.Surface, view: View, part: ModularPart, full_impulse: float, grid: bool
+) -> None:
+    place = view.rectangle(part.rectangle)
+    if part.destroyed:
+        draw_destroyed(surface, place)
+        return
+    colour = part.colour(full_impulse)
+    pygame.draw.rect(surface, colour, place)
+    if grid:
+        red, green, blue = (round(0.8 * channel) for channel in colour)
+        pygame.draw.line(surface, (red, green, blue), place.topleft, (place.right - 1, place.top))
+        pygame.draw.line(surface, (red, green, blue), place.topleft, (place.left, place.bottom - 1))
+
+
+def draw_build_zone(surface: pygame.Surface, view: View, zone: BuildZone) -> None:
+    """Draw where modules may stand, with the grid where it is legible, and the keep-outs."""
+    whole = view.rectangle(zone.rectangle_m.scaled(UNITS_PER_M))
+    if view.pixels_per_unit * MODULE_SIDE_UNITS >= _SMALLEST_GRID_PX:
+        for cell in zone.cells():
+            place = view.rectangle(zone.cell_rectangle_m(cell).scaled(UNITS_PER_M))
+            pygame.draw.line(surface, FAINT, place.topleft, place.topright)
+            pygame.draw.line(surface, FAINT, place.topleft, place.bottomleft)
+    for keep_out in zone.keep_outs:
+        hatch(surface, view.rectangle(keep_out.rectangle_m.scaled(UNITS_PER_M)), FAINT)
+    dashed_rectangle(surface, whole, QUIET_INK)
+
+
+def draw_charge_mark(surface: pygame.Surface, view: View, scene: Scene) -> None:
+    """Draw a cross where the charge is."""
+    x, y = view.pixel(*scene.charge_centre)
+    for slope in (-1, 1):
+        pygame.draw.line(surface, QUIET_INK, (x - 6, y - 6 * slope), (x + 6, y + 6 * slope), 2)
+
+
+def name_plates(
+    lettering: Lettering, view: View, outlines: Sequence[StructureOutline]
+) -> list[tuple[pygame.Surface, Point]]:
+    """Return the names of the structures, each with a place where it covers no other one."""
+    site = view.rectangle(view.site)
+    named = [outline for outline in outlines if outline.cells is None]
+    taken = [view.rectangle(outline.rectangle) for outline in outlines]
+    plates: list[tuple[pygame.Surface, Point]] = []
+    for outline in sorted(named, key=lambda outline: not outline.protected):
+        plate = _plate(lettering, outline)
+        own = view.rectangle(outline.rectangle)
+        # The outer modules alone bear loads: a name on the inner ones hides nothing.
+        ring = 2 * round(MODULE_SIDE_UNITS * view.pixels_per_unit)
+        place = _free_place(plate.get_rect(), own, own.inflate(-ring, -ring), taken, site)
+        if place is not None:
+            taken.append(place)
+            plates.append((plate, place.topleft))
+    return plates
+
+
+def _plate(lettering: Lettering, outline: StructureOutline) -> pygame.Surface:
+    colour = PROTECTED if outline.protected else INK
+    text = lettering.write(outline.name, colour, bold=outline.protected)
+    plate = empty_surface(text.get_width() + 8, text.get_height() + 2)
+    plate.fill((*SITE, 225))
+    plate.blit(text, (4, 1))
+    return plate
+
+
+def _free_place(
+    plate: pygame.Rect,
+    own: pygame.Rect,
+    inner: pygame.Rect,
+    taken: list[pygame.Rect],
+    site: pygame.Rect,
+) -> pygame.Rect | None:
+    """Return a place inside the structure or beside it that nothing else takes, if any."""
+    inside = plate.copy()
+    inside.center = own.center
+    if inner.contains(inside):
+        return inside
+    gap = 6
+    for corner, place in (
+        ("midbottom", (own.centerx, own.top - gap)),
+        ("midtop", (own.centerx, own.bottom + gap)),
+        ("midleft", (own.right + gap, own.centery)),
+        ("midright", (own.left - gap, own.centery)),
+    ):
+        beside = plate.copy()
+        setattr(beside, corner, place)
+        beside.clamp_ip(site.inflate(-2 * gap, -2 * gap))
+        if beside.collidelist(taken) == -1:
+            return beside
+    return None

@@ -1,0 +1,491 @@
+"""Figures of evaluations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil, isnan
+from typing import Final
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import ThreatOutcome
+from blast_env.evaluation.comparison import LayoutEvaluation
+from blast_env.geometry import Cell
+from blast_env.physics.scene import Scene, StructureOutline
+from blast_env.physics.structure import ModularObstacle
+from blast_env.rendering.site_plan import (
+    draw_charge,
+    draw_loads,
+    draw_outline,
+    draw_site,
+    draw_zone,
+    in_metres,
+    legend_handles,
+    load_colours,
+    rectangle_patch,
+    write_heading,
+    write_names,
+)
+from blast_env.rendering.style import (
+    BARRIER,
+    EXPLOSIVE,
+    INK,
+    PROTECTED,
+    QUIET_INK,
+    count_of,
+    nice_ceiling,
+    number_on_axis,
+    render_extra,
+    unit_interval,
+)
+from blast_env.scenario import BuildZone, Scenario
+from blast_env.scenario.build_scene import build_scene
+from blast_env.statistics import Estimate
+
+with render_extra():
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import PatchCollection
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import FuncFormatter
+
+
+_PERCENT = 100.0
+
+
+def draw_plan(axes: Axes, evaluation: LayoutEvaluation, scene: Scene) -> None:
+    """Draw the site, the layout, and the charges in the colours of their reductions."""
+    draw_layout(axes, evaluation.scenario.build_zone, scene)
+    _draw_charges(axes, evaluation)
+    axes.add_line(_worst_ring(*evaluation.worst.threat.charge.position_m))
+    axes.set_title("Site, layout and charges", fontsize=11)
+
+
+def draw_layout(axes: Axes, zone: BuildZone | None, scene: Scene) -> None:
+    """Draw the site and what stands on it, the modules of the barrier as filled squares."""
+    draw_site(axes, in_metres(scene.site))
+    if zone is not None:
+        draw_zone(axes, zone)
+    for outline in scene.structures:
+        draw_outline(axes, outline)
+        if outline.cells is not None:
+            parts = [rectangle_patch(in_metres(part.rectangle)) for part in outline.build().parts]
+            axes.add_collection(PatchCollection(parts, color=unit_interval(BARRIER), zorder=4))
+
+
+def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
+    # The least protected last, on top.
+    outcomes = sorted(evaluation.outcomes, key=lambda outcome: -np.nan_to_num(outcome.reduction))
+    reduction = _PERCENT * np.array([outcome.reduction for outcome in outcomes])
+    scale = Normalize(0.0, _PERCENT)
+    for marker, in_range in (("o", True), ("s", False)):
+        chosen = np.array([outcome.in_range is in_range for outcome in outcomes])
+        places = np.array([outcome.threat.charge.position_m for outcome in outcomes])[chosen]
+        axes.scatter(
+            places[:, 0],
+            places[:, 1],
+            c=reduction[chosen],
+            norm=scale,
+            s=62.0,
+            marker=marker,
+            edgecolor=unit_interval(INK),
+            linewidth=0.6,
+            zorder=5,
+        )
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    below = "min" if np.nanmin(reduction, initial=0.0) < 0.0 else "neither"
+    mappable = ScalarMappable(scale)
+    bar = figure.colorbar(mappable, ax=axes, location="bottom", shrink=0.8, pad=0.02, extend=below)
+    bar.set_label("charges: reduction of the impulse on the protected structures (%)")
+
+
+def plan_legend(evaluation: LayoutEvaluation, scene: Scene) -> list[Artist]:
+    """Return the legend entries for what the plan shows."""
+    handles: list[Artist] = [_charge_handle("o", "charge")]
+    if not evaluation.in_range:
+        label = "charge outside the calibration's range"
+        handles.append(_charge_handle("s", label))
+    handles.append(_worst_ring())
+    site = layout_legend(scene.structures, evaluation.scenario.build_zone)
+    return [*handles, *(handle for handle in site if handle.get_label() != "charge")]
+
+
+def layout_legend(structures: Sequence[StructureOutline], zone: BuildZone | None) -> list[Artist]:
+    """Return the legend entries for a charge and for what `draw_layout` shows."""
+    handles = legend_handles(structures, zone)
+    for handle in handles:
+        if handle.get_label() == "barrier module":
+            handle.set(fill=True, facecolor=unit_interval(BARRIER))
+    return handles
+
+
+def _charge_handle(marker: str, label: str) -> Line2D:
+    return Line2D(
+        [],
+        [],
+        marker=marker,
+        linestyle="none",
+        markersize=8.0,
+        markerfacecolor="white",
+        markeredgecolor=unit_interval(INK),
+        label=label,
+    )
+
+
+def _worst_ring(*position_m: float) -> Line2D:
+    """Return the ring around the worst charge; without a position, one for the legend."""
+    return Line2D(
+        position_m[:1],
+        position_m[1:],
+        marker="o",
+        markersize=15.0,
+        markerfacecolor="none",
+        markeredgecolor=unit_interval(EXPLOSIVE),
+        markeredgewidth=2.2,
+        linestyle="none",
+        label="charge with the largest impulse",
+        zorder=6,
+    )
+
+
+def what_stands(scene: Scene) -> list[StructureOutline]:
+    """Return what names should not cover: structures, and the barrier's modules one by one."""
+    obstacles = [outline for outline in scene.structures if outline.cells is None]
+    for outline in scene.structures:
+        if outline.cells is not None:
+            corners = [part.rectangle[:2] for part in outline.build().parts]
+            single = replace(outline, rows=1, columns=1, cells=((0, 0),))
+            obstacles += [replace(single, corner=corner) for corner in corners]
+    return obstacles
+
+
+# Okabe and Ito's colours, which people with any colour vision can tell apart.
+_WITHOUT, _WITH = "#D55E00", "#0072B2"
+
+
+_HEIGHT_IN, _RIGHT_IN = 8.4, 7.2
+
+
+_PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 5.6, (4.8, 8.4)
+
+
+_MOST_NAMED_THREATS = 40
+
+
+_MOST_UPRIGHT_NAMES = 16
+
+
+def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
+    """Return a figure of an evaluation.
+
+    On the left the site with the layout and all charges, in the colour of how much of their
+    impulse the layout takes off. On the right the impulse of each threat without and with the
+    barrier, and below it the mean load on every module of the protected structure that is loaded
+    most without a barrier.
+
+    Args:
+        evaluation: The evaluation.
+    """
+    site = evaluation.scenario.site
+    least_in, most_in = _PLAN_WIDTHS_IN
+    plan_in = min(max(_PLAN_HEIGHT_IN * site.width_m / site.height_m, least_in), most_in)
+    figure = Figure(figsize=(plan_in + _RIGHT_IN, _HEIGHT_IN), layout="constrained")
+    halves = figure.add_gridspec(1, 2, width_ratios=(plan_in, _RIGHT_IN))
+    plan = figure.add_subplot(halves[0])
+    right = halves[1].subgridspec(2, 1, height_ratios=(1.0, 1.05))
+    threats = figure.add_subplot(right[0])
+    lower = right[1].subgridspec(1, 2)
+    modules = [figure.add_subplot(lower[column]) for column in range(2)]
+    threat = evaluation.threats[0]
+    scene = build_scene(evaluation.scenario, evaluation.layout, threat.seed, threat.charge)
+    draw_plan(plan, evaluation, scene)
+    _draw_threats(threats, evaluation)
+    _draw_modules(modules, evaluation, scene)
+    handles = plan_legend(evaluation, scene)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=9, frameon=False)
+    write_heading(figure, _title(evaluation), _subtitle(evaluation))
+    write_names(plan, what_stands(scene))
+    return figure
+
+
+def _title(evaluation: LayoutEvaluation) -> str:
+    modules = len(evaluation.layout)
+    barrier = count_of("barrier module", modules) if modules else "no barrier"
+    reduction = f"reduction of the impulse {_percent(evaluation.mean_reduction)}"
+    return f"{evaluation.scenario.name}, {barrier}: {reduction}{_interval(evaluation.reduction)}"
+
+
+def _subtitle(evaluation: LayoutEvaluation) -> str:
+    charge = evaluation.worst.threat.charge
+    x_m, y_m = charge.position_m
+    range_note = "" if evaluation.in_range else "; partly outside the calibration's range"
+    return (
+        f"{count_of('threat', len(evaluation.threats))}; worst: {charge.tnt_kg:g} kg TNT at "
+        f"({x_m:.1f} m, {y_m:.1f} m), {evaluation.worst.impulse_pa_s:,.0f} Pa·s; "
+        f"calibration {evaluation.calibration.name}, engine {evaluation.engine_name}{range_note}"
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{_PERCENT * share:.0f} %"
+
+
+def _interval(reduction: Estimate) -> str:
+    """Return the interval in words; nothing for a single threat."""
+    if np.isnan(reduction.low):
+        return ""
+    return f" (95 %: {_percent(reduction.low)} to {_percent(reduction.high)})"
+
+
+def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
+    """Draw the impulse of each threat without and with the barrier, the worst first."""
+    outcomes = sorted(evaluation.outcomes, key=lambda outcome: -outcome.impulse_psi_s)
+    place = np.arange(1, len(outcomes) + 1)
+    bare = np.array([outcome.unprotected_impulse_pa_s for outcome in outcomes])
+    impulse = np.array([outcome.impulse_pa_s for outcome in outcomes])
+    axes.vlines(place, impulse, bare, color=unit_interval(QUIET_INK), linewidth=1.2, zorder=2)
+    for values, estimate, colour, words in (
+        (bare, evaluation.unprotected_impulse_pa_s, _WITHOUT, "without"),
+        (impulse, evaluation.impulse_pa_s, _WITH, "with"),
+    ):
+        label = f"{words} barrier, mean {estimate.value:,.0f} Pa·s"
+        axes.plot(place, values, "o", color=colour, markersize=5.5, label=label, zorder=3)
+        axes.axhline(estimate.value, color=colour, linewidth=1.2, zorder=1)
+        if not np.isnan(estimate.low):
+            axes.axhspan(estimate.low, estimate.high, color=colour, alpha=0.15, linewidth=0.0)
+    worst = _percent(1.0 - evaluation.cvar_level)
+    label = f"mean of the worst {worst} with barrier, {evaluation.cvar:,.0f} Pa·s"
+    axes.axhline(evaluation.cvar, color=_WITH, linewidth=1.4, linestyle="--", label=label)
+    axes.set_xlim(0.3, len(outcomes) + 0.7)
+    axes.set_ylim(0.0, 1.32 * max(bare.max(), impulse.max()))  # room for the legend
+    axes.set_ylabel(f"{_impulse_name(evaluation)}\nprotected structures (Pa·s)")
+    axes.set_title("Every threat, the worst with the barrier first", fontsize=11)
+    axes.legend(loc="upper center", ncols=2, fontsize=8.5, frameon=False)
+    axes.grid(axis="y", alpha=0.3)
+    _name_threats(axes, [outcome.threat.seed for outcome in outcomes])
+
+
+def _impulse_name(evaluation: LayoutEvaluation) -> str:
+    """Return what the impulses are: of one structure as it is, or a weighted sum."""
+    protected = evaluation.loads[0].protected
+    weighted = len(protected) > 1 or protected[0].weight != 1.0
+    return "weighted sum of the impulses on the" if weighted else "impulse on the"
+
+
+def _name_threats(axes: Axes, seeds: Sequence[int]) -> None:
+    bands = "; bands: 95 % intervals of the means" if len(seeds) > 1 else ""
+    if len(seeds) > _MOST_NAMED_THREATS:
+        axes.set_xlabel(f"rank of the threat{bands}")
+        return
+    upright = len(seeds) <= _MOST_UPRIGHT_NAMES and max(seeds) < 10_000
+    axes.set_xticks(
+        range(1, len(seeds) + 1),
+        [str(seed) for seed in seeds],
+        fontsize=8,
+        rotation=0.0 if upright else 90.0,
+    )
+    axes.set_xlabel(f"seed of the threat{bands}")
+
+
+def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: Scene) -> None:
+    """Draw the mean load on the modules of one structure, without and with the barrier."""
+    table = evaluation.table.set_index("structure")
+    protected = table[table.protected]
+    name = str((protected.weight * protected.unprotected_impulse_pa_s).idxmax())
+    modules = evaluation.module_table
+    of_structure = modules[modules.structure == name]
+    columns = ("unprotected_impulse_sim", "impulse_sim")
+    highest = float(of_structure[list(columns)].to_numpy().max())
+    scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
+    for axes, column, words in zip(panels, columns, ("without", "with"), strict=True):
+        (outline,) = (each for each in scene.structures if each.name == name)
+        obstacle = outline.build()
+        for part, impulse in zip(obstacle.parts, of_structure[column], strict=True):
+            part.impulse, part.hits = float(impulse), int(impulse > 0.0)
+        _draw_structure(axes, obstacle, scale)
+        pa_s = float(table[column.replace("_sim", "_pa_s")][name])
+        axes.set_title(
+            f"{name} {words} barrier\n{pa_s:,.0f} Pa·s",
+            fontsize=11,
+            color=unit_interval(PROTECTED),
+        )
+    figure = panels[0].get_figure(root=True)
+    assert figure is not None
+    bar = figure.colorbar(
+        ScalarMappable(scale, load_colours()),
+        ax=list(panels),
+        shrink=0.9,
+        pad=0.03,
+        format=FuncFormatter(number_on_axis),
+    )
+    bar.set_label("mean impulse per module\n(simulation units); white: not hit")
+
+
+def _draw_structure(axes: Axes, obstacle: ModularObstacle, scale: Normalize) -> None:
+    draw_loads(axes, obstacle, scale, linewidth=0.4)
+    draw_outline(axes, obstacle)
+    left, bottom, right, top = in_metres(obstacle.rectangle)
+    axes.set(xlim=(left - 0.25, right + 0.25), ylim=(bottom - 0.25, top + 0.25), aspect="equal")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    axes.spines[:].set_visible(False)
+
+
+MOST_SHOWN: Final = 12
+"""How many cases a figure has at most: the first ones."""
+
+
+_COLUMNS: Final = 4
+
+
+_PANEL_IN: Final = 3.2
+
+
+_LEAST_WIDTH_IN: Final = 9.6  # the heading has to fit
+
+
+_PANEL_HEIGHTS_IN: Final = (2.0, 4.8)
+
+
+_THREAT_PT: Final = 29.0  # of the lines between title and panel
+
+
+_TITLE_IN: Final = 0.95  # of a panel, with the numbers along x
+
+
+_NUMBERS_IN: Final = 0.4  # along y
+
+
+_FRAME_IN: Final = 1.8  # heading and legend
+
+
+_OUT_OF_RANGE: Final = " ~"
+
+
+@dataclass(frozen=True, eq=False)
+class ProtectedCase:
+    """A layout, and what it does against the threat of its case.
+
+    Attributes:
+        scenario: The site.
+        layout: (row, column) of each module.
+        outcome: With the layout and without a barrier.
+    """
+
+    scenario: Scenario
+    layout: tuple[Cell, ...]
+    outcome: ThreatOutcome
+
+    def scene(self) -> Scene:
+        """Return the site with the layout and the charge."""
+        threat = self.outcome.threat
+        return build_scene(self.scenario, self.layout, threat.seed, threat.charge)
+
+
+def cases_figure(cases: Sequence[ProtectedCase], reduction: Estimate) -> Figure:
+    """Return a picture of layouts and of how much each takes off, four in a row.
+
+    Args:
+        cases: At least one. The first `MOST_SHOWN` are drawn, numbered from 1; if there are more,
+            the picture says so.
+        reduction: Of the mean impulse on the protected structures over all cases.
+
+    Raises:
+        BlastEnvError: If there is no case.
+    """
+    if not cases:
+        raise BlastEnvError("cases: there are none, must be at least one")
+    shown = cases[:MOST_SHOWN]
+    columns = min(len(shown), _COLUMNS)
+    figure, panels = _empty_panels(shown, columns)
+    is_one_site = len({case.scenario.content_hash for case in cases}) == 1
+    scenes = [case.scene() for case in shown]
+    for number, (axes, case, scene) in enumerate(zip(panels, shown, scenes, strict=True), start=1):
+        _draw_case(axes, case, scene, f"case {number}")
+        _write_threat(axes, case, "" if is_one_site else f"{case.scenario.name}, ")
+        axes.set_xlabel("x (m)" if number > len(shown) - columns else "")
+        axes.set_ylabel("y (m)" if number % columns == 1 or columns == 1 else "")
+    zones = [case.scenario.build_zone for case in shown if case.scenario.build_zone is not None]
+    richest = max(zones, key=lambda zone: len(zone.keep_outs), default=None)
+    structures = [outline for scene in scenes for outline in scene.structures]
+    handles = layout_legend(structures, richest)
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+    place = cases[0].scenario.name if is_one_site else "different sites"
+    write_heading(figure, f"{place}: {_headline(len(cases), reduction)}", _cases_subtitle(cases))
+    return figure
+
+
+def _empty_panels(shown: Sequence[ProtectedCase], columns: int) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a panel a case, high enough for the highest site."""
+    rows = ceil(len(shown) / columns)
+    width_in = max(columns * _PANEL_IN, _LEAST_WIDTH_IN)
+    sites = [case.scenario.site for case in shown]
+    slenderness = max(site.height_m / site.width_m for site in sites)
+    least_in, most_in = _PANEL_HEIGHTS_IN
+    plan_in = slenderness * (width_in / columns - _NUMBERS_IN)
+    panel_in = min(max(plan_in, least_in), most_in) + _TITLE_IN
+    figure = Figure(figsize=(width_in, rows * panel_in + _FRAME_IN), layout="constrained")
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for axes in panels[len(shown) :]:
+        axes.set_visible(False)
+    return figure, panels[: len(shown)]
+
+
+def _draw_case(axes: Axes, case: ProtectedCase, scene: Scene, name: str) -> None:
+    draw_layout(axes, case.scenario.build_zone, scene)
+    draw_charge(axes, case.outcome.threat.charge.position_m)
+    axes.tick_params(labelsize=7.5)
+    mark = "" if case.outcome.in_range else _OUT_OF_RANGE
+    axes.set_title(
+        f"{name}: reduction {_percent_or_dash(case.outcome.reduction)}{mark}",
+        fontsize=10.5,
+        fontweight="bold",
+        color=unit_interval(INK),
+        pad=_THREAT_PT,
+    )
+
+
+def _write_threat(axes: Axes, case: ProtectedCase, site: str) -> None:
+    """Write two quiet lines between title and panel."""
+    (x_m, y_m), tnt_kg = case.outcome.threat.charge
+    charge = f"{tnt_kg:g} kg TNT at ({x_m:.1f}, {y_m:.1f}) m"
+    axes.annotate(
+        f"{site}{count_of('module', len(case.layout))}\n{charge}",
+        (0.5, 1.0),
+        xycoords="axes fraction",
+        xytext=(0.0, 2.0),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        fontsize=9,
+        color=unit_interval(QUIET_INK),
+    )
+
+
+def _headline(count: int, reduction: Estimate) -> str:
+    if count == 1:
+        return f"reduction {_percent_or_dash(reduction.value)}"
+    text = f"a layout for each case, mean reduction {_percent_or_dash(reduction.value)}"
+    if isnan(reduction.low):
+        return text
+    return f"{text} (95 %: {_percent_or_dash(reduction.low)} to {_percent_or_dash(reduction.high)})"
+
+
+def _cases_subtitle(cases: Sequence[ProtectedCase]) -> str:
+    """Return what the numbers are, how many cases are shown, and which are to be distrusted."""
+    parts = ["reduction of the impulse on the protected structures"]
+    if len(cases) > MOST_SHOWN:
+        parts.append(f"mean over all {len(cases)} cases, of which the first {MOST_SHOWN} are shown")
+    else:
+        parts.append(count_of("case", len(cases)))
+    if not all(case.outcome.in_range for case in cases):
+        parts.append("~ outside the calibration's range")
+    return "; ".join(parts)
+
+
+def _percent_or_dash(share: float) -> str:
+    return "-" if isnan(share) else f"{_PERCENT * share:.0f} %"

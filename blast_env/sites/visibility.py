@@ -1,0 +1,140 @@
+"""The lines along which a charge sees the protected structures, and what modules cut of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from math import cos, pi, sin
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Cell, Rectangle
+from blast_env.scenario import AnySource, PointSource, Scenario, SegmentSource
+from blast_env.scenario.sections import PointM
+from blast_env.units import MODULE_SIDE_M
+
+DIRECTIONS: Final = 360
+"""Lines that leave each place."""
+
+
+PLACES: Final = 9
+"""Places along a segment, or in a rectangle, 3 x 3."""
+
+
+@dataclass(frozen=True, eq=False)
+class SightLines:
+    """Straight ways from where a charge may be to the protected structures.
+
+    From places spread evenly over every source, lines leave in directions spread evenly, as the
+    balls of a charge do. Those that would meet a protected structure count, each by the weights
+    of its source and of the structure.
+
+    Attributes:
+        weight: Weight of each line that no other structure stops (lines,).
+        cut: Which lines a module on each cell of the build zone would cut (lines, rows, columns).
+        open_share: Share, by weight, of the lines that no other structure stops.
+    """
+
+    weight: FloatArray
+    cut: BoolArray
+    open_share: float
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "SightLines":
+        """Return the sight lines of a scenario.
+
+        Raises:
+            BlastEnvError: If it has no build zone.
+        """
+        origin, direction, source_weight = _all_lines(scenario)
+        protected_m, other_m = np.full((2, len(origin)), np.inf)
+        weight = np.zeros(len(origin))
+        for structure in scenario.structures:
+            entry_m = _entry_m(origin, direction, structure.rectangle_m)
+            if structure.protected:
+                nearer = entry_m < protected_m
+                weight[nearer] = (structure.weight * source_weight)[nearer]
+                protected_m = np.minimum(protected_m, entry_m)
+            else:
+                other_m = np.minimum(other_m, entry_m)
+        free = (weight > 0.0) & (protected_m < other_m)
+        cut = _cut(scenario, origin[free], direction[free], protected_m[free])
+        return cls(weight[free], cut, float(weight[free].sum() / max(weight.sum(), 1e-300)))
+
+    def cut_share(self, layout: Sequence[Cell]) -> float:
+        """Return the share of the lines, by weight, that a layout cuts.
+
+        Args:
+            layout: (row, column) of the cells that hold a module.
+        """
+        if not layout or not len(self.weight):
+            return 0.0
+        rows, columns = np.array(layout).T
+        return float(self.weight @ self.cut[:, rows, columns].any(axis=1) / self.weight.sum())
+
+
+def _all_lines(scenario: Scenario) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return origins (lines, 2), directions (lines, 2) and weights of sources (lines,)."""
+    places = [(place, source.weight) for source in scenario.charge for place in _places(source)]
+    origin = np.repeat(np.array([place for place, _ in places]), DIRECTIONS, axis=0)
+    weight = np.repeat(np.array([weight for _, weight in places]), DIRECTIONS)
+    return origin, np.tile(np.array(_directions()), (len(places), 1)), weight
+
+
+@cache
+def _directions() -> tuple[tuple[float, float], ...]:
+    """Return the directions, none of them along an axis.
+
+    Rounded, so that the last bit of sines, which differs between machines, decides nothing.
+    """
+    angles = (2.0 * pi * (index + 0.5) / DIRECTIONS for index in range(DIRECTIONS))
+    return tuple((round(cos(angle), 9), round(sin(angle), 9)) for angle in angles)
+
+
+def _places(source: AnySource) -> list[PointM]:
+    """Return the places of a source, each in the middle of as large a part of it."""
+    if isinstance(source, PointSource):
+        return [source.position_m]
+    if isinstance(source, SegmentSource):
+        (x0, y0), (x1, y1) = source.segment_m
+        shares = [(index + 0.5) / PLACES for index in range(PLACES)]
+        return [(x0 + share * (x1 - x0), y0 + share * (y1 - y0)) for share in shares]
+    side = round(PLACES**0.5)
+    shares = [(index + 0.5) / side for index in range(side)]
+    (left, bottom), (width, height) = source.corner_m, source.size_m
+    return [(left + across * width, bottom + up * height) for up in shares for across in shares]
+
+
+def _entry_m(origin: FloatArray, direction: FloatArray, rectangle: Rectangle) -> FloatArray:
+    """Return how far along each line it enters a rectangle (lines,); infinite if it misses."""
+    low = (np.array([rectangle.left, rectangle.bottom]) - origin) / direction
+    high = (np.array([rectangle.right, rectangle.top]) - origin) / direction
+    enter = np.minimum(low, high).max(axis=1)
+    leave = np.maximum(low, high).min(axis=1)
+    return np.where((enter < leave) & (leave > 0.0), enter, np.inf)
+
+
+def _cut(
+    scenario: Scenario, origin: FloatArray, direction: FloatArray, length_m: FloatArray
+) -> BoolArray:
+    """Return which lines a module on each cell would cut, (lines, rows, columns)."""
+    zone = scenario.build_zone
+    if zone is None:
+        raise BlastEnvError(f"scenario {scenario.name!r} has no build zone, so nothing cuts a line")
+    left, bottom = zone.corner_m
+    x = left + (np.arange(zone.columns) + 0.5) * MODULE_SIDE_M
+    y = bottom + (np.arange(zone.rows) + 0.5) * MODULE_SIDE_M
+    to_x = x - origin[:, :1]  # (lines, columns)
+    to_y = y - origin[:, 1:]  # (lines, rows)
+    along_x, along_y = direction[:, :1], direction[:, 1:]
+    along = (to_y * along_y)[:, :, np.newaxis] + (to_x * along_x)[:, np.newaxis, :]
+    beside = (to_y * along_x)[:, :, np.newaxis] - (to_x * along_y)[:, np.newaxis, :]
+    half_width = MODULE_SIDE_M / 2.0 * np.abs(direction).sum(axis=1)
+    cut: BoolArray = (
+        (np.abs(beside) < half_width[:, np.newaxis, np.newaxis])
+        & (along > 0.0)
+        & (along < length_m[:, np.newaxis, np.newaxis])
+    )
+    return cut

@@ -1,0 +1,1 @@
+"""Studies of the model that commands run: benchmark, calibration, pressure, shielding."""

@@ -1,0 +1,1 @@
+"""Fitting a power law to a reference on many blasts in a free field."""

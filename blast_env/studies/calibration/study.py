@@ -1,0 +1,403 @@
+"""The free-field study: blasts at many distances with many seeds, resumable."""
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, Literal
+
+import joblib
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from blast_env.calibration.laws import Fit, ScalingLaw, fit_linear, fit_power_law, fit_proportional
+from blast_env.calibration.metrics import (
+    FitMetrics,
+    bootstrap_coefficients,
+    fit_metrics,
+    leave_one_out,
+)
+from blast_env.calibration.model import (
+    Calibration,
+    MetricsSection,
+    ReferenceSection,
+    SimulatedQuantity,
+)
+from blast_env.calibration.references import kingery_bulmash, paper_ufc_column
+from blast_env.errors import BlastEnvError
+from blast_env.physics.engine import find_engine
+from blast_env.physics.parameters import parameters_digest
+from blast_env.scenario import Scenario
+from blast_env.simulation import simulate
+from blast_env.units import PA_PER_PSI, UNITS_PER_M
+
+RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")
+
+
+@dataclass(frozen=True)
+class FreeFieldRun:
+    """One blast of a study.
+
+    Attributes:
+        key: Hash of scenario and charge, seed, engine and its version; tells runs apart.
+        distance_m: From the charge's centre to the facade.
+        seed: Seed of the blast.
+        impulse_sim: Sum of m |v| over the hits on the structure, simulation units.
+        transferred_impulse_sim: Momentum really transferred to it, simulation units.
+        first_hit_s: Time of the first hit; None where nothing hit it.
+    """
+
+    key: str
+    distance_m: float
+    seed: int
+    impulse_sim: float
+    transferred_impulse_sim: float
+    first_hit_s: float | None
+
+
+@dataclass(frozen=True)
+class FreeFieldStudy:
+    """Blasts on one structure in the open at several distances.
+
+    Attributes:
+        scenario: A scenario with one point charge and one structure, such as `free_field`.
+        distances_m: Distances from the charge's centre to the facade, ascending.
+        seeds: Seeds; every distance gets all of them.
+        engine: Name of the engine.
+    """
+
+    scenario: Scenario
+    distances_m: tuple[float, ...]
+    seeds: tuple[int, ...]
+    engine: str = "pymunk"
+
+    def __post_init__(self) -> None:
+        """Check the arguments.
+
+        Raises:
+            BlastEnvError: If distances are not ascending, or seeds are repeated or missing.
+        """
+        for before, after in zip(self.distances_m, self.distances_m[1:], strict=False):
+            if not before < after:
+                raise BlastEnvError(
+                    f"distances: {after:g} m follows {before:g} m, must be ascending, none twice"
+                )
+        if not self.distances_m:
+            raise BlastEnvError("distances: there are none, must be at least one")
+        if not self.seeds or len(set(self.seeds)) < len(self.seeds):
+            raise BlastEnvError(f"seeds: {self.seeds} must be at least one, none twice")
+
+    def run(
+        self,
+        processes: int = 1,
+        store: Path | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> pd.DataFrame:
+        """Run all blasts that the store does not hold yet.
+
+        Args:
+            processes: Worker processes.
+            store: File of finished runs, one JSON object a line; each run is added as it ends,
+                so that an interrupted study goes on where it was. A last line that was cut short
+                is run again.
+            progress: Called with the share of the blasts that is done.
+
+        Returns:
+            One row a blast, by distance and seed; the columns are `RUN_COLUMNS`.
+
+        Raises:
+            BlastEnvError: If the store is not one, or cannot be written.
+        """
+        finished = {} if store is None else read_store(store)
+        wanted = {
+            self._key(scenario, seed): (scenario, distance_m, seed)
+            for distance_m in self.distances_m
+            for scenario in (self.scenario.at_stand_off(distance_m),)
+            for seed in self.seeds
+        }
+        missing = [key for key in wanted if key not in finished]
+        jobs = (joblib.delayed(_run_one)(key, *wanted[key], self.engine) for key in missing)
+        parallel = joblib.Parallel(n_jobs=processes, return_as="generator_unordered")
+        for done, run in enumerate(parallel(jobs), start=1):
+            finished[run.key] = run
+            if store is not None:
+                append_to_store(store, run)
+            if progress is not None:
+                progress(1.0 - (len(missing) - done) / len(wanted))
+        rows = [asdict(finished[key]) for key in wanted]
+        table = pd.DataFrame(rows)[list(RUN_COLUMNS)]
+        return table.sort_values(["distance_m", "seed"], ignore_index=True)
+
+    def _key(self, scenario: Scenario, seed: int) -> str:
+        version = find_engine(self.engine).version
+        return f"{scenario.content_hash} {seed} {self.engine} {version}"
+
+
+def impulse_by_seed(
+    runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse"
+) -> NDArray[np.float64]:
+    """Return the impulses, simulation units (seeds, distances), from the table of a study."""
+    pivot = runs.pivot_table(index="seed", columns="distance_m", values=f"{simulated}_sim")
+    return pivot.to_numpy(dtype=np.float64)
+
+
+def summarise(runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse") -> pd.DataFrame:
+    """Return mean and 95 % confidence interval at each distance.
+
+    Args:
+        runs: The table of a study.
+        simulated: Which sum over the collisions `i_sim` is.
+
+    Returns:
+        One row a distance: `distance_m`, `seeds`, `i_sim`, its half-width `ci95` (Student's t),
+        the standard deviation `sd` between seeds, `transferred_sim` and `arrival_s`.
+    """
+    groups = runs.groupby("distance_m")
+    table = pd.DataFrame(
+        {
+            "seeds": groups.size(),
+            "i_sim": groups[f"{simulated}_sim"].mean(),
+            "sd": groups[f"{simulated}_sim"].std(ddof=1),
+            "transferred_sim": groups.transferred_impulse_sim.mean(),
+            "arrival_s": groups.first_hit_s.mean(),
+        }
+    )
+    # Student's t; scipy.stats has it too, but takes a third of a second to import.
+    t = stdtrit(np.maximum(table.seeds - 1, 1), 0.975)
+    table.insert(2, "ci95", t * table.sd / np.sqrt(table.seeds))
+    return table.reset_index()
+
+
+def read_store(path: Path) -> dict[str, FreeFieldRun]:
+    """Return the runs in a store by their keys; none if there is no such file.
+
+    Raises:
+        BlastEnvError: If a line other than an unfinished last one is not a run.
+    """
+    if not path.exists():
+        return {}
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BlastEnvError(f"{path}: cannot be read: {error}") from error
+    runs: dict[str, FreeFieldRun] = {}
+    for number, line in enumerate(lines[:-1], start=1):
+        try:
+            run = FreeFieldRun(**json.loads(line))
+        except (TypeError, ValueError) as error:
+            raise BlastEnvError(
+                f"{path}: line {number} is not a run of a study: {error}"
+            ) from error
+        runs[run.key] = run
+    return runs
+
+
+def append_to_store(path: Path, run: FreeFieldRun) -> None:
+    """Add a run to a store, after cutting off a last line that was left unfinished.
+
+    Raises:
+        BlastEnvError: If the file cannot be written.
+    """
+    line = json.dumps(asdict(run)) + "\n"
+    try:
+        with path.open("ab+") as file:
+            _cut_unfinished_line(file)
+            file.write(line.encode())
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise BlastEnvError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _cut_unfinished_line(file: Any) -> None:
+    size = file.seek(0, os.SEEK_END)
+    if size == 0:
+        return
+    file.seek(size - 1)
+    if file.read(1) == b"\n":
+        return
+    file.seek(0)
+    file.truncate(file.read().rfind(b"\n") + 1)
+
+
+def _run_one(
+    key: str, scenario: Scenario, distance_m: float, seed: int, engine: str
+) -> FreeFieldRun:
+    """Run one blast, in a worker process."""
+    result = simulate(scenario, seed=seed, engine=engine)
+    (structure,) = result.obstacles
+    return FreeFieldRun(
+        key=key,
+        distance_m=distance_m,
+        seed=seed,
+        impulse_sim=structure.impulse,
+        transferred_impulse_sim=structure.transferred_impulse,
+        first_hit_s=structure.first_hit_s,
+    )
+
+
+FITS: Final[Mapping[str, Fit]] = MappingProxyType(
+    {"proportional": fit_proportional, "linear": fit_linear, "power": fit_power_law}
+)
+
+
+LawName = Literal["proportional", "linear", "power"]
+
+
+ImpulseQuantity = Literal["incident_impulse", "reflected_impulse"]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a simulator is calibrated against.
+
+    Attributes:
+        section: What it is, for the record.
+        impulse_psi_s: Its impulse at each distance (n,), psi*s.
+    """
+
+    section: ReferenceSection
+    impulse_psi_s: np.ndarray
+
+
+def paper_reference(distances_m: tuple[float, ...]) -> Reference:
+    """Return the paper's UFC column.
+
+    Raises:
+        BlastEnvError: If a distance is not among the paper's eight.
+    """
+    column = paper_ufc_column()
+    for distance_m in distances_m:
+        if distance_m not in column.index:
+            known = ", ".join(f"{known_m:g}" for known_m in column.index)
+            raise BlastEnvError(
+                f"the paper's UFC column has no value at {distance_m:g} m, must be one of {known}"
+            )
+    section = ReferenceSection(source="paper UFC column", quantity="impulse")
+    return Reference(section, column.loc[list(distances_m)].to_numpy(dtype=np.float64))
+
+
+def kingery_bulmash_reference(
+    distances_m: tuple[float, ...],
+    charge_kg: float,
+    quantity: ImpulseQuantity = "reflected_impulse",
+    burst: Literal["hemispherical", "spherical"] = "hemispherical",
+) -> Reference:
+    """Return Kingery and Bulmash's impulse.
+
+    Raises:
+        BlastEnvError: If a distance is outside the range of the curves.
+    """
+    impulse_pa_s = kingery_bulmash(quantity, np.array(distances_m), charge_kg, burst)
+    section = ReferenceSection(
+        source="Kingery-Bulmash", quantity=quantity, burst=burst, charge_kg=charge_kg
+    )
+    return Reference(section, impulse_pa_s / PA_PER_PSI)
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationReport:
+    """A study with its three fits.
+
+    Attributes:
+        study: What was run.
+        runs: One row a blast.
+        summary: One row a distance; see `summarise`.
+        reference: What it was fitted to.
+        laws: The three laws by name.
+        metrics: How well each agrees.
+        simulated: Which sum over the collisions they convert.
+    """
+
+    study: FreeFieldStudy
+    runs: pd.DataFrame
+    summary: pd.DataFrame
+    reference: Reference
+    laws: Mapping[str, ScalingLaw]
+    metrics: Mapping[str, FitMetrics]
+    simulated: SimulatedQuantity = "impulse"
+
+    def table(self) -> pd.DataFrame:
+        """Return the summary with the reference and the three laws beside it, psi*s."""
+        table = self.summary.assign(reference_psi_s=self.reference.impulse_psi_s)
+        for name, law in self.laws.items():
+            scaled = law(table.i_sim.to_numpy())
+            table[f"{name}_psi_s"] = scaled
+            table[f"{name}_error_percent"] = 100.0 * (scaled / table.reference_psi_s - 1.0)
+        return table
+
+    def calibration(self, name: str, law: LawName = "power") -> Calibration:
+        """Return the calibration of one of the laws.
+
+        Args:
+            name: Its name.
+            law: Which of the laws.
+        """
+        study, by_seed = self.study, impulse_by_seed(self.runs, self.simulated)
+        reference = self.reference.impulse_psi_s
+        left_out = leave_one_out(
+            study.distances_m, self.summary.i_sim.to_numpy(), reference, FITS[law]
+        )
+        intervals = bootstrap_coefficients(by_seed, reference, FITS[law])
+        (structure,) = study.scenario.structures
+        (source,) = study.scenario.charge
+        metrics = self.metrics[law]
+        return Calibration(
+            name=name,
+            law=law,
+            coefficients=self.laws[law].coefficients,
+            coefficient_intervals={key: (i.low, i.high) for key, i in intervals.items()},
+            reference=self.reference.section,
+            preset=study.scenario.simulation.preset,
+            parameters_digest=parameters_digest(study.scenario.parameters, study.engine),
+            engine=study.engine,
+            engine_version=find_engine(study.engine).version,
+            blast_env_version=version("blast-env"),
+            facade_width_m=structure.rectangle_m.top - structure.rectangle_m.bottom,
+            ball_radius_m=study.scenario.parameters.air.radius_units / UNITS_PER_M,
+            simulated=self.simulated,
+            tnt_kg=source.tnt_kg,
+            distances_m=study.distances_m,
+            seeds=study.seeds,
+            i_sim=tuple(self.summary.i_sim),
+            i_sim_ci95=tuple(self.summary.ci95),
+            i_reference_psi_s=tuple(reference.tolist()),
+            metrics=MetricsSection(
+                mape_percent=metrics.mape_percent,
+                rmse=metrics.rmse,
+                integral_error_percent=metrics.integral_error_percent,
+                leave_one_out_mape_percent=left_out.metrics.mape_percent,
+            ),
+        )
+
+
+def calibrate(
+    study: FreeFieldStudy,
+    runs: pd.DataFrame,
+    reference: Reference,
+    simulated: SimulatedQuantity = "impulse",
+) -> CalibrationReport:
+    """Fit the three laws to the runs of a study.
+
+    Args:
+        study: The study.
+        runs: Its runs.
+        reference: What to fit to.
+        simulated: Which sum over the collisions to convert.
+
+    Raises:
+        BlastEnvError: If the runs cannot be fitted, e.g. because nothing arrived at a distance.
+    """
+    summary = summarise(runs, simulated)
+    i_sim = summary.i_sim.to_numpy(dtype=np.float64)
+    laws = {name: fit(i_sim, reference.impulse_psi_s) for name, fit in FITS.items()}
+    metrics = {
+        name: fit_metrics(study.distances_m, law(i_sim), reference.impulse_psi_s)
+        for name, law in laws.items()
+    }
+    return CalibrationReport(study, runs, summary, reference, laws, metrics, simulated)

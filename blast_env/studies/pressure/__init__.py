@@ -1,0 +1,1 @@
+"""Pressure over time, held against Kingery & Bulmash."""

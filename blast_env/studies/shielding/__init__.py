@@ -1,0 +1,1 @@
+"""How much of a blast goes round the corners of a block."""
