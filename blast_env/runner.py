@@ -1,58 +1,88 @@
-"""Many blasts at once, in threads of one process."""
+"""Many independent pieces of work, several at a time."""
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Literal, TypeVar
+
+import joblib
 
 from blast_env.errors import BlastEnvError
-from blast_env.simulation import Blast, BlastResult
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+Workers = Literal["processes", "threads"]
+"""What does the work. Threads copy nothing, and pay with compiled engines, which let other threads
+run; pymunk and plain Python want processes."""
 
 
-def simulate_many(
-    blasts: Sequence[Blast],
-    threads: int = 1,
-    progress: Callable[[float], None] | None = None,
-) -> list[BlastResult]:
-    """Run blasts to their ends, several at a time.
+def in_order(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    workers: int = 1,
+    kind: Workers = "processes",
+) -> Iterator[Result]:
+    """Yield the results in the order of the items, each as soon as those before it are there.
 
-    The results are those of `Blast.run`, to the last bit, whatever the number of threads.
-
-    Threads pay with the engine `event`: its compiled loop lets other threads run, and nothing has
-    to be copied from process to process. The preparation of a blast and its result are Python,
-    which one thread at a time runs. With `pymunk` threads change nothing but the order of the
-    work; there use processes.
+    The number of workers changes nothing but the time. When the consumer stops or an item raises,
+    what has not begun is left out. Where joblib has been told of another backend
+    (`joblib.parallel_config`), that one does the work.
 
     Args:
-        blasts: The blasts.
-        threads: How many run at the same time; more than there are cores do not help.
-        progress: Called in the caller's thread with the share of the blasts that is done.
-
-    Returns:
-        The results, in the order of the blasts.
+        function: Does one item; for processes, it and the items must pickle.
+        items: The work.
+        workers: How many items are under way at the same time; a single one does them here.
+        kind: Processes or threads.
 
     Raises:
-        BlastEnvError: If `threads` is not a whole number of at least 1, or if a blast cannot be
-            run; the message says which, the first one of them. Those that have not begun yet are
-            left out then.
+        BlastEnvError: If `workers` is not a whole number of at least 1.
     """
-    if not isinstance(threads, int) or threads < 1:
-        raise BlastEnvError(f"threads is {threads!r}, must be a whole number of at least 1")
-    results: list[BlastResult] = []
-    with ThreadPoolExecutor(min(threads, len(blasts)) or 1) as pool:
-        running = [pool.submit(blast.run) for blast in blasts]
-        try:
-            for number, future in enumerate(running):
-                results.append(_result_of(future, number))
-                if progress is not None:
-                    progress(len(results) / len(blasts))
-        except BaseException:  # an interruption as well: do not first run what is left
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    check_workers("workers", workers)
+    if min(workers, len(items)) <= 1:
+        return map(function, items)
+    return _parallel(function, items, workers, kind, "generator")
+
+
+def as_completed(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    workers: int = 1,
+    kind: Workers = "processes",
+) -> Iterator[tuple[int, Result]]:
+    """Yield (index, result) of each item as soon as it is there, so that it can be kept at once.
+
+    Arguments and errors are those of `in_order`.
+    """
+    check_workers("workers", workers)
+    if min(workers, len(items)) <= 1:
+        return enumerate(map(function, items))
+    numbered = _Numbered(function)
+    return _parallel(numbered, list(enumerate(items)), workers, kind, "generator_unordered")
+
+
+def check_workers(name: str, workers: int) -> None:
+    """Refuse a number of workers that is not a whole number of at least 1 (`BlastEnvError`)."""
+    if not isinstance(workers, int) or isinstance(workers, bool) or workers < 1:
+        raise BlastEnvError(f"{name} is {workers!r}, must be a whole number of at least 1")
+
+
+class _Numbered:
+    """A function whose results carry the index of their item."""
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        self._function = function
+
+    def __call__(self, numbered: tuple[int, Any]) -> tuple[int, Any]:
+        index, item = numbered
+        return index, self._function(item)
+
+
+def _parallel(
+    function: Callable[[Any], Any],
+    items: Sequence[Any],
+    workers: int,
+    kind: Workers,
+    return_as: Literal["generator", "generator_unordered"],
+) -> Iterator[Any]:
+    parallel = joblib.Parallel(min(workers, len(items)), prefer=kind, return_as=return_as)
+    results: Iterator[Any] = parallel(joblib.delayed(function)(item) for item in items)
     return results
-
-
-def _result_of(future: "Future[BlastResult]", number: int) -> BlastResult:
-    """Wait for a result; an error of the user's says which blast it came from."""
-    try:
-        return future.result()
-    except ValueError as error:  # what unusable arguments cause, `BlastEnvError` among it
-        raise BlastEnvError(f"blasts[{number}]: {error}") from error

@@ -4,8 +4,7 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
-from blast_env.runner import simulate_many
-from blast_env.simulation import Blast
+from blast_env.simulation import Blast, simulate_many
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 
 WALL = tuple((row, 0) for row in range(2, 12))
