@@ -193,7 +193,7 @@ def _search_code() -> str:
     folder = Path(blast_agents.__file__).parent
     paths = sorted((folder / "search").glob("*.py"))
     digest = sha256()
-    for path in (*paths, folder / "rules.py", folder / "random_layouts.py"):
+    for path in (*paths, folder / "rules.py"):
         if path.name not in _NO_INFLUENCE:
             digest.update(f"{path.name}\n".encode() + path.read_bytes())
     versions = " ".join(f"{name} {version(name)}" for name in _PACKAGES)
