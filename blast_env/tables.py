@@ -1,6 +1,9 @@
-"""Columns of tables: name, unit and meaning in one place."""
+"""Tables whose columns say their unit and meaning in one place."""
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
+
+import pandas as pd
 
 
 class Column(NamedTuple):
@@ -16,3 +19,13 @@ class Column(NamedTuple):
     name: str
     unit: str
     meaning: str
+
+
+def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) -> pd.DataFrame:
+    """Return rows, each by the names of the columns, as a data frame in the columns' order.
+
+    Raises:
+        KeyError: If a row lacks a column.
+    """
+    names = [column.name for column in columns]
+    return pd.DataFrame([[row[name] for name in names] for row in rows], columns=names)

@@ -203,7 +203,7 @@ def write_pictures(settings: DemoSettings, comparison: Comparison) -> list[Path]
     """
     standings, agent = comparison.standings, comparison.agent
     case, layout = standings.track.cases[0], agent.proposals[0].layout
-    scenario, threat = case.scenario, case.held_out[0]
+    scenario, threat = case.scenario, case.threats[0]
     where = ", ".join(each.name for each in scenario.structures if each.protected)
     panels = [
         FilmPanel(

@@ -1,7 +1,7 @@
 """What `blast-env evaluate` was called with, and what that means for files."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -12,7 +12,14 @@ import typer
 
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LayoutEvaluation, draw_threats, evaluate_against
+from blast_env.evaluation import (
+    BlastEvaluator,
+    Evaluators,
+    LayoutEvaluation,
+    SeedRange,
+    draw_threats,
+    evaluate_against,
+)
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.export import LayoutPlan, check_target, export_layouts
 from blast_env.files import make_folder, write_atomically
@@ -37,10 +44,12 @@ class EvaluateOptions:
     out: Path | None
     as_json: bool
 
-    def seed_range(self, default_first: int) -> range:
-        """Return the seeds of the threats."""
-        first = default_first if self.first_seed is None else self.first_seed
-        return range(first, first + self.seeds)
+    @property
+    def seed_range(self) -> range:
+        """The seeds of the threats: those that judge, unless the user wants others."""
+        if self.first_seed is None:
+            return SeedRange.JUDGEMENT.seeds(0, self.seeds)
+        return range(self.first_seed, self.first_seed + self.seeds)
 
     def prepare_files(self, layouts: int) -> None:
         """Refuse targets of no use before the blasts, so that no result is lost for want of one.
@@ -65,17 +74,15 @@ def write_table(table: pd.DataFrame, path: Path) -> Path:
     return path
 
 
-def cache_record(evaluators: Iterable[BlastEvaluator]) -> dict[str, float]:
+def cache_record(evaluator: BlastEvaluator | Evaluators) -> dict[str, float]:
     """Return how many blasts were run and how many were known already."""
-    counted = list(evaluators)
-    blasts = sum(each.blasts for each in counted)
-    hits = sum(each.cache_hits for each in counted)
-    return {"blasts": blasts, "hits": hits, "hit_rate": hits / max(blasts + hits, 1)}
+    blasts, hits = evaluator.blasts, evaluator.cache_hits
+    return {"blasts": blasts, "hits": hits, "hit_rate": evaluator.cache_hit_rate}
 
 
-def cache_text(evaluators: Iterable[BlastEvaluator]) -> str:
+def cache_text(evaluator: BlastEvaluator | Evaluators) -> str:
     """Return the same for people."""
-    record = cache_record(evaluators)
+    record = cache_record(evaluator)
     return (
         f"{record['blasts']:g} blasts run, {record['hits']:g} known already "
         f"(cache hit rate {percent(record['hit_rate'])})"
@@ -134,7 +141,7 @@ def report_layout(
         content = {
             **evaluation.to_dict(),
             "provenance": dict(plan.provenance),
-            "cache": cache_record([evaluator]),
+            "cache": cache_record(evaluator),
             "files": [str(path) for path in written],
         }
         print_line(json.dumps(content, indent=2))
@@ -142,7 +149,7 @@ def report_layout(
     _print_evaluation(evaluation, seeds)
     for path in written:
         print_line(f"wrote {path}")
-    print_line(cache_text([evaluator]))
+    print_line(cache_text(evaluator))
 
 
 def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
@@ -153,8 +160,15 @@ def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
         "threats.csv": evaluation.threat_table,
     }
     written += [write_table(table, out / name) for name, table in tables.items()]
-    written.append(evaluation.figure(out / "evaluation.png"))
+    written.append(_figure(evaluation, out / "evaluation.png"))
     return written
+
+
+def _figure(evaluation: LayoutEvaluation, path: Path) -> Path:
+    from blast_env.rendering.evaluation_figures import evaluation_figure  # needs an extra
+    from blast_env.rendering.figures import save_figure
+
+    return save_figure(evaluation_figure(evaluation), path)
 
 
 def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
@@ -259,8 +273,8 @@ FirstSeed = Annotated[
     int | None,
     typer.Option(
         min=0,
-        help="The seeds count from here; use others than for a search.",
-        show_default="0; with --run the first one that no training meets",
+        help="The seeds count from here.",
+        show_default="the first one that no training and no search meets",
     ),
 ]
 
@@ -350,7 +364,7 @@ def _evaluate_file(path: Path, scenario: str, options: EvaluateOptions) -> None:
     cells = load_layout(path, chosen)
     plan = LayoutPlan(chosen, cells, provenance=LayoutFile.load(path).provenance)
     evaluator = BlastEvaluator(chosen, options.engine or _ENGINE, cache=options.cache)
-    report_layout(plan, evaluator, options.seed_range(0), options)
+    report_layout(plan, evaluator, options.seed_range, options)
 
 
 def _evaluate_run(run: Path, options: EvaluateOptions) -> None:

@@ -184,14 +184,15 @@ def _screening(episode: Episode) -> "BlastScreening":
     """Return the blast that is shown: of the worst threat, with its first realisation."""
     from blast_env.rendering.placing import BlastScreening
 
-    protected, _ = episode.assess()
-    threats = episode.objective.threats
-    threat = threats[int(np.argmax(protected.threat_impulses_psi_s))][0]
-    evaluator = episode.objective.evaluator
+    objective = episode.objective
+    case, evaluator = objective.case, objective.evaluator
+    impulses = np.array(objective.impulses_pa_s(episode.placement.cells))
+    of_charges = impulses.reshape(case.realisations, -1).mean(axis=0)
+    threat = case.threats[int(of_charges.argmax())]
     # Sorted, as for the assessment: the order of the cells may change the last bits.
     cells = tuple(sorted(episode.placement.cells))
     blast = Blast(evaluator.scenario, cells, threat.seed, evaluator.engine, threat.charge)
-    remark = f": the worst of {len(threats)} charges" if len(threats) > 1 else ""
+    remark = f": the worst of {len(case.charges)} charges" if len(case.charges) > 1 else ""
     return BlastScreening(blast, _outcome(episode), remark)
 
 
@@ -199,7 +200,7 @@ def _outcome(episode: Episode) -> str:
     """Return what came of the blast, in words."""
     protected, unprotected = episode.assess()
     reduction_percent = 100.0 * protected.reduction_from(unprotected)
-    of_all = "all charges: " if len(episode.objective.threats) > 1 else ""
+    of_all = "all charges: " if len(episode.objective.case.charges) > 1 else ""
     return (
         f"{of_all}{protected.impulse_psi_s:.3g} psi s ({protected.impulse_pa_s:.3g} Pa s),"
         f" reduction {reduction_percent:.0f} %"

@@ -8,8 +8,8 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from blast_env.envs.objective import Objective
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.comparison import Objective
 from blast_env.geometry import Cell
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnySource, BuildZone, PointSource, Scenario, load_scenario

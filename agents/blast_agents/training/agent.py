@@ -25,10 +25,10 @@ from torch import nn
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
 from blast_agents.training.hyperparameters import Hyperparameters, schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
-from blast_env.envs.objective import Evaluators
 from blast_env.envs.observations import Array, GridEpisode, GridObservation, Sight
 from blast_env.envs.strategies import check_size, zone_of
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.evaluator import Evaluators
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge

@@ -15,7 +15,7 @@ from blast_agents.training.agent import (
     Model,
     TrainedAgent,
 )
-from blast_agents.training.held_out import HeldOut
+from blast_agents.training.cases import Selection
 from blast_agents.training.run_folder import (
     EvaluationRow,
     RolloutRow,
@@ -67,7 +67,7 @@ class Recorder(BaseCallback):
         folder: Where everything is written.
         settings: Of the run.
         scenario: A scenario of the size that the policy is for.
-        held_out: For the evaluations.
+        selection: What the best weights are chosen by.
         progress: What the run has come to so far; goes on from here.
         show: Called with the share of the steps that is done.
     """
@@ -77,13 +77,13 @@ class Recorder(BaseCallback):
         folder: RunFolder,
         settings: TrainingSettings,
         scenario: Scenario,
-        held_out: HeldOut,
+        selection: Selection,
         progress: Progress,
         show: Callable[[float], None],
     ) -> None:
         super().__init__()
         self.folder, self.settings, self.scenario = folder, settings, scenario
-        self.held_out, self.progress, self.show = held_out, progress, show
+        self.selection, self.progress, self.show = selection, progress, show
         self.algorithm: Model
         self._episodes = Episodes()
         self._is_pending = False
@@ -155,7 +155,7 @@ class Recorder(BaseCallback):
 
     def _evaluate(self) -> None:
         agent = TrainedAgent(self.algorithm.policy, self.scenario, self.settings.engine)
-        reduction = self.held_out.reduction(agent)
+        reduction = self.selection.reduction(agent)
         counters = self.progress.counters
         row = EvaluationRow(
             counters.steps, counters.episodes, *reduction, counters.blasts, counters.seconds

@@ -17,8 +17,8 @@ from blast_agents.training.agent import (
     make_model,
     torch_threads,
 )
+from blast_agents.training.cases import Selection
 from blast_agents.training.environments import make_environments, training_source
-from blast_agents.training.held_out import HeldOut
 from blast_agents.training.hyperparameters import Hyperparameters
 from blast_agents.training.learning_curve import save_learning_curve
 from blast_agents.training.recorder import Progress, Recorder
@@ -75,10 +75,12 @@ def train(
         hyperparameters=fitted(hyperparameters, settings, scenario),
         scenario_hash=scenario.content_hash,
     )
-    held_out = HeldOut.of(settings, source)  # refuses an unknown engine before anything is written
+    selection = Selection.of(
+        settings, source
+    )  # refuses an unknown engine before anything is written
     folder = RunFolder(Path(run))
     folder.create(configuration, scenario, shlex.join(sys.argv))
-    return _run(_Run(folder, configuration, source, held_out), Progress(), None, progress)
+    return _run(_Run(folder, configuration, source, selection), Progress(), None, progress)
 
 
 def resume(
@@ -107,8 +109,8 @@ def resume(
     if configuration.settings.scenario == SITES:
         source = training_source(SITES)
         check_scenario(source.representative, configuration, "generated sites")
-    held_out = HeldOut.of(configuration.settings, source)
-    job = _Run(folder, configuration, source, held_out)
+    selection = Selection.of(configuration.settings, source)
+    job = _Run(folder, configuration, source, selection)
     if not folder.last.exists() and not folder.best.exists():  # ended in the first rollout
         return _run(job, Progress(), None, progress)
     checkpoint = Checkpoint.load(folder.last)
@@ -127,13 +129,13 @@ class _Run:
         folder: The run folder.
         configuration: Its configuration.
         source: Gives the episodes their scenario.
-        held_out: For the evaluations.
+        selection: What the best weights are chosen by.
     """
 
     folder: RunFolder
     configuration: RunConfiguration
     source: ScenarioSource
-    held_out: HeldOut
+    selection: Selection
 
 
 def _run(
@@ -175,7 +177,7 @@ def _learn(
     if checkpoint is not None:
         _restore(model, checkpoint, job.folder)
     scenario = job.source.representative
-    recorder = Recorder(job.folder, settings, scenario, job.held_out, so_far, show)
+    recorder = Recorder(job.folder, settings, scenario, job.selection, so_far, show)
     recorder.algorithm = model
     model.set_logger(configure(str(job.folder.tensorboard), ["tensorboard"]))
     left = settings.steps - so_far.counters.steps
