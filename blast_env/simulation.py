@@ -18,7 +18,8 @@ from blast_env.calibration.model import (
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Cell
 from blast_env.physics.collisions import CollisionArray
-from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, find_engine
+from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.recording.run_record import RunRecord, run_record

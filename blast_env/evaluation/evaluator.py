@@ -19,7 +19,8 @@ from blast_env.evaluation.store import (
     find_cache,
 )
 from blast_env.geometry import Cell
-from blast_env.physics.engine import Engine, find_engine
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario, check_layout
 from blast_env.simulation import Blast

@@ -25,7 +25,7 @@ from blast_env.evaluation import Threat
 from blast_env.evaluation.store import calibration_digest, code_version, engine_text
 from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
 
 _PACKAGES: Final = ("numpy", "pymoo")
 """What a search draws its numbers with."""

@@ -30,7 +30,7 @@ from blast_env.calibration.model import (
 )
 from blast_env.calibration.references import kingery_bulmash, paper_ufc_column
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import parameters_digest
 from blast_env.scenario import Scenario
 from blast_env.simulation import simulate

@@ -16,7 +16,7 @@ import pandas as pd
 from blast_env.arrays import FloatArray
 from blast_env.calibration.references import kingery_bulmash
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import parameters_digest
 from blast_env.statistics import Estimate
 from blast_env.studies.shielding.ratios import (
