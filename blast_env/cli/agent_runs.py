@@ -4,10 +4,7 @@ Imports `agents`, so the command imports this module only when it is asked for a
 """
 
 import json
-import platform
-import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
@@ -34,6 +31,7 @@ from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.evaluation import BlastEvaluator
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
+from blast_env.provenance import command, versions
 from blast_env.rendering.evaluation_figures import ProtectedCase, cases_figure
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import save_scenario
@@ -233,15 +231,12 @@ def _place(settings: TrainingSettings, cases: Sequence[Case]) -> str:
 def _provenance(run: Path, settings: TrainingSettings) -> dict[str, Any]:
     """Return where the layouts come from."""
     return {
-        "command": ["blast-env", *sys.argv[1:]],
+        "command": command(),
         "run": str(run),
         "weights": "best",
         "algorithm": settings.algorithm,
         "threat": settings.threat,
-        "versions": {
-            name: version(name) for name in ("blast-env", "torch", "stable-baselines3", "numpy")
-        }
-        | {"python": platform.python_version()},
+        "versions": versions(packages=("torch", "stable-baselines3", "numpy")),
     }
 
 

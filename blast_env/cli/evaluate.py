@@ -146,6 +146,10 @@ def report_layout(
 
 
 def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
+    # Here, because pictures need the extra `render`.
+    from blast_env.rendering.evaluation_figures import evaluation_figure
+    from blast_env.rendering.figures import save_figure
+
     written = [evaluation.to_json(out / "evaluation.json")]
     tables = {
         "structures.csv": evaluation.table,
@@ -153,7 +157,7 @@ def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
         "threats.csv": evaluation.threat_table,
     }
     written += [write_table(table, out / name) for name, table in tables.items()]
-    written.append(evaluation.figure(out / "evaluation.png"))
+    written.append(save_figure(evaluation_figure(evaluation), out / "evaluation.png"))
     return written
 
 

@@ -1,7 +1,6 @@
 """`blast-env league`: searches, rules and trained agents on the same held-out cases."""
 
 import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,6 +16,7 @@ from blast_env.cli.output import (
     user_errors,
 )
 from blast_env.errors import BlastEnvError
+from blast_env.provenance import command
 
 if TYPE_CHECKING:
     from blast_agents.league import Contest, ResultStore, Standings, Track
@@ -75,7 +75,7 @@ def league(
         ]
         _print_outlook(contests)
         all_standings = [_play(contest, processes) for contest in contests]
-        written = write_league(all_standings, out, shlex.join(["blast-env", *sys.argv[1:]]))
+        written = write_league(all_standings, out, shlex.join(command()))
     for path in written:
         print_line(f"wrote {path}")
 

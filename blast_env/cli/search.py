@@ -1,9 +1,6 @@
 """What `blast-env search` prints and writes."""
 
-import platform
-import sys
 from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
@@ -28,6 +25,7 @@ from blast_env.evaluation import BlastEvaluator, LayoutEvaluation, Threat, evalu
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.files import make_folder, write_atomically
 from blast_env.physics.scene import Charge
+from blast_env.provenance import command, versions
 from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
 
 if TYPE_CHECKING:
@@ -135,18 +133,13 @@ def _provenance(
     result, problem = run.result, run.unprotected.problem
     low, high = (None if np.isnan(end) else float(end) for end in checked.ci95)
     return {
-        "command": ["blast-env", *sys.argv[1:]],
+        "command": command(),
         "options": asdict(options),
         "threats": [
             {"charge_position_m": t.charge.position_m, "tnt_kg": t.charge.tnt_kg, "seed": t.seed}
             for t in problem.threats
         ],
-        "versions": {
-            "blast_env": version("blast-env"),
-            "engine": problem.evaluator.engine.version,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-        },
+        "versions": versions(problem.evaluator.engine.version),
         "result": {
             "blasts": result.blasts,
             "interrupted": result.interrupted,

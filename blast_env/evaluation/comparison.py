@@ -407,20 +407,6 @@ class LayoutEvaluation:
             temporary.write_text(text + "\n", encoding="utf-8")
         return Path(path)
 
-    def figure(self, path: str | Path) -> Path:
-        """Save a figure of the evaluation: `.png`, `.svg` or `.pdf`.
-
-        Returns:
-            The path.
-
-        Raises:
-            BlastEnvError: If it cannot be written there, or the extra `render` is missing.
-        """
-        from blast_env.rendering.evaluation_figures import evaluation_figure
-        from blast_env.rendering.figures import save_figure
-
-        return save_figure(evaluation_figure(self), path)
-
     @cached_property
     def _impulse_psi_s(self) -> FloatArray:
         return np.array([outcome.impulse_psi_s for outcome in self.outcomes])

@@ -22,10 +22,11 @@ from blast_agents.league.tracks import TrackCase
 from blast_agents.proposal import Proposal
 from blast_env.calibration.model import scenario_calibration
 from blast_env.evaluation import Threat
-from blast_env.evaluation.store import calibration_digest, code_version, engine_text
+from blast_env.evaluation.store import calibration_digest, engine_text
 from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.engines import find_engine
+from blast_env.provenance import code_version
 
 _PACKAGES: Final = ("numpy", "pymoo")
 """What a search draws its numbers with."""

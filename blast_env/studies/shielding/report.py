@@ -2,11 +2,9 @@
 
 import json
 import math
-import platform
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from importlib.metadata import version
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
@@ -18,6 +16,7 @@ from blast_env.calibration.references import kingery_bulmash
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import parameters_digest
+from blast_env.provenance import versions
 from blast_env.statistics import Estimate
 from blast_env.studies.shielding.ratios import (
     EXPERIMENT,
@@ -60,12 +59,7 @@ def shielding_record(
         "parameters": study.parameters.model_dump(mode="json"),
         "parameters_digest": parameters_digest(study.parameters, engine.name),
         "engine": engine.name,
-        "versions": {
-            "blast_env": version("blast-env"),
-            "engine": engine.version,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-        },
+        "versions": versions(engine.version),
         "seeds": list(study.seeds),
         "time_limit_s": study.time_limit_s,
         "geometry": asdict(study.geometry),
