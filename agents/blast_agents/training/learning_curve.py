@@ -1,12 +1,13 @@
-"""The learning curve of a run as a figure."""
+"""The learning curve of a run: its points, and the figure."""
 
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from blast_agents.training.run_folder import RunConfiguration
-from blast_agents.training.train import Progress
+from blast_agents.training.agent import Counters
+from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunConfiguration
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.site_plan import write_heading
 from blast_env.rendering.style import number_on_axis, render_extra
@@ -21,6 +22,21 @@ _TRAINING: Final = "#56B4E9"
 _HELD_OUT: Final = "#D55E00"
 _BEST: Final = "#000000"
 _NAMES: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
+
+
+@dataclass
+class Progress:
+    """What a run has come to so far.
+
+    Attributes:
+        counters: How far it is.
+        rollouts: A row each.
+        evaluations: A row each.
+    """
+
+    counters: Counters = field(default_factory=Counters)
+    rollouts: list[RolloutRow] = field(default_factory=list)
+    evaluations: list[EvaluationRow] = field(default_factory=list)
 
 
 def learning_curve(progress: Progress, configuration: RunConfiguration) -> Figure:

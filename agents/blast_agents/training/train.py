@@ -27,7 +27,7 @@ from blast_agents.training.agent import (
 from blast_agents.training.environments import make_environments, training_source
 from blast_agents.training.held_out import HeldOut
 from blast_agents.training.hyperparameters import Hyperparameters
-from blast_agents.training.learning_curve import save_learning_curve
+from blast_agents.training.learning_curve import Progress, save_learning_curve
 from blast_agents.training.run_folder import (
     SITES,
     EvaluationRow,
@@ -57,21 +57,6 @@ class Episodes:
     rewards: list[float] = field(default_factory=list)
     reductions: list[float] = field(default_factory=list)
     modules: list[int] = field(default_factory=list)
-
-
-@dataclass
-class Progress:
-    """What a run has come to so far.
-
-    Attributes:
-        counters: How far it is.
-        rollouts: A row each.
-        evaluations: A row each.
-    """
-
-    counters: Counters = field(default_factory=Counters)
-    rollouts: list[RolloutRow] = field(default_factory=list)
-    evaluations: list[EvaluationRow] = field(default_factory=list)
 
 
 class Recorder(BaseCallback):
