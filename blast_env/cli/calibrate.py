@@ -152,6 +152,7 @@ def _reference(name: ReferenceName, study: FreeFieldStudy, burst: Burst) -> Refe
 
 
 def _write(report: CalibrationReport, stored: Calibration, stem: str) -> None:
+    # Here, because pictures need the extra `render`.
     from blast_env.rendering.figures import save_figure
     from blast_env.studies.calibration.figure import calibration_figure
 
@@ -296,6 +297,7 @@ def _write_shielding(
     exponent: float | None,
     options: ShieldingOptions,
 ) -> list[Path]:
+    # Here, because pictures need the extra `render`.
     from blast_env.rendering.figures import save_figure
     from blast_env.studies.shielding.figure import shielding_figure
 

@@ -10,8 +10,15 @@ from typing import Annotated, Final
 import pandas as pd
 import typer
 
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
-from blast_env.errors import BlastEnvError
+from blast_env.cli.output import (
+    make_table,
+    print_line,
+    progress_bar,
+    result_console,
+    save_pictures,
+    user_errors,
+)
+from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator, LayoutEvaluation, draw_threats, evaluate_against
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.export import LayoutPlan, check_target, export_layouts
@@ -146,10 +153,6 @@ def report_layout(
 
 
 def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
-    # Here, because pictures need the extra `render`.
-    from blast_env.rendering.evaluation_figures import evaluation_figure
-    from blast_env.rendering.figures import save_figure
-
     written = [evaluation.to_json(out / "evaluation.json")]
     tables = {
         "structures.csv": evaluation.table,
@@ -157,8 +160,15 @@ def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
         "threats.csv": evaluation.threat_table,
     }
     written += [write_table(table, out / name) for name, table in tables.items()]
-    written.append(save_figure(evaluation_figure(evaluation), out / "evaluation.png"))
-    return written
+    return written + save_pictures(lambda: _save_figure(evaluation, out))
+
+
+def _save_figure(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
+    # Here, because pictures need the extra `render`.
+    from blast_env.rendering.evaluation_figures import evaluation_figure
+    from blast_env.rendering.figures import save_figure
+
+    return [save_figure(evaluation_figure(evaluation), out / "evaluation.png")]
 
 
 def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
@@ -359,11 +369,7 @@ def _evaluate_file(path: Path, scenario: str, options: EvaluateOptions) -> None:
 
 def _evaluate_run(run: Path, options: EvaluateOptions) -> None:
     """Evaluate the agent of a run, if the packages that it needs are there."""
-    try:
+    # Here, because runs need the extras.
+    with import_extra("agents,render", "--run"):
         from blast_env.cli.agent_runs import evaluate_run
-    except ImportError as error:
-        missing = error.name or str(error)
-        raise BlastEnvError(
-            f"--run needs {missing!r}, which is not installed: pip install blast-env[agents,render]"
-        ) from error
     evaluate_run(run, options)

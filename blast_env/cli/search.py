@@ -3,20 +3,30 @@
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import pandas as pd
 import typer
+from blast_agents.search import (
+    LayoutProblem,
+    SearchMethod,
+    SearchResult,
+    find_search_method,
+    hidden_threats,
+    visible_threats,
+)
+from blast_agents.search import Progress as SearchProgress
+from blast_agents.search.problem import Unprotected
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.output import (
-    agents_extra,
     make_table,
     message_console,
     print_line,
     progress_bar,
     result_console,
+    save_pictures,
     user_errors,
 )
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
@@ -27,12 +37,6 @@ from blast_env.files import make_folder, write_atomically
 from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
 from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
-
-if TYPE_CHECKING:
-    from blast_agents.search import LayoutProblem, SearchMethod, SearchResult
-    from blast_agents.search import Progress as SearchProgress
-    from blast_agents.search.problem import Unprotected
-
 
 ThreatName = Literal["visible", "hidden"]
 
@@ -66,8 +70,8 @@ class SearchRun:
         cache_hits: Loads that it asked for and that were known already.
     """
 
-    result: "SearchResult"
-    unprotected: "Unprotected"
+    result: SearchResult
+    unprotected: Unprotected
     seconds: float
     cache_hits: int
 
@@ -114,16 +118,21 @@ def write_search(
     provenance = _provenance(run, options, checked)
     written = [write_layout(out / "layout.json", scenario, result.layout, provenance)]
     if result.history:
-        from blast_agents.search.figure import search_figure
-
-        from blast_env.rendering.figures import save_figure
-
         written.append(_write_table(result.history_table(), out / "history.csv"))
-        written.append(save_figure(search_figure(result, run.unprotected), out / "search.png"))
+        written += save_pictures(lambda: _save_figure(run, out))
     if result.front:
         written.append(_write_table(result.front_table(), out / "front.csv"))
     for path in written:
         print_line(f"wrote {path}")
+
+
+def _save_figure(run: SearchRun, out: Path) -> list[Path]:
+    # Here, because pictures need the extra `render`.
+    from blast_agents.search.figure import search_figure
+
+    from blast_env.rendering.figures import save_figure
+
+    return [save_figure(search_figure(run.result, run.unprotected), out / "search.png")]
 
 
 def _provenance(
@@ -225,7 +234,7 @@ def search(
     Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats that
     the search has not met; those blasts do not count.
     """
-    with user_errors(), agents_extra("a search"):
+    with user_errors():
         options = SearchOptions(
             method=method,
             scenario=scenario,
@@ -254,9 +263,6 @@ def search(
 
 
 def _run(options: SearchOptions, evaluator: BlastEvaluator, processes: int) -> SearchRun:
-    from blast_agents.search import LayoutProblem, find_search_method
-    from blast_agents.search.problem import Unprotected
-
     scenario = evaluator.scenario
     initial = tuple(load_layout(path, scenario) for path in options.start_from)
     method = find_search_method(options.method, initial)
@@ -274,8 +280,6 @@ def _run(options: SearchOptions, evaluator: BlastEvaluator, processes: int) -> S
 
 def _threats(scenario: Scenario, options: SearchOptions, seed: int) -> tuple[Threat, ...]:
     """Return the threats of the search (its seed) or those that check it (another seed)."""
-    from blast_agents.search import hidden_threats, visible_threats
-
     model = find_threat_model(options.threat, options.threats)
     realisations = find_realisations(options.realisations, options.threat)
     if options.threat == "hidden":
@@ -297,11 +301,11 @@ def _visible_charge(scenario: Scenario, options: SearchOptions) -> Charge:
 
 
 def _with_progress(
-    method: "SearchMethod",
-    problem: "LayoutProblem",
-    unprotected: "Unprotected",
+    method: SearchMethod,
+    problem: LayoutProblem,
+    unprotected: Unprotected,
     options: SearchOptions,
-) -> "SearchResult":
+) -> SearchResult:
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -313,7 +317,7 @@ def _with_progress(
         label = f"{method.name} search in {problem.scenario.name}"
         task = progress.add_task(label, total=options.budget, best="-")
 
-        def report(state: "SearchProgress") -> None:
+        def report(state: SearchProgress) -> None:
             best = "-" if state.best is None else percent(unprotected.reduction(state.best))
             progress.update(task, completed=state.blasts, best=best)
 

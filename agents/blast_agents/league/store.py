@@ -9,7 +9,6 @@ import re
 from dataclasses import asdict
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 from typing import Final, Generic, NamedTuple, TypeVar
 
@@ -26,7 +25,7 @@ from blast_env.evaluation.store import calibration_digest, engine_text
 from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.engines import find_engine
-from blast_env.provenance import code_version
+from blast_env.provenance import code_version, versions
 
 _PACKAGES: Final = ("numpy", "pymoo")
 """What a search draws its numbers with."""
@@ -194,11 +193,12 @@ def _search_code() -> str:
     folder = Path(blast_agents.__file__).parent
     paths = sorted((folder / "search").glob("*.py"))
     digest = sha256()
-    for path in (*paths, folder / "rules.py", folder / "random_layouts.py"):
+    for path in (*paths, folder / "rules.py"):
         if path.name not in _NO_INFLUENCE:
             digest.update(f"{path.name}\n".encode() + path.read_bytes())
-    versions = " ".join(f"{name} {version(name)}" for name in _PACKAGES)
-    return f"{digest.hexdigest()[:16]} {versions}"
+    known = versions(packages=_PACKAGES)
+    drawn_with = " ".join(f"{name} {known[name]}" for name in _PACKAGES)
+    return f"{digest.hexdigest()[:16]} {drawn_with}"
 
 
 def _model(case: TrackCase, engine: str) -> Model:
