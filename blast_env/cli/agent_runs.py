@@ -1,6 +1,6 @@
 """What the agent of a run proposes for threats that its training has not met.
 
-Imports `agents`, so the command imports this module only when it is asked for a run.
+Imports torch, so the command imports this module only when it is asked for a run.
 """
 
 import json
@@ -16,7 +16,7 @@ from blast_agents.training.held_out import Case
 from blast_agents.training.run_folder import SITES, RunFolder
 from blast_agents.unseen_cases import FIRST_SEED, propose, unseen_cases
 
-from blast_env.cli.evaluate import (
+from blast_env.cli.evaluation_report import (
     EvaluateOptions,
     cache_record,
     cache_text,
