@@ -20,7 +20,7 @@ from blast_agents.training.environments import environment_id
 from blast_agents.training.run_folder import EvaluationRow, RunFolder, read_rows
 from blast_agents.training.train import TrainingResult
 
-from blast_env.cli.evaluate import percent
+from blast_env.cli.evaluation_report import percent
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.export import LayoutPlan, export_layouts

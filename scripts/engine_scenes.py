@@ -13,7 +13,7 @@ from blast_env import load_scenario, simulate
 from blast_env.files import write_atomically
 from blast_env.geometry import Cell
 from blast_env.physics.collisions import incidence_angle_rad
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
 from blast_env.studies.benchmark.engines import dense_courtyard

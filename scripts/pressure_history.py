@@ -11,12 +11,13 @@ import joblib
 import typer
 
 from blast_env import load_scenario, simulate
-from blast_env.calibration import Friedlander, facade_history, kingery_bulmash
+from blast_env.calibration import Friedlander, kingery_bulmash
 from blast_env.calibration.model import load_calibration
 from blast_env.cli.output import print_line, user_errors
 from blast_env.rendering.figures import save_figure
 from blast_env.simulation import BlastResult
 from blast_env.studies.pressure.figure import PressureCase, pressure_figure
+from blast_env.studies.pressure.pulses import facade_history
 from blast_env.units import MS_PER_S
 
 CALIBRATION = "ballistic_kb_100kg"

@@ -1,13 +1,10 @@
 """What the agent of a run proposes for threats that its training has not met.
 
-Imports `agents`, so the command imports this module only when it is asked for a run.
+Imports torch, so the command imports this module only when it is asked for a run.
 """
 
 import json
-import platform
-import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
@@ -18,7 +15,7 @@ from blast_agents.training.cases import unseen_cases
 from blast_agents.training.environments import training_source
 from blast_agents.training.run_folder import SITES, RunFolder
 
-from blast_env.cli.evaluate import (
+from blast_env.cli.evaluation_report import (
     EvaluateOptions,
     cache_record,
     cache_text,
@@ -36,6 +33,7 @@ from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
 from blast_env.physics.engine import Engine
 from blast_env.rendering.evaluation_figures import comparison_figure
+from blast_env.provenance import command, versions
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import save_scenario
 from blast_env.units import MS_PER_S
@@ -215,15 +213,12 @@ def _place(settings: TrainingSettings, cases: Sequence[Case]) -> str:
 def _provenance(run: Path, settings: TrainingSettings) -> dict[str, Any]:
     """Return where the layouts come from."""
     return {
-        "command": ["blast-env", *sys.argv[1:]],
+        "command": command(),
         "run": str(run),
         "weights": "best",
         "algorithm": settings.algorithm,
         "threat": settings.threat,
-        "versions": {
-            name: version(name) for name in ("blast-env", "torch", "stable-baselines3", "numpy")
-        }
-        | {"python": platform.python_version()},
+        "versions": versions(packages=("torch", "stable-baselines3", "numpy")),
     }
 
 

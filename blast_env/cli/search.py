@@ -1,25 +1,29 @@
 """What `blast-env search` prints and writes."""
 
-import platform
-import sys
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import pandas as pd
 import typer
+from blast_agents.search import (
+    LayoutProblem,
+    SearchMethod,
+    SearchResult,
+    find_search_method,
+)
+from blast_agents.search import Progress as SearchProgress
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.output import (
-    agents_extra,
     make_table,
     message_console,
     print_line,
     progress_bar,
     result_console,
+    save_pictures,
     user_errors,
 )
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
@@ -34,16 +38,12 @@ from blast_env.evaluation import (
     evaluate_against,
 )
 from blast_env.evaluation.cases import practice_hidden, practice_visible
+from blast_env.statistics import reductions
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.files import make_folder, write_atomically
 from blast_env.physics.scene import Charge
+from blast_env.provenance import command, versions
 from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
-from blast_env.statistics import reductions
-
-if TYPE_CHECKING:
-    from blast_agents.search import LayoutProblem, SearchMethod, SearchResult
-    from blast_agents.search import Progress as SearchProgress
-
 
 ThreatName = Literal["visible", "hidden"]
 
@@ -77,8 +77,8 @@ class SearchRun:
         cache_hits: Loads that it asked for and that were known already.
     """
 
-    problem: "LayoutProblem"
-    result: "SearchResult"
+    problem: LayoutProblem
+    result: SearchResult
     seconds: float
     cache_hits: int
 
@@ -126,16 +126,21 @@ def write_search(
     provenance = _provenance(run, options, checked)
     written = [write_layout(out / "layout.json", scenario, result.layout, provenance)]
     if result.history:
-        from blast_agents.search.figure import search_figure
-
-        from blast_env.rendering.figures import save_figure
-
         written.append(_write_table(result.history_table(), out / "history.csv"))
-        written.append(save_figure(search_figure(result, run.problem), out / "search.png"))
+        written += save_pictures(lambda: _save_figure(run, out))
     if result.front:
         written.append(_write_table(result.front_table(), out / "front.csv"))
     for path in written:
         print_line(f"wrote {path}")
+
+
+def _save_figure(run: SearchRun, out: Path) -> list[Path]:
+    # Here, because pictures need the extra `render`.
+    from blast_agents.search.figure import search_figure
+
+    from blast_env.rendering.figures import save_figure
+
+    return [save_figure(search_figure(run.result, run.problem), out / "search.png")]
 
 
 def _provenance(
@@ -145,18 +150,13 @@ def _provenance(
     result, problem = run.result, run.problem
     low, high = (None if np.isnan(end) else float(end) for end in checked.ci95)
     return {
-        "command": ["blast-env", *sys.argv[1:]],
+        "command": command(),
         "options": asdict(options),
         "threats": [
             {"charge_position_m": t.charge.position_m, "tnt_kg": t.charge.tnt_kg, "seed": t.seed}
             for t in problem.threats
         ],
-        "versions": {
-            "blast_env": version("blast-env"),
-            "engine": problem.evaluator.engine.version,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-        },
+        "versions": versions(problem.evaluator.engine.version),
         "result": {
             "blasts": result.blasts,
             "interrupted": result.interrupted,
@@ -238,7 +238,7 @@ def search(
     Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats that
     the search has not met; those blasts do not count.
     """
-    with user_errors(), agents_extra("a search"):
+    with user_errors():
         options = SearchOptions(
             method=method,
             scenario=scenario,
@@ -267,8 +267,6 @@ def search(
 
 
 def _run(options: SearchOptions, evaluator: BlastEvaluator, processes: int) -> SearchRun:
-    from blast_agents.search import LayoutProblem, find_search_method
-
     scenario = evaluator.scenario
     initial = tuple(load_layout(path, scenario) for path in options.start_from)
     method = find_search_method(options.method, initial)
@@ -304,8 +302,8 @@ def _visible_charge(scenario: Scenario, options: SearchOptions) -> Charge:
 
 
 def _with_progress(
-    method: "SearchMethod", problem: "LayoutProblem", options: SearchOptions
-) -> "SearchResult":
+    method: SearchMethod, problem: LayoutProblem, options: SearchOptions
+) -> SearchResult:
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -317,7 +315,7 @@ def _with_progress(
         label = f"{method.name} search in {problem.scenario.name}"
         task = progress.add_task(label, total=options.budget, best="-")
 
-        def report(state: "SearchProgress") -> None:
+        def report(state: SearchProgress) -> None:
             best = "-" if state.best is None else percent(problem.reduction(state.best))
             progress.update(task, completed=state.blasts, best=best)
 

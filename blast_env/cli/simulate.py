@@ -81,6 +81,7 @@ def _changed(scenario: Scenario, preset: str | None, stand_off: float | None) ->
 def _run(blast: Blast, film: Path | None, progress: Callable[[float], None]) -> BlastResult:
     if film is None:
         return blast.run(progress)
+    # Here, because films need the extra `render`.
     from blast_env.rendering.film import write_film
 
     return write_film(blast, film, progress=progress)
@@ -95,6 +96,7 @@ def _write(
     if parquet is not None:
         written.append(result.to_parquet(parquet))
     if heat_map is not None:
+        # Here, because pictures need the extra `render`.
         from blast_env.rendering import figures
 
         figures.save_figure(figures.heat_map(result), heat_map)

@@ -14,13 +14,14 @@ from blast_env.evaluation.store import (
     BlastKey,
     LoadsCache,
     calibration_digest,
-    code_version,
     engine_text,
     find_cache,
 )
 from blast_env.geometry import Cell
-from blast_env.physics.engine import Engine, find_engine
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
+from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
 from blast_env.scenario import Scenario, check_layout
 from blast_env.simulation import Blast

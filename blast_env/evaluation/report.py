@@ -2,11 +2,9 @@
 
 import json
 import math
-import platform
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,6 +24,7 @@ from blast_env.evaluation.store import BlastCache
 from blast_env.files import write_atomically
 from blast_env.geometry import Cell, Layout
 from blast_env.physics.engine import Engine
+from blast_env.provenance import versions
 from blast_env.recording.tables import module_table
 from blast_env.scenario import Scenario, check_layout
 from blast_env.scenario.build_scene import build_scene
@@ -173,7 +172,7 @@ def evaluation_record(evaluation: "LayoutEvaluation") -> dict[str, Any]:
         "layout": [list(cell) for cell in evaluation.layout],
         "engine": evaluation.engine_name,
         "calibration": evaluation.calibration.name,
-        "versions": _versions(evaluation.engine_version),
+        "versions": versions(evaluation.engine_version),
         "result": _result(evaluation),
         "notes": list(evaluation.notes),
         "threats": _rows(evaluation.threat_table),
@@ -219,7 +218,7 @@ def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
     ]
     return {
         "engine": engine.name,
-        "versions": _versions(engine.version),
+        "versions": versions(engine.version),
         "result": {
             "reduction": _estimate(comparison.reduction),
             "impulse_pa_s": _estimate(comparison.mean_pa_s),
@@ -229,15 +228,6 @@ def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
             "unprotected_cvar_pa_s": comparison.unprotected_cvar_pa_s,
         },
         "cases": cases,
-    }
-
-
-def _versions(engine_version: str) -> dict[str, str]:
-    return {
-        "blast_env": version("blast-env"),
-        "engine": engine_version,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
     }
 
 

@@ -5,9 +5,7 @@ import json
 import warnings
 from collections import OrderedDict
 from dataclasses import asdict
-from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
@@ -21,9 +19,6 @@ from blast_env.geometry import Cell
 from blast_env.physics.engine import Engine
 from blast_env.physics.scene import Charge
 
-_NO_INFLUENCE: Final = frozenset({"cli", "envs", "export", "recording", "rendering", "sites"})
-"""Parts of the package that cannot change the loads of a blast."""
-
 
 class BlastKey(NamedTuple):
     """All that the loads of a blast depend on.
@@ -35,7 +30,7 @@ class BlastKey(NamedTuple):
         seed: Seed of fan and air.
         engine: The engine with its version; see `engine_text`.
         calibration: Digest of the calibration, for the loads in psi*s.
-        code: Version of the package; see `code_version`.
+        code: Version of the package; see `provenance.code_version`.
     """
 
     scenario_hash: str
@@ -108,21 +103,6 @@ def engine_text(engine: Engine) -> str:
 def calibration_digest(calibration: Calibration) -> str:
     """Return the SHA-256 of a calibration: one of the same name may be made anew."""
     return sha256(calibration.model_dump_json().encode()).hexdigest()
-
-
-@cache
-def code_version() -> str:
-    """Return the version of the package, with a digest of the code that loads depend on.
-
-    The digest, because whoever changes the model does not change the version at once.
-    """
-    folder = Path(__file__).resolve().parents[1]
-    digest = sha256()
-    for path in sorted(folder.rglob("*.py")):
-        name = path.relative_to(folder)
-        if name.parts[0] not in _NO_INFLUENCE:
-            digest.update(f"{name.as_posix()}\n".encode() + path.read_bytes())
-    return f"{version('blast-env')}+{digest.hexdigest()[:16]}"
 
 
 SUFFIX: Final = ".loads"

@@ -13,7 +13,7 @@ from blast_env.studies.shielding.reflection import (
     ReflectionStudy,
     head_on_load,
 )
-from blast_env.studies.shielding.report import BlockGeometry
+from blast_env.studies.shielding.report import BlockGeometry, ShieldingStudy
 from blast_env.studies.shielding.scenes import facade_scenario
 from tests.calibration.shielding_cases import DENSE
 
@@ -119,8 +119,6 @@ def test_bad_distances_are_refused(distances: tuple[float, ...], words: str) -> 
 
 def test_side_on_loads_are_the_transferred_ones(report: ReflectionReport) -> None:
     """The same blasts in the open as the shielding study's, so that the two can be compared."""
-    from blast_env.studies.shielding.report import ShieldingStudy
-
     study = report.study
     shielding = ShieldingStudy(DENSE, seeds=study.seeds, geometry=GEOMETRY).run()
     assert shielding.wall[:, LoadKind.TRANSFERRED].tobytes() == report.side_on.tobytes()

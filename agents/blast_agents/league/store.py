@@ -7,7 +7,6 @@ import json
 import re
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -19,10 +18,11 @@ from blast_agents.league.tracks import practice_of
 from blast_agents.proposal import Proposal
 from blast_env.calibration.model import scenario_calibration
 from blast_env.evaluation import Case, Threat
-from blast_env.evaluation.store import calibration_digest, code_version, engine_text
+from blast_env.evaluation.store import calibration_digest, engine_text
 from blast_env.files import FolderStore
 from blast_env.geometry import Layout
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
+from blast_env.provenance import code_version, versions
 
 _PACKAGES: Final = ("numpy", "pymoo")
 """What a search draws its numbers with."""
@@ -171,8 +171,9 @@ def _search_code() -> str:
     for path in (*paths, folder / "rules.py"):
         if path.name not in _NO_INFLUENCE:
             digest.update(f"{path.name}\n".encode() + path.read_bytes())
-    versions = " ".join(f"{name} {version(name)}" for name in _PACKAGES)
-    return f"{digest.hexdigest()[:16]} {versions}"
+    known = versions(packages=_PACKAGES)
+    drawn_with = " ".join(f"{name} {known[name]}" for name in _PACKAGES)
+    return f"{digest.hexdigest()[:16]} {drawn_with}"
 
 
 def _model(case: Case, engine: str) -> Model:
