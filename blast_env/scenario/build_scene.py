@@ -9,7 +9,7 @@ from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.presets import for_charge
 from blast_env.physics.scene import Charge, Scene, StructureOutline
 from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
-from blast_env.scenario import Scenario, check_layout
+from blast_env.scenario import BuildZone, Scenario, check_layout
 from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
 from blast_env.units import UNITS_PER_M
 
@@ -66,7 +66,7 @@ def build_scene(
     site = scenario.site.rectangle_m.scaled(UNITS_PER_M)
     structures = tuple(_outline(section) for section in scenario.structures)
     if cells:
-        structures += (_barrier_outline(scenario, cells),)
+        structures += (barrier_outline(scenario.zone, cells),)
     centre = (charge.position_m[0] * UNITS_PER_M, charge.position_m[1] * UNITS_PER_M)
     air = air_lattice(
         parameters.air,
@@ -113,10 +113,8 @@ def _outline(section: AnyStructure) -> StructureOutline:
     )
 
 
-def _barrier_outline(scenario: Scenario, cells: tuple[Cell, ...]) -> StructureOutline:
-    zone = scenario.build_zone
-    if zone is None:  # check_layout refuses a layout without a zone
-        raise AssertionError("a layout was accepted without a build zone")
+def barrier_outline(zone: BuildZone, cells: tuple[Cell, ...]) -> StructureOutline:
+    """Return the barrier that the modules on these cells of a zone make."""
     return StructureOutline(
         kind=ModularObstacle,
         name=BARRIER_NAME,

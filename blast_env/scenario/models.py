@@ -102,6 +102,19 @@ class Scenario(Section):
     calibration: Name | None = None
 
     @property
+    def zone(self) -> BuildZone:
+        """The build zone, for what cannot do without one.
+
+        Raises:
+            BlastEnvError: If there is none.
+        """
+        if self.build_zone is None:
+            raise BlastEnvError(
+                f"scenario {self.name!r} has no build zone, so nothing can be placed in it"
+            )
+        return self.build_zone
+
+    @property
     def parameters(self) -> SimulationParameters:
         """The parameters of the blast model."""
         return self.simulation.parameters
