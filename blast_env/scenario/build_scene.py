@@ -9,7 +9,7 @@ from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.presets import for_charge
 from blast_env.physics.scene import Charge, Scene, StructureOutline
 from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
-from blast_env.scenario import BuildZone, Scenario, check_layout
+from blast_env.scenario import BuildZone, Scenario, check_layout, usable_cells
 from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
 from blast_env.units import UNITS_PER_M
 
@@ -59,7 +59,7 @@ def build_scene(
     """
     cells = check_layout(scenario, layout)
     if charge is not None:
-        check_layout(scenario.with_charge(charge), cells)
+        _check_clear(scenario.with_charge(charge), cells)
     charge_rng, fan_rng, air_rng = random_streams(seed)
     charge = scenario.sample_charge(charge_rng) if charge is None else charge
     parameters = for_charge(scenario.parameters, charge.tnt_kg)
@@ -85,6 +85,17 @@ def build_scene(
         structures=structures,
         parameters=parameters,
     )
+
+
+def _check_clear(scenario: Scenario, cells: tuple[Cell, ...]) -> None:
+    """Refuse a layout with a module on the charge; nothing else depends on where that is.
+
+    Raises:
+        LayoutError: If there is one.
+    """
+    usable = usable_cells(scenario)
+    if not all(usable[cell] for cell in cells):
+        check_layout(scenario, cells)
 
 
 def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]:

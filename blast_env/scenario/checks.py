@@ -171,6 +171,17 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
     )
 
 
+def check_sources(parts: Parts) -> tuple[Problem, ...]:
+    """Return what is wrong between the sources of the charge and the other sections.
+
+    Those are what `check_parts` finds if the other sections fit each other.
+    """
+    problems = (*_charge_problems(parts), *_build_zone_problems(parts))
+    if parts.parameters is None:
+        return problems
+    return (*problems, *_charge_scaling_problems(parts.parameters, parts.sources))
+
+
 def _sound(adapter: TypeAdapter[Item], value: object) -> Item | None:
     """Return the section, or `None` if it is missing or unsound."""
     try:

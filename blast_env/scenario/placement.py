@@ -55,6 +55,8 @@ def cell_from(item: Any, place: str) -> Cell:
     Raises:
         LayoutError: If it is anything else.
     """
+    if type(item) is tuple and tuple(map(type, item)) == (int, int):
+        return item  # the usual case
     listed = item.tolist() if isinstance(item, np.ndarray | np.generic) else item
     if not isinstance(listed, list | tuple):
         raise LayoutError(f"{place}: is {type_word(listed)}, {_PAIR}")

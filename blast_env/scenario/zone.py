@@ -18,6 +18,7 @@ from blast_env.scenario.sections import (
     AnyStructure,
     Count,
     PointM,
+    PointSource,
     RectangleSource,
     Section,
     SizeM,
@@ -188,8 +189,8 @@ def source_bounds_m(source: AnySource) -> Rectangle:
 
 def distances_m(source: AnySource, boxes: Boxes) -> FloatArray:
     """Return how near the centre of a charge from this source can come to each rectangle."""
-    if isinstance(source, RectangleSource):
-        return box_distances_m(source.rectangle_m, boxes)
+    if isinstance(source, PointSource | RectangleSource):
+        return box_distances_m(source_bounds_m(source), boxes)
     return _segment_distances(*source.segment_m, boxes)
 
 
