@@ -32,8 +32,8 @@ from blast_env.evaluation.report import case_table, comparison_record
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
 from blast_env.physics.engine import Engine
-from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.provenance import command, versions
+from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import save_scenario
 from blast_env.units import MS_PER_S

@@ -1,7 +1,7 @@
 """The options of `blast-env evaluate`, and what it prints and writes."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -16,7 +16,14 @@ from blast_env.cli.output import (
     result_console,
     save_pictures,
 )
-from blast_env.evaluation import Evaluators, SeedRange, BlastEvaluator, LayoutEvaluation, draw_threats, evaluate_against
+from blast_env.evaluation import (
+    BlastEvaluator,
+    Evaluators,
+    LayoutEvaluation,
+    SeedRange,
+    draw_threats,
+    evaluate_against,
+)
 from blast_env.export import LayoutPlan, check_target, export_layouts
 from blast_env.files import make_folder, write_atomically
 from blast_env.statistics import Estimate

@@ -1,9 +1,9 @@
 """What `blast-env search` prints and writes."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -38,12 +38,12 @@ from blast_env.evaluation import (
     evaluate_against,
 )
 from blast_env.evaluation.cases import practice_hidden, practice_visible
-from blast_env.statistics import reductions
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.files import make_folder, write_atomically
 from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
 from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
+from blast_env.statistics import reductions
 
 ThreatName = Literal["visible", "hidden"]
 

@@ -59,12 +59,10 @@ def _map(
     )
     y, x = _centres_m(rows)[:, np.newaxis], _centres_m(columns)[np.newaxis, :]
     characters = np.full((rows, columns), " ")
-    zone = scenario.build_zone
-    if zone is not None:
-        free = placement.free
-        for cell in zone.cells():
-            sign = "M" if cell in placement.cells else "." if free[cell] else "x"
-            characters[_inside(zone.cell_rectangle_m(cell), x, y)] = sign
+    zone, free = scenario.zone, placement.free
+    for cell in zone.cells():
+        sign = "M" if cell in placement.cells else "." if free[cell] else "x"
+        characters[_inside(zone.cell_rectangle_m(cell), x, y)] = sign
     known = len(sources) == 1 and isinstance(sources[0], PointSource)
     for source in sources:
         near = distances_m(source, (x, y, x, y)) <= scenario.charge_radius_m
@@ -209,11 +207,10 @@ def _outcome(episode: Episode) -> str:
 
 def _state_lines(episode: Episode) -> list[str]:
     """Return what is left to build with, and how many illegal actions there were."""
-    placement, zone = episode.placement, episode.placement.scenario.build_zone
-    stock = 0 if zone is None else zone.stock
-    lines = [f"{placement.stock_left} of {stock} modules left"]
+    placement, zone = episode.placement, episode.placement.scenario.zone
+    lines = [f"{placement.stock_left} of {zone.stock} modules left"]
     extras = []
-    if zone is not None and zone.budget is not None:
+    if zone.budget is not None:
         extras.append(f"budget: {placement.budget_left:g} of {zone.budget:g} left")
     if episode.illegal_actions:
         plural = "" if episode.illegal_actions == 1 else "s"

@@ -14,7 +14,6 @@ from blast_env.envs.arguments import (
     real_number,
     strategy,
     whole_number,
-    with_possible_charges,
 )
 from blast_env.envs.observations import (
     Array,
@@ -219,7 +218,7 @@ class Task:
         if options.blast_seed is not None:
             seeds = options.blast_seed + np.arange(seeds.size).reshape(seeds.shape)
         charges = tuple(options.charge(each) for each in drawn)
-        possible = with_possible_charges(scenario, charges) if options.fix_charge else scenario
+        possible = scenario.with_possible_charges(charges) if options.fix_charge else scenario
         evaluator = self.evaluators.of(scenario)
         sight = Sight(scenario, self.threat_model.shown(scenario, charges), evaluator)
         placement = Placement.of(possible, options.layout)

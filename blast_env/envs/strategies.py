@@ -129,11 +129,7 @@ def zone_of(scenario: Scenario) -> BuildZone:
     Raises:
         BlastEnvError: If it has none.
     """
-    if scenario.build_zone is None:
-        raise BlastEnvError(
-            f"scenario {scenario.name!r} has no build zone, so nothing can be placed in it"
-        )
-    return scenario.build_zone
+    return scenario.zone
 
 
 def check_size(scenario: Scenario, representative: Scenario) -> None:
@@ -160,8 +156,7 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
 
 
 def _sizes(scenario: Scenario) -> tuple[tuple[float, float], tuple[int, int]]:
-    zone = zone_of(scenario)
-    return (scenario.site.width_m, scenario.site.height_m), (zone.rows, zone.columns)
+    return (scenario.site.width_m, scenario.site.height_m), scenario.zone.shape
 
 
 @dataclass(frozen=True)

@@ -158,8 +158,7 @@ class LayoutRepair(Repair):
 
 def repaired(scenario: Scenario, layout: Layout, rng: np.random.Generator) -> Layout:
     """Return as much of a layout as may stand: what is left out is chosen at random."""
-    zone = scenario.build_zone
-    stock = 0 if zone is None else zone.stock
+    stock = scenario.zone.stock
     if len(layout) > stock:
         kept = rng.choice(len(layout), size=stock, replace=False)
         layout = tuple(layout[index] for index in sorted(kept))

@@ -59,8 +59,7 @@ class LayoutProblem:
     @property
     def stock(self) -> int:
         """Most modules that a layout may have."""
-        zone = self.scenario.build_zone
-        return 0 if zone is None else zone.stock
+        return self.scenario.zone.stock
 
     @property
     def charge(self) -> Charge:
