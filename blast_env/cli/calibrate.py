@@ -17,7 +17,14 @@ from blast_env.calibration.model import (
     save_calibration,
 )
 from blast_env.calibration.references import paper_table
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
+from blast_env.cli.output import (
+    make_table,
+    print_line,
+    progress_bar,
+    result_console,
+    save_pictures,
+    user_errors,
+)
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
 from blast_env.physics.engines import find_engine
@@ -108,10 +115,10 @@ def calibrate_free_field(options: FreeFieldOptions) -> None:
     report = fit_laws(study, runs, reference, options.simulated)
     stored = report.calibration(options.name, options.law)
     stored = stored.model_copy(update={"tnt_range_kg": tnt_range_kg})
-    _write(report, stored, options.stem)
+    written = _write(report, stored, options.stem)
     _print(report, stored)
-    for suffix in (".json", ".csv", ".png", ".runs.jsonl"):
-        print_line(f"wrote {options.stem}{suffix}")
+    for path in (*written, f"{options.stem}.runs.jsonl"):
+        print_line(f"wrote {path}")
 
 
 def _scenario(options: FreeFieldOptions) -> Scenario:
@@ -151,15 +158,20 @@ def _reference(name: ReferenceName, study: FreeFieldStudy, burst: Burst) -> Refe
     return kingery_bulmash_reference(study.distances_m, charge_kg, name, burst)
 
 
-def _write(report: CalibrationReport, stored: Calibration, stem: str) -> None:
+def _write(report: CalibrationReport, stored: Calibration, stem: str) -> list[Path]:
+    record, table, picture = (Path(f"{stem}{suffix}") for suffix in (".json", ".csv", ".png"))
+    save_calibration(stored, record)
+    with write_atomically(table) as temporary:
+        report.table().to_csv(temporary, index=False)
+    return [record, table, *save_pictures(lambda: _save_figure(report, stored, picture))]
+
+
+def _save_figure(report: CalibrationReport, stored: Calibration, path: Path) -> list[Path]:
     # Here, because pictures need the extra `render`.
     from blast_env.rendering.figures import save_figure
     from blast_env.studies.calibration.figure import calibration_figure
 
-    save_calibration(stored, Path(f"{stem}.json"))
-    with write_atomically(Path(f"{stem}.csv")) as temporary:
-        report.table().to_csv(temporary, index=False)
-    save_figure(calibration_figure(report, stored.name), Path(f"{stem}.png"))
+    return [save_figure(calibration_figure(report, stored.name), path)]
 
 
 def _print(report: CalibrationReport, stored: Calibration) -> None:
@@ -297,18 +309,22 @@ def _write_shielding(
     exponent: float | None,
     options: ShieldingOptions,
 ) -> list[Path]:
-    # Here, because pictures need the extra `render`.
-    from blast_env.rendering.figures import save_figure
-    from blast_env.studies.shielding.figure import shielding_figure
-
     stem = f"shielding.{options.preset}.{options.engine}"
     record, gauges = options.out / f"{stem}.json", options.out / f"{stem}.csv"
     with write_atomically(record) as temporary:
         temporary.write_text(report.to_json(exponent, reflection), encoding="utf-8")
     with write_atomically(gauges) as temporary:
         report.gauges.to_csv(temporary, index=False)
-    figure = save_figure(shielding_figure(report, exponent), options.out / f"{stem}.png")
-    return [record, gauges, figure]
+    picture = options.out / f"{stem}.png"
+    return [record, gauges, *save_pictures(lambda: _save_shielding(report, exponent, picture))]
+
+
+def _save_shielding(report: ShieldingReport, exponent: float | None, path: Path) -> list[Path]:
+    # Here, because pictures need the extra `render`.
+    from blast_env.rendering.figures import save_figure
+    from blast_env.studies.shielding.figure import shielding_figure
+
+    return [save_figure(shielding_figure(report, exponent), path)]
 
 
 def _print_ratios(report: ShieldingReport, exponent: float | None) -> None:
