@@ -41,6 +41,7 @@ from blast_env.studies.shielding.report import (
     ShieldingStudy,
     scaled_ratio,
 )
+from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
 
 ReferenceName = Literal["paper_ufc", "reflected_impulse", "incident_impulse"]
@@ -99,7 +100,7 @@ def calibrate_free_field(options: FreeFieldOptions) -> None:
     """
     distances_m = _parse_numbers("--distances", options.distances)
     tnt_range_kg = _parse_range(options.tnt_range)
-    options.out.mkdir(parents=True, exist_ok=True)
+    make_folder(options.out)
     engine = find_engine(options.engine).name
     study = FreeFieldStudy(_scenario(options), distances_m, options.seeds, engine)
     reference = _reference(options.reference, study, options.burst)
@@ -156,8 +157,7 @@ def _write(report: CalibrationReport, stored: Calibration, stem: str) -> None:
     from blast_env.studies.calibration.figure import calibration_figure
 
     save_calibration(stored, Path(f"{stem}.json"))
-    with write_atomically(Path(f"{stem}.csv")) as temporary:
-        report.table().to_csv(temporary, index=False)
+    write_csv(report.table(), f"{stem}.csv")
     save_figure(calibration_figure(report, stored.name), Path(f"{stem}.png"))
 
 
@@ -300,11 +300,10 @@ def _write_shielding(
     from blast_env.studies.shielding.figure import shielding_figure
 
     stem = f"shielding.{options.preset}.{options.engine}"
-    record, gauges = options.out / f"{stem}.json", options.out / f"{stem}.csv"
+    record = options.out / f"{stem}.json"
     with write_atomically(record) as temporary:
         temporary.write_text(report.to_json(exponent, reflection), encoding="utf-8")
-    with write_atomically(gauges) as temporary:
-        report.gauges.to_csv(temporary, index=False)
+    gauges = write_csv(report.gauges, options.out / f"{stem}.csv")
     figure = save_figure(shielding_figure(report, exponent), options.out / f"{stem}.png")
     return [record, gauges, figure]
 

@@ -46,11 +46,12 @@ def test_an_interrupted_study_goes_on_without_repeating(
     store, whole, run_one = tmp_path / "runs.jsonl", STUDY.run(), study_module._run_one
     ran: list[tuple[float, int]] = []
 
-    def counted(key: str, scenario: object, distance_m: float, seed: int, engine: str) -> object:
+    def counted(job: tuple) -> object:
+        _, _, distance_m, seed, _ = job
         if len(ran) == 4:
             raise KeyboardInterrupt
         ran.append((distance_m, seed))
-        return run_one(key, scenario, distance_m, seed, engine)  # type: ignore[arg-type]
+        return run_one(job)
 
     monkeypatch.setattr(study_module, "_run_one", counted)
     with pytest.raises(KeyboardInterrupt):

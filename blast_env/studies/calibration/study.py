@@ -9,7 +9,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-import joblib
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -32,6 +31,7 @@ from blast_env.calibration.references import kingery_bulmash, paper_ufc_column
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import find_engine
 from blast_env.physics.parameters import parameters_digest
+from blast_env.runner import as_completed
 from blast_env.scenario import Scenario
 from blast_env.simulation import simulate
 from blast_env.units import PA_PER_PSI, UNITS_PER_M
@@ -121,9 +121,8 @@ class FreeFieldStudy:
             for seed in self.seeds
         }
         missing = [key for key in wanted if key not in finished]
-        jobs = (joblib.delayed(_run_one)(key, *wanted[key], self.engine) for key in missing)
-        parallel = joblib.Parallel(n_jobs=processes, return_as="generator_unordered")
-        for done, run in enumerate(parallel(jobs), start=1):
+        jobs = [(key, *wanted[key], self.engine) for key in missing]
+        for done, (_, run) in enumerate(as_completed(_run_one, jobs, processes), start=1):
             finished[run.key] = run
             if store is not None:
                 append_to_store(store, run)
@@ -225,10 +224,9 @@ def _cut_unfinished_line(file: Any) -> None:
     file.truncate(file.read().rfind(b"\n") + 1)
 
 
-def _run_one(
-    key: str, scenario: Scenario, distance_m: float, seed: int, engine: str
-) -> FreeFieldRun:
+def _run_one(job: tuple[str, Scenario, float, int, str]) -> FreeFieldRun:
     """Run one blast, in a worker process."""
+    key, scenario, distance_m, seed, engine = job
     result = simulate(scenario, seed=seed, engine=engine)
     (structure,) = result.obstacles
     return FreeFieldRun(
