@@ -82,6 +82,22 @@ def as_completed(
     return _parallel(numbered, list(enumerate(items)), workers, kind, "generator_unordered")
 
 
+def share_of(
+    progress: Callable[[float], None] | None, done: int, whole: int, part: int = 1
+) -> Callable[[float], None] | None:
+    """Return a function that reports the share of a part as a share of the whole.
+
+    Args:
+        progress: Takes the share of the whole.
+        done: How much of the whole comes before the part.
+        whole: How much there is in all.
+        part: How much the part is.
+    """
+    if progress is None:
+        return None
+    return lambda share: progress((done + share * part) / whole)
+
+
 def check_workers(name: str, workers: int) -> None:
     """Refuse a number of workers that is not a whole number of at least 1 (`BlastEnvError`)."""
     if not isinstance(workers, int) or isinstance(workers, bool) or workers < 1:

@@ -173,7 +173,7 @@ OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(
 
 
 VISIBLE_REALISATIONS: Final = 2
-"""Blasts for a visible charge unless an argument says otherwise (`scripts.measure_noise`)."""
+"""Blasts for a visible charge unless an argument says otherwise (`scripts.layouts noise`)."""
 
 
 HIDDEN_THREATS: Final = 16

@@ -32,9 +32,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import find_engine
 from blast_env.physics.parameters import parameters_digest
 from blast_env.runner import as_completed
-from blast_env.scenario import Scenario
+from blast_env.scenario import Scenario, load_scenario
 from blast_env.simulation import simulate
-from blast_env.units import PA_PER_PSI, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
 RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")
 
@@ -135,6 +135,23 @@ class FreeFieldStudy:
     def _key(self, scenario: Scenario, seed: int) -> str:
         version = find_engine(self.engine).version
         return f"{scenario.content_hash} {seed} {self.engine} {version}"
+
+
+def free_field(tnt_kg: float | None = None, side_modules: int | None = None) -> Scenario:
+    """Return `free_field` with another charge, or a facade of another width.
+
+    The strip behind the facade stays as wide as it was.
+    """
+    document = load_scenario("free_field").model_dump()
+    (source,), (structure,) = document["charge"], document["structures"]
+    if tnt_kg is not None:
+        source["tnt_kg"] = tnt_kg
+    if side_modules is not None:
+        lower_m = (document["site"]["height_m"] - side_modules * MODULE_SIDE_M) / 2.0
+        document["site"]["width_m"] += (side_modules - structure["side_modules"]) * MODULE_SIDE_M
+        structure["corner_m"] = (structure["corner_m"][0], lower_m)
+        structure["side_modules"] = side_modules
+    return Scenario.from_document(document, "free_field with changes")
 
 
 def impulse_by_seed(

@@ -43,7 +43,6 @@ from blast_env.studies.shielding.scenes import (
 if TYPE_CHECKING:
     from blast_env.studies.shielding.reflection import ReflectionReport
 
-
 SCHEMA_VERSION: Final = 1
 """The version of the file that `ShieldingReport.to_json` writes."""
 
@@ -100,7 +99,6 @@ def _plain(value: Any) -> Any:
 
 LoadName = Literal["transferred_impulse", "impulse"]
 """The momentum really transferred along the normals, or the paper's m |v|."""
-
 
 LOADS: Final[Mapping[LoadName, LoadKind]] = MappingProxyType(
     {"transferred_impulse": LoadKind.TRANSFERRED, "impulse": LoadKind.IMPULSE}
