@@ -18,8 +18,8 @@ def test_equal_shares_at_all_gauges_are_the_ratio() -> None:
     report = made_up(0.4)
     for estimate in (
         report.one_corner,
-        report.one_corner_near,
-        report.one_corner_far,
+        report.ratio("one_corner_near"),
+        report.ratio("one_corner_far"),
         report.two_corners,
         report.ratio("one_corner", "impulse"),
     ):
@@ -33,8 +33,8 @@ def test_thirds_and_faces_are_the_gauges_that_their_names_say() -> None:
     even = made_up(1.0, seeds=1)
     shares = np.concatenate((np.full(8, 0.2), np.full(7, 0.5), np.full(8, 0.8), np.full(12, 0.3)))
     report = ShieldingReport(even.study, even.block * shares, even.wall)
-    assert report.one_corner_near.value == pytest.approx(0.2, rel=1e-6)
-    assert report.one_corner_far.value == pytest.approx(0.8, rel=1e-6)
+    assert report.ratio("one_corner_near").value == pytest.approx(0.2, rel=1e-6)
+    assert report.ratio("one_corner_far").value == pytest.approx(0.8, rel=1e-6)
     assert report.two_corners.value == pytest.approx(0.3, rel=1e-6)
     assert 0.4 < report.one_corner.value < 0.5  # farther gauges have less of the free field
 

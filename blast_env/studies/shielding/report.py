@@ -159,16 +159,6 @@ class ShieldingReport:
         return self.ratio("one_corner")
 
     @property
-    def one_corner_near(self) -> Estimate:
-        """As `one_corner`, the third of the gauges at the front."""
-        return self.ratio("one_corner_near")
-
-    @property
-    def one_corner_far(self) -> Estimate:
-        """As `one_corner`, the third of the gauges at the back."""
-        return self.ratio("one_corner_far")
-
-    @property
     def two_corners(self) -> Estimate:
         """Normal impulse on the back over that in the open, at the same path lengths."""
         return self.ratio("two_corners")
