@@ -11,6 +11,7 @@ from blast_env.studies.benchmark.environment import (
     TimedEngine,
     benchmark_engine,
     measure_environment,
+    measure_frame_ms,
     random_action,
 )
 from blast_env.studies.benchmark.parallel import (
@@ -48,6 +49,10 @@ def test_every_part_of_an_episode_is_timed() -> None:
     assert figures.outside_physics < figures.outside_engine < 1.0
     parts_ms = (figures.reset_ms, figures.mask_ms, figures.observation_ms, figures.episode_ms)
     assert min(parts_ms) > 0.0
+
+
+def test_a_frame_is_timed() -> None:
+    assert measure_frame_ms(small(), repeats=1) > 0.0
 
 
 def test_the_engine_is_one_that_the_calibration_allows() -> None:
