@@ -1,6 +1,7 @@
 """Many independent pieces of work, several at a time."""
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal, TypeVar
 
 import joblib
@@ -39,7 +40,29 @@ def in_order(
     check_workers("workers", workers)
     if min(workers, len(items)) <= 1:
         return map(function, items)
+    if kind == "threads":
+        return _in_threads(function, items, workers)
     return _parallel(function, items, workers, kind, "generator")
+
+
+def run_all(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    workers: int = 1,
+    progress: Callable[[float], None] | None = None,
+    kind: Workers = "processes",
+) -> list[Result]:
+    """Return the results of all items in their order.
+
+    Arguments and errors are those of `in_order`; `progress` is called with the share of the items
+    that is done.
+    """
+    results: list[Result] = []
+    for result in in_order(function, items, workers, kind):
+        results.append(result)
+        if progress is not None:
+            progress(len(results) / len(items))
+    return results
 
 
 def as_completed(
@@ -59,10 +82,38 @@ def as_completed(
     return _parallel(numbered, list(enumerate(items)), workers, kind, "generator_unordered")
 
 
+def share_of(
+    progress: Callable[[float], None] | None, done: int, whole: int, part: int = 1
+) -> Callable[[float], None] | None:
+    """Return a function that reports the share of a part as a share of the whole.
+
+    Args:
+        progress: Takes the share of the whole.
+        done: How much of the whole comes before the part.
+        whole: How much there is in all.
+        part: How much the part is.
+    """
+    if progress is None:
+        return None
+    return lambda share: progress((done + share * part) / whole)
+
+
 def check_workers(name: str, workers: int) -> None:
     """Refuse a number of workers that is not a whole number of at least 1 (`BlastEnvError`)."""
     if not isinstance(workers, int) or isinstance(workers, bool) or workers < 1:
         raise BlastEnvError(f"{name} is {workers!r}, must be a whole number of at least 1")
+
+
+def _in_threads(
+    function: Callable[[Item], Result], items: Sequence[Item], workers: int
+) -> Iterator[Result]:
+    """Not joblib's threads: of several errors those raise the one that came first in time."""
+    with ThreadPoolExecutor(workers) as pool:
+        futures = [pool.submit(function, item) for item in items]
+        try:
+            yield from (future.result() for future in futures)
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 class _Numbered:

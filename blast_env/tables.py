@@ -1,9 +1,12 @@
-"""Tables whose columns say their unit and meaning in one place."""
+"""Tables: columns with unit and meaning in one place; as Markdown, and as CSV files."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
+
+from blast_env.files import write_atomically
 
 
 class Column(NamedTuple):
@@ -29,3 +32,30 @@ def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) ->
     """
     names = [column.name for column in columns]
     return pd.DataFrame([[row[name] for name in names] for row in rows], columns=names)
+
+
+def markdown_table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a Markdown table; bars in the cells are escaped."""
+    lines = [headers, *rows]
+    cells = [[str(cell).replace("|", r"\|") for cell in line] for line in lines]
+    text = [f"| {' | '.join(line)} |" for line in cells]
+    return "\n".join([text[0], "|---" * len(headers) + "|", *text[1:]])
+
+
+def write_csv(table: pd.DataFrame, path: str | Path, float_format: str | None = None) -> Path:
+    """Write a table without its index as CSV, complete or not at all.
+
+    Args:
+        table: The table.
+        path: The file.
+        float_format: How to write numbers, such as "%.6g"; None: with all their digits.
+
+    Returns:
+        The path.
+
+    Raises:
+        BlastEnvError: If it cannot be written there.
+    """
+    with write_atomically(path) as temporary:
+        table.to_csv(temporary, index=False, float_format=float_format, lineterminator="\n")
+    return Path(path)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from blast_env.statistics import Estimate
+from blast_env.studies.agreement.layouts import Noise
 from scripts.difficulty_outcomes import Outcome, TaskResult
-from scripts.measure_noise import Noise
 
 LEAST_REDUCTION, MOST_REDUCTION = 0.15, 0.85
 """Between these the best layout does something and leaves something to do."""

@@ -4,144 +4,66 @@ Nothing is simulated: i_sim and i_ufc are the paper's own, and the rest is worke
 of each table how far the printed cells are off, and where the paper contradicts itself.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import numpy as np
 import pandas as pd
 import typer
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from rich.table import Table
 
-from blast_env.calibration import (
-    PAPER_UFC_LABEL,
-    LinearLaw,
-    PowerLaw,
-    ProportionalLaw,
-    ScalingLaw,
-    fit_linear,
-    fit_metrics,
-    fit_power_law,
-    fit_proportional,
-    paper_table,
-)
-from blast_env.calibration.laws import Fit
 from blast_env.cli.output import make_table, result_console, user_errors
-from blast_env.errors import BlastEnvError
-from blast_env.files import write_atomically
+from blast_env.files import make_folder
 from blast_env.rendering.figures import save_figure
-from blast_env.rendering.style import INK, unit_interval
-from blast_env.units import PA_PER_PSI
+from blast_env.studies.paper import (
+    CONTRADICTIONS,
+    PAPER_LAWS,
+    TABLE_4_DECIMALS,
+    comparative_table,
+    comparison_table,
+    deviations,
+    figure_5,
+    metrics_row,
+)
+from blast_env.tables import write_csv
 
 OUT: Final = Path("out/paper")
-CELLS: Final = ("scaled", "abs", "pct")
-"""The cells of a row of Tables 1 to 3 that are worked out, as `paper_table` names them."""
 
 
-@dataclass(frozen=True)
-class PaperLaw:
-    """A law of the paper's section 3 with what is printed about it.
-
-    Attributes:
-        name: The paper's name of the method, in Table 4.
-        number: Number of its table.
-        fit: Our fit.
-        in_text: The law with the coefficients that the text prints.
-        table_4: MAPE (%), RMSE (psi s) and integral error (%) as printed.
-        decimals: Decimals of i_scaled, E_abs and E% in its table.
-        subtracts_rounded: Whether the E_abs of its table are differences of printed cells.
-    """
-
-    name: str
-    number: int
-    fit: Fit
-    in_text: ScalingLaw
-    table_4: tuple[float, float, float]
-    decimals: tuple[int, int, int] = (5, 5, 2)
-    subtracts_rounded: bool = False
-
-    @property
-    def fitted(self) -> ScalingLaw:
-        """The law that the paper's columns give."""
-        paper = paper_table()
-        return self.fit(paper["i_sim"], paper["i_ufc_psi_s"])
-
-
-PROPORTIONAL: Final = PaperLaw(
-    "Proportional Coefficient", 1, fit_proportional, ProportionalLaw(4.343e-5), (14.9, 0.0794, 5.2)
-)
-LINEAR: Final = PaperLaw(
-    "Linear Regression", 2, fit_linear, LinearLaw(-0.01696, 4.392e-5), (16.7, 0.0788, 3.6)
-)
-POWER: Final = PaperLaw(
-    "Power-Law Model",
-    number=3,
-    fit=fit_power_law,
-    in_text=PowerLaw(0.000124, 0.881),
-    table_4=(11.4, 0.0985, 1.5),
-    decimals=(4, 4, 1),
-    subtracts_rounded=True,
-)
-PAPER_LAWS: Final = (PROPORTIONAL, LINEAR, POWER)
-TABLE_4_DECIMALS: Final = (1, 4, 1)
-
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
-_LOOKS: Final = (("#0072B2", "--", "s"), ("#009E73", "-.", "^"), ("#D55E00", "-", "D"))
-
-
-def comparison_table(paper_law: PaperLaw) -> pd.DataFrame:
-    """Return Table 1, 2 or 3, not rounded, and the three worked-out columns as printed.
-
-    Where the paper subtracts rounded cells, so do we, for E_abs alone.
-    """
-    paper = paper_table()
-    reference = paper["i_ufc_psi_s"]
-    scaled = pd.Series(paper_law.fitted(paper["i_sim"]))
-    error, digits = (scaled - reference).abs(), paper_law.decimals[0]
-    of_rounded = (scaled.round(digits) - reference.round(digits)).abs()
-    ours = {
-        "r_m": paper["r_m"],
-        "i_ufc_psi_s": reference,
-        "i_sim": paper["i_sim"],
-        "i_scaled_psi_s": scaled,
-        "e_abs_psi_s": of_rounded if paper_law.subtracts_rounded else error,
-        "e_percent": 100.0 * error / reference,
-    }
-    printed = {f"printed_{cell}": paper[f"t{paper_law.number}_{cell}"] for cell in CELLS}
-    return pd.DataFrame(ours | printed)
-
-
-def comparative_table() -> pd.DataFrame:
-    """Return Table 4, not rounded, and its three columns as printed."""
-    names = ["mape_percent", "rmse_psi_s", "integral_error_percent"]
-    methods = pd.Series([law.name for law in PAPER_LAWS], name="method")
-    ours = pd.DataFrame([metrics_row(law.fitted) for law in PAPER_LAWS], columns=names)
-    printed = pd.DataFrame([law.table_4 for law in PAPER_LAWS], columns=names)
-    return pd.concat([methods, ours, printed.add_prefix("printed_")], axis=1)
-
-
-def metrics_row(law: ScalingLaw) -> tuple[float, float, float]:
-    """Return MAPE (%), RMSE (psi s) and integral error (%) of a law on the paper's columns."""
-    paper = paper_table()
-    metrics = fit_metrics(paper["r_m"], law(paper["i_sim"]), paper["i_ufc_psi_s"])
-    return metrics.mape_percent, metrics.rmse, metrics.integral_error_percent
-
-
-def deviations(table: pd.DataFrame, decimals: tuple[int, int, int]) -> NDArray[np.float64]:
-    """Return ours minus printed (rows, 3), in units of the last printed digit.
-
-    Up to 0.5 it is the paper's own rounding.
+def reproduce(out: Path) -> list[Path]:
+    """Print the tables and what is to be said of them; write them and the figure.
 
     Args:
-        table: Of `comparison_table` or `comparative_table`: ends with three columns and the same
-            three as printed.
-        decimals: Decimals of the three columns in print.
+        out: The folder to write to; it is made if need be.
+
+    Returns:
+        The files.
+
+    Raises:
+        BlastEnvError: If something cannot be written; no file is left half-written then.
     """
-    cells = table.iloc[:, -6:].to_numpy(dtype=np.float64)
-    return np.asarray((cells[:, :3] - cells[:, 3:]) * 10.0 ** np.array(decimals))
+    make_folder(out)
+    console, written = result_console(), []
+    headers: tuple[str, ...] = ("R (m)", "i_ufc", "i_sim", "i_scaled", "E_abs", "E%")
+    for law in PAPER_LAWS:
+        table = comparison_table(law)
+        title = f"Table {law.number}: {law.name} (impulses in psi s)"
+        formats = (".0f", f".{law.decimals[0]}f", ".2f", *(f".{n}f" for n in law.decimals))
+        console.print(rich_table(title, headers, table, formats))
+        console.print(largest_deviation(table, law.decimals))
+        written.append(write_csv(table, out / f"table_{law.number}.csv", "%.10g"))
+    table = comparative_table()
+    headers = ("scaling method", "MAPE (%)", "RMSE (psi s)", "integral error (%)")
+    formats = ("s", *(f".{n}f" for n in TABLE_4_DECIMALS))
+    console.print(rich_table("Table 4: comparison", headers, table, formats))
+    console.print(largest_deviation(table, TABLE_4_DECIMALS))
+    written.append(write_csv(table, out / "table_4.csv", "%.10g"))
+    console.print(coefficient_table())
+    console.print(f"{CONTRADICTIONS}\n")
+    written.append(save_figure(figure_5(), out / "figure_5.png"))
+    for path in written:
+        console.print(f"wrote {path}", markup=False)
+    return written
 
 
 def rich_table(
@@ -175,116 +97,6 @@ def coefficient_table() -> Table:
             row = (f"{value:.{digits}f}" for value, digits in measures)
             table.add_row(law.name, source, ", ".join(named), *row)
     return table
-
-
-CONTRADICTIONS: Final = """\
-Where the paper contradicts itself (more in docs/paper.md):
-- k: the text prints 4.343e-05; Table 1 and the first row of Table 4 come from 4.2707e-05, which is
-  what equation (6) gives.
-- A and B: the text's "final conversion formula" has them rounded to three digits, which gives
-  neither Table 3 nor the last row of Table 4; unrounded they give both.
-- E_abs of Table 3: differences of rounded cells, up to 0.8 of the last digit beside the difference
-  of the numbers themselves. Worked out as the paper did here."""
-
-
-def figure_5() -> Figure:
-    """Return the paper's Figure 5 for all three laws, with their deviations below."""
-    figure = Figure(figsize=(7.0, 7.2), layout="constrained")
-    impulse, deviation = figure.subplots(2, 1, sharex=True, height_ratios=(2.1, 1.0))
-    paper = paper_table()
-    look: dict[str, Any] = {"color": unit_interval(INK), "linewidth": 1.4}
-    deviation.axhline(0.0, **look)
-    look |= {"marker": "o", "markersize": 6.5}
-    impulse.plot(paper["r_m"], paper["i_ufc_psi_s"], label=PAPER_UFC_LABEL, **look)
-    for paper_law, (colour, style, marker) in zip(PAPER_LAWS, _LOOKS, strict=True):
-        law = paper_law.fitted
-        scaled = law(paper["i_sim"])
-        look = {"color": colour, "linestyle": style, "linewidth": 1.6, "marker": marker}
-        look |= {"markersize": 6.0, "markeredgecolor": "white", "markeredgewidth": 0.7}
-        impulse.plot(paper["r_m"], scaled, label=_formula(law), **look)
-        deviation.plot(paper["r_m"], 100.0 * (scaled / paper["i_ufc_psi_s"] - 1.0), **look)
-    _label(impulse, deviation)
-    return figure
-
-
-def _label(impulse: Axes, deviation: Axes) -> None:
-    """Write the title, axes and legend of Figure 5."""
-    impulse.set_title("The paper's simulation, scaled by its three laws", fontweight="bold")
-    impulse.set(ylabel="impulse (psi s)", ylim=(0.0, 1.2))
-    impulse.legend(framealpha=1.0, edgecolor="none", labelspacing=0.7, handlelength=3.2)
-    in_pa = impulse.twinx()
-    in_pa.set(ylabel="impulse (Pa s)", ylim=(0.0, 1.2 * PA_PER_PSI))
-    in_pa.spines["top"].set_visible(False)
-    ticks = paper_table()["r_m"].tolist()
-    deviation.set(
-        xlabel="distance $R$ (m)", ylabel="deviation from the\nUFC column (%)", xticks=ticks
-    )
-    for axes in (impulse, deviation):
-        axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
-
-
-def _formula(law: ScalingLaw) -> str:
-    """Return a law as a legend entry."""
-    numbers = [_number(value) for value in law.coefficients.values()]
-    simulated = r"i_\mathrm{sim}"
-    match law:
-        case ProportionalLaw():
-            return rf"proportional, ${numbers[0]}\,{simulated}$"
-        case LinearLaw():
-            return rf"linear, ${numbers[0]} + {numbers[1]}\,{simulated}$"
-        case _:
-            return rf"power law, ${numbers[0]}\,{simulated}^{{\,{numbers[1]}}}$"
-
-
-def _number(value: float) -> str:
-    digits, _, exponent = f"{value:.3e}".partition("e")
-    return f"{value:.4g}" if abs(value) > 1e-2 else rf"{digits} \times 10^{{{int(exponent)}}}"
-
-
-def reproduce(out: Path) -> list[Path]:
-    """Print the tables and what is to be said of them; write them and the figure.
-
-    Args:
-        out: The folder to write to; it is made if need be.
-
-    Returns:
-        The files.
-
-    Raises:
-        BlastEnvError: If something cannot be written; no file is left half-written then.
-    """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BlastEnvError(f"{out}: cannot be made: {error.strerror or error}") from error
-    console, written = result_console(), []
-    headers: tuple[str, ...] = ("R (m)", "i_ufc", "i_sim", "i_scaled", "E_abs", "E%")
-    for law in PAPER_LAWS:
-        table = comparison_table(law)
-        title = f"Table {law.number}: {law.name} (impulses in psi s)"
-        formats = (".0f", f".{law.decimals[0]}f", ".2f", *(f".{n}f" for n in law.decimals))
-        console.print(rich_table(title, headers, table, formats))
-        console.print(largest_deviation(table, law.decimals))
-        written.append(_write_csv(table, out / f"table_{law.number}.csv"))
-    table = comparative_table()
-    headers = ("scaling method", "MAPE (%)", "RMSE (psi s)", "integral error (%)")
-    formats = ("s", *(f".{n}f" for n in TABLE_4_DECIMALS))
-    console.print(rich_table("Table 4: comparison", headers, table, formats))
-    console.print(largest_deviation(table, TABLE_4_DECIMALS))
-    written.append(_write_csv(table, out / "table_4.csv"))
-    console.print(coefficient_table())
-    console.print(f"{CONTRADICTIONS}\n")
-    written.append(save_figure(figure_5(), out / "figure_5.png"))
-    for path in written:
-        console.print(f"wrote {path}", markup=False)
-    return written
-
-
-def _write_csv(table: pd.DataFrame, path: Path) -> Path:
-    with write_atomically(path) as temporary:
-        table.to_csv(temporary, index=False, float_format="%.10g", lineterminator="\n")
-    return path
 
 
 def main(

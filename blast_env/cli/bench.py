@@ -1,5 +1,6 @@
 """`blast-env bench`: how fast blasts are on this machine."""
 
+from importlib.util import find_spec
 from typing import Annotated, Final
 
 import typer
@@ -16,7 +17,11 @@ from blast_env.studies.benchmark.engines import (
     measure_memory_mb,
     measure_speed,
 )
-from blast_env.studies.benchmark.environment import measure_environment
+from blast_env.studies.benchmark.environment import (
+    FRAME_BALLS,
+    measure_environment,
+    measure_frame_ms,
+)
 from blast_env.studies.benchmark.parallel import measure_fleets, measure_threads
 
 _MANY_BALLS: Final = {
@@ -83,7 +88,7 @@ def bench(
         result_console().print(_engine_table(scenes, repeats))
         print_line(
             "5 % step: the longest at which pymunk's loads are within 5 % of those of the event "
-            "engine, as `python -m scripts.compare_engines` finds.\nRatio: time of pymunk over "
+            "engine, as `python -m scripts.engines compare` finds.\nRatio: time of pymunk over "
             "time of the event engine.\n"
         )
         if threads > 1:
@@ -99,6 +104,9 @@ def bench(
             many = many.with_simulation(overrides=_MANY_BALLS)
             balls = len(build_scene(many).balls)
             print_line(f"peak memory with {balls:,} balls: {measure_memory_mb(many):.0f} MB")
+        if environment and find_spec("pygame") is not None:
+            frame_ms = measure_frame_ms(load_scenario(scenario or "courtyard"), repeats)
+            print_line(f"a frame with {FRAME_BALLS:,} balls: {frame_ms:.1f} ms; target 20 ms")
         if environment:
             _print_environment(load_scenario(scenario or "courtyard"), repeats)
 

@@ -48,6 +48,7 @@ from blast_env.studies.shielding.report import (
     ShieldingStudy,
     scaled_ratio,
 )
+from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
 
 ReferenceName = Literal["paper_ufc", "reflected_impulse", "incident_impulse"]
@@ -106,7 +107,7 @@ def calibrate_free_field(options: FreeFieldOptions) -> None:
     """
     distances_m = _parse_numbers("--distances", options.distances)
     tnt_range_kg = _parse_range(options.tnt_range)
-    options.out.mkdir(parents=True, exist_ok=True)
+    make_folder(options.out)
     engine = find_engine(options.engine).name
     study = FreeFieldStudy(_scenario(options), distances_m, options.seeds, engine)
     reference = _reference(options.reference, study, options.burst)
@@ -159,10 +160,9 @@ def _reference(name: ReferenceName, study: FreeFieldStudy, burst: Burst) -> Refe
 
 
 def _write(report: CalibrationReport, stored: Calibration, stem: str) -> list[Path]:
-    record, table, picture = (Path(f"{stem}{suffix}") for suffix in (".json", ".csv", ".png"))
+    record, picture = Path(f"{stem}.json"), Path(f"{stem}.png")
     save_calibration(stored, record)
-    with write_atomically(table) as temporary:
-        report.table().to_csv(temporary, index=False)
+    table = write_csv(report.table(), f"{stem}.csv")
     return [record, table, *save_pictures(lambda: _save_figure(report, stored, picture))]
 
 
@@ -310,11 +310,10 @@ def _write_shielding(
     options: ShieldingOptions,
 ) -> list[Path]:
     stem = f"shielding.{options.preset}.{options.engine}"
-    record, gauges = options.out / f"{stem}.json", options.out / f"{stem}.csv"
+    record = options.out / f"{stem}.json"
     with write_atomically(record) as temporary:
         temporary.write_text(report.to_json(exponent, reflection), encoding="utf-8")
-    with write_atomically(gauges) as temporary:
-        report.gauges.to_csv(temporary, index=False)
+    gauges = write_csv(report.gauges, options.out / f"{stem}.csv")
     picture = options.out / f"{stem}.png"
     return [record, gauges, *save_pictures(lambda: _save_shielding(report, exponent, picture))]
 

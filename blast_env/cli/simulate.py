@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -51,6 +52,15 @@ def simulate(
     heat_map: Annotated[
         Path | None, typer.Option(help="Write a picture of the load: .png, .svg, .pdf.")
     ] = None,
+    history: Annotated[
+        Path | None, typer.Option(help="Write a picture of the impulse over time, likewise.")
+    ] = None,
+    scheme: Annotated[
+        Path | None, typer.Option(help="Write a picture of the initial state, likewise.")
+    ] = None,
+    velocities: Annotated[
+        Path | None, typer.Option(help="Write a picture of the fan's velocities, likewise.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Run one blast and print what each structure took."""
@@ -65,7 +75,8 @@ def simulate(
         with progress_bar(f"blast in {chosen.name}") as progress:
             result = _run(blast, film, progress)
         written = [path for path in (film,) if path is not None]
-        written += _write(result, excel, parquet, heat_map)
+        written += _write_tables(result, excel, parquet)
+        written += _write_pictures(result, heat_map, history, scheme, velocities)
     if as_json:
         print_line(json.dumps(_as_json(result, written), indent=2))
     else:
@@ -87,21 +98,34 @@ def _run(blast: Blast, film: Path | None, progress: Callable[[float], None]) -> 
     return write_film(blast, film, progress=progress)
 
 
-def _write(
-    result: BlastResult, excel: Path | None, parquet: Path | None, heat_map: Path | None
-) -> list[Path]:
+def _write_tables(result: BlastResult, excel: Path | None, parquet: Path | None) -> list[Path]:
     written = []
     if excel is not None:
         written.append(result.to_excel(excel))
     if parquet is not None:
         written.append(result.to_parquet(parquet))
-    if heat_map is not None:
-        # Here, because pictures need the extra `render`.
-        from blast_env.rendering import figures
-
-        figures.save_figure(figures.heat_map(result), heat_map)
-        written.append(heat_map)
     return written
+
+
+def _write_pictures(
+    result: BlastResult,
+    heat_map: Path | None,
+    history: Path | None,
+    scheme: Path | None,
+    velocities: Path | None,
+) -> list[Path]:
+    if not any((heat_map, history, scheme, velocities)):
+        return []
+    from blast_env.rendering import figures  # Matplotlib takes long to import
+
+    blast = result.blast
+    pictures = (
+        (heat_map, partial(figures.heat_map, result)),
+        (history, partial(figures.impulse_over_time, result)),
+        (scheme, partial(figures.model_scheme, blast.scene)),
+        (velocities, partial(figures.initial_velocities, blast.scenario.parameters)),
+    )
+    return [figures.save_figure(draw(), path) for path, draw in pictures if path is not None]
 
 
 def print_summary(result: BlastResult, written: Sequence[Path]) -> None:

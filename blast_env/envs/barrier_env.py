@@ -158,7 +158,7 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     | perimeter_gate, hidden | 0.8 (1.1) | 1.2 (1.6) | 1.7 (2.2) | 2.4 (3.1) | 3.3 (4.4) |
     | street_junction, hidden | 0.7 (0.6) | 1.0 (0.9) | 1.4 (1.2) | 1.9 (1.8) | 2.8 (2.5) |
 
-    (`python -m scripts.measure_noise --layouts 12 --charges 12 --seeds 4`.) Hence 2 realisations
+    (`python -m scripts.layouts noise --layouts 12 --charges 12 --seeds 4`.) Hence 2 realisations
     of a visible charge and 16 hidden charges: the spread is then twice the scatter or more.
 
     An episode costs `threats * realisations` blasts, and as many without a barrier.

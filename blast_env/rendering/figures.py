@@ -1,4 +1,4 @@
-"""Figures of one blast: scheme of the site, impulse over time."""
+"""Figures of one blast: scheme of the site, initial velocities, impulse over time."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -26,11 +26,10 @@ from blast_env.scenario import Scenario
 from blast_env.studies.calibration.study import (
     FreeFieldStudy,
     calibrate,
+    free_field,
     kingery_bulmash_reference,
     paper_reference,
 )
-from scripts.facade_width import free_field_with_facade
-from scripts.hopkinson_cranz import free_field
 from tests.scenarios import BALLISTIC_COURTYARD
 
 CALIBRATION = load_calibration("ballistic_kb_100kg")
@@ -157,7 +156,7 @@ def test_twice_the_width_is_not_twice_the_load() -> None:
     seeds = range(16)
     raw, scaled = [], []
     for side_modules in (20, 40):
-        wide = free_field_with_facade(side_modules).at_stand_off(40.0)
+        wide = free_field(side_modules=side_modules).at_stand_off(40.0)
         results = [simulate(wide, seed=seed, engine="event") for seed in seeds]
         raw.append(np.mean([result.impulse_sim("building") for result in results]))
         scaled.append(np.mean([result.impulse("building").psi_s for result in results]))
@@ -283,7 +282,7 @@ def test_the_simulator_still_gives_what_the_calibration_was_made_from(
     """
     stored = load_calibration(name, engine)
     seeds = stored.seeds[:3]
-    scenario = free_field(stored.tnt_kg, stored.preset)
+    scenario = free_field(stored.tnt_kg).with_simulation(stored.preset)
     study = FreeFieldStudy(scenario, stored.distances_m[:1], seeds, engine)
     mean = study.run()[f"{stored.simulated}_sim"].mean()
     half_width = stored.i_sim_ci95[0] * np.sqrt(len(stored.seeds) / len(seeds))

@@ -6,7 +6,7 @@ import pytest
 
 from blast_env import Scenario, load_scenario
 from blast_env.studies.benchmark.parallel import FleetFigures
-from tests.test_benchmark_env import collisional_courtyard
+from tests.studies.test_benchmark_env import collisional_courtyard
 
 bench = importlib.import_module("blast_env.cli.bench")  # the package names the command like this
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib
 import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
@@ -84,6 +85,27 @@ def test_simulate_prints_loads_with_units_and_writes_all_files(
         assert str(path) in result.stdout.replace("\n", "")
 
 
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ("--heat-map", "building"),
+        ("--history", "impulse over time"),
+        ("--scheme", "Model scheme: the state at the detonation"),
+        ("--velocities", "Initial velocities of 12 explosive balls"),
+    ],
+)
+def test_simulate_writes_each_picture(
+    sparse: Path, tmp_path: Path, option: str, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(matplotlib.rcParams, "svg.fonttype", "none")  # text stays text
+    picture = tmp_path / "picture.svg"
+    result = run("simulate", sparse, "--engine", "event", option, picture)
+    assert result.exit_code == 0, result.output
+    assert f"wrote {picture}" in result.stdout.replace("\n", "")
+    assert words in picture.read_text("utf-8")
+    assert [path.name for path in tmp_path.iterdir()] == ["picture.svg"]
+
+
 def test_simulate_prints_json_that_can_be_read() -> None:
     result = run("simulate", "free_field", "--stand-off", "20", "--json")
     assert result.exit_code == 0
@@ -111,6 +133,7 @@ def test_simulate_takes_charge_and_preset() -> None:
         (("courtyard", "--stand-off", "20"), "needs one point charge"),
         (("free_field", "--excel", "table.txt"), "table.txt"),
         (("free_field", "--film", "film.avi"), "film.avi"),
+        (("free_field", "--scheme", "scheme.bmp"), "must be one of .png, .svg, .pdf"),
         (("free_field", "--heat-map", "no/such/folder/map.png"), "no/such/folder"),
     ],
 )

@@ -49,7 +49,7 @@ def test_the_first_run_compiles_and_says_so_and_only_the_first(tmp_path: Path) -
     assert again == ([path, *digests], "")
 
     # Not the file of the function that is kept on disk: a change of that one Numba would notice.
-    source = tmp_path / "blast_env" / "physics" / "event" / "collisions.py"
+    source = tmp_path / "blast_env" / "physics" / "event" / "contacts.py"
     text = source.read_text(encoding="utf-8")
     changed = text.replace(
         "-(1.0 + restitution) * reduced_mass", "-(1.5 + restitution) * reduced_mass"

@@ -23,12 +23,10 @@ from blast_env.simulation import Blast
 Departures = Mapping[int, list[int]]
 """Balls that leave the space after a step, by the number of the step."""
 
-
 _DENSE_AIR = {
     "air": {"spacing_units": 3.0, "mass": 0.1, "elasticity": 1.0},
     "explosive": {"elasticity": 1.0},
 }
-
 
 _BYTES_PER_MAXRSS_UNIT = 1 if platform.system() == "Darwin" else 1024
 
@@ -130,7 +128,7 @@ class BenchmarkScene:
         name: Name for the table.
         scenario: The scenario.
         close_step_radii: Longest step at which the loads of pymunk are within 5 % of those of the
-            event engine, as `python -m scripts.compare_engines` finds; None if not known.
+            event engine, as `python -m scripts.engines compare` finds; None if not known.
         least_ratio: How many times faster than that the event engine is to be; None: not said.
     """
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from statistics import median
 from time import process_time
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,11 @@ from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Placement, Scenario
 from blast_env.scenario.build_scene import build_scene
+from blast_env.simulation import Blast
 from blast_env.units import MS_PER_S
+
+FRAME_BALLS: Final = 2000
+"""Balls of the frame that is timed."""
 
 
 @dataclass
@@ -194,3 +198,25 @@ def _timed(call: Callable[[], object]) -> float:
     start = process_time()
     call()
     return process_time() - start
+
+
+def measure_frame_ms(scenario: Scenario, repeats: int) -> float:
+    """Return the least processor time of painting a frame with `FRAME_BALLS` balls, ms."""
+    from blast_env.rendering.frames import FramePainter  # an extra
+
+    blast = Blast(scenario, engine="event")
+    balls, site = blast.start().balls(), blast.scene.site
+    rng = np.random.default_rng(0)
+    some = rng.integers(len(balls), size=FRAME_BALLS)
+    position = rng.uniform((site.left, site.bottom), (site.right, site.top), (FRAME_BALLS, 2))
+    many = BallStates(
+        index=np.arange(FRAME_BALLS),
+        kind=balls.kind[some],
+        position=position,
+        velocity=balls.velocity[some],
+        mass=balls.mass[some],
+        radius=balls.radius[some],
+    )
+    painter, obstacles = FramePainter.for_blast(blast), blast.scene.obstacles()
+    paint = partial(painter.paint, many, obstacles, 0.0)
+    return MS_PER_S * min(_timed(paint) for _ in range(repeats + 1))

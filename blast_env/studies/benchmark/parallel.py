@@ -22,10 +22,8 @@ from blast_env.studies.benchmark.environment import benchmark_engine, random_act
 _LOT_S: Final = 1.0
 """One thread takes about this long for the blasts that are timed."""
 
-
 _TRIED: Final = 4
 """Blasts that are run to see how many that is."""
-
 
 _FEWEST: Final = 4
 """Blasts of each thread at least, so that a long one at the end weighs little."""

@@ -25,14 +25,12 @@ _LAWS = {
     "power": ("#009E73", "-", "o"),
 }
 
-
 _SIMULATED_LABELS: Final[Mapping[SimulatedQuantity, str]] = MappingProxyType(
     {
         "impulse": "impulse on the facade, sum of m|v|",
         "transferred_impulse": "impulse really transferred to the facade",
     }
 )
-
 
 _LEAST_TICK_RATIO = 1.18
 

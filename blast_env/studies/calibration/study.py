@@ -8,7 +8,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-import joblib
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -32,9 +31,10 @@ from blast_env.errors import BlastEnvError
 from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import parameters_digest
 from blast_env.provenance import package_version
-from blast_env.scenario import Scenario
+from blast_env.runner import as_completed
+from blast_env.scenario import Scenario, load_scenario
 from blast_env.simulation import simulate
-from blast_env.units import PA_PER_PSI, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
 RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")
 
@@ -121,9 +121,8 @@ class FreeFieldStudy:
             for seed in self.seeds
         }
         missing = [key for key in wanted if key not in finished]
-        jobs = (joblib.delayed(_run_one)(key, *wanted[key], self.engine) for key in missing)
-        parallel = joblib.Parallel(n_jobs=processes, return_as="generator_unordered")
-        for done, run in enumerate(parallel(jobs), start=1):
+        jobs = [(key, *wanted[key], self.engine) for key in missing]
+        for done, (_, run) in enumerate(as_completed(_run_one, jobs, processes), start=1):
             finished[run.key] = run
             if store is not None:
                 append_to_store(store, run)
@@ -136,6 +135,23 @@ class FreeFieldStudy:
     def _key(self, scenario: Scenario, seed: int) -> str:
         version = find_engine(self.engine).version
         return f"{scenario.content_hash} {seed} {self.engine} {version}"
+
+
+def free_field(tnt_kg: float | None = None, side_modules: int | None = None) -> Scenario:
+    """Return `free_field` with another charge, or a facade of another width.
+
+    The strip behind the facade stays as wide as it was.
+    """
+    document = load_scenario("free_field").model_dump()
+    (source,), (structure,) = document["charge"], document["structures"]
+    if tnt_kg is not None:
+        source["tnt_kg"] = tnt_kg
+    if side_modules is not None:
+        lower_m = (document["site"]["height_m"] - side_modules * MODULE_SIDE_M) / 2.0
+        document["site"]["width_m"] += (side_modules - structure["side_modules"]) * MODULE_SIDE_M
+        structure["corner_m"] = (structure["corner_m"][0], lower_m)
+        structure["side_modules"] = side_modules
+    return Scenario.from_document(document, "free_field with changes")
 
 
 def impulse_by_seed(
@@ -225,10 +241,9 @@ def _cut_unfinished_line(file: Any) -> None:
     file.truncate(file.read().rfind(b"\n") + 1)
 
 
-def _run_one(
-    key: str, scenario: Scenario, distance_m: float, seed: int, engine: str
-) -> FreeFieldRun:
+def _run_one(job: tuple[str, Scenario, float, int, str]) -> FreeFieldRun:
     """Run one blast, in a worker process."""
+    key, scenario, distance_m, seed, engine = job
     result = simulate(scenario, seed=seed, engine=engine)
     (structure,) = result.obstacles
     return FreeFieldRun(

@@ -2,19 +2,27 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from blast_env.calibration.references import Friedlander
+from blast_env.calibration.model import load_calibration
+from blast_env.calibration.references import Friedlander, kingery_bulmash
 from blast_env.rendering.site_plan import write_heading
 from blast_env.rendering.style import render_extra
-from blast_env.studies.pressure.pulses import PressureHistory
+from blast_env.runner import run_all
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.simulation import BlastResult, simulate
+from blast_env.studies.pressure.pulses import PressureHistory, facade_history
 from blast_env.units import MS_PER_S
 
 with render_extra():
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+CALIBRATION = "ballistic_kb_100kg"
+
+BIN_S = 0.0005
 
 PA_PER_KPA = 1000.0
 
@@ -82,3 +90,37 @@ def _positive_kpa(wave: Friedlander, time_s: np.ndarray) -> np.ndarray:
     since_s = time_s - wave.arrival_s
     inside = (since_s >= 0.0) & (since_s <= wave.positive_duration_s)
     return np.where(inside, wave.pressure(time_s) / PA_PER_KPA, np.nan)
+
+
+def pressure_case(distance_m: float, seeds: range, processes: int) -> PressureCase:
+    """Return the simulated history and the reference at a distance."""
+    scenario = load_scenario("free_field").at_stand_off(distance_m)
+    results = run_all(partial(_blast, scenario), seeds, processes)
+    calibration = load_calibration(CALIBRATION)
+    impulse_sim = sum(result.impulse_sim("building") for result in results) / len(results)
+    raw = facade_history(results, "building", "left", BIN_S)
+    width_m = calibration.facade_width_m
+    charge_kg = results[0].blast.scene.charge.tnt_kg
+    wanted = calibration.convert(impulse_sim, width_m, distance_m, charge_kg)
+    history = facade_history(results, "building", "left", BIN_S, scale=wanted.pa_s / raw.impulse)
+    return PressureCase(
+        distance_m, history, history.friedlander(), reference_wave(distance_m, charge_kg)
+    )
+
+
+def _blast(scenario: Scenario, seed: int) -> BlastResult:
+    return simulate(scenario, seed=seed)
+
+
+def reference_wave(distance_m: float, charge_kg: float) -> Friedlander:
+    """Return Kingery and Bulmash's reflected pressure as a Friedlander waveform."""
+    peak, duration_s, impulse, arrival_s = (
+        kingery_bulmash(quantity, distance_m, charge_kg)
+        for quantity in (
+            "reflected_overpressure",
+            "positive_duration",
+            "reflected_impulse",
+            "arrival_time",
+        )
+    )
+    return Friedlander.from_impulse(peak, duration_s, impulse, arrival_s)

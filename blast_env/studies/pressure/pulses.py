@@ -23,20 +23,15 @@ from blast_env.units import UNITS_PER_M
 Face = Literal["left", "right", "bottom", "top"]
 """A facade of a structure, by the side that its normal points to."""
 
-
 ARRIVAL_SHARE: Final = 0.05
 """Share of the peak pressure that a bin must pass for the blast to have arrived."""
-
 
 DURATION_SHARE: Final = 0.95
 """Share of the impulse that comes within the positive duration."""
 
-
 _MOST_BINS: Final = 10_000
 
-
 _LEAST_BINS_FOR_FIT: Final = 4
-
 
 _MOST_RUNNER_BINS: Final = 40
 

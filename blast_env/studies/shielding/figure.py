@@ -29,15 +29,11 @@ with render_extra():
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 
-
 _GAUGE_DEPTH_M: Final = 1.0  # drawn before the faces, so that no two overlap at a corner
-
 
 _PATH_OFFSET_M: Final = 1.4
 
-
 _MARGIN_M: Final = 2.6
-
 
 _HIGHEST_RATIO: Final = 1.0
 
@@ -119,21 +115,16 @@ def _draw_path(axes: Axes, geometry: BlockGeometry) -> None:
 # Okabe and Ito's colours, which people with any colour vision can tell apart.
 _BAND: Final = "#E69F00"
 
-
 _OPEN: Final = "#000000"
-
 
 _FACES: Final[tuple[tuple[Region, str, str, str, str], ...]] = (
     ("one_corner", "side", "sides, one corner away", "#0072B2", "o"),
     ("two_corners", "back", "back, two corners away", "#CC79A7", "s"),
 )
 
-
 _LEAST_TOP: Final = 1.1  # of the axis of ratios: the free field itself is to be seen
 
-
 _HIGHEST_TOP: Final = 1.5
-
 
 _DECADES: Final = 2.5  # of loads that are shown
 

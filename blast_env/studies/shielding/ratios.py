@@ -18,9 +18,7 @@ from blast_env.studies.shielding.scenes import BlockGeometry
 
 _ITERATIONS: Final = 30
 
-
 _LONGEST_STEP: Final = 2.0  # in log load, which keeps Newton's method from running away
-
 
 _RIDGE: Final = 1e-9  # of the mean diagonal; only matters where the loads do not fix the curve
 
@@ -79,7 +77,6 @@ def _powers(path_m: FloatArray, origin: float) -> FloatArray:
 
 LATE_SHARE_OF_TIME: Final = 0.2
 """The last part of the time limit; what arrives in it shows whether loads are complete."""
-
 
 _LEAST_COSINE: Final = 0.99  # of a normal with its face's; hits on corners belong to no face
 
@@ -141,7 +138,6 @@ def faces_hit(collisions: CollisionArray) -> dict[Face, NDArray[np.bool_]]:
 Region = Literal["one_corner", "one_corner_near", "one_corner_far", "two_corners"]
 """All gauges of the sides, the third of them at the front, the third at the back; the back."""
 
-
 REGIONS: Final[tuple[Region, ...]] = (
     "one_corner",
     "one_corner_near",
@@ -149,13 +145,10 @@ REGIONS: Final[tuple[Region, ...]] = (
     "two_corners",
 )
 
-
 RESAMPLES: Final = 1000
 """Draws of seeds for an interval."""
 
-
 _RNG_SEED: Final = 0
-
 
 _CONFIDENCE: Final = 0.95
 

@@ -4,7 +4,7 @@ Without a target: a calibration fixes the scale of impulses, not these. They say
 set's blast behaves as a shock does.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -15,6 +15,7 @@ import pandas as pd
 from blast_env.arrays import FloatArray
 from blast_env.calibration.references import kingery_bulmash, scaled_distance
 from blast_env.errors import BlastEnvError
+from blast_env.runner import share_of
 from blast_env.simulation import BlastResult
 from blast_env.studies.shielding.ratios import (
     Face,
@@ -27,11 +28,10 @@ from blast_env.studies.shielding.ratios import (
     wall_loads,
 )
 from blast_env.studies.shielding.scenes import StudySettings, facade_scenario, wall_scenario
-from blast_env.units import MODULE_SIDE_M
+from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
 ARRIVAL_SHARE: Final = 0.05
 """Share of the impulse that has come by the arrival; a particle front has runners, a shock none."""
-
 
 _GAUGE_WIDTH_M: Final = 4.0  # around the axis, where the wall is head-on
 
@@ -96,9 +96,11 @@ class ReflectionStudy(StudySettings):
         parameters = self.scene_parameters
         facades = [facade_scenario(d, self.geometry, parameters) for d in self.distances_m]
         wall = wall_scenario(self.geometry, parameters)
-        share = len(facades) / (len(facades) + 1)
-        head_on = self.run_blasts(facades, head_on_load, processes, _part_of(progress, 0.0, share))
-        (open_field,) = self.run_blasts([wall], face_loads, processes, _part_of(progress, share, 1))
+        scenes = len(facades) + 1
+        of_facades = share_of(progress, 0, scenes, len(facades))
+        head_on = self.run_blasts(facades, head_on_load, processes, of_facades)
+        of_wall = share_of(progress, len(facades), scenes)
+        (open_field,) = self.run_blasts([wall], face_loads, processes, of_wall)
         side_on = np.array([wall_loads(faces)[LoadKind.TRANSFERRED] for faces in open_field])
         return ReflectionReport(self, np.array(head_on).transpose(1, 2, 0), side_on)
 
@@ -198,10 +200,52 @@ def head_on_load(result: BlastResult) -> HeadOnLoad:
     return HeadOnLoad(float(come[-1]) / rows, float(hits["time_s"][arrival]))
 
 
-def _part_of(
-    progress: Callable[[float], None] | None, start: float, end: float
-) -> Callable[[float], None] | None:
-    """Return a function that reports the share of a part as a share of the whole."""
-    if progress is None:
-        return None
-    return lambda share: progress(start + share * (end - start))
+@dataclass(frozen=True)
+class NearField:
+    """What a parameter set does between the first and the last distance of a study.
+
+    Attributes:
+        thermal_share: Share of the charge's energy that is random in direction.
+        radius_m: Radius of the balls.
+        head_on_slope: d ln i / d ln R of the load on a facade that looks at the charge.
+        side_on_slope: Likewise of the load on a wall parallel to the flow.
+        ratio_near: Head-on over side-on load at the first distance.
+        ratio_far: At the last one.
+    """
+
+    thermal_share: float
+    radius_m: float
+    head_on_slope: float
+    side_on_slope: float
+    ratio_near: float
+    ratio_far: float
+
+
+def near_field(report: ReflectionReport) -> NearField:
+    """Return what a study found."""
+    study, parameters = report.study, report.study.parameters
+    distance_m = np.array(study.distances_m)
+    drawn = draw_loads(report.head_on[:, 0], distance_m, report.side_on, study.geometry)
+    head_on, side_on = drawn.loads[0], drawn.free_field[0]
+    return NearField(
+        thermal_share=parameters.explosive.thermal_share,
+        radius_m=parameters.air.radius_units / UNITS_PER_M,
+        head_on_slope=_slope(distance_m, head_on),
+        side_on_slope=_slope(distance_m, side_on),
+        ratio_near=float(head_on[0] / side_on[0]),
+        ratio_far=float(head_on[-1] / side_on[-1]),
+    )
+
+
+def reference_near_field(distances_m: Sequence[float]) -> NearField:
+    """Return Kingery and Bulmash's, of 100 kg TNT on the ground."""
+    distance_m = np.array(distances_m)
+    head_on = kingery_bulmash("reflected_impulse", distance_m, 100.0)
+    side_on = kingery_bulmash("incident_impulse", distance_m, 100.0)
+    ratio = head_on / side_on
+    slopes = _slope(distance_m, head_on), _slope(distance_m, side_on)
+    return NearField(np.nan, np.nan, *slopes, float(ratio[0]), float(ratio[-1]))
+
+
+def _slope(distance_m: np.ndarray, load: np.ndarray) -> float:
+    return float(np.log(load[-1] / load[0]) / np.log(distance_m[-1] / distance_m[0]))

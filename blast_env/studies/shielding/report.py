@@ -93,7 +93,6 @@ def _plain(value: Any) -> Any:
 LoadName = Literal["transferred_impulse", "impulse"]
 """The momentum really transferred along the normals, or the paper's m |v|."""
 
-
 LOADS: Final[Mapping[LoadName, LoadKind]] = MappingProxyType(
     {"transferred_impulse": LoadKind.TRANSFERRED, "impulse": LoadKind.IMPULSE}
 )
@@ -151,16 +150,6 @@ class ShieldingReport:
     def one_corner(self) -> Estimate:
         """Normal impulse on the sides over that in the open, at the same path lengths."""
         return self.ratio("one_corner")
-
-    @property
-    def one_corner_near(self) -> Estimate:
-        """As `one_corner`, the third of the gauges at the front."""
-        return self.ratio("one_corner_near")
-
-    @property
-    def one_corner_far(self) -> Estimate:
-        """As `one_corner`, the third of the gauges at the back."""
-        return self.ratio("one_corner_far")
 
     @property
     def two_corners(self) -> Estimate:

@@ -2,11 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import ceil, hypot
 from typing import Any, TypeVar
 
-import joblib
 import numpy as np
 
 from blast_env.arrays import FloatArray
@@ -15,6 +14,7 @@ from blast_env.physics.engine import EndReason
 from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import preset
+from blast_env.runner import run_all
 from blast_env.scenario import Scenario
 from blast_env.simulation import BlastResult, simulate
 from blast_env.units import MODULE_SIDE_M
@@ -246,28 +246,16 @@ class StudySettings:
         Raises:
             BlastEnvError: If a blast ended at its limit of collisions.
         """
-        numbers = [(scene, seed) for seed in self.seeds for scene in range(len(scenes))]
-        jobs = (
-            joblib.delayed(_run_one)((scene, seed), scenes[scene], self.engine, read)
-            for scene, seed in numbers
-        )
-        parallel = joblib.Parallel(n_jobs=processes, return_as="generator_unordered")
-        readings: dict[tuple[int, int], Reading] = {}
-        for number, reading in parallel(jobs):
-            readings[number] = reading
-            if progress is not None:
-                progress(len(readings) / len(numbers))
-        return [[readings[scene, seed] for seed in self.seeds] for scene in range(len(scenes))]
+        jobs = [(scene, seed) for seed in self.seeds for scene in scenes]
+        readings = run_all(partial(_run_one, self.engine, read), jobs, processes, progress)
+        return [readings[number :: len(scenes)] for number in range(len(scenes))]
 
 
 def _run_one(
-    number: tuple[int, int],
-    scenario: Scenario,
-    engine: str,
-    read: Callable[[BlastResult], Reading],
-) -> tuple[tuple[int, int], Reading]:
+    engine: str, read: Callable[[BlastResult], Reading], job: tuple[Scenario, int]
+) -> Reading:
     """Run one blast, in a worker process."""
-    _, seed = number
+    scenario, seed = job
     result = simulate(scenario, seed=seed, engine=engine)
     if result.end_reason is EndReason.EVENT_LIMIT:
         limit = scenario.parameters.stepping.most_collisions
@@ -275,4 +263,4 @@ def _run_one(
             f"{scenario.name}, seed {seed}: the blast ended at {result.time_s:.3g} s, at its limit "
             f"of {limit:,} collisions (stepping.most_collisions): its loads are not complete"
         )
-    return number, read(result)
+    return read(result)

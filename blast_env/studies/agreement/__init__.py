@@ -1,0 +1,1 @@
+"""Whether the engines, and finer balls, say the same: loads, single modules, layouts."""

@@ -1,0 +1,120 @@
+"""The free-field study: resumable, parallel, summed up with intervals."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from scipy import stats
+
+from blast_env import load_scenario, simulate
+from blast_env.errors import BlastEnvError
+from blast_env.studies.calibration import study as study_module
+from blast_env.studies.calibration.study import (
+    FreeFieldRun,
+    FreeFieldStudy,
+    append_to_store,
+    impulse_by_seed,
+    read_store,
+    summarise,
+)
+
+SMALL = load_scenario("free_field").with_simulation(
+    overrides={"explosive": {"ball_count": 120}, "stepping": {"time_limit_s": 0.1}}
+)
+STUDY = FreeFieldStudy(SMALL, (8.0, 12.0), (5, 6, 7))
+
+
+def test_every_run_is_the_blast_of_its_distance_and_seed() -> None:
+    runs = STUDY.run()
+    assert runs[["distance_m", "seed"]].to_numpy().tolist() == [
+        [d, s] for d in (8.0, 12.0) for s in (5, 6, 7)
+    ]
+    expected = simulate(SMALL.at_stand_off(12.0), seed=6)
+    (row,) = runs[(runs.distance_m == 12.0) & (runs.seed == 6)].itertuples()
+    assert row.impulse_sim == expected.impulse_sim("building")
+    assert row.transferred_impulse_sim == expected.obstacle("building").transferred_impulse
+    assert row.first_hit_s == expected.collisions.time_s.min()
+
+
+def test_two_processes_give_the_same_table() -> None:
+    pd.testing.assert_frame_equal(STUDY.run(processes=2), STUDY.run(), check_exact=True)
+
+
+def test_an_interrupted_study_goes_on_without_repeating(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, whole, run_one = tmp_path / "runs.jsonl", STUDY.run(), study_module._run_one
+    ran: list[tuple[float, int]] = []
+
+    def counted(job: tuple) -> object:
+        _, _, distance_m, seed, _ = job
+        if len(ran) == 4:
+            raise KeyboardInterrupt
+        ran.append((distance_m, seed))
+        return run_one(job)
+
+    monkeypatch.setattr(study_module, "_run_one", counted)
+    with pytest.raises(KeyboardInterrupt):
+        STUDY.run(store=store)
+    assert len(read_store(store)) == 4
+    with store.open("a") as file:
+        file.write('{"key": "cut sho')  # what a killed process leaves
+    first, ran[:] = list(ran), []
+    pd.testing.assert_frame_equal(STUDY.run(store=store), whole, check_exact=True)
+    assert len(ran) == 2
+    assert not set(ran) & set(first)
+    ran.clear()
+    shares: list[float] = []
+    STUDY.run(store=store, progress=shares.append)
+    assert ran == []
+
+
+def test_runs_of_other_parameters_are_not_believed(tmp_path: Path) -> None:
+    store = tmp_path / "runs.jsonl"
+    FreeFieldStudy(SMALL, (8.0,), (5,)).run(store=store)
+    heavier = SMALL.with_simulation(overrides={"air": {"mass": 0.5}})
+    other = FreeFieldStudy(heavier, (8.0,), (5,)).run(store=store)
+    assert len(read_store(store)) == 2
+    expected = simulate(heavier.at_stand_off(8.0), seed=5).impulse_sim("building")
+    assert other.impulse_sim.tolist() == [expected]
+
+
+def test_the_summary_has_means_and_student_intervals() -> None:
+    runs = STUDY.run()
+    table = summarise(runs)
+    values = runs[runs.distance_m == 8.0].impulse_sim.to_numpy()
+    assert table.i_sim[0] == pytest.approx(values.mean())
+    low, high = stats.t.interval(0.95, 2, values.mean(), stats.sem(values))
+    assert table.ci95[0] == pytest.approx((high - low) / 2)
+    assert table.seeds.tolist() == [3, 3]
+    assert impulse_by_seed(runs).mean(axis=0) == pytest.approx(table.i_sim.to_numpy())
+
+
+@pytest.mark.parametrize(
+    ("distances", "seeds", "words"),
+    [
+        ((8.0, 8.0), (1,), "8 m follows 8 m"),
+        ((12.0, 8.0), (1,), "8 m follows 12 m"),
+        ((), (1,), "distances"),
+        ((8.0,), (), "seeds"),
+        ((8.0,), (1, 1), "seeds"),
+    ],
+)
+def test_bad_studies_are_refused(
+    distances: tuple[float, ...], seeds: tuple[int, ...], words: str
+) -> None:
+    with pytest.raises(BlastEnvError, match=words):
+        FreeFieldStudy(SMALL, distances, seeds)
+
+
+def test_a_store_that_is_none_is_refused_with_its_line(tmp_path: Path) -> None:
+    store = tmp_path / "runs.jsonl"
+    append_to_store(store, FreeFieldRun("key", 8.0, 1, 2.0, 3.0, None))
+    with store.open("a") as file:
+        file.write("nonsense\n")
+    with pytest.raises(BlastEnvError, match="line 2 is not a run"):
+        read_store(store)
+    store.write_bytes(b"\xff\xfe\n")
+    with pytest.raises(BlastEnvError, match="cannot be read"):
+        read_store(store)
+    assert read_store(tmp_path / "none.jsonl") == {}
