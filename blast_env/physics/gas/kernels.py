@@ -20,6 +20,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from blast_env.physics.gas.lanes import get, larger, put, root, select, smaller
+
 Reals = NDArray[Any]
 
 GAMMA: Final = 1.4
@@ -90,18 +92,16 @@ def _slope(back: Any, ahead: Any, limit: Any, half: Any, zero: Any) -> Any:
     centre = half * (back + ahead)
     back = limit * back
     ahead = limit * ahead
-    least = back if back < ahead else ahead
-    most = ahead if back < ahead else back
-    least = least if least < centre else centre
-    most = most if most > centre else centre
-    return (least if least > zero else zero) + (most if most < zero else zero)
+    least = smaller(smaller(back, ahead), centre)
+    most = larger(larger(back, ahead), centre)
+    return larger(least, zero) + smaller(most, zero)
 
 
 @njit(forceinline=True, error_model="numpy")
 def _copy_rows(work: Reals, count: int, source: int, target: int, n: int) -> None:
     for k in range(count):
         for i in range(n):
-            work[target + k * PITCH + i] = work[source + k * PITCH + i]
+            put(work, target + k * PITCH + i, get(work, source + k * PITCH + i))
 
 
 @njit(error_model="numpy")
@@ -117,10 +117,17 @@ def _load_row(
     if bad > 0:
         _lift_row(state, z, y, x, n)
         _convert_row(state, work, z, y, x, n)
-    codes = code[z, y, x : x + n]
+    real = work.dtype.type
+    at = (z * code.shape[1] + y) * code.shape[2] + x
     for i in range(n):
-        work[_CODE_HIGH + i] = codes[i]
+        put(work, _CODE_HIGH + i, real(get(code, at + i)))
     return bad
+
+
+@njit(forceinline=True, error_model="numpy")
+def _place(state: Reals, k: int, z: int, y: int, x: int) -> int:
+    """Return where a cell lies in memory, in numbers."""
+    return ((k * state.shape[1] + z) * state.shape[2] + y) * state.shape[3] + x
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -129,30 +136,29 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
     half, one = real(0.5), real(1.0)
     gamma, gamma_1 = real(GAMMA), real(GAMMA - 1.0)
     floor = real(_FLOOR)
-    density = state[DENSITY, z, y, x : x + n]
-    mx = state[X_MOMENTUM, z, y, x : x + n]
-    my = state[Y_MOMENTUM, z, y, x : x + n]
-    mz = state[Z_MOMENTUM, z, y, x : x + n]
-    energy = state[ENERGY, z, y, x : x + n]
+    density = _place(state, DENSITY, z, y, x)
+    x_momentum = _place(state, X_MOMENTUM, z, y, x)
+    y_momentum = _place(state, Y_MOMENTUM, z, y, x)
+    z_momentum = _place(state, Z_MOMENTUM, z, y, x)
+    energy = _place(state, ENERGY, z, y, x)
     bad = 0
     for i in range(n):
-        r = density[i]
+        r = get(state, density + i)
+        mx, my = get(state, x_momentum + i), get(state, y_momentum + i)
+        mz = get(state, z_momentum + i)
         per_r = one / r
-        u, v, w = mx[i] * per_r, my[i] * per_r, mz[i] * per_r
-        p = gamma_1 * (energy[i] - half * (mx[i] * u + my[i] * v + mz[i] * w))
-        bad += 0 if (r >= floor) & (p >= floor) else 1
-        sound = sqrt(gamma * p * per_r)
+        u, v, w = mx * per_r, my * per_r, mz * per_r
+        p = gamma_1 * (get(state, energy + i) - half * (mx * u + my * v + mz * w))
+        bad += select(smaller(r, p) >= floor, 0, 1)
+        sound = root(gamma * p * per_r)
         level = half * (abs(u) + abs(v)) + sound
         upright = half * abs(w) + sound
-        signal = work[_SIGNAL + i]
-        signal = level if level > signal else signal
-        signal = upright if upright > signal else signal
-        work[_HIGH + i] = r
-        work[_HIGH + _U + i] = u
-        work[_HIGH + _V + i] = v
-        work[_HIGH + _W + i] = w
-        work[_HIGH + _P + i] = p
-        work[_SIGNAL + i] = signal
+        put(work, _HIGH + i, r)
+        put(work, _HIGH + _U + i, u)
+        put(work, _HIGH + _V + i, v)
+        put(work, _HIGH + _W + i, w)
+        put(work, _HIGH + _P + i, p)
+        put(work, _SIGNAL + i, larger(larger(level, upright), get(work, _SIGNAL + i)))
     return bad
 
 
@@ -185,43 +191,43 @@ def _predict_plane_row(work: Reals, n: int, ratio: Any) -> None:
     limit, least = real(_LIMIT), real(_LEAST_SHARE)
     step = half * ratio
     for i in range(n):
-        side_w, side_e = work[_CODE_MID + i], work[_CODE_MID + 2 + i]
-        side_s, side_n = work[_CODE_LOW + 1 + i], work[_CODE_HIGH + 1 + i]
+        side_w, side_e = get(work, _CODE_MID + i), get(work, _CODE_MID + 2 + i)
+        side_s, side_n = get(work, _CODE_LOW + 1 + i), get(work, _CODE_HIGH + 1 + i)
         air_w, air_e = side_w == zero, side_e == zero
         air_s, air_n = side_s == zero, side_n == zero
-        r, u, v = work[_MID + 1 + i], work[_MID + _U + 1 + i], work[_MID + _V + 1 + i]
-        w, p = work[_MID + _W + 1 + i], work[_MID + _P + 1 + i]
+        r, u, v = get(work, _MID + 1 + i), get(work, _MID + _U + 1 + i), get(work, _MID + _V + 1 + i)
+        w, p = get(work, _MID + _W + 1 + i), get(work, _MID + _P + 1 + i)
 
-        back = work[_MID + i] if air_w else r
-        ahead = work[_MID + 2 + i] if air_e else r
+        back = select(air_w, get(work, _MID + i), r)
+        ahead = select(air_e, get(work, _MID + 2 + i), r)
         rx = _slope(r - back, ahead - r, limit, half, zero)
-        back = work[_MID + _U + i] if air_w else side_w * u
-        ahead = work[_MID + _U + 2 + i] if air_e else side_e * u
+        back = select(air_w, get(work, _MID + _U + i), side_w * u)
+        ahead = select(air_e, get(work, _MID + _U + 2 + i), side_e * u)
         ux = _slope(u - back, ahead - u, limit, half, zero)
-        back = work[_MID + _V + i] if air_w else v
-        ahead = work[_MID + _V + 2 + i] if air_e else v
+        back = select(air_w, get(work, _MID + _V + i), v)
+        ahead = select(air_e, get(work, _MID + _V + 2 + i), v)
         vx = _slope(v - back, ahead - v, limit, half, zero)
-        back = work[_MID + _W + i] if air_w else w
-        ahead = work[_MID + _W + 2 + i] if air_e else w
+        back = select(air_w, get(work, _MID + _W + i), w)
+        ahead = select(air_e, get(work, _MID + _W + 2 + i), w)
         wx = _slope(w - back, ahead - w, limit, half, zero)
-        back = work[_MID + _P + i] if air_w else p
-        ahead = work[_MID + _P + 2 + i] if air_e else p
+        back = select(air_w, get(work, _MID + _P + i), p)
+        ahead = select(air_e, get(work, _MID + _P + 2 + i), p)
         px = _slope(p - back, ahead - p, limit, half, zero)
 
-        back = work[_LOW + 1 + i] if air_s else r
-        ahead = work[_HIGH + 1 + i] if air_n else r
+        back = select(air_s, get(work, _LOW + 1 + i), r)
+        ahead = select(air_n, get(work, _HIGH + 1 + i), r)
         ry = _slope(r - back, ahead - r, limit, half, zero)
-        back = work[_LOW + _U + 1 + i] if air_s else u
-        ahead = work[_HIGH + _U + 1 + i] if air_n else u
+        back = select(air_s, get(work, _LOW + _U + 1 + i), u)
+        ahead = select(air_n, get(work, _HIGH + _U + 1 + i), u)
         uy = _slope(u - back, ahead - u, limit, half, zero)
-        back = work[_LOW + _V + 1 + i] if air_s else side_s * v
-        ahead = work[_HIGH + _V + 1 + i] if air_n else side_n * v
+        back = select(air_s, get(work, _LOW + _V + 1 + i), side_s * v)
+        ahead = select(air_n, get(work, _HIGH + _V + 1 + i), side_n * v)
         vy = _slope(v - back, ahead - v, limit, half, zero)
-        back = work[_LOW + _W + 1 + i] if air_s else w
-        ahead = work[_HIGH + _W + 1 + i] if air_n else w
+        back = select(air_s, get(work, _LOW + _W + 1 + i), w)
+        ahead = select(air_n, get(work, _HIGH + _W + 1 + i), w)
         wy = _slope(w - back, ahead - w, limit, half, zero)
-        back = work[_LOW + _P + 1 + i] if air_s else p
-        ahead = work[_HIGH + _P + 1 + i] if air_n else p
+        back = select(air_s, get(work, _LOW + _P + 1 + i), p)
+        ahead = select(air_n, get(work, _HIGH + _P + 1 + i), p)
         py = _slope(p - back, ahead - p, limit, half, zero)
 
         spread = ux + vy
@@ -234,28 +240,38 @@ def _predict_plane_row(work: Reals, n: int, ratio: Any) -> None:
 
         rx, ux, vx, wx, px = half * rx, half * ux, half * vx, half * wx, half * px
         ry, uy, vy, wy, py = half * ry, half * uy, half * vy, half * wy, half * py
-        r_most = abs(rx) if abs(rx) > abs(ry) else abs(ry)
-        p_most = abs(px) if abs(px) > abs(py) else abs(py)
+        r_most = larger(abs(rx), abs(ry))
+        p_most = larger(abs(px), abs(py))
         good = (r_half - r_most > least * r) & (p_half - p_most > least * p)
-        r = r_half if good else r
-        u = u_half if good else u
-        v = v_half if good else v
-        w = w_half if good else w
-        p = p_half if good else p
-        rx, ux, vx = rx if good else zero, ux if good else zero, vx if good else zero
-        wx, px = wx if good else zero, px if good else zero
-        ry, uy, vy = ry if good else zero, uy if good else zero, vy if good else zero
-        wy, py = wy if good else zero, py if good else zero
-        work[_WEST + 1 + i], work[_EAST + 1 + i] = r - rx, r + rx
-        work[_WEST + _U + 1 + i], work[_EAST + _U + 1 + i] = u - ux, u + ux
-        work[_WEST + _V + 1 + i], work[_EAST + _V + 1 + i] = v - vx, v + vx
-        work[_WEST + _W + 1 + i], work[_EAST + _W + 1 + i] = w - wx, w + wx
-        work[_WEST + _P + 1 + i], work[_EAST + _P + 1 + i] = p - px, p + px
-        work[_BELOW + 1 + i], work[_ABOVE + 1 + i] = r - ry, r + ry
-        work[_BELOW + _U + 1 + i], work[_ABOVE + _U + 1 + i] = u - uy, u + uy
-        work[_BELOW + _V + 1 + i], work[_ABOVE + _V + 1 + i] = v - vy, v + vy
-        work[_BELOW + _W + 1 + i], work[_ABOVE + _W + 1 + i] = w - wy, w + wy
-        work[_BELOW + _P + 1 + i], work[_ABOVE + _P + 1 + i] = p - py, p + py
+        r = select(good, r_half, r)
+        u = select(good, u_half, u)
+        v = select(good, v_half, v)
+        w = select(good, w_half, w)
+        p = select(good, p_half, p)
+        rx, ux, vx = select(good, rx, zero), select(good, ux, zero), select(good, vx, zero)
+        wx, px = select(good, wx, zero), select(good, px, zero)
+        ry, uy, vy = select(good, ry, zero), select(good, uy, zero), select(good, vy, zero)
+        wy, py = select(good, wy, zero), select(good, py, zero)
+        put(work, _WEST + 1 + i, r - rx)
+        put(work, _EAST + 1 + i, r + rx)
+        put(work, _WEST + _U + 1 + i, u - ux)
+        put(work, _EAST + _U + 1 + i, u + ux)
+        put(work, _WEST + _V + 1 + i, v - vx)
+        put(work, _EAST + _V + 1 + i, v + vx)
+        put(work, _WEST + _W + 1 + i, w - wx)
+        put(work, _EAST + _W + 1 + i, w + wx)
+        put(work, _WEST + _P + 1 + i, p - px)
+        put(work, _EAST + _P + 1 + i, p + px)
+        put(work, _BELOW + 1 + i, r - ry)
+        put(work, _ABOVE + 1 + i, r + ry)
+        put(work, _BELOW + _U + 1 + i, u - uy)
+        put(work, _ABOVE + _U + 1 + i, u + uy)
+        put(work, _BELOW + _V + 1 + i, v - vy)
+        put(work, _ABOVE + _V + 1 + i, v + vy)
+        put(work, _BELOW + _W + 1 + i, w - wy)
+        put(work, _ABOVE + _W + 1 + i, w + wy)
+        put(work, _BELOW + _P + 1 + i, p - py)
+        put(work, _ABOVE + _P + 1 + i, p + py)
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -266,25 +282,25 @@ def _predict_column_row(work: Reals, n: int, ratio: Any) -> None:
     limit, least = real(_LIMIT), real(_LEAST_SHARE)
     step = half * ratio
     for i in range(n):
-        side_s, side_n = work[_CODE_LOW + i], work[_CODE_HIGH + i]
+        side_s, side_n = get(work, _CODE_LOW + i), get(work, _CODE_HIGH + i)
         air_s, air_n = side_s == zero, side_n == zero
-        r, u, v = work[_MID + i], work[_MID + _U + i], work[_MID + _V + i]
-        w, p = work[_MID + _W + i], work[_MID + _P + i]
+        r, u, v = get(work, _MID + i), get(work, _MID + _U + i), get(work, _MID + _V + i)
+        w, p = get(work, _MID + _W + i), get(work, _MID + _P + i)
 
-        back = work[_LOW + i] if air_s else r
-        ahead = work[_HIGH + i] if air_n else r
+        back = select(air_s, get(work, _LOW + i), r)
+        ahead = select(air_n, get(work, _HIGH + i), r)
         rz = _slope(r - back, ahead - r, limit, half, zero)
-        back = work[_LOW + _U + i] if air_s else u
-        ahead = work[_HIGH + _U + i] if air_n else u
+        back = select(air_s, get(work, _LOW + _U + i), u)
+        ahead = select(air_n, get(work, _HIGH + _U + i), u)
         uz = _slope(u - back, ahead - u, limit, half, zero)
-        back = work[_LOW + _V + i] if air_s else v
-        ahead = work[_HIGH + _V + i] if air_n else v
+        back = select(air_s, get(work, _LOW + _V + i), v)
+        ahead = select(air_n, get(work, _HIGH + _V + i), v)
         vz = _slope(v - back, ahead - v, limit, half, zero)
-        back = work[_LOW + _W + i] if air_s else side_s * w
-        ahead = work[_HIGH + _W + i] if air_n else side_n * w
+        back = select(air_s, get(work, _LOW + _W + i), side_s * w)
+        ahead = select(air_n, get(work, _HIGH + _W + i), side_n * w)
         wz = _slope(w - back, ahead - w, limit, half, zero)
-        back = work[_LOW + _P + i] if air_s else p
-        ahead = work[_HIGH + _P + i] if air_n else p
+        back = select(air_s, get(work, _LOW + _P + i), p)
+        ahead = select(air_n, get(work, _HIGH + _P + i), p)
         pz = _slope(p - back, ahead - p, limit, half, zero)
 
         r_half = r - step * (w * rz + r * wz)
@@ -294,18 +310,23 @@ def _predict_column_row(work: Reals, n: int, ratio: Any) -> None:
         p_half = p - step * (w * pz + gamma * p * wz)
         rz, uz, vz, wz, pz = half * rz, half * uz, half * vz, half * wz, half * pz
         good = (r_half - abs(rz) > least * r) & (p_half - abs(pz) > least * p)
-        r = r_half if good else r
-        u = u_half if good else u
-        v = v_half if good else v
-        w = w_half if good else w
-        p = p_half if good else p
-        rz, uz, vz = rz if good else zero, uz if good else zero, vz if good else zero
-        wz, pz = wz if good else zero, pz if good else zero
-        work[_BELOW + i], work[_ABOVE + i] = r - rz, r + rz
-        work[_BELOW + _U + i], work[_ABOVE + _U + i] = u - uz, u + uz
-        work[_BELOW + _V + i], work[_ABOVE + _V + i] = v - vz, v + vz
-        work[_BELOW + _W + i], work[_ABOVE + _W + i] = w - wz, w + wz
-        work[_BELOW + _P + i], work[_ABOVE + _P + i] = p - pz, p + pz
+        r = select(good, r_half, r)
+        u = select(good, u_half, u)
+        v = select(good, v_half, v)
+        w = select(good, w_half, w)
+        p = select(good, p_half, p)
+        rz, uz, vz = select(good, rz, zero), select(good, uz, zero), select(good, vz, zero)
+        wz, pz = select(good, wz, zero), select(good, pz, zero)
+        put(work, _BELOW + i, r - rz)
+        put(work, _ABOVE + i, r + rz)
+        put(work, _BELOW + _U + i, u - uz)
+        put(work, _ABOVE + _U + i, u + uz)
+        put(work, _BELOW + _V + i, v - vz)
+        put(work, _ABOVE + _V + i, v + vz)
+        put(work, _BELOW + _W + i, w - wz)
+        put(work, _ABOVE + _W + i, w + wz)
+        put(work, _BELOW + _P + i, p - pz)
+        put(work, _ABOVE + _P + i, p + pz)
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -329,66 +350,64 @@ def _hllc_row(
     zero, half, one, gamma = real(0.0), real(0.5), real(1.0), real(GAMMA)
     per_pressure = real(1.0 / (GAMMA - 1.0))
     for i in range(n):
-        side_l = work[code_left + i]
-        side_r = work[code_right + i]
+        side_l = get(work, code_left + i)
+        side_r = get(work, code_right + i)
         air_l = side_l == zero
         air_r = side_r == zero
-        rl0, rr0 = work[left + i], work[right + i]
-        ul0, ur0 = work[left + normal + i], work[right + normal + i]
-        vl0, vr0 = work[left + second + i], work[right + second + i]
-        wl0, wr0 = work[left + third + i], work[right + third + i]
-        pl0, pr0 = work[left + _P + i], work[right + _P + i]
-        rl = rl0 if air_l else rr0
-        ul = ul0 if air_l else side_l * ur0
-        vl = vl0 if air_l else vr0
-        wl = wl0 if air_l else wr0
-        pl = pl0 if air_l else pr0
-        rr = rr0 if air_r else rl0
-        ur = ur0 if air_r else side_r * ul0
-        vr = vr0 if air_r else vl0
-        wr = wr0 if air_r else wl0
-        pr = pr0 if air_r else pl0
+        rl0, rr0 = get(work, left + i), get(work, right + i)
+        ul0, ur0 = get(work, left + normal + i), get(work, right + normal + i)
+        vl0, vr0 = get(work, left + second + i), get(work, right + second + i)
+        wl0, wr0 = get(work, left + third + i), get(work, right + third + i)
+        pl0, pr0 = get(work, left + _P + i), get(work, right + _P + i)
+        rl = select(air_l, rl0, rr0)
+        ul = select(air_l, ul0, side_l * ur0)
+        vl = select(air_l, vl0, vr0)
+        wl = select(air_l, wl0, wr0)
+        pl = select(air_l, pl0, pr0)
+        rr = select(air_r, rr0, rl0)
+        ur = select(air_r, ur0, side_r * ul0)
+        vr = select(air_r, vr0, vl0)
+        wr = select(air_r, wr0, wl0)
+        pr = select(air_r, pr0, pl0)
 
         sound2_l = gamma * pl / rl
         sound2_r = gamma * pr / rr
-        root_l, root_r = sqrt(rl), sqrt(rr)
+        root_l, root_r = root(rl), root(rr)
         share = root_l / (root_l + root_r)
         rest = one - share
         jump = ur - ul
         mean = share * ul + rest * ur
-        sound = sqrt(share * sound2_l + rest * sound2_r + half * share * rest * jump * jump)
-        slow_l, slow_m = ul - sqrt(sound2_l), mean - sound
-        fast_r, fast_m = ur + sqrt(sound2_r), mean + sound
-        slow = slow_l if slow_l < slow_m else slow_m
-        fast = fast_r if fast_r > fast_m else fast_m
+        sound = root(share * sound2_l + rest * sound2_r + half * share * rest * jump * jump)
+        slow = smaller(ul - root(sound2_l), mean - sound)
+        fast = larger(ur + root(sound2_r), mean + sound)
 
         ql = rl * (slow - ul)
         qr = rr * (fast - ur)
         middle = ((pl - pr) + (qr * ur - ql * ul)) / (qr - ql)
-        middle = zero if side_l + side_r < zero else middle
+        middle = select(side_l + side_r < zero, zero, middle)
 
         from_left = middle >= zero
-        r = rl if from_left else rr
-        u = ul if from_left else ur
-        v = vl if from_left else vr
-        w = wl if from_left else wr
-        p = pl if from_left else pr
-        q = ql if from_left else qr
-        wave = slow if from_left else fast
-        outside = (slow >= zero) if from_left else (fast <= zero)
+        r = select(from_left, rl, rr)
+        u = select(from_left, ul, ur)
+        v = select(from_left, vl, vr)
+        w = select(from_left, wl, wr)
+        p = select(from_left, pl, pr)
+        q = select(from_left, ql, qr)
+        wave = select(from_left, slow, fast)
+        outside = select(from_left, slow >= zero, fast <= zero)
         energy = per_pressure * p + half * r * (u * u + v * v + w * w)
         per_width = one / (wave - middle)
         p_star = p + q * (middle - u)
         r_star = q * per_width
         e_star = ((wave - u) * energy - p * u + p_star * middle) * per_width
-        speed = u if outside else middle
-        p_face = p if outside else p_star
-        mass = speed * (r if outside else r_star)
-        work[out + i] = mass
-        work[out + normal + i] = mass * speed + p_face
-        work[out + second + i] = mass * v
-        work[out + third + i] = mass * w
-        work[out + _P + i] = speed * ((energy if outside else e_star) + p_face)
+        speed = select(outside, u, middle)
+        p_face = select(outside, p, p_star)
+        mass = speed * select(outside, r, r_star)
+        put(work, out + i, mass)
+        put(work, out + normal + i, mass * speed + p_face)
+        put(work, out + second + i, mass * v)
+        put(work, out + third + i, mass * w)
+        put(work, out + _P + i, speed * (select(outside, energy, e_star) + p_face))
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -416,7 +435,7 @@ def _record_walls(
     for k in range(first[line], first[line + 1]):
         i = walls[k, 0] - x
         if 0 <= i < n:
-            pressure[walls[k, 1]] = work[flux + i]
+            pressure[walls[k, 1]] = get(work, flux + i)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -455,7 +474,7 @@ def advance_planes(
     rows = code.shape[1]
     lines = code.shape[0] * rows
     for i in range(PITCH):
-        work[_SIGNAL + i] = 0
+        put(work, _SIGNAL + i, work.dtype.type(0.0))
     lifted = 0
     for z in range(z_from, z_to):
         for tile in range(tiles):
@@ -489,13 +508,15 @@ def advance_planes(
                     _record_walls(work, pressure, walls, first, line, _ALONG + _U + 2, xa, n - 3)
                     for k in range(5):
                         for i in range(n - 4):
-                            work[_CHANGE + k * PITCH + 2 + i] = (
-                                work[_ALONG + k * PITCH + 3 + i]
-                                - work[_ALONG + k * PITCH + 2 + i]
+                            at = k * PITCH + 2 + i
+                            put(
+                                work,
+                                _CHANGE + at,
+                                get(work, _ALONG + at + 1) - get(work, _ALONG + at),
                             )
     notes[1] += lifted
     for i in range(PITCH):
-        notes[0] = max(notes[0], work[_SIGNAL + i])
+        notes[0] = max(notes[0], get(work, _SIGNAL + i))
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -505,8 +526,8 @@ def _join_tiles(work: Reals, edges: Reals, y: int, tile: int, width: int) -> Non
         for i in range(MARGIN):
             at = _HIGH + k * PITCH + i
             if tile > 0:
-                work[at] = edges[y, k * MARGIN + i]
-            edges[y, k * MARGIN + i] = work[at + width]
+                put(work, at, edges[y, k * MARGIN + i])
+            edges[y, k * MARGIN + i] = get(work, at + width)
 
 
 @njit(error_model="numpy")
@@ -515,13 +536,13 @@ def _update_plane_row(
 ) -> None:
     zero = work.dtype.type(0.0)
     for k in range(5):
-        row = state[k, z, y, x : x + n]
+        row = _place(state, k, z, y, x)
         shift = k * PITCH + 2
         for i in range(n):
-            old = row[i]
-            across = work[_ACROSS + shift + i] - work[_ACROSS_LOW + shift + i]
-            new = old - ratio * (work[_CHANGE + shift + i] + across)
-            row[i] = new if work[_CODE_LOW + 2 + i] == zero else old
+            old = get(state, row + i)
+            across = get(work, _ACROSS + shift + i) - get(work, _ACROSS_LOW + shift + i)
+            new = old - ratio * (get(work, _CHANGE + shift + i) + across)
+            put(state, row + i, select(get(work, _CODE_LOW + 2 + i) == zero, new, old))
 
 
 @njit(error_model="numpy")
@@ -530,13 +551,13 @@ def _update_column_row(
 ) -> None:
     zero = work.dtype.type(0.0)
     for k in range(5):
-        row = state[k, z, y, x : x + n]
+        row = _place(state, k, z, y, x)
         shift = k * PITCH
         for i in range(n):
-            old = row[i]
-            across = work[_ACROSS + shift + i] - work[_ACROSS_LOW + shift + i]
+            old = get(state, row + i)
+            across = get(work, _ACROSS + shift + i) - get(work, _ACROSS_LOW + shift + i)
             new = old - ratio * across
-            row[i] = new if work[_CODE_LOW + i] == zero else old
+            put(state, row + i, select(get(work, _CODE_LOW + i) == zero, new, old))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -559,7 +580,7 @@ def advance_columns(
     rows = code.shape[1]
     lines = code.shape[0] * rows
     for i in range(PITCH):
-        work[_SIGNAL + i] = 0
+        put(work, _SIGNAL + i, work.dtype.type(0.0))
     lifted = 0
     for y in range(y_from, y_to):
         for tile in range(tiles):
@@ -581,7 +602,7 @@ def advance_columns(
                     _update_column_row(state, work, z - 2, y, x, n, ratio)
     notes[1] += lifted
     for i in range(PITCH):
-        notes[0] = max(notes[0], work[_SIGNAL + i])
+        notes[0] = max(notes[0], get(work, _SIGNAL + i))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
