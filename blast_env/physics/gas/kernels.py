@@ -82,7 +82,8 @@ _CODE_LOW: Final = _ACROSS_LOW + _VARIABLES * PITCH
 _CODE_MID: Final = _CODE_LOW + PITCH
 _CODE_HIGH: Final = _CODE_MID + PITCH
 _SIGNAL: Final = _CODE_HIGH + PITCH
-WORK_SIZE: Final = _SIGNAL + PITCH
+_WORST: Final = _SIGNAL + PITCH
+WORK_SIZE: Final = _WORST + PITCH
 """Length of a workspace."""
 
 
@@ -141,7 +142,6 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
     y_momentum = _place(state, Y_MOMENTUM, z, y, x)
     z_momentum = _place(state, Z_MOMENTUM, z, y, x)
     energy = _place(state, ENERGY, z, y, x)
-    bad = 0
     for i in range(n):
         r = get(state, density + i)
         mx, my = get(state, x_momentum + i), get(state, y_momentum + i)
@@ -149,7 +149,6 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
         per_r = one / r
         u, v, w = mx * per_r, my * per_r, mz * per_r
         p = gamma_1 * (get(state, energy + i) - half * (mx * u + my * v + mz * w))
-        bad += select(smaller(r, p) >= floor, 0, 1)
         sound = root(gamma * p * per_r)
         level = half * (abs(u) + abs(v)) + sound
         upright = half * abs(w) + sound
@@ -159,6 +158,14 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
         put(work, _HIGH + _W + i, w)
         put(work, _HIGH + _P + i, p)
         put(work, _SIGNAL + i, larger(larger(level, upright), get(work, _SIGNAL + i)))
+        put(work, _WORST + i, smaller(p, r))
+    if len(state) > FUEL:
+        fuel = _place(state, FUEL, z, y, x)
+        for i in range(n):
+            put(work, _HIGH + _Y + i, get(state, fuel + i) / get(work, _HIGH + i))
+    bad = 0
+    for i in range(n):
+        bad += select(get(work, _WORST + i) >= floor, 0, 1)
     return bad
 
 
@@ -410,13 +417,64 @@ def _hllc_row(
         put(work, out + _P + i, speed * (select(outside, energy, e_star) + p_face))
 
 
+@njit(error_model="numpy")
+def _predict_plane_fuel(work: Reals, n: int, ratio: Any) -> None:
+    """Set the share of fuel at the four upright faces of n cells, half a step on."""
+    real = work.dtype.type
+    zero, half, limit = real(0.0), real(0.5), real(_LIMIT)
+    step = half * ratio
+    for i in range(n):
+        y = get(work, _MID + _Y + 1 + i)
+        u, v = get(work, _MID + _U + 1 + i), get(work, _MID + _V + 1 + i)
+        back = select(get(work, _CODE_MID + i) == zero, get(work, _MID + _Y + i), y)
+        ahead = select(get(work, _CODE_MID + 2 + i) == zero, get(work, _MID + _Y + 2 + i), y)
+        yx = half * _slope(y - back, ahead - y, limit, half, zero)
+        back = select(get(work, _CODE_LOW + 1 + i) == zero, get(work, _LOW + _Y + 1 + i), y)
+        ahead = select(get(work, _CODE_HIGH + 1 + i) == zero, get(work, _HIGH + _Y + 1 + i), y)
+        yy = half * _slope(y - back, ahead - y, limit, half, zero)
+        y_half = y - ratio * (u * yx + v * yy)
+        good = y_half - larger(abs(yx), abs(yy)) >= zero
+        y, yx, yy = select(good, y_half, y), select(good, yx, zero), select(good, yy, zero)
+        put(work, _WEST + _Y + 1 + i, y - yx)
+        put(work, _EAST + _Y + 1 + i, y + yx)
+        put(work, _BELOW + _Y + 1 + i, y - yy)
+        put(work, _ABOVE + _Y + 1 + i, y + yy)
+
+
+@njit(error_model="numpy")
+def _predict_column_fuel(work: Reals, n: int, ratio: Any) -> None:
+    """Set the share of fuel at the lower and the upper faces of n cells, half a step on."""
+    real = work.dtype.type
+    zero, half, limit = real(0.0), real(0.5), real(_LIMIT)
+    for i in range(n):
+        y = get(work, _MID + _Y + i)
+        back = select(get(work, _CODE_LOW + i) == zero, get(work, _LOW + _Y + i), y)
+        ahead = select(get(work, _CODE_HIGH + i) == zero, get(work, _HIGH + _Y + i), y)
+        yz = half * _slope(y - back, ahead - y, limit, half, zero)
+        y_half = y - ratio * get(work, _MID + _W + i) * yz
+        good = y_half - abs(yz) >= zero
+        y, yz = select(good, y_half, y), select(good, yz, zero)
+        put(work, _BELOW + _Y + i, y - yz)
+        put(work, _ABOVE + _Y + i, y + yz)
+
+
+@njit(error_model="numpy")
+def _fuel_row(work: Reals, n: int, left: int, right: int, out: int) -> None:
+    """Set the fluxes of fuel from those of mass; what comes in through open faces has none."""
+    zero = work.dtype.type(0.0)
+    for i in range(n):
+        mass = get(work, out + i)
+        share = select(mass >= zero, get(work, left + _Y + i), get(work, right + _Y + i))
+        put(work, out + _Y + i, mass * share)
+
+
 @njit(forceinline=True, error_model="numpy")
-def _shift_rows(work: Reals, n: int) -> None:
+def _shift_rows(work: Reals, count: int, n: int) -> None:
     """Go on to the next row: what was high is now in the middle, what was there is low."""
-    _copy_rows(work, _VARIABLES, _MID, _LOW, n)
-    _copy_rows(work, _VARIABLES, _HIGH, _MID, n)
-    _copy_rows(work, _VARIABLES, _ABOVE, _ABOVE_LOW, n)
-    _copy_rows(work, _VARIABLES, _ACROSS, _ACROSS_LOW, n)
+    _copy_rows(work, count, _MID, _LOW, n)
+    _copy_rows(work, count, _HIGH, _MID, n)
+    _copy_rows(work, count, _ABOVE, _ABOVE_LOW, n)
+    _copy_rows(work, count, _ACROSS, _ACROSS_LOW, n)
     _copy_rows(work, 2, _CODE_MID, _CODE_LOW, n)
 
 
@@ -471,6 +529,7 @@ def advance_planes(
     """
     y0, y1, x0, x1 = box[2], box[3], box[4], box[5]
     tiles = (x1 - x0 + TILE - 1) // TILE
+    count = len(state)
     rows = code.shape[1]
     lines = code.shape[0] * rows
     for i in range(PITCH):
@@ -484,17 +543,21 @@ def advance_planes(
             for y in range(y0 - 2, y1 + 2):
                 # Rows up to y are loaded, those up to y - 1 get their states at the faces, and
                 # those up to y - 2 are done.
-                _shift_rows(work, n)
+                _shift_rows(work, count, n)
                 lifted += _load_row(state, code, work, z, y, xa - MARGIN, n)
                 _join_tiles(work, edges, y, tile, xb - xa)
                 if y < y0:
                     continue
                 _predict_plane_row(work, n - 2, ratio)
+                if count > FUEL:
+                    _predict_plane_fuel(work, n - 2, ratio)
                 if y > y0:
                     _hllc_row(
                         work, n - 4, _ABOVE_LOW + 2, _BELOW + 2, _CODE_LOW + 2, _CODE_MID + 2,
                         _V, _U, _W, _ACROSS + 2,
                     )
+                    if count > FUEL:
+                        _fuel_row(work, n - 4, _ABOVE_LOW + 2, _BELOW + 2, _ACROSS + 2)
                     line = lines + z * rows + y - 1
                     _record_walls(work, pressure, walls, first, line, _ACROSS + _V + 2, xa, n - 4)
                 if y > y0 + 1:
@@ -504,9 +567,11 @@ def advance_planes(
                         work, n - 3, _EAST + 1, _WEST + 2, _CODE_MID + 1, _CODE_MID + 2,
                         _U, _V, _W, _ALONG + 2,
                     )
+                    if count > FUEL:
+                        _fuel_row(work, n - 3, _EAST + 1, _WEST + 2, _ALONG + 2)
                     line = z * rows + y - 1
                     _record_walls(work, pressure, walls, first, line, _ALONG + _U + 2, xa, n - 3)
-                    for k in range(5):
+                    for k in range(count):
                         for i in range(n - 4):
                             at = k * PITCH + 2 + i
                             put(
@@ -535,7 +600,7 @@ def _update_plane_row(
     state: Reals, work: Reals, z: int, y: int, x: int, n: int, ratio: Any
 ) -> None:
     zero = work.dtype.type(0.0)
-    for k in range(5):
+    for k in range(len(state)):
         row = _place(state, k, z, y, x)
         shift = k * PITCH + 2
         for i in range(n):
@@ -550,7 +615,7 @@ def _update_column_row(
     state: Reals, work: Reals, z: int, y: int, x: int, n: int, ratio: Any
 ) -> None:
     zero = work.dtype.type(0.0)
-    for k in range(5):
+    for k in range(len(state)):
         row = _place(state, k, z, y, x)
         shift = k * PITCH
         for i in range(n):
@@ -577,6 +642,7 @@ def advance_columns(
     """Move the gas along z in the rows from y_from to y_to; see `advance_planes`."""
     z0, z1, x0, x1 = box[0], box[1], box[4], box[5]
     tiles = (x1 - x0 + TILE - 1) // TILE
+    count = len(state)
     rows = code.shape[1]
     lines = code.shape[0] * rows
     for i in range(PITCH):
@@ -587,15 +653,19 @@ def advance_columns(
             x = x0 + (x1 - x0) * tile // tiles
             n = x0 + (x1 - x0) * (tile + 1) // tiles - x
             for z in range(z0 - 2, z1 + 2):
-                _shift_rows(work, n)
+                _shift_rows(work, count, n)
                 lifted += _load_row(state, code, work, z, y, x, n)
                 if z < z0:
                     continue
                 _predict_column_row(work, n, ratio)
+                if count > FUEL:
+                    _predict_column_fuel(work, n, ratio)
                 if z > z0:
                     _hllc_row(
                         work, n, _ABOVE_LOW, _BELOW, _CODE_LOW, _CODE_MID, _W, _U, _V, _ACROSS
                     )
+                    if count > FUEL:
+                        _fuel_row(work, n, _ABOVE_LOW, _BELOW, _ACROSS)
                     line = 2 * lines + (z - 1) * rows + y
                     _record_walls(work, pressure, walls, first, line, _ACROSS + _W, x, n)
                 if z > z0 + 1:
@@ -603,6 +673,17 @@ def advance_columns(
     notes[1] += lifted
     for i in range(PITCH):
         notes[0] = max(notes[0], get(work, _SIGNAL + i))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def burn(state: Reals, box: NDArray[np.int64], share: Any, heat: Any) -> None:
+    """Turn a share of the fuel in every cell of a box into energy, so much per mass."""
+    for z in range(box[0], box[1]):
+        for y in range(box[2], box[3]):
+            for x in range(box[4], box[5]):
+                burnt = share * state[FUEL, z, y, x]
+                state[FUEL, z, y, x] -= burnt
+                state[ENERGY, z, y, x] += heat * burnt
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

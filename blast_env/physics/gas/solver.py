@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from math import sqrt
+from math import expm1, sqrt
 from typing import Any, Final, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -43,6 +43,18 @@ class Totals(NamedTuple):
     fuel_kg: float
 
 
+class Burning(NamedTuple):
+    """How the passive scalar burns: a constant share in time, wherever it is.
+
+    Attributes:
+        time_s: Time in which all but 1/e of it has burnt.
+        heat_j_kg: Energy that its mass sets free.
+    """
+
+    time_s: float
+    heat_j_kg: float
+
+
 class Recorder(Protocol):
     """Something that looks at the gas after every step."""
 
@@ -79,6 +91,7 @@ class GasSolver:
         recorders: Sequence[Recorder] = (),
         precision: Literal["single", "double"] = "single",
         with_fuel: bool = False,
+        burning: Burning | None = None,
         threads: int = 1,
         courant: float = COURANT,
         skip_still_air: bool = True,
@@ -96,6 +109,10 @@ class GasSolver:
                 f"still air has {pressure_pa} Pa and {density_kg_m3} kg/m^3, "
                 "but both must be above 0"
             )
+        if burning is not None and not (with_fuel and burning.time_s > 0.0):
+            raise BlastEnvError(
+                f"burning is {burning}, but needs with_fuel=True and a time above 0 s"
+            )
         self.grid = grid
         self.faces = faces
         self.recorders = tuple(recorders)
@@ -106,6 +123,7 @@ class GasSolver:
         self.density_kg_m3 = density_kg_m3
         self.velocity_m_s = sqrt(pressure_pa / density_kg_m3)
         self._courant = courant
+        self._burning = burning
         self._skip = skip_still_air
         self._threads = threads
         dtype = _DTYPES[precision]
@@ -191,6 +209,8 @@ class GasSolver:
         passes: tuple[Callable[[Any], None], ...] = (self._move_planes, self._move_columns)
         for move in passes if self.steps % 2 == 0 else passes[::-1]:
             move(ratio)
+        if self._burning is not None:
+            self._burn(self._burning, step_s)
         self._signal = max(float(self._notes[:, 0].max()), sqrt(GAMMA))
         self._lifted += int(self._notes[:, 1].sum())
         z0, z1, y0, y1, x0, x1 = self.box.tolist()
@@ -272,6 +292,12 @@ class GasSolver:
             )
 
         self._share_out(move, int(self.box[2]), int(self.box[3]))
+
+    def _burn(self, burning: Burning, step_s: float) -> None:
+        real = self.state.dtype.type
+        share = real(-expm1(-step_s / burning.time_s))
+        heat = real(burning.heat_j_kg / self.velocity_m_s**2)
+        kernels.burn(self.state, self.box, share, heat)
 
     def _share_out(self, move: Callable[[int, int, int], None], first: int, end: int) -> None:
         """Give each thread its part of the layers from first to end, then leave still air out."""
