@@ -704,6 +704,21 @@ def fastest_signal(state: Reals) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def largest_excess(state: Reals, box: NDArray[np.int64]) -> float:
+    """Return the largest distance of the pressure from that of still air in a box."""
+    largest = 0.0
+    for z in range(box[0], box[1]):
+        for y in range(box[2], box[3]):
+            for x in range(box[4], box[5]):
+                motion = 0.0
+                for k in range(X_MOMENTUM, ENERGY):
+                    motion += state[k, z, y, x] ** 2
+                inner = state[ENERGY, z, y, x] - 0.5 * motion / state[DENSITY, z, y, x]
+                largest = max(largest, abs((GAMMA - 1.0) * inner - 1.0))
+    return largest
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def tighten(state: Reals, still: Reals, box: NDArray[np.int64], most: int) -> None:
     """Take layers of still air off the six sides of a box, at most so many from each."""
     for side in range(6):

@@ -239,6 +239,24 @@ class GasSolver:
         """Return the density of the passive scalar, kg/m^3 (nx, ny, nz)."""
         return self.density_kg_m3 * self._get(kernels.FUEL)
 
+    def wall_overpressure_pa(self) -> NDArray[np.float64]:
+        """Return the mean overpressures on `faces` during the last step (n,)."""
+        return self.pressure_pa * (self.wall_pressure - 1.0).astype(np.float64)
+
+    def overpressure_at(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the overpressures in some cells, x, y and z (n, 3)."""
+        x, y, z = cells.T + MARGIN
+        return self.pressure_pa * self._excess(self.state[:, z, y, x])
+
+    def overpressure_in(self, axis: int, layer: int) -> NDArray[np.float64]:
+        """Return the overpressures in a layer of cells, along the two other axes."""
+        inner = self.state[:, MARGIN:-MARGIN, MARGIN:-MARGIN, MARGIN:-MARGIN]
+        return self.pressure_pa * self._excess(np.take(inner, layer, axis=3 - axis)).T
+
+    def largest_overpressure_pa(self) -> float:
+        """Return the largest distance from the pressure of still air, anywhere in the gas."""
+        return self.pressure_pa * float(kernels.largest_excess(self.state, self.box))
+
     def totals(self) -> Totals:
         """Return mass, momentum and energy of the gas in the grid."""
         air = ~self.grid.solid
@@ -324,6 +342,13 @@ class GasSolver:
         box = self._whole.copy()
         box[1::2] = box[::2]
         return box
+
+    def _excess(self, values: Reals) -> NDArray[np.float64]:
+        """Return the pressure above that of still air, exactly 0 in still air, from the state."""
+        real = self.state.dtype.type
+        motion = values[1] * values[1] + values[2] * values[2] + values[3] * values[3]
+        inner = values[ENERGY] - real(0.5) * motion / values[kernels.DENSITY]
+        return (real(GAMMA - 1.0) * inner - real(1.0)).astype(np.float64)
 
     def _put(self, component: int, values: NDArray[np.float64]) -> None:
         """Set a component in the air cells; solid cells keep still air."""
