@@ -10,14 +10,14 @@ speaks for the numbers of `TNT`.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from math import cbrt, ceil, exp, inf, isfinite, log, log2, pi, sqrt
 from threading import Lock
 from typing import Final
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
@@ -60,12 +60,23 @@ class Explosive:
         """Return the radius of a sphere of the explosive."""
         return cbrt(3.0 * charge_kg / (4.0 * pi * self.density_kg_m3))
 
+    def in_free_air(self, charge_kg: float, gauges_m: ArrayLike = ()) -> SphericalBlast:
+        """Return the blast of a sphere of it, about to expand, with gauges at radii."""
+        return SphericalBlast(
+            charge_kg,
+            self.density_kg_m3,
+            self.prompt_j_kg,
+            self.later_j_kg,
+            self.later_s_kg * cbrt(charge_kg),
+            gauges_m=gauges_m,
+        )
+
 
 TNT: Final = Explosive(
     density_kg_m3=1630.0,
-    prompt_j_kg=3.3e6,
-    later_j_kg=3.5e6,
-    later_s_kg=2.06e-3,
+    prompt_j_kg=3.1e6,
+    later_j_kg=2.6e6,
+    later_s_kg=1.2e-3,
     ground_factor=1.8,
 )
 """The one source of this engine."""
@@ -73,7 +84,7 @@ TNT: Final = Explosive(
 
 @dataclass(frozen=True)
 class GasCharge:
-    """A charge of TNT at a place.
+    """A charge at a place.
 
     A charge whose centre is not higher than its own radius lies on the ground: it is then taken as
     a half sphere with its centre in the ground's surface, and part of its energy goes into the
@@ -82,10 +93,12 @@ class GasCharge:
     Attributes:
         mass_kg: Mass of the charge.
         position_m: Its centre: x, y, and height above the ground.
+        explosive: What it is made of.
     """
 
     mass_kg: float
     position_m: tuple[float, float, float]
+    explosive: Explosive = TNT
 
     def __post_init__(self) -> None:
         if not 0.0 < self.mass_kg < inf:
@@ -102,22 +115,23 @@ class GasCharge:
     @property
     def on_ground(self) -> bool:
         """Whether it lies on the ground."""
-        return self.position_m[2] <= TNT.radius_m(self.mass_kg)
+        return self.position_m[2] <= self.explosive.radius_m(self.mass_kg)
 
     @property
     def free_air_kg(self) -> float:
         """Mass that makes the same blast in free air."""
-        return self.mass_kg * (TNT.ground_factor if self.on_ground else 1.0)
+        return self.mass_kg * (self.explosive.ground_factor if self.on_ground else 1.0)
 
     @property
     def burning(self) -> Burning:
         """How its products burn in the solver."""
-        return Burning(TNT.later_s_kg * cbrt(self.free_air_kg), TNT.later_j_kg)
+        time_s = self.explosive.later_s_kg * cbrt(self.free_air_kg)
+        return Burning(time_s, self.explosive.later_j_kg)
 
     @property
     def least_radius_m(self) -> float:
         """The least radius of the front."""
-        return TNT.radius_m(self.free_air_kg)
+        return self.explosive.radius_m(self.free_air_kg)
 
     def profile(self, radius_m: float) -> "RadialProfile":
         """Return the blast when its front is at a radius, or up to 3 % before it.
@@ -130,7 +144,7 @@ class GasCharge:
                 f"the front of {self.mass_kg:g} kg is asked for at a radius of {radius_m:g} m, "
                 f"but must be at {self.least_radius_m:g} m or more, the radius of the charge"
             )
-        unit = _unit_profiles().before(radius_m / cbrt(self.free_air_kg))
+        unit = _unit_profiles(self.explosive).before(radius_m / cbrt(self.free_air_kg))
         return unit.scaled(self.free_air_kg)
 
 
@@ -186,7 +200,7 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
     inner = energy - 0.5 * (momentum * velocity).sum(axis=0)
     solver.set_state(
         density_kg_m3=density,
-        velocity_m_s=velocity,
+        velocity_m_s=tuple(velocity),
         pressure_pa=(GAMMA - 1.0) * inner,
         fuel_kg_m3=fuel,
     )
@@ -274,10 +288,9 @@ def _farthest_corner(grid: GasGrid, point: tuple[float, float, float]) -> float:
 class _Profiles:
     """Profiles of 1 kg in free air, at fronts that follow each other in equal ratios."""
 
-    def __init__(self) -> None:
-        self._blast = SphericalBlast(
-            1.0, TNT.density_kg_m3, TNT.prompt_j_kg, TNT.later_j_kg, TNT.later_s_kg
-        )
+    def __init__(self, explosive: Explosive) -> None:
+        self._later_s = explosive.later_s_kg
+        self._blast = explosive.in_free_air(1.0)
         self._profiles = [self._now()]
         self._lock = Lock()
 
@@ -296,13 +309,13 @@ class _Profiles:
     def _now(self) -> RadialProfile:
         blast = self._blast
         state = blast.state.copy()
-        state[PRODUCTS] *= exp(-blast.time_s / TNT.later_s_kg)
+        state[PRODUCTS] *= exp(-blast.time_s / self._later_s)
         return RadialProfile(blast.time_s, blast.front_m, blast.shell_m, state)
 
 
-@cache
-def _unit_profiles() -> _Profiles:
-    return _Profiles()
+@lru_cache(maxsize=4)
+def _unit_profiles(explosive: Explosive) -> _Profiles:
+    return _Profiles(explosive)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -110,12 +110,12 @@ class SphericalBlast:
     @property
     def edges_m(self) -> Floats:
         """Radii between the shells, from 0 (n + 1)."""
-        return self.shell_m * np.arange(self.state.shape[1] + 1.0)
+        return np.asarray(self.shell_m * np.arange(self.state.shape[1] + 1.0))
 
     @property
     def volumes_m3(self) -> Floats:
         """Volumes of the shells (n,)."""
-        return 4.0 / 3.0 * pi * np.diff(self.edges_m**3)
+        return np.asarray(4.0 / 3.0 * pi * np.diff(self.edges_m**3))
 
     @property
     def history(self) -> Floats:
@@ -153,8 +153,8 @@ class SphericalBlast:
 
     def pressure(self) -> Floats:
         """Return the pressure in each shell, Pa."""
-        density, momentum, energy, _ = self.state
-        return np.asarray((GAMMA - 1.0) * (energy - 0.5 * momentum**2 / density))
+        motion = 0.5 * self.state[MOMENTUM] ** 2 / self.state[DENSITY]
+        return np.asarray((GAMMA - 1.0) * (self.state[ENERGY] - motion))
 
     def _merge_shells(self) -> None:
         """Make one shell of every two, and add still air outside."""
@@ -187,9 +187,10 @@ def _march(
         The number of steps, the time and the outermost shell that is not still.
     """
     shells = state.shape[1]
-    radii = shell_m * (np.arange(shells) + 0.5)
-    areas = (shell_m * np.arange(shells + 1)) ** 2
-    volumes = np.diff((shell_m * np.arange(shells + 1)) ** 3) / 3.0
+    edges = np.arange(shells + 1) * shell_m
+    radii: Floats = 0.5 * (edges[:-1] + edges[1:])
+    areas: Floats = edges**2
+    volumes: Floats = (edges[1:] ** 3 - edges[:-1] ** 3) / 3.0
     gas = np.zeros((4, shells))  # density, velocity, pressure, share of products
     inner = np.zeros((4, shells))
     outer = np.zeros((4, shells))
