@@ -11,7 +11,6 @@ from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.kernels import MARGIN
 
 
-
 @dataclass(frozen=True, eq=False)
 class Faces:
     """Faces of solid cells that touch air.

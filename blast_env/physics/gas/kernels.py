@@ -202,7 +202,11 @@ def _predict_plane_row(work: Reals, n: int, ratio: Any) -> None:
         side_s, side_n = get(work, _CODE_LOW + 1 + i), get(work, _CODE_HIGH + 1 + i)
         air_w, air_e = side_w == zero, side_e == zero
         air_s, air_n = side_s == zero, side_n == zero
-        r, u, v = get(work, _MID + 1 + i), get(work, _MID + _U + 1 + i), get(work, _MID + _V + 1 + i)
+        r, u, v = (
+            get(work, _MID + 1 + i),
+            get(work, _MID + _U + 1 + i),
+            get(work, _MID + _V + 1 + i),
+        )
         w, p = get(work, _MID + _W + 1 + i), get(work, _MID + _P + 1 + i)
 
         back = select(air_w, get(work, _MID + i), r)
@@ -422,7 +426,6 @@ def _predict_plane_fuel(work: Reals, n: int, ratio: Any) -> None:
     """Set the share of fuel at the four upright faces of n cells, half a step on."""
     real = work.dtype.type
     zero, half, limit = real(0.0), real(0.5), real(_LIMIT)
-    step = half * ratio
     for i in range(n):
         y = get(work, _MID + _Y + 1 + i)
         u, v = get(work, _MID + _U + 1 + i), get(work, _MID + _V + 1 + i)
@@ -553,8 +556,16 @@ def advance_planes(
                     _predict_plane_fuel(work, n - 2, ratio)
                 if y > y0:
                     _hllc_row(
-                        work, n - 4, _ABOVE_LOW + 2, _BELOW + 2, _CODE_LOW + 2, _CODE_MID + 2,
-                        _V, _U, _W, _ACROSS + 2,
+                        work,
+                        n - 4,
+                        _ABOVE_LOW + 2,
+                        _BELOW + 2,
+                        _CODE_LOW + 2,
+                        _CODE_MID + 2,
+                        _V,
+                        _U,
+                        _W,
+                        _ACROSS + 2,
                     )
                     if count > FUEL:
                         _fuel_row(work, n - 4, _ABOVE_LOW + 2, _BELOW + 2, _ACROSS + 2)
@@ -564,8 +575,16 @@ def advance_planes(
                     _update_plane_row(state, work, z, y - 2, xa, n - 4, ratio)
                 if y0 < y < y1 + 1:
                     _hllc_row(
-                        work, n - 3, _EAST + 1, _WEST + 2, _CODE_MID + 1, _CODE_MID + 2,
-                        _U, _V, _W, _ALONG + 2,
+                        work,
+                        n - 3,
+                        _EAST + 1,
+                        _WEST + 2,
+                        _CODE_MID + 1,
+                        _CODE_MID + 2,
+                        _U,
+                        _V,
+                        _W,
+                        _ALONG + 2,
                     )
                     if count > FUEL:
                         _fuel_row(work, n - 3, _EAST + 1, _WEST + 2, _ALONG + 2)
@@ -733,9 +752,7 @@ def tighten(state: Reals, still: Reals, box: NDArray[np.int64], most: int) -> No
 
 
 @njit(error_model="numpy")
-def _is_still(
-    state: Reals, still: Reals, box: NDArray[np.int64], axis: int, layer: int
-) -> bool:
+def _is_still(state: Reals, still: Reals, box: NDArray[np.int64], axis: int, layer: int) -> bool:
     z0, z1, y0, y1, x0, x1 = box
     if axis == 0:
         z0, z1 = layer, layer + 1

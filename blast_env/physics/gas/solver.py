@@ -322,9 +322,7 @@ class GasSolver:
         if self._pool is None:
             move(0, first, end)
         else:
-            bounds = [
-                first + (end - first) * k // self._threads for k in range(self._threads + 1)
-            ]
+            bounds = [first + (end - first) * k // self._threads for k in range(self._threads + 1)]
             list(self._pool.map(move, range(self._threads), bounds[:-1], bounds[1:]))
         if self._skip:
             kernels.tighten(self.state, self._still, self.box, 2)
