@@ -69,7 +69,8 @@ class GasGrid:
 
     def centres_m(self, axis: int) -> NDArray[np.float64]:
         """Return the centres of the cells along an axis (n,)."""
-        return self.origin_m[axis] + self.cell_m * (np.arange(self.shape[axis]) + 0.5)
+        cells = np.arange(self.shape[axis], dtype=np.float64) + 0.5
+        return np.asarray(self.origin_m[axis] + self.cell_m * cells)
 
     def cell_at(self, position_m: tuple[float, float, float]) -> tuple[int, int, int]:
         """Return the cell that holds a point.

@@ -5,13 +5,15 @@ end. Both are in the way, and the compiler does not always see that it can do wi
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 from numba import types
 from numba.extending import intrinsic
 
+_lane: Final[Callable[[Callable[..., Any]], Callable[..., Any]]] = intrinsic
 
-@intrinsic
+
+@_lane
 def select(_context: Any, condition: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any]]:
     """Return one if the condition holds, else the other; both are worked out."""
 
@@ -23,7 +25,7 @@ def select(_context: Any, condition: Any, one: Any, other: Any) -> tuple[Any, Ca
     return one(condition, one, other), build
 
 
-@intrinsic
+@_lane
 def root(_context: Any, value: Any) -> tuple[Any, Callable[..., Any]]:
     """Return the square root, without a call of the C library."""
 
@@ -34,7 +36,7 @@ def root(_context: Any, value: Any) -> tuple[Any, Callable[..., Any]]:
     return value(value), build
 
 
-@intrinsic
+@_lane
 def smaller(_context: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any]]:
     """Return the smaller of two reals, the other one where they do not compare."""
 
@@ -46,7 +48,7 @@ def smaller(_context: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any
     return one(one, other), build
 
 
-@intrinsic
+@_lane
 def larger(_context: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any]]:
     """Return the larger of two reals, the other one where they do not compare."""
 
@@ -58,7 +60,7 @@ def larger(_context: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any]
     return one(one, other), build
 
 
-@intrinsic
+@_lane
 def get(_context: Any, array: Any, index: Any) -> tuple[Any, Callable[..., Any]]:
     """Return an entry of an array as it lies in memory; the index must be right."""
 
@@ -68,7 +70,7 @@ def get(_context: Any, array: Any, index: Any) -> tuple[Any, Callable[..., Any]]
     return array.dtype(array, index), build
 
 
-@intrinsic
+@_lane
 def put(_context: Any, array: Any, index: Any, value: Any) -> tuple[Any, Callable[..., Any]]:
     """Set an entry of an array as it lies in memory; the index must be right."""
 

@@ -173,8 +173,8 @@ class GasSolver:
         pressure = pressure / self.pressure_pa
         energy = pressure / (GAMMA - 1.0)
         self._put(kernels.DENSITY, density)
-        for k, values in enumerate(velocity_m_s):
-            velocity = np.asarray(values, dtype=np.float64) / self.velocity_m_s
+        for k, component in enumerate(velocity_m_s):
+            velocity = np.asarray(component, dtype=np.float64) / self.velocity_m_s
             self._put(kernels.X_MOMENTUM + k, density * velocity)
             energy = energy + 0.5 * density * velocity * velocity
         self._put(ENERGY, energy)

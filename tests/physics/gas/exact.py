@@ -112,11 +112,14 @@ def sedov_energy(dimensions: int) -> float:
     start = [2.0 / (GAMMA + 1.0), (GAMMA + 1.0) / (GAMMA - 1.0), 2.0 / (GAMMA + 1.0)]
     solution = solve_ivp(slopes, (1.0, 0.02), start, dense_output=True, rtol=1e-8, atol=1e-12)
 
+    inner = solution.sol
+    assert inner is not None
+
     def energy(x: float) -> float:
-        u, g, p = solution.sol(x)
+        u, g, p = inner(x)
         return float((0.5 * g * u * u + p / (GAMMA - 1.0)) * x ** (n - 1))
 
-    inside = solution.sol(0.02)[2] / (GAMMA - 1.0) * 0.02**n / n
+    inside = inner(0.02)[2] / (GAMMA - 1.0) * 0.02**n / n
     area = {1: 2.0, 2: 2.0 * pi, 3: 4.0 * pi}[n]
     return float(area * power**2 * (quad(energy, 0.02, 1.0, limit=200)[0] + inside))
 

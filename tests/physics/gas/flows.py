@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from blast_env.physics.gas.grid import FaceKind, GasGrid
 from blast_env.physics.gas.solver import GasSolver
 
-CLOSED = dict.fromkeys(("x_low", "x_high", "y_low", "y_high", "z_low", "z_high"), FaceKind.MIRROR)
+CLOSED: dict[str, Any] = dict.fromkeys(
+    ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high"), FaceKind.MIRROR
+)
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 BLAST_PA = 5e7
@@ -28,7 +30,7 @@ def pipe(
     return GasGrid(cell_m, np.zeros(shape, dtype=bool), **kinds)
 
 
-def along(values: Floats, axis: int) -> Floats:
+def along(values: NDArray[Any], axis: int) -> NDArray[Any]:
     """Return values that change along one axis as an array over three."""
     shape = [1, 1, 1]
     shape[axis] = len(values)
@@ -52,7 +54,7 @@ def blast(
     radius: float = 2.5,
     cell_m: float = 0.5,
     setup: Callable[[GasGrid], dict[str, Any]] | None = None,
-    faces: dict[str, FaceKind] | None = None,
+    faces: dict[str, Any] | None = None,
     pressure_pa: float = BLAST_PA,
     density_kg_m3: float = BLAST_KG_M3,
     **options: Any,
@@ -68,7 +70,7 @@ def blast(
     solver.set_state(
         density_kg_m3=np.where(hot, density_kg_m3, solver.density_kg_m3),
         pressure_pa=np.where(hot, pressure_pa, solver.pressure_pa),
-        **({"fuel_kg_m3": np.where(hot, density_kg_m3, 0.0)} if options.get("with_fuel") else {}),
+        fuel_kg_m3=np.where(hot, density_kg_m3, 0.0),
     )
     return solver
 

@@ -1,10 +1,12 @@
 """Nothing is lost, nothing leaks, and what walls take up is what they are said to take up."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from blast_env.physics.gas.faces import Faces, exposed_faces, ground_faces
-from blast_env.physics.gas.grid import FaceKind
+from blast_env.physics.gas.grid import FaceKind, GasGrid
 from blast_env.physics.gas.probes import FaceLoads
 from blast_env.physics.gas.solver import Burning
 from tests.physics.gas.flows import CLOSED, blast, street
@@ -56,7 +58,7 @@ def test_walls_take_up_the_momentum_of_the_gas() -> None:
     loads: list[FaceLoads] = []
     all_faces: list[Faces] = []
 
-    def setup(grid):
+    def setup(grid: GasGrid) -> dict[str, Any]:
         faces = exposed_faces(grid, grid.solid)
         loads.append(FaceLoads(len(faces)))
         all_faces.append(faces)
@@ -78,7 +80,7 @@ def test_the_ground_takes_up_momentum_too() -> None:
     solid = np.zeros((24, 24, 20), dtype=bool)
     loads: list[FaceLoads] = []
 
-    def setup(grid):
+    def setup(grid: GasGrid) -> dict[str, Any]:
         faces = ground_faces(grid)
         loads.append(FaceLoads(len(faces)))
         return {"faces": faces, "recorders": loads}
@@ -96,7 +98,7 @@ def test_the_ground_takes_up_momentum_too() -> None:
 def test_a_blast_in_a_corner_equals_its_mirror_images() -> None:
     """Eight balls in the open, or one in a corner of three mirrors, or of three walls."""
     n = 14
-    options = {"radius": 2.5, "precision": "double"}
+    options: dict[str, Any] = {"radius": 2.5, "precision": "double"}
     low = {f"{axis}_low": FaceKind.MIRROR for axis in "xyz"}
     corner = blast(np.zeros((n, n, n), dtype=bool), (4, 5, 3), faces=low, **options)
     corner.advance(0.01)

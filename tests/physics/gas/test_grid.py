@@ -11,6 +11,7 @@ from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import LoadTable, Snapshots
 from blast_env.physics.gas.solver import Burning, GasSolver
 
+WRONG: Any = "wall"
 AIR = np.zeros((4, 3, 2), dtype=bool)
 GRID = GasGrid(0.5, AIR, origin_m=(1.0, 2.0, 0.0))
 
@@ -23,10 +24,10 @@ GRID = GasGrid(0.5, AIR, origin_m=(1.0, 2.0, 0.0))
         (lambda: GasGrid(0.5, AIR[0]), "must be of three dimensions"),
         (lambda: GasGrid(0.5, AIR.astype(int)), "and bool"),
         (lambda: GasGrid(0.5, AIR[:0]), "no cells at all"),
-        (lambda: GasGrid(0.5, AIR, x_low="wall"), "x_low is 'wall', but must be one of"),
-        (lambda: GasGrid(0.5, AIR, origin_m=(0.0, 0.0)), "three finite lengths"),
+        (lambda: GasGrid(0.5, AIR, x_low=WRONG), "x_low is 'wall', but must be one of"),
+        (lambda: GasGrid(0.5, AIR, origin_m=WRONG[:2]), "three finite lengths"),
         (lambda: GRID.cell_at((3.1, 2.0, 0.0)), "x = 3.1 m is outside the grid, 1.0 to 3.0 m"),
-        (lambda: GasSolver(GRID, precision="half"), "precision is 'half'"),
+        (lambda: GasSolver(GRID, precision=WRONG), "precision is 'wall'"),
         (lambda: GasSolver(GRID, threads=0), "threads is 0, but must be at least 1"),
         (lambda: GasSolver(GRID, courant=0.6), "courant is 0.6, but must be above 0"),
         (lambda: GasSolver(GRID, pressure_pa=0.0), "0.0 Pa"),

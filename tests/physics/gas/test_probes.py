@@ -1,5 +1,7 @@
 """Loads on faces, gauges, maps and pictures."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -76,12 +78,14 @@ def test_faces_are_loaded_from_their_own_side() -> None:
         centre[axis] = 6.5
         recorders: list[FaceLoads] = []
 
-        def setup(grid, recorders=recorders):
+        def setup(grid: GasGrid, recorders: list[FaceLoads] = recorders) -> dict[str, Any]:
             faces = exposed_faces(grid, grid.solid)
             recorders.append(FaceLoads(len(faces)))
             return {"faces": faces, "recorders": recorders}
 
-        solver = blast(solid, tuple(centre), setup=setup, faces={"z_low": FaceKind.OPEN})
+        solver = blast(
+            solid, (centre[0], centre[1], centre[2]), setup=setup, faces={"z_low": FaceKind.OPEN}
+        )
         solver.advance(0.01)
         load = recorders[0].positive_impulse_pa_s
         near = solver.faces.side == -1
@@ -97,7 +101,7 @@ def test_faces_are_loaded_from_their_own_side() -> None:
 def test_gauges_keep_the_history() -> None:
     made: list[Gauges] = []
 
-    def setup(grid):
+    def setup(grid: GasGrid) -> dict[str, Any]:
         made.append(Gauges(grid, [grid.cell_at((8.0, 4.5, 0.1)), (27, 4, 2)]))
         return {"recorders": made}
 
@@ -124,9 +128,9 @@ def test_gauges_keep_the_history() -> None:
 
 def test_maps_agree_with_gauges() -> None:
     cells = [(16, 9, 0), (3, 20, 0)]
-    made: list = []
+    made: list[Any] = []
 
-    def setup(grid):
+    def setup(grid: GasGrid) -> dict[str, Any]:
         made.extend((Gauges(grid, cells), GroundMap(grid)))
         return {"recorders": made}
 
@@ -146,7 +150,7 @@ def test_pictures_are_taken_once_at_their_times() -> None:
     times = [0.0, 0.002, 0.0020001, 0.01, 1.0]
     made: list[Snapshots] = []
 
-    def setup(grid):
+    def setup(grid: GasGrid) -> dict[str, Any]:
         made.extend((Snapshots(grid, 2, 1, times), Snapshots(grid, 1, 12, times)))
         return {"recorders": made}
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from blast_env.physics.gas import kernels
 from blast_env.physics.gas.faces import exposed_faces
+from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import FaceLoads
 from blast_env.physics.gas.solver import GasSolver
 from tests.physics.gas.flows import blast, street
@@ -97,7 +98,8 @@ def test_rows_longer_than_a_tile() -> None:
     hot = np.arange(length) % 60 < 3
     pressure[hot, 1:4, :2] = 3e6
     results = []
-    for turn in (lambda v: v, lambda v: v.transpose(1, 0, 2)):
+    turns: tuple[Turn, ...] = (lambda v: v, lambda v: v.transpose(1, 0, 2))
+    for turn in turns:
         solver = blast(
             np.ascontiguousarray(turn(solid)), (0, 0, 0), radius=0.0, precision="double",
             with_fuel=True,
@@ -120,7 +122,7 @@ def test_single_precision_gives_the_loads_of_double() -> None:
         house[20:25, 10:15, 0:8] = True
         recorders: list[FaceLoads] = []
 
-        def setup(grid):
+        def setup(grid: GasGrid) -> dict[str, Any]:
             faces = exposed_faces(grid, house)
             recorders.append(FaceLoads(len(faces)))
             return {"faces": faces, "recorders": recorders}
