@@ -28,6 +28,7 @@ CELLS_M = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
 FREE_FIELD_START_Z = 1.0
 """Where the front is, m/kg^(1/3), when the free field goes over to three dimensions."""
 
+ROUNDING = 1e-9
 LATEST = 1.5
 """A run ends at this many times the reference's end of the positive phase at the latest."""
 
@@ -85,11 +86,11 @@ def wide_wall(
 ) -> Ratio:
     """Return the load on a rigid wall, nearest to a charge on the ground, normally reflected.
 
-    Half of the scene, beside a mirror through the charge; the distance is rounded to cells. The
+    Half of the scene, beside a mirror through the charge; the distance is rounded up to cells. The
     wall and the air behind the charge are so wide that their ends are not felt in the first
     positive phase.
     """
-    to_wall = round(distance_m / cell_m)
+    to_wall = ceil(distance_m / cell_m - ROUNDING)
     distance_m = to_wall * cell_m
     latest_s = LATEST * _phase_end_s(distance_m, charge_kg)
     duration_s = kingery_bulmash("positive_duration", distance_m, charge_kg)
@@ -128,7 +129,7 @@ def free_field(
     along, wide = ceil((farthest_m + unit) / cell_m), ceil((0.45 * farthest_m + unit) / cell_m)
     solid = np.zeros((along, wide, wide), dtype=np.bool_)
     grid = GasGrid(cell_m, solid, x_low=FaceKind.MIRROR, y_low=FaceKind.MIRROR)
-    cells = [(round(z * unit / cell_m), 0, 0) for z in z_m_kg]
+    cells = [(int(z * unit / cell_m), 0, 0) for z in z_m_kg]
     gauges = Gauges(grid, cells)
     charge = GasCharge(charge_kg, (0.0, 0.0, 0.0), explosive)
     solver = GasSolver(grid, recorders=[gauges], with_fuel=True, burning=charge.burning)

@@ -74,9 +74,9 @@ class Explosive:
 
 TNT: Final = Explosive(
     density_kg_m3=1630.0,
-    prompt_j_kg=3.1e6,
+    prompt_j_kg=2.95e6,
     later_j_kg=2.6e6,
-    later_s_kg=1.2e-3,
+    later_s_kg=1.0e-3,
     ground_factor=1.8,
 )
 """The one source of this engine."""

@@ -32,8 +32,11 @@ DENSITY, MOMENTUM, ENERGY, PRODUCTS = 0, 1, 2, 3
 _FRONT_SHARE: Final = 1e-3
 """The front is where pressure first differs from that of still air by this share of it."""
 
+_STILL_SHARE: Final = 1e-12
+"""Beyond the last shell whose pressure differs by this share from still air's, none is moved."""
+
 _SPARE_SHELLS: Final = 4
-"""Shells of still air that the front must have before it."""
+"""Shells of still air that there must be outside."""
 
 _FIRST_STEPS: Final = 20
 _LEAST_SHARE: Final = 0.05
@@ -133,7 +136,7 @@ class SphericalBlast:
             raise BlastEnvError("a blast without a bound in time or space never ends")
         record = np.zeros((_BATCH, 1 + len(self._gauges_m)))
         while self.time_s < until_s and self.front_m < until_front_m:
-            steps, self.time_s, front = _march(
+            steps, self.time_s, front, last = _march(
                 self.state,
                 self.shell_m,
                 self.time_s,
@@ -148,7 +151,7 @@ class SphericalBlast:
             self.steps += steps
             self.front_m = self.shell_m * (front + 1.0)
             self._history.append(record[:steps].copy())
-            if front >= self.state.shape[1] - _SPARE_SHELLS:
+            if last >= self.state.shape[1] - _SPARE_SHELLS:
                 self._merge_shells()
 
     def pressure(self) -> Floats:
@@ -180,11 +183,12 @@ def _march(
     until_front_m: float,
     gauges_m: Floats,
     record: Floats,
-) -> tuple[int, float, int]:
+) -> tuple[int, float, int, int]:
     """Make steps until a bound is reached, the grid or the record is full.
 
     Returns:
-        The number of steps, the time and the outermost shell that is not still.
+        The number of steps, the time, the shell where the front is, and the outermost one that is
+        not quite still.
     """
     shells = state.shape[1]
     edges = np.arange(shells + 1) * shell_m
@@ -195,21 +199,17 @@ def _march(
     inner = np.zeros((4, shells))
     outer = np.zeros((4, shells))
     flux = np.zeros((4, shells + 1))
-    front = shells - 1
+    last = shells - 1 - _SPARE_SHELLS  # outermost shell that is not quite still
     steps = 0
     while True:
-        # Beyond the front all shells are still; the first call looks at all of them.
-        end = min(shells, front + 1 + _SPARE_SHELLS)
+        end = min(shells, last + 1 + _SPARE_SHELLS)  # all shells in the first round
         fastest = _primitive(state, gas, end)
-        front = 0
-        for i in range(end - 1, -1, -1):
-            if abs(gas[2, i] - AIR_PRESSURE_PA) > _FRONT_SHARE * AIR_PRESSURE_PA:
-                front = i
-                break
-        full = front >= shells - _SPARE_SHELLS or steps == len(record)
-        if full or time_s >= until_s or shell_m * (front + 1) >= until_front_m:
-            return steps, time_s, front
-        end = min(shells, front + 1 + _SPARE_SHELLS)
+        last = _outermost(gas, end, _STILL_SHARE)
+        front = _outermost(gas, last + 1, _FRONT_SHARE)
+        full = last >= shells - _SPARE_SHELLS or steps == len(record)
+        if full or time_s >= until_s or shell_m * (front + 1.0) >= until_front_m:
+            return steps, time_s, front, last
+        end = min(end, last + 1 + _SPARE_SHELLS)
         share = min(1.0, 0.1 + (steps_before + steps) / _FIRST_STEPS)
         step_s = share * COURANT * shell_m / fastest
         record[steps, 0] = time_s
@@ -233,6 +233,15 @@ def _march(
             state[2, i] += released * state[3, i]
         time_s += step_s
         steps += 1
+
+
+@njit(error_model="numpy")
+def _outermost(gas: Floats, end: int, share: float) -> int:
+    """Return the outermost shell whose pressure differs from still air's by a share of it."""
+    for i in range(end - 1, -1, -1):
+        if abs(gas[2, i] - AIR_PRESSURE_PA) > share * AIR_PRESSURE_PA:
+            return i
+    return 0
 
 
 @njit(error_model="numpy")
