@@ -161,7 +161,7 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
         put(work, _HIGH + _W + i, w)
         put(work, _HIGH + _P + i, p)
         put(work, _SIGNAL + i, larger(larger(level, upright), get(work, _SIGNAL + i)))
-        put(work, _WORST + i, smaller(p, r))
+        put(work, _WORST + i, smaller(r, p))  # in this order, nan is found
     if len(state) > FUEL:
         fuel = _place(state, FUEL, z, y, x)
         for i in range(n):

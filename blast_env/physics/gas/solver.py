@@ -27,6 +27,18 @@ _FIRST_SHARE: Final = 0.2
 _DTYPES: Final = {"single": np.float32, "double": np.float64}
 
 
+def state_bytes(
+    shape: tuple[int, int, int],
+    precision: Literal["single", "double"] = "single",
+    *,
+    with_fuel: bool = False,
+) -> int:
+    """Return how much memory the state of a grid takes; nothing else grows with all its cells."""
+    nx, ny, nz = (n + 2 * MARGIN for n in shape)
+    per_cell = np.dtype(_DTYPES[precision]).itemsize * (6 if with_fuel else 5) + 1
+    return nx * ny * nz * per_cell
+
+
 class Totals(NamedTuple):
     """Sums over the air cells.
 
@@ -75,7 +87,6 @@ class GasSolver:
         steps: Steps so far.
         cell_updates: Cells moved on by a step so far, all directions counted as one; cells of air
             that was left out as still do not count.
-        lifted: Cells that had to be lifted to the floor of density or pressure so far.
         state: The state in the solver's units (5 or 6, z, y, x), margin included.
         wall_pressure: Mean pressures on `faces` during the last step, in the solver's units (n,).
             These are the fluxes of momentum, so that an impulse from them is exactly the momentum
