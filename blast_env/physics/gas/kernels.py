@@ -58,6 +58,11 @@ EDGE_SIZE: Final = 12
 _FLOOR: Final = 1e-6
 """Of density and pressure, in units of those of still air."""
 
+_STILL: Final = 1e-12
+"""Momentum and fuel up to this count as none, in units of still air. Ahead of a wave they fall off
+without end, to numbers that a processor is slow with, where density and energy are still long
+since."""
+
 # Rows of a variable follow each other: density, velocities along x, y and z, pressure, fuel share.
 _VARIABLES: Final = 6
 _U: Final = PITCH
@@ -629,12 +634,14 @@ def _update_plane_row(
 ) -> None:
     zero = work.dtype.type(0.0)
     for k in range(len(state)):
+        least = work.dtype.type(0.0 if k in (DENSITY, ENERGY) else _STILL)
         row = _place(state, k, z, y, x)
         shift = k * PITCH + 2
         for i in range(n):
             old = get(state, row + i)
             across = get(work, _ACROSS + shift + i) - get(work, _ACROSS_LOW + shift + i)
             new = old - ratio * (get(work, _CHANGE + shift + i) + across)
+            new = select(abs(new) > least, new, zero)
             put(state, row + i, select(get(work, _CODE_LOW + 2 + i) == zero, new, old))
 
 
@@ -644,12 +651,14 @@ def _update_column_row(
 ) -> None:
     zero = work.dtype.type(0.0)
     for k in range(len(state)):
+        least = work.dtype.type(0.0 if k in (DENSITY, ENERGY) else _STILL)
         row = _place(state, k, z, y, x)
         shift = k * PITCH
         for i in range(n):
             old = get(state, row + i)
             across = get(work, _ACROSS + shift + i) - get(work, _ACROSS_LOW + shift + i)
             new = old - ratio * across
+            new = select(abs(new) > least, new, zero)
             put(state, row + i, select(get(work, _CODE_LOW + i) == zero, new, old))
 
 

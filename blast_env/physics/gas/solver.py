@@ -155,7 +155,7 @@ class GasSolver:
             [bound for n in self._code.shape for bound in (MARGIN, n - MARGIN)], dtype=np.int64
         )
         self.box = self._empty_box() if skip_still_air else self._whole.copy()
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
         self._signal = 0.0
         self._lifted = 0
 
@@ -330,11 +330,16 @@ class GasSolver:
 
     def _share_out(self, move: Callable[[int, int, int], None], first: int, end: int) -> None:
         """Give each thread its part of the layers from first to end, then leave still air out."""
-        if self._pool is None:
-            move(0, first, end)
-        else:
-            bounds = [first + (end - first) * k // self._threads for k in range(self._threads + 1)]
-            list(self._pool.map(move, range(self._threads), bounds[:-1], bounds[1:]))
+        count = self._threads
+        bounds = [first + (end - first) * k // count for k in range(count + 1)]
+        others = [
+            self._pool.submit(move, k, bounds[k], bounds[k + 1])
+            for k in range(1, count)
+            if self._pool is not None
+        ]
+        move(0, bounds[0], bounds[1])
+        for other in others:
+            other.result()
         if self._skip:
             kernels.tighten(self.state, self._still, self.box, 2)
 

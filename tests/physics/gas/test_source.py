@@ -1,8 +1,11 @@
 """The charge: what of it arrives on a grid, and which charges cannot be laid there."""
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
+from blast_env.calibration import kingery_bulmash
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.solver import GasSolver
@@ -128,6 +131,16 @@ def test_the_ground_takes_its_share() -> None:
     assert not above.on_ground
     assert on_ground.free_air_kg == pytest.approx(100.0 * TNT.ground_factor)
     assert above.free_air_kg == 100.0
+
+
+@pytest.mark.parametrize("impulse", ["incident_impulse", "reflected_impulse"])
+def test_the_share_of_the_ground_is_that_between_the_curves(
+    impulse: Literal["incident_impulse", "reflected_impulse"],
+) -> None:
+    z = np.linspace(1.7, 8.6, 30)
+    on_ground = kingery_bulmash(impulse, z, 1.0)
+    in_air = kingery_bulmash(impulse, z, TNT.ground_factor, "spherical")
+    np.testing.assert_allclose(on_ground, in_air, rtol=5e-3)
 
 
 def test_a_solver_gets_all_of_a_charge() -> None:
