@@ -39,11 +39,17 @@ _FUSED: Final = {"contract"}
 AIR, MIRROR, OPEN = 0, -1, 1
 """Codes of cells: gas, solid (normal velocity changes its sign), beyond an open face."""
 
-TILE: Final = 140
-"""Most cells of a row that are worked on at once."""
+_LANES: Final = 8
+"""Rows are worked on in so many cells at once; what is done beyond their end is not used."""
 
-PITCH: Final = TILE + 2 * MARGIN
-"""Distance of rows in the workspace. No multiple of 64, which the cache would not like."""
+TILE: Final = 136
+"""Most cells of a row that are worked on at once, without the margins."""
+
+PITCH: Final = 160
+"""Distance of rows in the workspace: a tile, its margins, and what is beyond the end.
+
+No multiple of 64, which the cache would not like.
+"""
 
 _LIMIT: Final = 1.5
 """Of generalised minmod: steepest slope in units of the smaller difference."""
@@ -58,7 +64,7 @@ EDGE_SIZE: Final = 12
 _FLOOR: Final = 1e-6
 """Of density and pressure, in units of those of still air."""
 
-_STILL: Final = 1e-12
+_STILL: Final = (0.0, 1e-12, 1e-12, 1e-12, 0.0, 1e-24)
 """Momentum and fuel up to this count as none, in units of still air. Ahead of a wave they fall off
 without end, to numbers that a processor is slow with, where density and energy are still long
 since."""
@@ -107,9 +113,15 @@ def _slope(back: Any, ahead: Any, limit: Any, half: Any, zero: Any) -> Any:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+def _whole(n: int) -> int:
+    """Return a number of cells rounded up: single cells at the end would cost as much as eight."""
+    return (n + _LANES - 1) & -_LANES
+
+
+@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _copy_rows(work: Reals, count: int, source: int, target: int, n: int) -> None:
     for k in range(count):
-        for i in range(n):
+        for i in range(_whole(n)):
             put(work, target + k * PITCH + i, get(work, source + k * PITCH + i))
 
 
@@ -128,7 +140,7 @@ def _load_row(
         _convert_row(state, work, z, y, x, n)
     real = work.dtype.type
     at = (z * code.shape[1] + y) * code.shape[2] + x
-    for i in range(n):
+    for i in range(_whole(n)):
         put(work, _CODE_HIGH + i, real(get(code, at + i)))
     return bad
 
@@ -150,7 +162,7 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
     y_momentum = _place(state, Y_MOMENTUM, z, y, x)
     z_momentum = _place(state, Z_MOMENTUM, z, y, x)
     energy = _place(state, ENERGY, z, y, x)
-    for i in range(n):
+    for i in range(_whole(n)):
         r = get(state, density + i)
         mx, my = get(state, x_momentum + i), get(state, y_momentum + i)
         mz = get(state, z_momentum + i)
@@ -169,7 +181,7 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
         put(work, _WORST + i, smaller(r, p))  # in this order, nan is found
     if len(state) > FUEL:
         fuel = _place(state, FUEL, z, y, x)
-        for i in range(n):
+        for i in range(_whole(n)):
             put(work, _HIGH + _Y + i, get(state, fuel + i) / get(work, _HIGH + i))
     bad = 0
     for i in range(n):
@@ -205,7 +217,7 @@ def _predict_plane_row(work: Reals, n: int, ratio: Any) -> None:
     zero, half, gamma = real(0.0), real(0.5), real(GAMMA)
     limit, least = real(_LIMIT), real(_LEAST_SHARE)
     step = half * ratio
-    for i in range(n):
+    for i in range(_whole(n)):
         side_w, side_e = get(work, _CODE_MID + i), get(work, _CODE_MID + 2 + i)
         side_s, side_n = get(work, _CODE_LOW + 1 + i), get(work, _CODE_HIGH + 1 + i)
         air_w, air_e = side_w == zero, side_e == zero
@@ -300,7 +312,7 @@ def _predict_column_row(work: Reals, n: int, ratio: Any) -> None:
     zero, half, gamma = real(0.0), real(0.5), real(GAMMA)
     limit, least = real(_LIMIT), real(_LEAST_SHARE)
     step = half * ratio
-    for i in range(n):
+    for i in range(_whole(n)):
         side_s, side_n = get(work, _CODE_LOW + i), get(work, _CODE_HIGH + i)
         air_s, air_n = side_s == zero, side_n == zero
         r, u, v = get(work, _MID + i), get(work, _MID + _U + i), get(work, _MID + _V + i)
@@ -368,7 +380,7 @@ def _hllc_row(
     real = work.dtype.type
     zero, half, one, gamma = real(0.0), real(0.5), real(1.0), real(GAMMA)
     per_pressure = real(1.0 / (GAMMA - 1.0))
-    for i in range(n):
+    for i in range(_whole(n)):
         side_l = get(work, code_left + i)
         side_r = get(work, code_right + i)
         air_l = side_l == zero
@@ -440,7 +452,7 @@ def _predict_plane_fuel(work: Reals, n: int, ratio: Any) -> None:
     """Set the share of fuel at the four upright faces of n cells, half a step on."""
     real = work.dtype.type
     zero, half, limit = real(0.0), real(0.5), real(_LIMIT)
-    for i in range(n):
+    for i in range(_whole(n)):
         y = get(work, _MID + _Y + 1 + i)
         u, v = get(work, _MID + _U + 1 + i), get(work, _MID + _V + 1 + i)
         back = select(get(work, _CODE_MID + i) == zero, get(work, _MID + _Y + i), y)
@@ -463,7 +475,7 @@ def _predict_column_fuel(work: Reals, n: int, ratio: Any) -> None:
     """Set the share of fuel at the lower and the upper faces of n cells, half a step on."""
     real = work.dtype.type
     zero, half, limit = real(0.0), real(0.5), real(_LIMIT)
-    for i in range(n):
+    for i in range(_whole(n)):
         y = get(work, _MID + _Y + i)
         back = select(get(work, _CODE_LOW + i) == zero, get(work, _LOW + _Y + i), y)
         ahead = select(get(work, _CODE_HIGH + i) == zero, get(work, _HIGH + _Y + i), y)
@@ -479,7 +491,7 @@ def _predict_column_fuel(work: Reals, n: int, ratio: Any) -> None:
 def _fuel_row(work: Reals, n: int, left: int, right: int, out: int) -> None:
     """Set the fluxes of fuel from those of mass; what comes in through open faces has none."""
     zero = work.dtype.type(0.0)
-    for i in range(n):
+    for i in range(_whole(n)):
         mass = get(work, out + i)
         share = select(mass >= zero, get(work, left + _Y + i), get(work, right + _Y + i))
         put(work, out + _Y + i, mass * share)
@@ -511,6 +523,21 @@ def _record_walls(
         i = walls[k, 0] - x
         if 0 <= i < n:
             pressure[walls[k, 1]] = get(work, flux + i)
+
+
+@njit(error_model="numpy", fastmath=_FUSED)
+def _forget_signals(work: Reals) -> None:
+    for i in range(PITCH):
+        put(work, _SIGNAL + i, work.dtype.type(0.0))
+
+
+@njit(error_model="numpy", fastmath=_FUSED)
+def _fastest(work: Reals, n: int) -> float:
+    """Return the fastest signal of the first n cells of the rows loaded since."""
+    fastest = 0.0
+    for i in range(n):
+        fastest = max(fastest, get(work, _SIGNAL + i))
+    return fastest
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
@@ -549,14 +576,13 @@ def advance_planes(
     count = len(state)
     rows = code.shape[1]
     lines = code.shape[0] * rows
-    for i in range(PITCH):
-        put(work, _SIGNAL + i, work.dtype.type(0.0))
     lifted = 0
     for z in range(z_from, z_to):
         for tile in range(tiles):
             xa = x0 + (x1 - x0) * tile // tiles
             xb = x0 + (x1 - x0) * (tile + 1) // tiles
             n = xb - xa + 2 * MARGIN
+            _forget_signals(work)
             for y in range(y0 - 2, y1 + 2):
                 # Rows up to y are loaded, those up to y - 1 get their states at the faces, and
                 # those up to y - 2 are done.
@@ -605,16 +631,15 @@ def advance_planes(
                     line = z * rows + y - 1
                     _record_walls(work, pressure, walls, first, line, _ALONG + _U + 2, xa, n - 3)
                     for k in range(count):
-                        for i in range(n - 4):
+                        for i in range(_whole(n - 4)):
                             at = k * PITCH + 2 + i
                             put(
                                 work,
                                 _CHANGE + at,
                                 get(work, _ALONG + at + 1) - get(work, _ALONG + at),
                             )
+            notes[0] = max(notes[0], _fastest(work, n))
     notes[1] += lifted
-    for i in range(PITCH):
-        notes[0] = max(notes[0], get(work, _SIGNAL + i))
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
@@ -634,7 +659,7 @@ def _update_plane_row(
 ) -> None:
     zero = work.dtype.type(0.0)
     for k in range(len(state)):
-        least = work.dtype.type(0.0 if k in (DENSITY, ENERGY) else _STILL)
+        least = work.dtype.type(_STILL[k])
         row = _place(state, k, z, y, x)
         shift = k * PITCH + 2
         for i in range(n):
@@ -651,7 +676,7 @@ def _update_column_row(
 ) -> None:
     zero = work.dtype.type(0.0)
     for k in range(len(state)):
-        least = work.dtype.type(0.0 if k in (DENSITY, ENERGY) else _STILL)
+        least = work.dtype.type(_STILL[k])
         row = _place(state, k, z, y, x)
         shift = k * PITCH
         for i in range(n):
@@ -682,13 +707,12 @@ def advance_columns(
     count = len(state)
     rows = code.shape[1]
     lines = code.shape[0] * rows
-    for i in range(PITCH):
-        put(work, _SIGNAL + i, work.dtype.type(0.0))
     lifted = 0
     for y in range(y_from, y_to):
         for tile in range(tiles):
             x = x0 + (x1 - x0) * tile // tiles
             n = x0 + (x1 - x0) * (tile + 1) // tiles - x
+            _forget_signals(work)
             for z in range(z0 - 2, z1 + 2):
                 _shift_rows(work, count, n)
                 lifted += _load_row(state, code, work, z, y, x, n)
@@ -707,9 +731,8 @@ def advance_columns(
                     _record_walls(work, pressure, walls, first, line, _ACROSS + _W, x, n)
                 if z > z0 + 1:
                     _update_column_row(state, work, z - 2, y, x, n, ratio)
+            notes[0] = max(notes[0], _fastest(work, n))
     notes[1] += lifted
-    for i in range(PITCH):
-        notes[0] = max(notes[0], get(work, _SIGNAL + i))
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
