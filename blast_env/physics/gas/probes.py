@@ -1,0 +1,354 @@
+"""What is recorded while the gas moves: loads on faces, gauges, maps of the ground, pictures.
+
+Overpressures become impulses step by step, in compiled code. Three impulses are kept, in Pa s: the
+sum of all positive phases, the first positive phase, and the sum of all negative phases (below 0).
+
+On a wall, the pressure of a step is the momentum that the wall took from the gas in it: the flux
+that turned the gas round. No estimate from cells is exact in that sense; the pressure of the cell
+before the wall lags behind it by half a cell, and clips its peak. A gauge in the air is the
+pressure of its cell.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from blast_env.errors import BlastEnvError
+from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.kernels import MARGIN, Reals
+from blast_env.physics.gas.solver import GasSolver
+
+ARRIVAL_PA: Final = 1000.0
+"""Overpressure at which a wave has arrived, unless said otherwise."""
+
+# Columns of a table of loads.
+_ARRIVAL, _PEAK, _PEAK_TIME, _POSITIVE, _FIRST, _NEGATIVE = 0, 1, 2, 3, 4, 5
+_RISE, _RISE_TIME, _PHASE, _NOW = 6, 7, 8, 9
+_COLUMNS: Final = 10
+# Phases.
+_BEFORE, _IN_FIRST, _AFTER = 0.0, 1.0, 2.0
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _add_step(
+    loads: NDArray[np.float64],
+    overpressure: NDArray[np.float64],
+    time_s: float,
+    step_s: float,
+    threshold: float,
+    is_mean: bool,
+) -> None:
+    """Add a step that ended at `time_s` to a table of loads.
+
+    Args:
+        loads: The table (n, columns), changed.
+        overpressure: Mean overpressures of the step, or those at its end (n,).
+        time_s: End of the step.
+        step_s: Length of the step.
+        threshold: Overpressure at which a wave has arrived.
+        is_mean: Whether the overpressures are means over the step.
+    """
+    for n in range(len(loads)):
+        load = loads[n]
+        now, before = overpressure[n], load[_NOW]
+        if now == 0.0 and before == 0.0:
+            continue
+        at = time_s - 0.5 * step_s if is_mean else time_s
+        part = step_s * (now if is_mean else 0.5 * (before + now))
+        if load[_PHASE] == _BEFORE and now >= threshold:
+            load[_PHASE] = _IN_FIRST
+            load[_ARRIVAL] = at - step_s * (now - threshold) / (now - before)
+        elif load[_PHASE] == _IN_FIRST and now <= 0.0:
+            load[_PHASE] = _AFTER
+        if part > 0.0:
+            load[_POSITIVE] += part
+            if load[_PHASE] != _AFTER:
+                load[_FIRST] += part
+        else:
+            load[_NEGATIVE] += part
+        if load[_PHASE] != _AFTER and (now - before) / step_s > load[_RISE]:
+            load[_RISE] = (now - before) / step_s
+            load[_RISE_TIME] = at - 0.5 * step_s
+        if now > load[_PEAK]:
+            load[_PEAK] = now
+            load[_PEAK_TIME] = at
+        load[_NOW] = now
+
+
+class LoadTable:
+    """Loads on a number of points, whose overpressures are added step by step.
+
+    Args:
+        count: Number of points.
+        arrival_pa: Overpressure at which a wave has arrived.
+        is_mean: Whether overpressures are means over the step, or those at its end.
+    """
+
+    def __init__(self, count: int, arrival_pa: float = ARRIVAL_PA, *, is_mean: bool) -> None:
+        if not arrival_pa > 0.0:
+            raise BlastEnvError(f"arrival_pa is {arrival_pa}, but must be above 0")
+        self._arrival_pa = arrival_pa
+        self._is_mean = is_mean
+        self._loads = np.zeros((count, _COLUMNS))
+        self._loads[:, _ARRIVAL] = np.nan
+
+    def add(self, overpressure: NDArray[np.float64], time_s: float, step_s: float) -> None:
+        """Add a step that ended at `time_s`, with the overpressures of all points (n,)."""
+        _add_step(self._loads, overpressure, time_s, step_s, self._arrival_pa, self._is_mean)
+
+    @property
+    def arrival_s(self) -> NDArray[np.float64]:
+        """Time at which the overpressure first reached the threshold, nan before (n,)."""
+        return self._loads[:, _ARRIVAL].copy()
+
+    @property
+    def steepest_s(self) -> NDArray[np.float64]:
+        """Time of the steepest rise in the first phase, nan before arrival (n,).
+
+        A shock is some cells wide, and its foot is ahead of it; its middle is where it belongs.
+        """
+        arrived = self._loads[:, _PHASE] != _BEFORE
+        return np.where(arrived, self._loads[:, _RISE_TIME], np.nan)
+
+    @property
+    def peak_pa(self) -> NDArray[np.float64]:
+        """Largest overpressure (n,)."""
+        return self._loads[:, _PEAK].copy()
+
+    @property
+    def peak_time_s(self) -> NDArray[np.float64]:
+        """Time of the largest overpressure (n,)."""
+        return self._loads[:, _PEAK_TIME].copy()
+
+    @property
+    def positive_impulse_pa_s(self) -> NDArray[np.float64]:
+        """Impulse of all positive phases (n,)."""
+        return self._loads[:, _POSITIVE].copy()
+
+    @property
+    def first_impulse_pa_s(self) -> NDArray[np.float64]:
+        """Impulse of the first positive phase, which ends after arrival at 0 Pa (n,)."""
+        return self._loads[:, _FIRST].copy()
+
+    @property
+    def negative_impulse_pa_s(self) -> NDArray[np.float64]:
+        """Impulse of all negative phases, 0 or below (n,)."""
+        return self._loads[:, _NEGATIVE].copy()
+
+    @property
+    def first_is_over(self) -> NDArray[np.bool_]:
+        """Whether the first positive phase is over (n,)."""
+        return self._loads[:, _PHASE] == _AFTER
+
+    @property
+    def overpressure_pa(self) -> NDArray[np.float64]:
+        """Overpressure at the last step (n,)."""
+        return self._loads[:, _NOW].copy()
+
+
+class FaceLoads(LoadTable):
+    """Recorder of the loads on the faces that the solver was given."""
+
+    def __init__(self, count: int, arrival_pa: float = ARRIVAL_PA) -> None:
+        super().__init__(count, arrival_pa, is_mean=True)
+
+    def record(self, solver: GasSolver, step_s: float) -> None:
+        """Add a step."""
+        self.add(solver.wall_overpressure_pa(), solver.time_s, step_s)
+
+
+class Gauges(LoadTable):
+    """Recorder of the overpressure in cells of air, with its whole history.
+
+    Args:
+        grid: The grid.
+        cells: The cells, x, y and z (n, 3).
+        arrival_pa: Overpressure at which a wave has arrived.
+    """
+
+    def __init__(
+        self,
+        grid: GasGrid,
+        cells: Sequence[tuple[int, int, int]] | NDArray[np.int64],
+        arrival_pa: float = ARRIVAL_PA,
+    ) -> None:
+        self.cells = np.asarray(cells, dtype=np.int64).reshape(-1, 3)
+        super().__init__(len(self.cells), arrival_pa, is_mean=False)
+        for cell in self.cells:
+            if (cell < 0).any() or (cell >= grid.shape).any():
+                raise BlastEnvError(f"gauge in cell {cell.tolist()}, but the grid is {grid.shape}")
+            if grid.solid[tuple(cell)]:
+                raise BlastEnvError(f"gauge in cell {cell.tolist()}, which is solid")
+        self._times: list[float] = []
+        self._history: list[NDArray[np.float64]] = []
+
+    def record(self, solver: GasSolver, step_s: float) -> None:
+        """Add a step."""
+        overpressure = solver.overpressure_at(self.cells)
+        self._times.append(solver.time_s)
+        self._history.append(overpressure)
+        self.add(overpressure, solver.time_s, step_s)
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Ends of the steps so far (steps,)."""
+        return np.array(self._times)
+
+    @property
+    def history_pa(self) -> NDArray[np.float64]:
+        """Overpressures at the ends of the steps (steps, n)."""
+        return np.array(self._history).reshape(len(self._times), len(self.cells))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _add_to_map(
+    state: Reals,
+    layer: int,
+    box: NDArray[np.int64],
+    peak: NDArray[np.float32],
+    impulse: NDArray[np.float32],
+    step: float,
+    gamma_1: Any,
+) -> None:
+    """Add a step to the maps of a layer, in the units of the state (y, x)."""
+    real = state.dtype.type
+    half, one = real(0.5), real(1.0)
+    if not box[0] <= layer < box[1]:
+        return
+    for y in range(box[2], box[3]):
+        for x in range(box[4], box[5]):
+            density = state[0, layer, y, x]
+            mx, my, mz = state[1, layer, y, x], state[2, layer, y, x], state[3, layer, y, x]
+            motion = half * (mx * mx + my * my + mz * mz) / density
+            over = gamma_1 * (state[4, layer, y, x] - motion) - one
+            peak[y, x] = max(peak[y, x], np.float32(over))
+            impulse[y, x] += np.float32(step * max(over, real(0.0)))
+
+
+class GroundMap:
+    """Recorder of the peak overpressure and the positive impulse in one layer of cells.
+
+    Args:
+        grid: The grid.
+        layer: The layer, counted from the ground.
+    """
+
+    def __init__(self, grid: GasGrid, layer: int = 0) -> None:
+        nx, ny, nz = grid.shape
+        if not 0 <= layer < nz:
+            raise BlastEnvError(f"layer is {layer}, but must be 0 to {nz - 1}")
+        self._layer = layer
+        self._solid = grid.solid[:, :, layer]
+        shape = (ny + 2 * MARGIN, nx + 2 * MARGIN)
+        self._peak = np.zeros(shape, dtype=np.float32)
+        self._impulse = np.zeros(shape, dtype=np.float32)
+        self._unit_pa = 1.0
+
+    def record(self, solver: GasSolver, step_s: float) -> None:
+        """Add a step."""
+        self._unit_pa = solver.pressure_pa
+        _add_to_map(
+            solver.state,
+            self._layer + MARGIN,
+            solver.box,
+            self._peak,
+            self._impulse,
+            step_s,
+            solver.state.dtype.type(0.4),
+        )
+
+    @property
+    def peak_pa(self) -> NDArray[np.float64]:
+        """Largest overpressures, nan in solid cells (nx, ny)."""
+        return self._trimmed(self._peak)
+
+    @property
+    def positive_impulse_pa_s(self) -> NDArray[np.float64]:
+        """Impulses of all positive phases, nan in solid cells (nx, ny)."""
+        return self._trimmed(self._impulse)
+
+    def _trimmed(self, values: NDArray[np.float32]) -> NDArray[np.float64]:
+        inner = values[MARGIN:-MARGIN, MARGIN:-MARGIN].T.astype(np.float64)
+        return np.where(self._solid, np.nan, self._unit_pa * inner)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """Overpressure in a plane at a time.
+
+    Attributes:
+        time_s: End of the first step that reached the time asked for.
+        overpressure_pa: Along the two axes that span the plane, nan in solid cells.
+    """
+
+    time_s: float
+    overpressure_pa: NDArray[np.float32]
+
+
+class Snapshots:
+    """Recorder of the overpressure in a plane of cells, for films.
+
+    Args:
+        grid: The grid.
+        axis: Axis that the plane is normal to: 2 for a plan, 0 or 1 for a section.
+        layer: The layer of cells along that axis.
+        times_s: When.
+    """
+
+    def __init__(self, grid: GasGrid, axis: int, layer: int, times_s: Sequence[float]) -> None:
+        if axis not in (0, 1, 2):
+            raise BlastEnvError(f"axis is {axis}, but must be 0, 1 or 2")
+        if not 0 <= layer < grid.shape[axis]:
+            raise BlastEnvError(f"layer is {layer}, but must be 0 to {grid.shape[axis] - 1}")
+        self.axis, self.layer = axis, layer
+        self.frames: list[Snapshot] = []
+        self._times = sorted(times_s)
+        self._solid = np.take(grid.solid, layer, axis=axis)
+
+    def record(self, solver: GasSolver, step_s: float) -> None:  # noqa: ARG002
+        """Take a picture if it is time; one picture of a step stands for all times in it."""
+        due = 0
+        while due < len(self._times) and self._times[due] <= solver.time_s:
+            due += 1
+        if due:
+            del self._times[:due]
+            plane = solver.overpressure_in(self.axis, self.layer)
+            pressure = np.where(self._solid, np.nan, plane).astype(np.float32)
+            self.frames.append(Snapshot(solver.time_s, pressure))
+
+
+@dataclass(frozen=True)
+class GroupStatus:
+    """How far the load on a group of faces is.
+
+    Attributes:
+        positive_impulse_pa_s: Mean impulse of all positive phases so far.
+        overpressure_pa: Mean overpressure at the last step.
+        largest_overpressure_pa: Largest overpressure on a face at the last step.
+        arrived: Share of the faces that a wave has reached.
+        first_is_over: Share of the faces whose first positive phase is over.
+    """
+
+    positive_impulse_pa_s: float
+    overpressure_pa: float
+    largest_overpressure_pa: float
+    arrived: float
+    first_is_over: float
+
+
+def group_status(loads: LoadTable, members: NDArray[np.int64]) -> GroupStatus:
+    """Return how far the load on some of the points of a table is; for when a run may end.
+
+    `GasSolver.largest_overpressure_pa` says what may still come.
+    """
+    return GroupStatus(
+        positive_impulse_pa_s=float(loads.positive_impulse_pa_s[members].mean()),
+        overpressure_pa=float(loads.overpressure_pa[members].mean()),
+        largest_overpressure_pa=float(loads.overpressure_pa[members].max()),
+        arrived=float(np.isfinite(loads.arrival_s[members]).mean()),
+        first_is_over=float(loads.first_is_over[members].mean()),
+    )

@@ -1,0 +1,375 @@
+"""A run of the gas on a grid: state, time steps, still air left out, and what is recorded."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from math import expm1, sqrt
+from typing import Any, Final, Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from blast_env.errors import BlastEnvError
+from blast_env.physics.gas import kernels
+from blast_env.physics.gas.faces import NO_FACES, Faces
+from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.kernels import ENERGY, GAMMA, MARGIN, Reals
+
+AIR_PRESSURE_PA: Final = 101_325.0
+AIR_DENSITY_KG_M3: Final = 1.225
+
+COURANT: Final = 0.45
+"""Of a step, in x and y together at most twice this; the scheme is stable to 0.5."""
+
+_FIRST_STEPS: Final = 10
+_FIRST_SHARE: Final = 0.2
+"""Share of the full step at the first one; grows evenly over the first steps."""
+
+_DTYPES: Final = {"single": np.float32, "double": np.float64}
+
+
+def state_bytes(
+    shape: tuple[int, int, int],
+    precision: Literal["single", "double"] = "single",
+    *,
+    with_fuel: bool = False,
+) -> int:
+    """Return how much memory the state of a grid takes; nothing else grows with all its cells."""
+    nx, ny, nz = (n + 2 * MARGIN for n in shape)
+    per_cell = np.dtype(_DTYPES[precision]).itemsize * (6 if with_fuel else 5) + 1
+    return nx * ny * nz * per_cell
+
+
+class Totals(NamedTuple):
+    """Sums over the air cells.
+
+    Attributes:
+        mass_kg: Mass.
+        momentum_kg_m_s: Momentum along x, y and z.
+        energy_j: Energy, that of still air included.
+        fuel_kg: Mass of the passive scalar.
+    """
+
+    mass_kg: float
+    momentum_kg_m_s: tuple[float, float, float]
+    energy_j: float
+    fuel_kg: float
+
+
+class Burning(NamedTuple):
+    """How the passive scalar burns: a constant share in time, wherever it is.
+
+    Attributes:
+        time_s: Time in which all but 1/e of it has burnt.
+        heat_j_kg: Energy that its mass sets free.
+    """
+
+    time_s: float
+    heat_j_kg: float
+
+
+class Recorder(Protocol):
+    """Something that looks at the gas after every step."""
+
+    def record(self, solver: "GasSolver", step_s: float) -> None:
+        """Look at the gas after a step of `step_s`."""
+
+
+class GasSolver:
+    """A gas in a grid, at rest until `set_state` says otherwise.
+
+    Inside, the state is in units of still air: its density, its pressure, and the velocity that
+    follows from both. Outside, everything is in SI units.
+
+    Attributes:
+        grid: The grid.
+        faces: Faces on which the pressure is known after every step, see `wall_pressure`.
+        time_s: Simulated time so far.
+        steps: Steps so far.
+        cell_updates: Cells moved on by a step so far, all directions counted as one; cells of air
+            that was left out as still do not count.
+        state: The state in the solver's units (5 or 6, z, y, x), margin included.
+        wall_pressure: Mean pressures on `faces` during the last step, in the solver's units (n,).
+            These are the fluxes of momentum, so that an impulse from them is exactly the momentum
+            that the wall took up.
+        box: Cells of `state` outside which the air is still: first and last + 1 along z, y and x.
+    """
+
+    def __init__(
+        self,
+        grid: GasGrid,
+        *,
+        faces: Faces = NO_FACES,
+        recorders: Sequence[Recorder] = (),
+        precision: Literal["single", "double"] = "single",
+        with_fuel: bool = False,
+        burning: Burning | None = None,
+        threads: int = 1,
+        courant: float = COURANT,
+        skip_still_air: bool = True,
+        pressure_pa: float = AIR_PRESSURE_PA,
+        density_kg_m3: float = AIR_DENSITY_KG_M3,
+    ) -> None:
+        if precision not in _DTYPES:
+            raise BlastEnvError(f"precision is {precision!r}, but must be 'single' or 'double'")
+        if threads < 1:
+            raise BlastEnvError(f"threads is {threads}, but must be at least 1")
+        if not 0.0 < courant <= 0.5:
+            raise BlastEnvError(f"courant is {courant}, but must be above 0 and at most 0.5")
+        if not (pressure_pa > 0.0 and density_kg_m3 > 0.0):
+            raise BlastEnvError(
+                f"still air has {pressure_pa} Pa and {density_kg_m3} kg/m^3, "
+                "but both must be above 0"
+            )
+        if burning is not None and not (with_fuel and burning.time_s > 0.0):
+            raise BlastEnvError(
+                f"burning is {burning}, but needs with_fuel=True and a time above 0 s"
+            )
+        self.grid = grid
+        self.faces = faces
+        self.recorders = tuple(recorders)
+        self.time_s = 0.0
+        self.steps = 0
+        self.cell_updates = 0
+        self.pressure_pa = pressure_pa
+        self.density_kg_m3 = density_kg_m3
+        self.velocity_m_s = sqrt(pressure_pa / density_kg_m3)
+        self._courant = courant
+        self._burning = burning
+        self._skip = skip_still_air
+        self._threads = threads
+        dtype = _DTYPES[precision]
+        self._code = grid.codes()
+        components = 6 if with_fuel else 5
+        self._still = np.zeros(components, dtype=dtype)
+        self._still[kernels.DENSITY] = 1.0
+        self._still[ENERGY] = 1.0 / (GAMMA - 1.0)
+        self.state: Reals = np.empty((components, *self._code.shape), dtype=dtype)
+        self.state[:] = self._still[:, None, None, None]
+        self.wall_pressure: Reals = np.ones(len(faces), dtype=dtype)
+        self._walls, self._first_wall = faces.kernel_table(grid.shape)
+        self._work = [np.zeros(kernels.WORK_SIZE, dtype=dtype) for _ in range(threads)]
+        edges = (self._code.shape[1], kernels.EDGE_SIZE)
+        self._edges = [np.zeros(edges, dtype=dtype) for _ in range(threads)]
+        self._notes = np.zeros((threads, 2))
+        self._whole = np.array(
+            [bound for n in self._code.shape for bound in (MARGIN, n - MARGIN)], dtype=np.int64
+        )
+        self.box = self._empty_box() if skip_still_air else self._whole.copy()
+        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
+        self._signal = 0.0
+        self._lifted = 0
+
+    @property
+    def lifted(self) -> int:
+        """Cells that had to be lifted to the floor of density or pressure so far."""
+        return self._lifted
+
+    def set_state(
+        self,
+        *,
+        density_kg_m3: ArrayLike,
+        velocity_m_s: Sequence[ArrayLike] = (0.0, 0.0, 0.0),
+        pressure_pa: ArrayLike,
+        fuel_kg_m3: ArrayLike = 0.0,
+    ) -> None:
+        """Set the gas in the air cells, from arrays over x, y and z or values for all of them."""
+        density = np.broadcast_to(np.asarray(density_kg_m3, dtype=np.float64), self.grid.shape)
+        pressure = np.broadcast_to(np.asarray(pressure_pa, dtype=np.float64), self.grid.shape)
+        air = ~self.grid.solid
+        for name, values in (("density_kg_m3", density), ("pressure_pa", pressure)):
+            least = values[air].min(initial=np.inf)
+            if not least > 0.0:
+                raise BlastEnvError(f"{name} falls to {least}, but must be above 0 everywhere")
+        density = density / self.density_kg_m3
+        pressure = pressure / self.pressure_pa
+        energy = pressure / (GAMMA - 1.0)
+        self._put(kernels.DENSITY, density)
+        for k, component in enumerate(velocity_m_s):
+            velocity = np.asarray(component, dtype=np.float64) / self.velocity_m_s
+            self._put(kernels.X_MOMENTUM + k, density * velocity)
+            energy = energy + 0.5 * density * velocity * velocity
+        self._put(ENERGY, energy)
+        if len(self.state) > kernels.FUEL:
+            self._put(kernels.FUEL, np.asarray(fuel_kg_m3) / self.density_kg_m3)
+        self._signal = 0.0
+        if self._skip:
+            self.box = self._whole.copy()
+            kernels.tighten(self.state, self._still, self.box, max(self._code.shape))
+
+    def advance(self, until_s: float, *, land: bool = False) -> None:
+        """Go on until the simulated time is at least `until_s`.
+
+        Without `land`, how a run is cut into calls does not change it.
+
+        Args:
+            until_s: Simulated time.
+            land: Shorten the last step so that it ends at `until_s`.
+        """
+        while self.time_s < until_s:
+            self.step(until_s - self.time_s if land else np.inf)
+
+    def step(self, most_s: float = np.inf) -> None:
+        """Make one time step, of at most `most_s`."""
+        if self._signal == 0.0:
+            self._signal = float(kernels.fastest_signal(self.state))
+        share = min(1.0, _FIRST_SHARE + (1.0 - _FIRST_SHARE) * self.steps / _FIRST_STEPS)
+        reduced = share * self._courant * self.grid.cell_m / self._signal
+        step_s = min(reduced / self.velocity_m_s, most_s)
+        ratio = self.state.dtype.type(step_s * self.velocity_m_s / self.grid.cell_m)
+        self._notes[:] = 0.0
+        passes: tuple[Callable[[Any], None], ...] = (self._move_planes, self._move_columns)
+        for move in passes if self.steps % 2 == 0 else passes[::-1]:
+            move(ratio)
+        if self._burning is not None:
+            self._burn(self._burning, step_s)
+        self._signal = max(float(self._notes[:, 0].max()), sqrt(GAMMA))
+        self._lifted += int(self._notes[:, 1].sum())
+        z0, z1, y0, y1, x0, x1 = self.box.tolist()
+        self.cell_updates += (z1 - z0) * (y1 - y0) * (x1 - x0)
+        self.steps += 1
+        self.time_s = self.time_s + step_s
+        for recorder in self.recorders:
+            recorder.record(self, step_s)
+
+    def density(self) -> NDArray[np.float64]:
+        """Return the density, kg/m^3 (nx, ny, nz)."""
+        return self.density_kg_m3 * self._get(kernels.DENSITY)
+
+    def velocity(self) -> NDArray[np.float64]:
+        """Return the velocity, m/s (3, nx, ny, nz)."""
+        momentum = np.stack([self._get(kernels.X_MOMENTUM + k) for k in range(3)])
+        return self.velocity_m_s * momentum / self._get(kernels.DENSITY)
+
+    def pressure(self) -> NDArray[np.float64]:
+        """Return the pressure, Pa (nx, ny, nz)."""
+        motion = sum(self._get(kernels.X_MOMENTUM + k) ** 2 for k in range(3))
+        inner = self._get(ENERGY) - 0.5 * motion / self._get(kernels.DENSITY)
+        return self.pressure_pa * (GAMMA - 1.0) * inner
+
+    def fuel(self) -> NDArray[np.float64]:
+        """Return the density of the passive scalar, kg/m^3 (nx, ny, nz)."""
+        return self.density_kg_m3 * self._get(kernels.FUEL)
+
+    def wall_overpressure_pa(self) -> NDArray[np.float64]:
+        """Return the mean overpressures on `faces` during the last step (n,)."""
+        return self.pressure_pa * (self.wall_pressure - 1.0).astype(np.float64)
+
+    def overpressure_at(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the overpressures in some cells, x, y and z (n, 3)."""
+        x, y, z = cells.T + MARGIN
+        return self.pressure_pa * self._excess(self.state[:, z, y, x])
+
+    def overpressure_in(self, axis: int, layer: int) -> NDArray[np.float64]:
+        """Return the overpressures in a layer of cells, along the two other axes."""
+        inner = self.state[:, MARGIN:-MARGIN, MARGIN:-MARGIN, MARGIN:-MARGIN]
+        return self.pressure_pa * self._excess(np.take(inner, layer, axis=3 - axis)).T
+
+    def largest_overpressure_pa(self) -> float:
+        """Return the largest distance from the pressure of still air, anywhere in the gas."""
+        return self.pressure_pa * float(kernels.largest_excess(self.state, self.box))
+
+    def totals(self) -> Totals:
+        """Return mass, momentum and energy of the gas in the grid."""
+        air = ~self.grid.solid
+        volume = self.grid.cell_m**3
+        sums = [float(self._get(k)[air].sum()) * volume for k in range(len(self.state))]
+        along = self.density_kg_m3 * self.velocity_m_s
+        return Totals(
+            mass_kg=self.density_kg_m3 * sums[kernels.DENSITY],
+            momentum_kg_m_s=(along * sums[1], along * sums[2], along * sums[3]),
+            energy_j=self.pressure_pa * sums[ENERGY],
+            fuel_kg=self.density_kg_m3 * sums[kernels.FUEL] if len(sums) > kernels.FUEL else 0.0,
+        )
+
+    def _move_planes(self, ratio: Any) -> None:
+        self._widen((2, 3, 4, 5))
+
+        def move(k: int, first: int, end: int) -> None:
+            kernels.advance_planes(
+                self.state,
+                self._code,
+                self._work[k],
+                self._edges[k],
+                self.box,
+                first,
+                end,
+                ratio,
+                self.wall_pressure,
+                self._walls,
+                self._first_wall,
+                self._notes[k],
+            )
+
+        self._share_out(move, int(self.box[0]), int(self.box[1]))
+
+    def _move_columns(self, ratio: Any) -> None:
+        self._widen((0, 1))
+
+        def move(k: int, first: int, end: int) -> None:
+            kernels.advance_columns(
+                self.state,
+                self._code,
+                self._work[k],
+                self.box,
+                first,
+                end,
+                ratio,
+                self.wall_pressure,
+                self._walls,
+                self._first_wall,
+                self._notes[k],
+            )
+
+        self._share_out(move, int(self.box[2]), int(self.box[3]))
+
+    def _burn(self, burning: Burning, step_s: float) -> None:
+        real = self.state.dtype.type
+        share = real(-expm1(-step_s / burning.time_s))
+        heat = real(burning.heat_j_kg / self.velocity_m_s**2)
+        kernels.burn(self.state, self.box, share, heat)
+
+    def _share_out(self, move: Callable[[int, int, int], None], first: int, end: int) -> None:
+        """Give each thread its part of the layers from first to end, then leave still air out."""
+        count = self._threads
+        bounds = [first + (end - first) * k // count for k in range(count + 1)]
+        others = [
+            self._pool.submit(move, k, bounds[k], bounds[k + 1])
+            for k in range(1, count)
+            if self._pool is not None
+        ]
+        move(0, bounds[0], bounds[1])
+        for other in others:
+            other.result()
+        if self._skip:
+            kernels.tighten(self.state, self._still, self.box, 2)
+
+    def _widen(self, sides: tuple[int, ...]) -> None:
+        """Let the box grow by as many cells as a pass can carry something."""
+        if self._skip and self.box[1] > self.box[0]:
+            for side in sides:
+                low = side % 2 == 0
+                moved = self.box[side] + (-2 if low else 2)
+                whole = self._whole[side]
+                self.box[side] = max(moved, whole) if low else min(moved, whole)
+
+    def _empty_box(self) -> NDArray[np.int64]:
+        box = self._whole.copy()
+        box[1::2] = box[::2]
+        return box
+
+    def _excess(self, values: Reals) -> NDArray[np.float64]:
+        """Return the pressure above that of still air, exactly 0 in still air, from the state."""
+        real = self.state.dtype.type
+        motion = values[1] * values[1] + values[2] * values[2] + values[3] * values[3]
+        inner = values[ENERGY] - real(0.5) * motion / values[kernels.DENSITY]
+        return (real(GAMMA - 1.0) * inner - real(1.0)).astype(np.float64)
+
+    def _put(self, component: int, values: NDArray[np.float64]) -> None:
+        """Set a component in the air cells; solid cells keep still air."""
+        inner = self.state[component, MARGIN:-MARGIN, MARGIN:-MARGIN, MARGIN:-MARGIN]
+        values = np.broadcast_to(values, self.grid.shape)
+        inner[:] = np.where(self.grid.solid, float(self._still[component]), values).T
+
+    def _get(self, component: int) -> NDArray[np.float64]:
+        inner = self.state[component, MARGIN:-MARGIN, MARGIN:-MARGIN, MARGIN:-MARGIN]
+        return inner.T.astype(np.float64)

@@ -1,0 +1,172 @@
+"""Loads on faces, gauges, maps and pictures."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.physics.gas.faces import exposed_faces, ground_faces
+from blast_env.physics.gas.grid import FaceKind, GasGrid
+from blast_env.physics.gas.probes import (
+    FaceLoads,
+    Gauges,
+    GroundMap,
+    LoadTable,
+    Snapshots,
+    group_status,
+)
+from tests.physics.gas.flows import blast, street
+
+
+def test_phases_of_a_history_by_hand() -> None:
+    """Foot, first phase, negative phase, second phase; steps of 1 ms."""
+    table = LoadTable(2, arrival_pa=100.0, is_mean=True)
+    history = [0.0, 50.0, 250.0, 400.0, 100.0, -50.0, -20.0, 30.0, 500.0, 0.0]
+    for k, value in enumerate(history):
+        table.add(np.array([value, 0.0]), (k + 1) * 1e-3, 1e-3)
+    assert table.positive_impulse_pa_s == pytest.approx([1.33, 0.0])
+    assert table.first_impulse_pa_s == pytest.approx([0.8, 0.0])
+    assert table.negative_impulse_pa_s == pytest.approx([-0.07, 0.0])
+    assert table.peak_pa.tolist() == [500.0, 0.0]
+    assert table.peak_time_s[0] == pytest.approx(8.5e-3)
+    # From 50 to 250 Pa, between the middles of the steps.
+    assert table.arrival_s == pytest.approx([1.75e-3, np.nan], nan_ok=True)
+    assert table.steepest_s == pytest.approx([2.0e-3, np.nan], nan_ok=True)
+    assert table.first_is_over.tolist() == [True, False]
+    status = group_status(table, np.array([0, 1]))
+    assert status.positive_impulse_pa_s == pytest.approx(0.665)
+    assert status.arrived == status.first_is_over == 0.5
+
+
+def test_values_at_the_ends_of_steps_are_joined_by_lines() -> None:
+    table = LoadTable(1, arrival_pa=1.0, is_mean=False)
+    for k, value in enumerate([0.0, 100.0, 50.0]):
+        table.add(np.array([value]), (k + 1) * 1e-3, 1e-3)
+    assert table.positive_impulse_pa_s == pytest.approx([0.125])
+    assert table.arrival_s == pytest.approx([1e-3 + 1e-5])
+
+
+def test_faces_of_chosen_cells() -> None:
+    solid = np.zeros((6, 5, 4), dtype=bool)
+    solid[2:4, 2, 0:2] = True
+    solid[5, 2, 0] = True  # at the border: nothing is beyond
+    grid = GasGrid(0.5, solid, origin_m=(10.0, 0.0, 0.0))
+    chosen = np.zeros_like(solid)
+    chosen[2:4, 2, 0:2] = True
+    faces = exposed_faces(grid, chosen)
+    # Two on each end, four on each side, two above, none below.
+    count = {(axis, side): 0 for axis in range(3) for side in (-1, 1)}
+    for axis, side in zip(faces.axis.tolist(), faces.side.tolist(), strict=True):
+        count[axis, side] += 1
+    assert count == {(0, -1): 2, (0, 1): 2, (1, -1): 4, (1, 1): 4, (2, -1): 0, (2, 1): 2}
+    assert solid[tuple(faces.solid.T)].all()
+    assert not solid[tuple(faces.air.T)].any()
+    top = faces.centres_m(grid)[faces.axis == 2]
+    assert sorted(top.tolist()) == [[11.25, 1.25, 1.0], [11.75, 1.25, 1.0]]
+    assert len(ground_faces(grid)) == 30 - 3
+    with pytest.raises(BlastEnvError, match="cells of air"):
+        exposed_faces(grid, np.ones_like(solid))
+
+
+def test_faces_are_loaded_from_their_own_side() -> None:
+    """A wall between mirrors: the side of the blast is loaded, the other is not; x, y and z."""
+    for axis in range(3):
+        solid = np.zeros((21, 21, 21), dtype=bool)
+        np.moveaxis(solid, axis, 0)[12] = True
+        centre = [10.5, 10.5, 10.5]
+        centre[axis] = 6.5
+        recorders: list[FaceLoads] = []
+
+        def setup(grid: GasGrid, recorders: list[FaceLoads] = recorders) -> dict[str, Any]:
+            faces = exposed_faces(grid, grid.solid)
+            recorders.append(FaceLoads(len(faces)))
+            return {"faces": faces, "recorders": recorders}
+
+        solver = blast(
+            solid, (centre[0], centre[1], centre[2]), setup=setup, faces={"z_low": FaceKind.OPEN}
+        )
+        solver.advance(0.01)
+        load = recorders[0].positive_impulse_pa_s
+        near = solver.faces.side == -1
+        assert (load[near] > 0.0).all()
+        assert (load[~near] == 0.0).all()
+        # The most loaded face is the one opposite the charge.
+        air = solver.faces.air[np.flatnonzero(near)[load[near].argmax()]]
+        expected = [10, 10, 10]
+        expected[axis] = 11
+        assert air.tolist() == expected
+
+
+def test_gauges_keep_the_history() -> None:
+    made: list[Gauges] = []
+
+    def setup(grid: GasGrid) -> dict[str, Any]:
+        made.append(Gauges(grid, [grid.cell_at((8.0, 4.5, 0.1)), (27, 4, 2)]))
+        return {"recorders": made}
+
+    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver.advance(0.03)
+    (gauges,) = made
+    history, time_s = gauges.history_pa, gauges.time_s
+    assert history.shape == (solver.steps, 2)
+    assert time_s[-1] == solver.time_s
+    assert (np.diff(time_s) > 0.0).all()
+    assert (history[:3, 1] == 0.0).all()
+    assert gauges.peak_pa == pytest.approx(history.max(axis=0))
+    assert gauges.arrival_s[0] < gauges.arrival_s[1]
+    joined = np.concatenate((np.zeros((1, 2)), history))
+    steps = np.diff(np.concatenate(([0.0], time_s)))
+    means = 0.5 * (joined[1:] + joined[:-1])
+    positive = (np.maximum(means, 0.0) * steps[:, None]).sum(axis=0)
+    assert gauges.positive_impulse_pa_s == pytest.approx(positive, rel=1e-9)
+    with pytest.raises(BlastEnvError, match="which is solid"):
+        Gauges(solver.grid, [(12, 5, 0)])
+    with pytest.raises(BlastEnvError, match="but the grid is"):
+        Gauges(solver.grid, [(30, 5, 0)])
+
+
+def test_maps_agree_with_gauges() -> None:
+    cells = [(16, 9, 0), (3, 20, 0)]
+    made: list[Any] = []
+
+    def setup(grid: GasGrid) -> dict[str, Any]:
+        made.extend((Gauges(grid, cells), GroundMap(grid)))
+        return {"recorders": made}
+
+    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver.advance(0.03)
+    gauges, ground = made
+    for k, (x, y, _) in enumerate(cells):
+        assert ground.peak_pa[x, y] == pytest.approx(gauges.peak_pa[k], rel=1e-5)
+        impulse = gauges.positive_impulse_pa_s[k]
+        assert ground.positive_impulse_pa_s[x, y] == pytest.approx(impulse, rel=0.02)
+    assert np.isnan(ground.peak_pa[13, 5])
+    with pytest.raises(BlastEnvError, match="0 to 9"):
+        GroundMap(solver.grid, layer=10)
+
+
+def test_pictures_are_taken_once_at_their_times() -> None:
+    times = [0.0, 0.002, 0.0020001, 0.01, 1.0]
+    made: list[Snapshots] = []
+
+    def setup(grid: GasGrid) -> dict[str, Any]:
+        made.extend((Snapshots(grid, 2, 1, times), Snapshots(grid, 1, 12, times)))
+        return {"recorders": made}
+
+    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver.advance(0.02)
+    plan, section = made
+    assert len(plan.frames) == len(section.frames) == 3
+    assert plan.frames[0].overpressure_pa.shape == (30, 26)
+    assert section.frames[0].overpressure_pa.shape == (30, 10)
+    assert [frame.time_s for frame in plan.frames] == [frame.time_s for frame in section.frames]
+    assert all(
+        time_s <= frame.time_s < time_s + 0.002
+        for time_s, frame in zip((0.0, 0.002, 0.01), plan.frames, strict=True)
+    )
+    for one, other in zip(plan.frames, section.frames, strict=True):
+        line = one.overpressure_pa[:, 12]
+        np.testing.assert_array_equal(line, other.overpressure_pa[:, 1])
+    assert np.isnan(plan.frames[0].overpressure_pa[13, 5])
+    assert solver.largest_overpressure_pa() >= np.nanmax(np.abs(solver.overpressure_in(2, 0)))
