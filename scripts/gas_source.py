@@ -30,9 +30,9 @@ SOURCES = {
     "4.18 + 3 MJ/kg in 2.5 ms": Explosive(1630.0, 4.184e6, 3.0e6, 2.5e-3, 1.8),
     "3.5 + 3.2 MJ/kg in 1.5 ms": Explosive(1630.0, 3.5e6, 3.2e6, 1.5e-3, 1.8),
     "2.6 + 3.9 MJ/kg in 2 ms": Explosive(1630.0, 2.6e6, 3.9e6, 2e-3, 1.8),
-    "2.95 + 2 MJ/kg in 1 ms": Explosive(1630.0, 2.95e6, 2.0e6, 1e-3, 1.8),
+    "2.8 + 2 MJ/kg in 1 ms": Explosive(1630.0, 2.8e6, 2.0e6, 1e-3, 1.8),
     "chosen": TNT,
-    "2.95 + 3.4 MJ/kg in 1 ms": Explosive(1630.0, 2.95e6, 3.4e6, 1e-3, 1.8),
+    "2.8 + 3.5 MJ/kg in 1 ms": Explosive(1630.0, 2.8e6, 3.5e6, 1e-3, 1.8),
 }
 """Energy at once, energy by burning and its time constant for 1 kg in free air."""
 
