@@ -74,7 +74,7 @@ class Blast:
                 f"charge_position_m is {position_m!r}, must be a pair of numbers (x, y)"
             ) from None
         drawn = draw_charge(self.scenario, self.seed) if self.charge is None else self.charge
-        return replace(self, charge=Charge((x_m, y_m), drawn.tnt_kg))
+        return replace(self, charge=drawn._replace(position_m=(x_m, y_m)))
 
     def start(self) -> BlastRun:
         """Return a run at time 0."""

@@ -39,8 +39,8 @@ class Threat:
                 pair of coordinates and a mass.
         """
         try:
-            (x_m, y_m), tnt_kg = self.charge
-            charge = Charge((float(x_m), float(y_m)), float(tnt_kg))
+            (x_m, y_m), tnt_kg, *height_m = self.charge
+            charge = Charge((float(x_m), float(y_m)), float(tnt_kg), *map(float, height_m))
         except (TypeError, ValueError):
             raise BlastEnvError(
                 f"charge is {self.charge!r}, must be ((x, y) in m, kg of TNT)"

@@ -58,7 +58,7 @@ def _conditions(zone: BuildZone) -> tuple[str, str]:
 def _charge(plan: LayoutPlan) -> str:
     """Return the mass of the charge, and where it is or may be."""
     if plan.charge is not None:
-        (x_m, y_m), tnt_kg = plan.charge
+        (x_m, y_m), tnt_kg = plan.charge.position_m, plan.charge.tnt_kg
         return f"{_number(tnt_kg)} kg TNT at ({x_m:.2f}, {y_m:.2f})"
     masses_kg = sorted({source.tnt_kg for source in plan.scenario.charge})
     return f"{' or '.join(map(_number, masses_kg))} kg TNT, anywhere on the layer CHARGE_PLACE"

@@ -111,7 +111,7 @@ def _write_json(plan: LayoutPlan, path: Path) -> None:
     """Write the layout file that `load_layout` reads, with the charge in its provenance."""
     provenance = dict(plan.provenance)
     if plan.charge is not None:
-        position_m, tnt_kg = plan.charge
+        position_m, tnt_kg = plan.charge.position_m, plan.charge.tnt_kg
         provenance["charge"] = {"position_m": list(position_m), "tnt_kg": tnt_kg}
     write_layout(path, plan.scenario, plan.layout, provenance)
 

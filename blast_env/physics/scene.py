@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -12,32 +12,63 @@ from blast_env.physics.particles import Balls
 from blast_env.physics.structure import ModularObstacle
 from blast_env.units import MODULE_SIDE_UNITS
 
+WallName = Literal["west", "east", "south", "north"]
+"""A wall of a structure, by the side that it looks to: west is towards smaller x."""
+
+WALLS: Final[tuple[WallName, ...]] = ("west", "east", "south", "north")
+
 
 class Charge(NamedTuple):
-    """One charge: where it is and its TNT-equivalent mass."""
+    """One charge: where it is in plan, its TNT-equivalent mass, and the height of its centre.
+
+    The particle engines know no height; for gas dynamics 0 is a charge that lies on the ground.
+    """
 
     position_m: tuple[float, float]
     tnt_kg: float
+    height_m: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """The initial state of one blast, in simulation units.
+class Gauge(NamedTuple):
+    """A place in the air whose overpressure is recorded: x, y, and height above the ground."""
+
+    name: str
+    position_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BlastSite:
+    """What stands where when a charge goes off: what every engine needs, in simulation units.
 
     Attributes:
         site: The simulated area.
         charge_centre: Centre of the charge.
         charge: The charge in metres and kilograms.
-        balls: All balls; air first, then the charge.
         structures: The structures and, when there is one, the barrier; see `obstacles`.
-        parameters: Parameters of the blast model for this charge.
+        gauges: Virtual gauges, in metres; the particle engines have none.
     """
 
     site: Rectangle
     charge_centre: tuple[float, float]
     charge: Charge
-    balls: Balls
     structures: tuple["StructureOutline", ...]
+    gauges: tuple[Gauge, ...] = ()
+
+    def obstacles(self) -> tuple[ModularObstacle, ...]:
+        """Return fresh obstacles without any hit, in the order of `structures`."""
+        return tuple(outline.build() for outline in self.structures)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scene(BlastSite):
+    """The initial state of one blast of particles, in simulation units.
+
+    Attributes:
+        balls: All balls; air first, then the charge.
+        parameters: Parameters of the blast model for this charge.
+    """
+
+    balls: Balls
     parameters: SimulationParameters
 
     @cached_property
@@ -60,14 +91,14 @@ class Scene:
         """Return an impulse rounded to a multiple of the quantum."""
         return round(impulse / self.impulse_quantum) * self.impulse_quantum
 
-    def obstacles(self) -> tuple[ModularObstacle, ...]:
-        """Return fresh obstacles without any hit, in the order of `structures`."""
-        return tuple(outline.build() for outline in self.structures)
-
 
 @dataclass(frozen=True)
 class StructureOutline:
-    """What a structure is before any blast; attributes as in `ModularObstacle`."""
+    """What a structure is before any blast; attributes as in `ModularObstacle`.
+
+    Two more are for gas dynamics: `height_m`, `None` for as high as the air, and `faces`, the
+    walls whose load counts ("west", "east", "south", "north").
+    """
 
     kind: type[ModularObstacle]
     name: str
@@ -78,6 +109,8 @@ class StructureOutline:
     weight: float
     cells: tuple[Cell, ...] | None
     capacity: float | None
+    height_m: float | None = None
+    faces: tuple[WallName, ...] = WALLS
 
     @property
     def rectangle(self) -> Rectangle:

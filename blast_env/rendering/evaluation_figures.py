@@ -465,7 +465,8 @@ def _draw_case(axes: Axes, panel: _Panel, scene: Scene, name: str) -> None:
 
 def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
     """Write two quiet lines between title and panel."""
-    (x_m, y_m), tnt_kg = panel.case.threats[0].charge
+    charge_here = panel.case.threats[0].charge
+    (x_m, y_m), tnt_kg = charge_here.position_m, charge_here.tnt_kg
     charge = f"{tnt_kg:g} kg TNT at ({x_m:.1f}, {y_m:.1f}) m"
     axes.annotate(
         f"{site}{count_of('module', len(panel.layout))}\n{charge}",

@@ -102,7 +102,14 @@ class FrontCase:
         # A run ends when no structure can be reached: this one is in a corner.
         far = StructureOutline(ModularObstacle, "far", (2.0, 2.0), 1, 1, True, 1.0, None, None)
         balls = Balls.concatenate((air, fan))
-        return Scene(site, centre, Charge(centre, 100.0), balls, (far,), parameters)
+        return Scene(
+            site=site,
+            charge_centre=centre,
+            charge=Charge(centre, 100.0),
+            balls=balls,
+            structures=(far,),
+            parameters=parameters,
+        )
 
 
 @dataclass(frozen=True, eq=False)
