@@ -3,10 +3,9 @@
 Importing the package registers its environments with Gymnasium.
 """
 
-from importlib.metadata import version
-
 from blast_env.envs.registration import register_environments as _register_environments
 from blast_env.physics.scene import Charge
+from blast_env.provenance import package_version
 from blast_env.scenario import (
     Scenario,
     bundled_scenarios,
@@ -17,7 +16,7 @@ from blast_env.scenario import (
 )
 from blast_env.simulation import Blast, BlastResult, simulate
 
-__version__ = version("blast-env")
+__version__ = package_version()
 __all__ = [
     "Blast",
     "BlastResult",

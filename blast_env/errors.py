@@ -1,6 +1,7 @@
 """The errors that a user can cause, each with a message that says what to change."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 
 
@@ -10,6 +11,10 @@ class BlastEnvError(ValueError):
 
 class LayoutError(BlastEnvError):
     """A cell cannot take a module: because of site, modules, stock, budget or access way."""
+
+
+class MissingExtraError(BlastEnvError):
+    """Something needs a package of an optional extra that is not installed."""
 
 
 class UnknownNameError(BlastEnvError):
@@ -28,6 +33,28 @@ class UnknownNameError(BlastEnvError):
 
     def __reduce__(self) -> tuple[type["UnknownNameError"], tuple[str, str, list[str]]]:
         return type(self), self._arguments
+
+
+@contextmanager
+def import_extra(extra: str, what: str) -> Iterator[None]:
+    """Import packages of an optional extra in this block.
+
+    Args:
+        extra: Name of the extra, or names with commas.
+        what: What cannot be had without it, e.g. `"genetic search"`.
+
+    Raises:
+        MissingExtraError: If a package is not installed; the message says how to get it.
+    """
+    try:
+        yield
+    except ImportError as error:
+        missing = error.name or str(error)
+        if missing.startswith(("blast_env", "blast_agents")):
+            raise  # no extra would help
+        raise MissingExtraError(
+            f"no {what} without {missing!r}: pip install blast-env[{extra}]"
+        ) from error
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

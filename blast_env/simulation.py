@@ -18,11 +18,19 @@ from blast_env.calibration.model import (
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Cell
 from blast_env.physics.collisions import CollisionArray
-from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, find_engine
+from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import ModularObstacle
-from blast_env.recording.run_record import RunRecord, run_record
-from blast_env.recording.tables import collision_table, module_table, structure_table
+from blast_env.provenance import versions
+from blast_env.recording.excel import write_workbook
+from blast_env.recording.parquet import write_parquet
+from blast_env.recording.tables import (
+    RunRecord,
+    collision_table,
+    module_table,
+    structure_table,
+)
 from blast_env.runner import check_workers, in_order
 from blast_env.scenario import Scenario
 from blast_env.scenario.build_scene import build_scene, draw_charge
@@ -230,7 +238,31 @@ class BlastResult:
     @cached_property
     def run_record(self) -> RunRecord:
         """Everything needed to repeat the run: what was run, with which versions."""
-        return run_record(self)
+        blast, charge = self.blast, self.blast.scene.charge
+        known = versions(self.engine_version)
+        record: RunRecord = {
+            "scenario": blast.scenario.name,
+            "scenario hash": blast.scenario.content_hash,
+            "layout (row, column)": " ".join(f"{row},{column}" for row, column in blast.layout),
+            "seed": blast.seed,
+            "charge x (m)": charge.position_m[0],
+            "charge y (m)": charge.position_m[1],
+            "charge TNT equivalent (kg)": charge.tnt_kg,
+            "engine": self.engine_name,
+            "engine version": known["engine"],
+            "blast-env version": known["blast_env"],
+            "python version": known["python"],
+            "numpy version": known["numpy"],
+            "balls at the start": len(blast.scene.balls),
+            "balls at the end": len(self.final_balls),
+            "steps": self.steps,
+            "simulated time (s)": self.time_s,
+            "ended because": str(self.end_reason),
+            "digest": self.digest,
+        }
+        for group, values in blast.scenario.parameters.model_dump().items():
+            record |= {f"parameter {group}.{name}": value for name, value in values.items()}
+        return record
 
     def to_excel(self, path: str | Path) -> Path:
         """Write a workbook with collisions, modules, structures and the run record.
@@ -241,8 +273,6 @@ class BlastResult:
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
-        from blast_env.recording.excel import write_workbook
-
         return write_workbook(self, Path(path))
 
     def to_parquet(self, path: str | Path) -> Path:
@@ -254,8 +284,6 @@ class BlastResult:
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
-        from blast_env.recording.parquet import write_parquet
-
         return write_parquet(self, Path(path))
 
 

@@ -40,6 +40,19 @@ def mean_estimate(values: FloatArray) -> Estimate:
     return Estimate(mean, mean - half_width, mean + half_width)
 
 
+def reductions(impulse: FloatArray | float, unprotected: FloatArray | float) -> NDArray[np.float64]:
+    """Return 1 - impulse / unprotected, elementwise; NaN where nothing arrives without a barrier.
+
+    Args:
+        impulse: With the barrier, any shape.
+        unprotected: Without it, the same shape.
+    """
+    with_barrier, without = np.asarray(impulse, float), np.asarray(unprotected, float)
+    left: FloatArray = np.full(without.shape, np.nan)
+    np.divide(with_barrier, without, out=left, where=without > 0.0)
+    return np.asarray(1.0 - left)
+
+
 def reduction_estimate(impulse: FloatArray, unprotected: FloatArray) -> Estimate:
     """Return 1 - mean(impulse) / mean(unprotected), with its 95 % confidence interval.
 

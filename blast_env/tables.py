@@ -1,13 +1,12 @@
 """Tables: columns with unit and meaning in one place; as Markdown, and as CSV files."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import pandas as pd
 
 from blast_env.files import write_atomically
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 class Column(NamedTuple):
@@ -25,6 +24,16 @@ class Column(NamedTuple):
     meaning: str
 
 
+def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) -> pd.DataFrame:
+    """Return rows, each by the names of the columns, as a data frame in the columns' order.
+
+    Raises:
+        KeyError: If a row lacks a column.
+    """
+    names = [column.name for column in columns]
+    return pd.DataFrame([[row[name] for name in names] for row in rows], columns=names)
+
+
 def markdown_table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a Markdown table; bars in the cells are escaped."""
     lines = [headers, *rows]
@@ -33,7 +42,7 @@ def markdown_table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> 
     return "\n".join([text[0], "|---" * len(headers) + "|", *text[1:]])
 
 
-def write_csv(table: "pd.DataFrame", path: str | Path, float_format: str | None = None) -> Path:
+def write_csv(table: pd.DataFrame, path: str | Path, float_format: str | None = None) -> Path:
     """Write a table without its index as CSV, complete or not at all.
 
     Args:

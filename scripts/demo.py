@@ -20,7 +20,7 @@ from blast_agents.training.environments import environment_id
 from blast_agents.training.run_folder import EvaluationRow, RunFolder, read_rows
 from blast_agents.training.train import TrainingResult
 
-from blast_env.cli.evaluate import percent
+from blast_env.cli.evaluation_report import percent
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.export import LayoutPlan, export_layouts
@@ -203,7 +203,7 @@ def write_pictures(settings: DemoSettings, comparison: Comparison) -> list[Path]
     """
     standings, agent = comparison.standings, comparison.agent
     case, layout = standings.track.cases[0], agent.proposals[0].layout
-    scenario, threat = case.scenario, case.held_out[0]
+    scenario, threat = case.scenario, case.threats[0]
     where = ", ".join(each.name for each in scenario.structures if each.protected)
     panels = [
         FilmPanel(

@@ -6,7 +6,7 @@ from typing import Final
 
 from blast_agents.league import RandomLayout, Result, Standings
 
-from blast_env.cli.evaluate import interval, percent
+from blast_env.cli.evaluation_report import interval, percent
 
 HEADERS: Final = (
     "layouts",

@@ -6,16 +6,14 @@ from functools import cached_property
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.comparison import CVAR_LEVEL
-from blast_env.geometry import Cell
+from blast_env.evaluation import CVAR_LEVEL
+from blast_env.geometry import Layout
 from blast_env.statistics import (
     Estimate,
     conditional_value_at_risk,
     mean_estimate,
     reduction_estimate,
 )
-
-Layout = tuple[Cell, ...]
 
 
 @dataclass(frozen=True, eq=False)

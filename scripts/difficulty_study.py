@@ -15,15 +15,15 @@ import numpy as np
 from blast_agents.rules import expected_charge, line_of_sight_wall, random_layout
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation import BlastEvaluator, Threat, draw_threats
+from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.comparison import check_something_arrives
+from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
-from scripts.difficulty_outcomes import Layout, Outcome, TaskResult
+from scripts.difficulty_outcomes import Outcome, TaskResult
 
 STAND_OFFS: Final = {0.0: "near the charge", 0.5: "in the middle", 1.0: "near the building"}
 """Shares of the way through the build zone at which the hand-made walls stand."""
-FIRST_HELD_OUT_SEED: Final = 1_000_000
-"""From here on seeds are held out; those from 0 up are for choosing."""
 
 _BARE: Final = "no barrier"
 _RANDOM: Final = "random layouts (mean)"
@@ -95,18 +95,18 @@ class Study:
         self._effort = effort
         self._processes = processes
         self._progress = progress
-        held_out = range(FIRST_HELD_OUT_SEED, FIRST_HELD_OUT_SEED + effort.seeds)
-        self.held_out = draw_threats(scenario, held_out)
+        self.held_out = draw_threats(scenario, SeedRange.JUDGEMENT.seeds(0, effort.seeds))
         rng = np.random.default_rng(0)
         self._pool = [random_layout(scenario, rng) for _ in range(effort.layouts)]
-        self._tried = draw_threats(scenario, range(effort.charges))
+        self._tried = draw_threats(scenario, SeedRange.SEARCH.seeds(0, effort.charges))
 
     def hidden(self) -> TaskResult:
         """Return the outcomes where one layout has to do for all threats."""
         effort, scenario = self._effort, self._scenario
-        more = draw_threats(scenario, range(effort.charges, effort.charges + effort.hidden_round))
+        more = draw_threats(scenario, SeedRange.SEARCH.seeds(effort.charges, effort.hidden_round))
         searched = self._best_of_pool(self._first_round, more)
         bare = self._impulses([()], self.held_out)
+        check_something_arrives([Case(scenario, self.held_out)], bare)
 
         def outcome(name: str, layouts: Sequence[Layout]) -> Outcome:
             return Outcome(name, tuple(layouts), self._impulses(layouts, self.held_out), bare[0])
@@ -160,9 +160,8 @@ class Study:
     def _again(self, charge: Charge) -> tuple[Threat, ...]:
         """Return a charge with further training seeds."""
         first = self._effort.charges
-        return tuple(
-            Threat(charge, seed) for seed in range(first, first + self._effort.visible_round)
-        )
+        seeds = SeedRange.SEARCH.seeds(first, self._effort.visible_round)
+        return tuple(Threat(charge, seed) for seed in seeds)
 
     def _best_of_pool(self, first: FloatArray, more: Sequence[Threat]) -> Layout:
         """Return the random layout that does best in two rounds on training threats.
@@ -178,7 +177,7 @@ class Study:
 
     def _on_charge(self, layouts: Sequence[Layout], charge: Charge) -> FloatArray:
         """Return the impulses of layouts, means over the held-out realisations (layouts,)."""
-        seeds = range(FIRST_HELD_OUT_SEED, FIRST_HELD_OUT_SEED + self._effort.realisations)
+        seeds = SeedRange.JUDGEMENT.seeds(0, self._effort.realisations)
         means: FloatArray = self._impulses(layouts, [Threat(charge, seed) for seed in seeds]).mean(
             axis=1
         )

@@ -1,7 +1,8 @@
-"""Layouts that are proposed, and what proposes them without a blast: trained agents."""
+"""Layouts that are proposed, and what proposes them without a blast."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 from typing import Protocol
 
@@ -43,3 +44,8 @@ def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
     began_s = perf_counter()
     layout = propose()
     return Proposal(layout, perf_counter() - began_s)
+
+
+def propose(agent: LayoutAgent, scenario: Scenario, charge: Charge | None) -> Proposal:
+    """Return what an agent proposes, and how long it took."""
+    return timed_proposal(partial(agent.propose, scenario, charge))

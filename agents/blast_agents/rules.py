@@ -12,7 +12,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell
 from blast_env.physics.scene import Charge
-from blast_env.scenario import AnySource, BuildZone, Placement, Scenario
+from blast_env.scenario import AnySource, Placement, Scenario
 from blast_env.scenario.sections import PointM
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
@@ -144,10 +144,7 @@ class _View:
 
     @classmethod
     def of(cls, scenario: Scenario, charge_m: PointM, free: BoolArray) -> "_View":
-        zone = scenario.build_zone
-        if zone is None:
-            raise BlastEnvError(f"{scenario.name} has no build zone: no wall can stand anywhere")
-        x_m, y_m = _centres_m(zone)
+        x_m, y_m = scenario.zone.centres_m
         target_x_m, target_y_m = _protected_middle_m(scenario)
         along_x, along_y = target_x_m - charge_m[0], target_y_m - charge_m[1]
         distance_m = hypot(along_x, along_y)
@@ -212,14 +209,6 @@ class _View:
         if reach_m <= end.reach_m:  # the module is at the other end
             return end
         return _End(end.side, reach_m, abs(float(self.depth_m[cell]) - wall_m))
-
-
-def _centres_m(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
-    """Return x and y of the cells' centres, (rows, columns) each."""
-    x_m = zone.corner_m[0] + (np.arange(zone.columns) + 0.5) * MODULE_SIDE_M
-    y_m = zone.corner_m[1] + (np.arange(zone.rows) + 0.5) * MODULE_SIDE_M
-    grid_x_m, grid_y_m = np.meshgrid(x_m, y_m)
-    return grid_x_m, grid_y_m
 
 
 def _protected_middle_m(scenario: Scenario) -> tuple[float, float]:

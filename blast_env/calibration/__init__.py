@@ -36,7 +36,6 @@ from blast_env.calibration.references import (
     paper_ufc_column,
     scaled_distance,
 )
-from blast_env.studies.pressure.pulses import PressureHistory, facade_history
 
 __all__ = [
     "PAPER_COLUMNS",
@@ -50,12 +49,10 @@ __all__ = [
     "LeaveOneOut",
     "LinearLaw",
     "PowerLaw",
-    "PressureHistory",
     "ProportionalLaw",
     "ScaledImpulse",
     "ScalingLaw",
     "bootstrap_coefficients",
-    "facade_history",
     "fit_linear",
     "fit_metrics",
     "fit_power_law",

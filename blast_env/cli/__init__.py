@@ -1,28 +1,42 @@
 """The command line, `blast-env`: one module a command."""
 
+from typing import Annotated
+
 import typer
 
 from blast_env.cli.bench import bench
 from blast_env.cli.calibrate import calibrate
 from blast_env.cli.evaluate import evaluate
 from blast_env.cli.league import league
+from blast_env.cli.output import print_line
 from blast_env.cli.search import search
 from blast_env.cli.simulate import simulate
 from blast_env.cli.train import train
 from blast_env.cli.validate import validate
+from blast_env.provenance import package_version
 
 app = typer.Typer(
     name="blast-env",
-    help="Blast loads on structures, and layouts of barriers that lower them.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command()(simulate)
-app.command()(validate)
-app.command()(calibrate)
-app.command()(evaluate)
-app.command()(search)
-app.command()(bench)
-app.command()(train)
-app.command()(league)
+for _command in (simulate, validate, calibrate, evaluate, search, bench, train, league):
+    app.command()(_command)
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        print_line(f"blast-env {package_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    _version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
+    ] = False,
+) -> None:
+    """Blast loads on structures, and layouts of barriers that lower them."""

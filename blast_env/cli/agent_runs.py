@@ -1,25 +1,21 @@
 """What the agent of a run proposes for threats that its training has not met.
 
-Imports `agents`, so the command imports this module only when it is asked for a run.
+Imports torch, so the command imports this module only when it is asked for a run.
 """
 
 import json
-import platform
-import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-from blast_agents.evaluation import CasesEvaluation, evaluate_layouts
+from blast_agents.proposal import propose
 from blast_agents.training import TrainedAgent, TrainingSettings, load_agent
+from blast_agents.training.cases import unseen_cases
 from blast_agents.training.environments import training_source
-from blast_agents.training.held_out import Case
 from blast_agents.training.run_folder import SITES, RunFolder
-from blast_agents.unseen_cases import FIRST_SEED, propose, unseen_cases
 
-from blast_env.cli.evaluate import (
+from blast_env.cli.evaluation_report import (
     EvaluateOptions,
     cache_record,
     cache_text,
@@ -31,10 +27,13 @@ from blast_env.cli.evaluate import (
 )
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
-from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation import BlastEvaluator, Case, Comparison, Evaluators, SeedRange, compare
+from blast_env.evaluation.report import case_table, comparison_record
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
-from blast_env.rendering.evaluation_figures import ProtectedCase, cases_figure
+from blast_env.physics.engine import Engine
+from blast_env.provenance import command, versions
+from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import save_scenario
 from blast_env.units import MS_PER_S
@@ -63,7 +62,7 @@ def evaluate_run(run: Path, options: EvaluateOptions) -> None:
     configuration = folder.configuration()
     settings = configuration.settings
     agent = load_agent(run)
-    seeds = options.seed_range(FIRST_SEED)
+    seeds = options.seed_range
     source: ScenarioSource = SingleScenario(folder.scenario(configuration))
     if settings.scenario == SITES:
         source = training_source(SITES)
@@ -101,34 +100,39 @@ def _report_cases(
 ) -> None:
     """A layout for each charge, or each site."""
     options.prepare_files(len(seeds))
-    cases = unseen_cases(settings, source, seeds, options.engine or agent.engine, options.cache)
-    proposals = [propose(agent, each.evaluator.scenario, each.told_charge) for each in cases]
+    cases = unseen_cases(settings, source, seeds)
+    evaluators = Evaluators(options.engine or agent.engine, options.cache)
+    proposals = [propose(agent, each.scenario, each.charge) for each in cases]
     with progress_bar(f"{2 * len(cases)} blasts in {_place(settings, cases)}") as progress:
-        evaluation = evaluate_layouts(
+        comparison = compare(
+            evaluators,
             cases,
             [each.layout for each in proposals],
             options.processes,
-            options.cvar_level,
-            progress,
+            cvar_level=options.cvar_level,
+            progress=progress,
         )
-    written = [] if options.out is None else _write(evaluation, provenance, options.out)
-    exported = _export(evaluation, settings, provenance, options)
+    record = {**comparison_record(comparison, evaluators.engine), "provenance": provenance}
+    written = [] if options.out is None else _write(comparison, record, options.out)
+    exported = _export(comparison, settings, provenance, options)
     if options.as_json:
-        _print_json(evaluation, provenance, [*written, *exported])
+        files = [str(path) for path in [*written, *exported]]
+        content = {**record, "cache": cache_record(evaluators), "files": files}
+        print_line(json.dumps(content, indent=2))
         return
     title = f"{_ALGORITHMS[settings.algorithm]} of {provenance['run']}, a layout a row"
-    _print_cases(evaluation, f"{title}, {seeds_text(seeds)}")
+    _print_cases(comparison, evaluators.engine, f"{title}, {seeds_text(seeds)}")
     milliseconds = median(MS_PER_S * each.seconds for each in proposals)
     print_line(f"proposed in {milliseconds:.1f} ms each (median), no blast spent on any")
     for path in written:
         print_line(f"wrote {path}")
     if exported:
         print_line(f"wrote {len(cases)} layouts to {options.export}, files: {len(exported)}")
-    print_line(cache_text(dict.fromkeys(case.evaluator for case in cases)))
+    print_line(cache_text(evaluators))
 
 
 def _export(
-    evaluation: CasesEvaluation,
+    comparison: Comparison,
     settings: TrainingSettings,
     provenance: dict[str, Any],
     options: EvaluateOptions,
@@ -136,27 +140,14 @@ def _export(
     """Write the layouts for other tools, if that is asked for."""
     if options.export is None:
         return []
-    plans = _plans(evaluation, provenance)
+    plans = _plans(comparison, provenance)
     exported = export_layouts(plans, options.export)
     return exported + _write_sites(settings, plans, options.export)
 
 
-def _print_json(
-    evaluation: CasesEvaluation, provenance: dict[str, Any], files: Sequence[Path]
-) -> None:
-    evaluators = dict.fromkeys(each.case.evaluator for each in evaluation.outcomes)
-    content = {
-        **evaluation.to_dict(),
-        "provenance": provenance,
-        "cache": cache_record(evaluators),
-        "files": [str(path) for path in files],
-    }
-    print_line(json.dumps(content, indent=2))
-
-
-def _print_cases(evaluation: CasesEvaluation, title: str) -> None:
-    table = make_table(title, _HEADERS)
-    for row in evaluation.table.to_dict("records"):
+def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
+    table, cases = make_table(title, _HEADERS), case_table(comparison)
+    for row in cases.to_dict("records"):
         table.add_row(
             row["scenario"],
             f"({row['charge_x_m']:.1f}, {row['charge_y_m']:.1f})",
@@ -167,48 +158,37 @@ def _print_cases(evaluation: CasesEvaluation, title: str) -> None:
             percent(row["reduction"]) + ("" if row["in_range"] else " ~"),
         )
     result_console().print(table)
-    outside = int((~evaluation.table["in_range"]).sum())
+    outside = int((~cases["in_range"]).sum())
     if outside:
         print_line(f"note: {outside} threats are outside the range of the calibration (~)")
     print_means(
-        evaluation.reduction,
-        (evaluation.unprotected_impulse_pa_s, evaluation.impulse_pa_s),
-        (evaluation.unprotected_cvar, evaluation.cvar),
-        evaluation.cvar_level,
+        comparison.reduction,
+        (comparison.unprotected_mean_pa_s, comparison.mean_pa_s),
+        (comparison.unprotected_cvar_pa_s, comparison.cvar_pa_s),
+        comparison.cvar_level,
     )
-    evaluator = evaluation.outcomes[0].case.evaluator
-    print_line(
-        f"engine {evaluator.engine.name} ({evaluator.engine.version}), calibration "
-        f"{evaluator.calibration.name}"
-    )
+    calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)
+    print_line(f"engine {engine.name} ({engine.version}), calibration {', '.join(calibrations)}")
 
 
-def _write(evaluation: CasesEvaluation, provenance: dict[str, Any], out: Path) -> list[Path]:
+def _write(comparison: Comparison, record: dict[str, Any], out: Path) -> list[Path]:
     path = out / "evaluation.json"
-    content = {**evaluation.to_dict(), "provenance": provenance}
     with write_atomically(path) as temporary:
-        text = json.dumps(content, indent=2, allow_nan=False)
+        text = json.dumps(record, indent=2, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
-    table = write_table(evaluation.table, out / "cases.csv")
-    cases = [
-        ProtectedCase(each.case.evaluator.scenario, each.layout, each.outcome)
-        for each in evaluation.outcomes
-    ]
-    figure = cases_figure(cases, evaluation.reduction)
-    return [path, table, save_figure(figure, out / "evaluation.png")]
+    table = write_table(case_table(comparison), out / "cases.csv")
+    return [path, table, save_figure(comparison_figure(comparison), out / "evaluation.png")]
 
 
-def _plans(evaluation: CasesEvaluation, provenance: dict[str, Any]) -> dict[str, LayoutPlan]:
+def _plans(comparison: Comparison, provenance: dict[str, Any]) -> dict[str, LayoutPlan]:
     """Return the layouts by the names of their files, numbered in the order of the table."""
-    digits = len(str(len(evaluation.outcomes)))
+    digits = len(str(len(comparison.cases)))
+    pairs = zip(comparison.cases, comparison.layouts, strict=True)
     return {
         f"layout_{number:0{digits}}": LayoutPlan(
-            each.case.evaluator.scenario,
-            each.layout,
-            each.case.told_charge,
-            {**provenance, "seed": each.case.threat.seed},
+            case.scenario, layout, case.charge, {**provenance, "seed": case.threats[0].seed}
         )
-        for number, each in enumerate(evaluation.outcomes, start=1)
+        for number, (case, layout) in enumerate(pairs, start=1)
     }
 
 
@@ -227,21 +207,18 @@ def _write_sites(
 def _place(settings: TrainingSettings, cases: Sequence[Case]) -> str:
     if settings.scenario == SITES:
         return f"{len(cases)} generated sites"
-    return cases[0].evaluator.scenario.name
+    return cases[0].scenario.name
 
 
 def _provenance(run: Path, settings: TrainingSettings) -> dict[str, Any]:
     """Return where the layouts come from."""
     return {
-        "command": ["blast-env", *sys.argv[1:]],
+        "command": command(),
         "run": str(run),
         "weights": "best",
         "algorithm": settings.algorithm,
         "threat": settings.threat,
-        "versions": {
-            name: version(name) for name in ("blast-env", "torch", "stable-baselines3", "numpy")
-        }
-        | {"python": platform.python_version()},
+        "versions": versions(packages=("torch", "stable-baselines3", "numpy")),
     }
 
 
@@ -249,8 +226,7 @@ def _overlap(settings: TrainingSettings, seeds: range) -> str:
     """Return what there is to say if the threats are those that the weights were chosen by."""
     if settings.scenario == SITES:  # other sites, whatever the seeds
         return ""
-    first = settings.evaluation_first_seed
-    chosen_by = range(first, first + settings.evaluation_cases)
+    chosen_by = SeedRange.SELECTION.seeds(settings.evaluation_first_seed, settings.evaluation_cases)
     both = range(max(seeds[0], chosen_by[0]), min(seeds[-1], chosen_by[-1]) + 1)
     if not both:
         return ""

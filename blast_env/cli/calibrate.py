@@ -20,7 +20,7 @@ from blast_env.calibration.references import paper_table
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.statistics import Estimate
 from blast_env.studies.calibration.study import (
@@ -153,6 +153,7 @@ def _reference(name: ReferenceName, study: FreeFieldStudy, burst: Burst) -> Refe
 
 
 def _write(report: CalibrationReport, stored: Calibration, stem: str) -> None:
+    # Here, because pictures need the extra `render`.
     from blast_env.rendering.figures import save_figure
     from blast_env.studies.calibration.figure import calibration_figure
 
@@ -296,6 +297,7 @@ def _write_shielding(
     exponent: float | None,
     options: ShieldingOptions,
 ) -> list[Path]:
+    # Here, because pictures need the extra `render`.
     from blast_env.rendering.figures import save_figure
     from blast_env.studies.shielding.figure import shielding_figure
 

@@ -1,236 +1,20 @@
-"""What `blast-env evaluate` was called with, and what that means for files."""
+"""`blast-env evaluate`: a layout, or the agent of a run, against no barrier."""
 
-import json
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from math import isnan
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
-import pandas as pd
 import typer
 
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LayoutEvaluation, draw_threats, evaluate_against
-from blast_env.evaluation.comparison import CVAR_LEVEL
-from blast_env.export import LayoutPlan, check_target, export_layouts
-from blast_env.files import make_folder, write_atomically
-from blast_env.scenario import LayoutFile, load_layout, load_scenario
-from blast_env.statistics import Estimate, check_cvar_level
-from blast_env.units import PA_PER_PSI
-
-_PERCENT = 100.0
-
-
-@dataclass(frozen=True)
-class EvaluateOptions:
-    """The options that a layout's file and a run have in common; see `evaluate`."""
-
-    seeds: int
-    first_seed: int | None
-    processes: int
-    engine: str | None
-    cvar_level: float
-    cache: Path | None
-    export: Path | None
-    out: Path | None
-    as_json: bool
-
-    def seed_range(self, default_first: int) -> range:
-        """Return the seeds of the threats."""
-        first = default_first if self.first_seed is None else self.first_seed
-        return range(first, first + self.seeds)
-
-    def prepare_files(self, layouts: int) -> None:
-        """Refuse targets of no use before the blasts, so that no result is lost for want of one.
-
-        Args:
-            layouts: How many layouts there are to be.
-
-        Raises:
-            BlastEnvError: If `out` cannot be a folder, or `export` is of no use.
-        """
-        if self.export is not None:
-            check_target(self.export, layouts)
-        if self.out is None:
-            return
-        make_folder(self.out)
-
-
-def write_table(table: pd.DataFrame, path: Path) -> Path:
-    """Write a table as CSV; return the path."""
-    with write_atomically(path) as temporary:
-        table.to_csv(temporary, index=False)
-    return path
-
-
-def cache_record(evaluators: Iterable[BlastEvaluator]) -> dict[str, float]:
-    """Return how many blasts were run and how many were known already."""
-    counted = list(evaluators)
-    blasts = sum(each.blasts for each in counted)
-    hits = sum(each.cache_hits for each in counted)
-    return {"blasts": blasts, "hits": hits, "hit_rate": hits / max(blasts + hits, 1)}
-
-
-def cache_text(evaluators: Iterable[BlastEvaluator]) -> str:
-    """Return the same for people."""
-    record = cache_record(evaluators)
-    return (
-        f"{record['blasts']:g} blasts run, {record['hits']:g} known already "
-        f"(cache hit rate {percent(record['hit_rate'])})"
-    )
-
-
-def percent(share: float) -> str:
-    """Return a share for people; a dash for one that does not exist."""
-    return "-" if isnan(share) else f"{_PERCENT * share:.1f} %"
-
-
-def interval(estimate: Estimate) -> str:
-    """Return an interval of shares; a dash where one threat says nothing about the others."""
-    if isnan(estimate.low):
-        return "-"
-    return f"{percent(estimate.low)} to {percent(estimate.high)}"
-
-
-def seeds_text(seeds: range) -> str:
-    """Return what the means are over."""
-    if len(seeds) == 1:
-        return f"seed {seeds[0]}"
-    return f"means over {len(seeds)} threats (seeds {seeds[0]} to {seeds[-1]})"
-
-
-_HEADERS: Final = (
-    "structure",
-    "protected",
-    "without (Pa s)",
-    "with (Pa s)",
-    "reduction",
-    "95 % interval",
-    "threats in range",
+from blast_env.cli.evaluation_report import EvaluateOptions, report_layout
+from blast_env.cli.output import (
+    user_errors,
 )
-
-
-def report_layout(
-    plan: LayoutPlan, evaluator: BlastEvaluator, seeds: range, options: EvaluateOptions
-) -> None:
-    """Evaluate a layout on threats that the seeds draw; print and write the result."""
-    threats = draw_threats(plan.scenario, seeds)
-    options.prepare_files(1)
-    with progress_bar(f"{2 * len(seeds)} blasts in {plan.scenario.name}") as progress:
-        evaluation = evaluate_against(
-            evaluator,
-            plan.layout,
-            threats,
-            options.processes,
-            cvar_level=options.cvar_level,
-            progress=progress,
-        )
-    written = [] if options.out is None else _write(evaluation, options.out)
-    if options.export is not None:
-        written += export_layouts({"layout": plan}, options.export)
-    if options.as_json:
-        content = {
-            **evaluation.to_dict(),
-            "provenance": dict(plan.provenance),
-            "cache": cache_record([evaluator]),
-            "files": [str(path) for path in written],
-        }
-        print_line(json.dumps(content, indent=2))
-        return
-    _print_evaluation(evaluation, seeds)
-    for path in written:
-        print_line(f"wrote {path}")
-    print_line(cache_text([evaluator]))
-
-
-def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
-    written = [evaluation.to_json(out / "evaluation.json")]
-    tables = {
-        "structures.csv": evaluation.table,
-        "modules.csv": evaluation.module_table,
-        "threats.csv": evaluation.threat_table,
-    }
-    written += [write_table(table, out / name) for name, table in tables.items()]
-    written.append(evaluation.figure(out / "evaluation.png"))
-    return written
-
-
-def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
-    """Print the structures' mean loads, and what the layout does over all threats."""
-    count = len(evaluation.threats)
-    table = make_table(
-        f"{evaluation.scenario.name}: {len(evaluation.layout)} barrier modules against none, "
-        f"{seeds_text(seeds)}",
-        _HEADERS,
-        text_columns=2,
-    )
-    for row in evaluation.table.to_dict("records"):
-        reduction = Estimate(row["reduction"], row["reduction_low"], row["reduction_high"])
-        table.add_row(
-            str(row["structure"]),
-            "yes" if row["protected"] else "no",
-            f"{row['unprotected_impulse_pa_s']:,.0f}",
-            f"{row['impulse_pa_s']:,.0f}",
-            percent(reduction.value),
-            interval(reduction),
-            f"{row['threats_in_range']} of {count}",
-        )
-    result_console().print(table)
-    _print_totals(evaluation)
-    for note in evaluation.notes:
-        print_line(f"note: {note}")
-
-
-def _print_totals(evaluation: LayoutEvaluation) -> None:
-    """Print what there is to say about the protected structures together."""
-    worst = evaluation.worst
-    print_means(
-        evaluation.reduction,
-        (evaluation.unprotected_impulse_pa_s, evaluation.impulse_pa_s),
-        (evaluation.unprotected_cvar, evaluation.cvar),
-        evaluation.cvar_level,
-    )
-    charge = worst.threat.charge
-    print_line(
-        f"worst threat: {charge.tnt_kg:g} kg TNT at ({charge.position_m[0]:.2f}, "
-        f"{charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: {worst.impulse_pa_s:,.0f} Pa s, "
-        f"reduction {percent(worst.reduction)}"
-    )
-    print_line(
-        f"engine {evaluation.engine_name} ({evaluation.engine_version}), calibration "
-        f"{evaluation.calibration.name}, scenario hash {evaluation.scenario.content_hash[:12]}"
-    )
-
-
-def print_means(
-    reduction: Estimate,
-    impulses_pa_s: Sequence[Estimate],
-    cvars_pa_s: Sequence[float],
-    cvar_level: float,
-) -> None:
-    """Print the reduction, and the mean impulses without and with barrier.
-
-    Args:
-        reduction: Of the protected structures, by weight.
-        impulses_pa_s: Without, with.
-        cvars_pa_s: Without, with.
-        cvar_level: Of these.
-    """
-    print_line(
-        f"protected structures, by weight: mean reduction {percent(reduction.value)} "
-        f"(95 % interval {interval(reduction)})"
-    )
-    names = ("without barrier", "with barrier")
-    for words, impulse, cvar in zip(names, impulses_pa_s, cvars_pa_s, strict=True):
-        half_width = "" if isnan(impulse.low) else f" +- {impulse.high - impulse.value:,.0f}"
-        print_line(
-            f"{words}: mean {impulse.value:,.0f}{half_width} Pa s "
-            f"({impulse.value / PA_PER_PSI:.4f} psi s), mean of the worst "
-            f"{100.0 * (1.0 - cvar_level):.3g} % {cvar:,.0f} Pa s"
-        )
-
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.comparison import CVAR_LEVEL
+from blast_env.export import LayoutPlan
+from blast_env.scenario import LayoutFile, load_layout, load_scenario
+from blast_env.statistics import check_cvar_level
 
 _SCENARIO = "courtyard"
 
@@ -259,8 +43,8 @@ FirstSeed = Annotated[
     int | None,
     typer.Option(
         min=0,
-        help="The seeds count from here; use others than for a search.",
-        show_default="0; with --run the first one that no training meets",
+        help="The seeds count from here.",
+        show_default="the first one that no training and no search meets",
     ),
 ]
 
@@ -350,16 +134,12 @@ def _evaluate_file(path: Path, scenario: str, options: EvaluateOptions) -> None:
     cells = load_layout(path, chosen)
     plan = LayoutPlan(chosen, cells, provenance=LayoutFile.load(path).provenance)
     evaluator = BlastEvaluator(chosen, options.engine or _ENGINE, cache=options.cache)
-    report_layout(plan, evaluator, options.seed_range(0), options)
+    report_layout(plan, evaluator, options.seed_range, options)
 
 
 def _evaluate_run(run: Path, options: EvaluateOptions) -> None:
     """Evaluate the agent of a run, if the packages that it needs are there."""
-    try:
+    # Here, because runs need the extras.
+    with import_extra("agents,render", "--run"):
         from blast_env.cli.agent_runs import evaluate_run
-    except ImportError as error:
-        missing = error.name or str(error)
-        raise BlastEnvError(
-            f"--run needs {missing!r}, which is not installed: pip install blast-env[agents,render]"
-        ) from error
     evaluate_run(run, options)

@@ -1,25 +1,31 @@
 """`blast-env league`: searches, rules and trained agents on the same held-out cases."""
 
 import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from blast_agents.league import (
+    Contest,
+    ResultStore,
+    Standings,
+    Track,
+    find_tracks,
+    standard_entries,
+)
 
 from blast_env.cli.output import (
-    agents_extra,
     make_table,
     print_line,
     progress_bar,
     result_console,
     user_errors,
 )
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.provenance import command
 
 if TYPE_CHECKING:
-    from blast_agents.league import Contest, ResultStore, Standings, Track
     from blast_agents.league.trained import TrainedRun
 
 
@@ -62,8 +68,8 @@ def league(
 
     An interrupted league goes on when it is called again with the same folder.
     """
-    with user_errors(), agents_extra("a league"):
-        from blast_agents.league import ResultStore, find_tracks
+    with user_errors():
+        # Here, because its figures need the extra `render`.
         from blast_agents.league.report import write_league
 
         tracks = find_tracks(track, cases, seeds, seed, scenario or ())
@@ -75,15 +81,17 @@ def league(
         ]
         _print_outlook(contests)
         all_standings = [_play(contest, processes) for contest in contests]
-        written = write_league(all_standings, out, shlex.join(["blast-env", *sys.argv[1:]]))
+        written = write_league(all_standings, out, shlex.join(command()))
     for path in written:
         print_line(f"wrote {path}")
 
 
-def _load_runs(runs: Sequence[Path], tracks: "Sequence[Track]") -> "list[TrainedRun]":
+def _load_runs(runs: Sequence[Path], tracks: Sequence[Track]) -> "list[TrainedRun]":
     if not runs:
         return []
-    from blast_agents.league.trained import TrainedRun, check_runs  # these take torch with them
+    # Here, because torch takes seconds to start, and is an extra.
+    with import_extra("agents", "trained agents"):
+        from blast_agents.league.trained import TrainedRun, check_runs
 
     loaded = [TrainedRun.load(run) for run in runs]
     check_runs(loaded, tracks)
@@ -91,20 +99,18 @@ def _load_runs(runs: Sequence[Path], tracks: "Sequence[Track]") -> "list[Trained
 
 
 def _contest(
-    track: "Track",
+    track: Track,
     runs: "Sequence[TrainedRun]",
     methods: Sequence[str],
     budgets: Sequence[int],
-    store: "ResultStore",
+    store: ResultStore,
     engine: str,
-) -> "Contest":
-    from blast_agents.league import Contest, standard_entries
-
+) -> Contest:
     agents = tuple(run.entry for run in runs if run.is_for(track))
     return Contest(track, (*standard_entries(methods, budgets), *agents), store, engine)
 
 
-def _print_outlook(contests: "Sequence[Contest]") -> None:
+def _print_outlook(contests: Sequence[Contest]) -> None:
     """Say what is to come before it begins."""
     total = 0
     for contest in contests:
@@ -118,7 +124,8 @@ def _print_outlook(contests: "Sequence[Contest]") -> None:
     print_line(f"up to {total:,} blasts in all")
 
 
-def _play(contest: "Contest", processes: int) -> "Standings":
+def _play(contest: Contest, processes: int) -> Standings:
+    # Here, because its figures need the extra `render`.
     from blast_agents.league.report import HEADERS, sample_text, table_rows, verdict_lines
 
     with progress_bar(contest.track.name) as progress:

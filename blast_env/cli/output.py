@@ -3,13 +3,14 @@
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, MissingExtraError
 
 _PIPE_COLUMNS = 120
 
@@ -43,24 +44,17 @@ def user_errors() -> Iterator[None]:
         raise typer.Exit(130) from None
 
 
-@contextmanager
-def agents_extra(what: str) -> Iterator[None]:
-    """Say how to get packages that are needed and not installed.
+def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:
+    """Save pictures, or say that there are none for want of the extra `render`.
 
     Args:
-        what: What needs them.
-
-    Raises:
-        BlastEnvError: If a package is missing.
+        save: Saves them, and returns their paths.
     """
     try:
-        yield
-    except ImportError as error:
-        missing = error.name or str(error)
-        raise BlastEnvError(
-            f"{what} needs {missing!r}, which is not installed: "
-            "pip install blast-env[agents,render]"
-        ) from error
+        return save()
+    except MissingExtraError as error:
+        message_console().print(f"note: {error}", markup=False, style="yellow")
+        return []
 
 
 @contextmanager

@@ -1,40 +1,49 @@
 """What `blast-env search` prints and writes."""
 
-import platform
-import sys
-from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
 import typer
+from blast_agents.search import (
+    LayoutProblem,
+    SearchMethod,
+    SearchResult,
+    find_search_method,
+)
+from blast_agents.search import Progress as SearchProgress
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.output import (
-    agents_extra,
     make_table,
     message_console,
     print_line,
     progress_bar,
     result_console,
+    save_pictures,
     user_errors,
 )
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LayoutEvaluation, Threat, evaluate_against
+from blast_env.evaluation import (
+    BlastEvaluator,
+    Case,
+    LayoutEvaluation,
+    SeedRange,
+    Threat,
+    draw_threats,
+    evaluate_against,
+)
+from blast_env.evaluation.cases import practice_hidden, practice_visible
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.files import make_folder, write_atomically
 from blast_env.physics.scene import Charge
+from blast_env.provenance import command, versions
 from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
-
-if TYPE_CHECKING:
-    from blast_agents.search import LayoutProblem, SearchMethod, SearchResult
-    from blast_agents.search import Progress as SearchProgress
-    from blast_agents.search.problem import Unprotected
-
+from blast_env.statistics import reductions
 
 ThreatName = Literal["visible", "hidden"]
 
@@ -62,32 +71,33 @@ class SearchRun:
     """A search that has ended.
 
     Attributes:
+        problem: What it was asked.
         result: What it found.
-        unprotected: The impulse without a barrier under its threats.
         seconds: How long it took.
         cache_hits: Loads that it asked for and that were known already.
     """
 
-    result: "SearchResult"
-    unprotected: "Unprotected"
+    problem: LayoutProblem
+    result: SearchResult
     seconds: float
     cache_hits: int
 
 
 def print_search(run: SearchRun, options: SearchOptions, checked: LayoutEvaluation) -> None:
     """Print what the layout does against the search's threats and against others, and the cost."""
-    result, problem = run.result, run.unprotected.problem
+    result, problem = run.result, run.problem
     table = make_table(
         f"{problem.scenario.name}: {result.method} search, {_risk_text(options)}",
         ("threats", "number", "without (Pa s)", "with (Pa s)", "reduction", "95 % interval"),
     )
-    bare_pa_s, impulse_pa_s = run.unprotected.impulse_pa_s, problem.impulse_pa_s(result.layout)
+    bare_pa_s = problem.case.combined(problem.unprotected_pa_s)
+    impulse_pa_s = problem.impulse_pa_s(result.layout)
     table.add_row(
         "of the search",
         str(len(problem.threats)),
         f"{bare_pa_s:,.0f}",
         f"{impulse_pa_s:,.0f}",
-        percent(1.0 - impulse_pa_s / bare_pa_s),
+        percent(reductions(impulse_pa_s, bare_pa_s).item()),
         "-",
     )
     low, high = checked.ci95
@@ -112,41 +122,41 @@ def write_search(
 ) -> None:
     """Write the layout, the history, the front and a figure, as far as there are such."""
     result = run.result
-    scenario = run.unprotected.problem.scenario
+    scenario = run.problem.scenario
     provenance = _provenance(run, options, checked)
     written = [write_layout(out / "layout.json", scenario, result.layout, provenance)]
     if result.history:
-        from blast_agents.search.figure import search_figure
-
-        from blast_env.rendering.figures import save_figure
-
         written.append(_write_table(result.history_table(), out / "history.csv"))
-        written.append(save_figure(search_figure(result, run.unprotected), out / "search.png"))
+        written += save_pictures(lambda: _save_figure(run, out))
     if result.front:
         written.append(_write_table(result.front_table(), out / "front.csv"))
     for path in written:
         print_line(f"wrote {path}")
 
 
+def _save_figure(run: SearchRun, out: Path) -> list[Path]:
+    # Here, because pictures need the extra `render`.
+    from blast_agents.search.figure import search_figure
+
+    from blast_env.rendering.figures import save_figure
+
+    return [save_figure(search_figure(run.result, run.problem), out / "search.png")]
+
+
 def _provenance(
     run: SearchRun, options: SearchOptions, checked: LayoutEvaluation
 ) -> dict[str, Any]:
     """Return what repeats the search, and what came out."""
-    result, problem = run.result, run.unprotected.problem
+    result, problem = run.result, run.problem
     low, high = (None if np.isnan(end) else float(end) for end in checked.ci95)
     return {
-        "command": ["blast-env", *sys.argv[1:]],
+        "command": command(),
         "options": asdict(options),
         "threats": [
             {"charge_position_m": t.charge.position_m, "tnt_kg": t.charge.tnt_kg, "seed": t.seed}
             for t in problem.threats
         ],
-        "versions": {
-            "blast_env": version("blast-env"),
-            "engine": problem.evaluator.engine.version,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-        },
+        "versions": versions(problem.evaluator.engine.version),
         "result": {
             "blasts": result.blasts,
             "interrupted": result.interrupted,
@@ -176,10 +186,6 @@ def _risk_text(options: SearchOptions) -> str:
 def percent(share: float) -> str:
     """Return a share for people."""
     return f"{100.0 * share:.1f} %"
-
-
-_HELD_OUT: Final = 1_000_003
-"""Added to the seed for threats that the search has not met."""
 
 
 def search(
@@ -232,7 +238,7 @@ def search(
     Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats that
     the search has not met; those blasts do not count.
     """
-    with user_errors(), agents_extra("a search"):
+    with user_errors():
         options = SearchOptions(
             method=method,
             scenario=scenario,
@@ -261,36 +267,28 @@ def search(
 
 
 def _run(options: SearchOptions, evaluator: BlastEvaluator, processes: int) -> SearchRun:
-    from blast_agents.search import LayoutProblem, find_search_method
-    from blast_agents.search.problem import Unprotected
-
     scenario = evaluator.scenario
     initial = tuple(load_layout(path, scenario) for path in options.start_from)
     method = find_search_method(options.method, initial)
-    problem = LayoutProblem(
-        evaluator,
-        _threats(scenario, options, options.seed),
-        find_risk(options.risk, options.cvar_level),
-        processes,
-    )
-    unprotected = Unprotected.of(problem)
+    problem = LayoutProblem(evaluator, _practice(scenario, options), processes)
+    problem.unprotected_pa_s  # noqa: B018  # refuses a case in which nothing arrives
     hits, begun_s = evaluator.cache_hits, perf_counter()
-    result = _with_progress(method, problem, unprotected, options)
-    return SearchRun(result, unprotected, perf_counter() - begun_s, evaluator.cache_hits - hits)
+    result = _with_progress(method, problem, options)
+    return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)
 
 
-def _threats(scenario: Scenario, options: SearchOptions, seed: int) -> tuple[Threat, ...]:
-    """Return the threats of the search (its seed) or those that check it (another seed)."""
-    from blast_agents.search import hidden_threats, visible_threats
-
+def _practice(scenario: Scenario, options: SearchOptions) -> Case:
+    """Return what the search may spend its blasts on."""
     model = find_threat_model(options.threat, options.threats)
     realisations = find_realisations(options.realisations, options.threat)
-    if options.threat == "hidden":
-        if options.charge_position_m is not None:
-            raise BlastEnvError("--charge-position is for a visible threat: a hidden one is drawn")
-        count = len(model.draw(scenario, np.random.default_rng(seed)))
-        return hidden_threats(scenario, count, realisations, seed)
-    return visible_threats(_visible_charge(scenario, options), realisations, seed)
+    risk = find_risk(options.risk, options.cvar_level)
+    if options.threat == "visible":
+        charge = _visible_charge(scenario, options)
+        return practice_visible(scenario, charge, realisations, options.seed, risk)
+    if options.charge_position_m is not None:
+        raise BlastEnvError("--charge-position is for a visible threat: a hidden one is drawn")
+    count = len(model.draw(scenario, np.random.default_rng(options.seed)))
+    return practice_hidden(scenario, count, realisations, options.seed, risk)
 
 
 def _visible_charge(scenario: Scenario, options: SearchOptions) -> Charge:
@@ -304,11 +302,8 @@ def _visible_charge(scenario: Scenario, options: SearchOptions) -> Charge:
 
 
 def _with_progress(
-    method: "SearchMethod",
-    problem: "LayoutProblem",
-    unprotected: "Unprotected",
-    options: SearchOptions,
-) -> "SearchResult":
+    method: SearchMethod, problem: LayoutProblem, options: SearchOptions
+) -> SearchResult:
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -320,20 +315,20 @@ def _with_progress(
         label = f"{method.name} search in {problem.scenario.name}"
         task = progress.add_task(label, total=options.budget, best="-")
 
-        def report(state: "SearchProgress") -> None:
-            best = "-" if state.best is None else percent(unprotected.reduction(state.best))
+        def report(state: SearchProgress) -> None:
+            best = "-" if state.best is None else percent(problem.reduction(state.best))
             progress.update(task, completed=state.blasts, best=best)
 
         return method.search(problem, options.budget, options.seed, report)
 
 
 def _check(run: SearchRun, options: SearchOptions, held_out: int) -> LayoutEvaluation:
-    """Evaluate the layout on threats that the search has not met."""
-    problem = run.unprotected.problem
-    once = replace(options, realisations=1, threats=held_out)
+    """Evaluate the layout on threats that judge: the search has met none of them."""
+    problem, seeds = run.problem, SeedRange.JUDGEMENT.seeds(0, held_out)
     if options.threat == "visible":
-        once = replace(options, realisations=held_out, threats=None)
-    threats = _threats(problem.scenario, once, options.seed + _HELD_OUT)
+        threats = tuple(Threat(problem.charge, seed) for seed in seeds)
+    else:
+        threats = draw_threats(problem.scenario, seeds)
     with progress_bar(f"check on {held_out} other threats") as progress:
         return evaluate_against(
             problem.evaluator,

@@ -92,6 +92,7 @@ def _changed(scenario: Scenario, preset: str | None, stand_off: float | None) ->
 def _run(blast: Blast, film: Path | None, progress: Callable[[float], None]) -> BlastResult:
     if film is None:
         return blast.run(progress)
+    # Here, because films need the extra `render`.
     from blast_env.rendering.film import write_film
 
     return write_film(blast, film, progress=progress)
@@ -115,7 +116,8 @@ def _write_pictures(
 ) -> list[Path]:
     if not any((heat_map, history, scheme, velocities)):
         return []
-    from blast_env.rendering import figures  # Matplotlib takes long to import
+    # Here, because pictures need the extra `render`.
+    from blast_env.rendering import figures
 
     blast = result.blast
     pictures = (

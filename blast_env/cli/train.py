@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from blast_env.cli.output import agents_extra, print_line, progress_bar, user_errors
-from blast_env.errors import BlastEnvError
+from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.errors import BlastEnvError, import_extra
 
 if TYPE_CHECKING:
     from blast_agents.training.train import TrainingResult
@@ -66,7 +66,7 @@ def train(
         "set": set_ or None,
     }
     given = {name: value for name, value in fresh.items() if value is not None}
-    with user_errors(), agents_extra("training"):
+    with user_errors():
         if resume is not None:
             result = _resume(resume, scenario, given)
         elif run is None:
@@ -77,7 +77,9 @@ def train(
 
 
 def _resume(folder: Path, scenario: str | None, given: Mapping[str, object]) -> "TrainingResult":
-    from blast_agents.training import resume
+    # Here, because torch takes seconds to start, and is an extra.
+    with import_extra("agents,render", "training"):
+        from blast_agents.training import resume
 
     if given:
         raise BlastEnvError(
@@ -90,10 +92,12 @@ def _resume(folder: Path, scenario: str | None, given: Mapping[str, object]) -> 
 def _train(
     run: Path, scenario: str, given: Mapping[str, object], options: list[str], envs: int | None
 ) -> "TrainingResult":
-    from blast_agents.training import load_hyperparameters, train
-    from blast_agents.training.environments import environment_id
-    from blast_agents.training.hyperparameters import HYPERPARAMETER_KEYS, parse_options
-    from blast_agents.training.run_folder import SETTING_KEYS, settings_from
+    # Here, because torch takes seconds to start, and is an extra.
+    with import_extra("agents,render", "training"):
+        from blast_agents.training import load_hyperparameters, train
+        from blast_agents.training.environments import environment_id
+        from blast_agents.training.hyperparameters import HYPERPARAMETER_KEYS, parse_options
+        from blast_agents.training.run_folder import SETTING_KEYS, settings_from
 
     algorithm = str(given.get("algo", _DEFAULT_ALGORITHM))
     changes = parse_options(options, [*HYPERPARAMETER_KEYS, *SETTING_KEYS])

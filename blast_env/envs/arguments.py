@@ -12,7 +12,6 @@ import numpy as np
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Cell
 from blast_env.physics.scene import Charge
-from blast_env.scenario import Scenario
 
 _Parameters = ParamSpec("_Parameters")
 
@@ -160,20 +159,6 @@ class ResetOptions:
             drawn.position_m if self.charge_position_m is None else self.charge_position_m,
             drawn.tnt_kg if self.tnt_kg is None else self.tnt_kg,
         )
-
-
-def with_possible_charges(scenario: Scenario, charges: Sequence[Charge]) -> Scenario:
-    """Return the scenario in which these charges are possible as well.
-
-    A module must keep clear of a charge that an option has put where the scenario has none.
-
-    Raises:
-        ScenarioError: If a charge is out of bounds, or not clear of a structure or the border.
-    """
-    document = scenario.model_dump()
-    points = [{"kind": "point", **charge._asdict()} for charge in dict.fromkeys(charges)]
-    document["charge"] = [*document["charge"], *points]
-    return Scenario.from_document(document, scenario.name)
 
 
 def _position_m(value: Any) -> tuple[float, float]:

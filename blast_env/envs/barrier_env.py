@@ -28,7 +28,6 @@ from blast_env.envs.episode import (
     find_threat_model,
     total,
 )
-from blast_env.envs.objective import Evaluators
 from blast_env.envs.observations import Array, Observation, Sight
 from blast_env.envs.strategies import (
     REWARDS,
@@ -39,6 +38,7 @@ from blast_env.envs.strategies import (
     zone_of,
 )
 from blast_env.evaluation.comparison import CVAR_LEVEL
+from blast_env.evaluation.evaluator import Evaluators
 from blast_env.evaluation.store import BlastCache
 from blast_env.geometry import Cell
 from blast_env.physics.engine import Engine

@@ -59,12 +59,10 @@ def _map(
     )
     y, x = _centres_m(rows)[:, np.newaxis], _centres_m(columns)[np.newaxis, :]
     characters = np.full((rows, columns), " ")
-    zone = scenario.build_zone
-    if zone is not None:
-        free = placement.free
-        for cell in zone.cells():
-            sign = "M" if cell in placement.cells else "." if free[cell] else "x"
-            characters[_inside(zone.cell_rectangle_m(cell), x, y)] = sign
+    zone, free = scenario.zone, placement.free
+    for cell in zone.cells():
+        sign = "M" if cell in placement.cells else "." if free[cell] else "x"
+        characters[_inside(zone.cell_rectangle_m(cell), x, y)] = sign
     known = len(sources) == 1 and isinstance(sources[0], PointSource)
     for source in sources:
         near = distances_m(source, (x, y, x, y)) <= scenario.charge_radius_m
@@ -184,14 +182,15 @@ def _screening(episode: Episode) -> "BlastScreening":
     """Return the blast that is shown: of the worst threat, with its first realisation."""
     from blast_env.rendering.placing import BlastScreening
 
-    protected, _ = episode.assess()
-    threats = episode.objective.threats
-    threat = threats[int(np.argmax(protected.threat_impulses_psi_s))][0]
-    evaluator = episode.objective.evaluator
+    objective = episode.objective
+    case, evaluator = objective.case, objective.evaluator
+    impulses = np.array(objective.impulses_pa_s(episode.placement.cells))
+    of_charges = impulses.reshape(case.realisations, -1).mean(axis=0)
+    threat = case.threats[int(of_charges.argmax())]
     # Sorted, as for the assessment: the order of the cells may change the last bits.
     cells = tuple(sorted(episode.placement.cells))
     blast = Blast(evaluator.scenario, cells, threat.seed, evaluator.engine, threat.charge)
-    remark = f": the worst of {len(threats)} charges" if len(threats) > 1 else ""
+    remark = f": the worst of {len(case.charges)} charges" if len(case.charges) > 1 else ""
     return BlastScreening(blast, _outcome(episode), remark)
 
 
@@ -199,7 +198,7 @@ def _outcome(episode: Episode) -> str:
     """Return what came of the blast, in words."""
     protected, unprotected = episode.assess()
     reduction_percent = 100.0 * protected.reduction_from(unprotected)
-    of_all = "all charges: " if len(episode.objective.threats) > 1 else ""
+    of_all = "all charges: " if len(episode.objective.case.charges) > 1 else ""
     return (
         f"{of_all}{protected.impulse_psi_s:.3g} psi s ({protected.impulse_pa_s:.3g} Pa s),"
         f" reduction {reduction_percent:.0f} %"
@@ -208,11 +207,10 @@ def _outcome(episode: Episode) -> str:
 
 def _state_lines(episode: Episode) -> list[str]:
     """Return what is left to build with, and how many illegal actions there were."""
-    placement, zone = episode.placement, episode.placement.scenario.build_zone
-    stock = 0 if zone is None else zone.stock
-    lines = [f"{placement.stock_left} of {stock} modules left"]
+    placement, zone = episode.placement, episode.placement.scenario.zone
+    lines = [f"{placement.stock_left} of {zone.stock} modules left"]
     extras = []
-    if zone is not None and zone.budget is not None:
+    if zone.budget is not None:
         extras.append(f"budget: {placement.budget_left:g} of {zone.budget:g} left")
     if episode.illegal_actions:
         plural = "" if episode.illegal_actions == 1 else "s"

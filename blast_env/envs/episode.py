@@ -1,6 +1,6 @@
 """One episode of placing, and what all episodes of an environment have in common."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import fsum
 from types import MappingProxyType
@@ -14,9 +14,7 @@ from blast_env.envs.arguments import (
     real_number,
     strategy,
     whole_number,
-    with_possible_charges,
 )
-from blast_env.envs.objective import Assessment, Evaluators, Objective
 from blast_env.envs.observations import (
     Array,
     EpisodeObservation,
@@ -36,10 +34,12 @@ from blast_env.envs.strategies import (
     check_size,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Threat
+from blast_env.evaluation.cases import Case, SeedRange, Threat
+from blast_env.evaluation.comparison import Assessment, Objective
+from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Cell
 from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement
+from blast_env.scenario import Placement, Scenario
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk
 
 ILLEGAL_TERM: Final = "illegal_actions"
@@ -130,7 +130,8 @@ class Episode:
             evaluators: They know how many blasts there were.
         """
         protected, unprotected = self.assess()
-        threats = self.objective.threats
+        case = self.objective.case
+        seeds = [threat.seed for threat in case.threats]
         return {
             "impulse_sim": protected.impulse_sim,
             "impulse_psi_s": protected.impulse_psi_s,
@@ -141,8 +142,10 @@ class Episode:
             "scenario_hash": self.sight.scenario.content_hash,
             "calibration": self.objective.evaluator.calibration.name,
             "calibration_in_range": protected.in_range,
-            "charges": tuple(each[0].charge for each in threats),
-            "blast_seeds": tuple(tuple(threat.seed for threat in each) for each in threats),
+            "charges": case.charges,
+            "blast_seeds": tuple(
+                tuple(seeds[index :: len(case.charges)]) for index in range(len(case.charges))
+            ),
             "blasts": evaluators.blasts,
             "cache_hits": evaluators.cache_hits,
             "cache_hit_rate": evaluators.cache_hit_rate,
@@ -211,21 +214,32 @@ class Task:
         scenario = self.source.sample(rng)
         check_size(scenario, self.source.representative)
         drawn = self.threat_model.draw(scenario, rng)
-        seeds = rng.integers(2**31, size=(len(drawn), self.realisations))
+        seeds = SeedRange.TRAINING.draw(rng, (len(drawn), self.realisations))
         if options.blast_seed is not None:
             seeds = options.blast_seed + np.arange(seeds.size).reshape(seeds.shape)
         charges = tuple(options.charge(each) for each in drawn)
-        possible = with_possible_charges(scenario, charges) if options.fix_charge else scenario
+        possible = scenario.with_possible_charges(charges) if options.fix_charge else scenario
         evaluator = self.evaluators.of(scenario)
         sight = Sight(scenario, self.threat_model.shown(scenario, charges), evaluator)
         placement = Placement.of(possible, options.layout)
         return Episode(
             sight=sight,
-            objective=Objective(evaluator, _threats(charges, seeds), self.risk),
+            objective=Objective(evaluator, self._case(scenario, charges, seeds)),
             observation=self.observation.episode(sight),
             initial=placement.cells,
             placement=placement,
         )
+
+    def _case(
+        self, scenario: Scenario, charges: Sequence[Charge], seeds: NDArray[np.int64]
+    ) -> Case:
+        """Return what the layout meets; `seeds` has the shape (charges, realisations)."""
+        threats = tuple(
+            Threat(charge, int(seed))
+            for of_realisation in seeds.T
+            for charge, seed in zip(charges, of_realisation, strict=True)
+        )
+        return Case(scenario, threats, self.realisations, self.risk)
 
 
 def find_threat_model(threat: str | ThreatModel, threats: int | None) -> ThreatModel:
@@ -265,13 +279,3 @@ def find_risk(risk: str | Risk, cvar_level: float) -> Risk:
     level = real_number("cvar_level", cvar_level, 0.0, 1.0)
     measures: dict[str, Risk] = {"mean": MeanRisk(), "cvar": ConditionalValueAtRisk(level)}
     return strategy("risk", risk, measures)
-
-
-def _threats(
-    charges: tuple[Charge, ...], seeds: NDArray[np.int64]
-) -> tuple[tuple[Threat, ...], ...]:
-    """Return the realisations of each charge; `seeds` has the shape (charges, realisations)."""
-    return tuple(
-        tuple(Threat(charge, seed) for seed in of_charge)
-        for charge, of_charge in zip(charges, seeds.tolist(), strict=True)
-    )

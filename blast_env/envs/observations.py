@@ -8,14 +8,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from blast_env.envs.strategies import zone_of
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import draw_threats
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.geometry import Rectangle
 from blast_env.scenario import AnySource, Placement, RectangleSource, Scenario, Site
 from blast_env.scenario.models import AnyStructure
-from blast_env.scenario.zone import Surroundings, empty_zone, source_bounds_m
+from blast_env.scenario.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 
 Array = NDArray[Any]
@@ -99,9 +98,7 @@ def stock_shares(placement: Placement) -> tuple[float, float, float]:
         The share of the stock, the number of modules as a share of 100 (at most 1), and the share
         of the budget (1 without a budget).
     """
-    zone = placement.scenario.build_zone
-    if zone is None:
-        return 0.0, 0.0, 0.0
+    zone = placement.scenario.zone
     left, budget_left = placement.stock_left, placement.budget_left
     of_budget = 1.0 if zone.budget is None or budget_left is None else budget_left / zone.budget
     return left / zone.stock, min(left / FULL_STOCK, 1.0), of_budget
@@ -117,13 +114,7 @@ def occupied_cells(placement: Placement) -> NDArray[np.bool_]:
 
 def cost_shares(scenario: Scenario) -> NDArray[np.float64]:
     """Return the cost of a module on each cell as a share of the highest, (rows, columns)."""
-    zone = scenario.build_zone
-    if zone is None:
-        return np.zeros((0, 0))
-    radius_m = scenario.charge_radius_m
-    costs = empty_zone(
-        Surroundings(zone, scenario.structures, scenario.charge, radius_m)
-    ).module_costs
+    costs = Placement.empty(scenario).module_costs
     shares: NDArray[np.float64] = costs / costs.max()
     return shares
 
@@ -297,7 +288,7 @@ class GridObservation:
         grid = SiteGrid.of(sight.scenario.site)
         planes = np.zeros((len(self.channels), grid.rows, grid.columns), dtype=np.float32)
         _draw_structures(planes, grid, sight.scenario)
-        zone = zone_of(sight.scenario)
+        zone = sight.scenario.zone
         lattice = grid.lattice(zone.corner_m, zone.rows, zone.columns)
         planes[_COST] = lattice.plane(cost_shares(sight.scenario))
         planes[_CHARGE] = _charge_plane(grid, sight.sources)
@@ -421,7 +412,7 @@ class FeaturesObservation:
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (features,)."""
-        zone = zone_of(scenario)
+        zone = scenario.zone
         return spaces.Box(0.0, 1.0, (_FIXED + 3 * zone.rows * zone.columns,), np.float32)
 
     def episode(self, sight: Sight) -> "FeaturesEpisode":
@@ -430,7 +421,7 @@ class FeaturesObservation:
         Raises:
             BlastEnvError: If the scenario has more structures than there is room for.
         """
-        scenario, zone = sight.scenario, zone_of(sight.scenario)
+        scenario, zone = sight.scenario, sight.scenario.zone
         size = np.array([scenario.site.width_m, scenario.site.height_m])
         boxes = np.array([source_bounds_m(source) for source in sight.sources])
         charges = [charge_share(source.tnt_kg) for source in sight.sources]

@@ -8,8 +8,8 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from blast_env.envs.objective import Objective
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.comparison import Objective
 from blast_env.geometry import Cell
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnySource, BuildZone, PointSource, Scenario, load_scenario
@@ -129,11 +129,7 @@ def zone_of(scenario: Scenario) -> BuildZone:
     Raises:
         BlastEnvError: If it has none.
     """
-    if scenario.build_zone is None:
-        raise BlastEnvError(
-            f"scenario {scenario.name!r} has no build zone, so nothing can be placed in it"
-        )
-    return scenario.build_zone
+    return scenario.zone
 
 
 def check_size(scenario: Scenario, representative: Scenario) -> None:
@@ -160,8 +156,7 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
 
 
 def _sizes(scenario: Scenario) -> tuple[tuple[float, float], tuple[int, int]]:
-    zone = zone_of(scenario)
-    return (scenario.site.width_m, scenario.site.height_m), (zone.rows, zone.columns)
+    return (scenario.site.width_m, scenario.site.height_m), scenario.zone.shape
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,21 @@
 """Evaluating layouts: loads under threats, and reductions with their uncertainty."""
 
-from blast_env.evaluation.cases import Threat, draw_threats
+from blast_env.evaluation.cases import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.comparison import (
+    CVAR_LEVEL,
+    Assessment,
+    Comparison,
+    Objective,
+    compare,
+)
+from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
+from blast_env.evaluation.loads import BlastLoads, StructureLoad
+from blast_env.evaluation.report import (
     LayoutEvaluation,
     ThreatOutcome,
     evaluate_against,
     evaluate_layout,
 )
-from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastCache, BlastKey, DiskCache, LoadsCache
 from blast_env.statistics import (
     Estimate,
@@ -18,17 +25,25 @@ from blast_env.statistics import (
 )
 
 __all__ = [
+    "CVAR_LEVEL",
+    "Assessment",
     "BlastCache",
     "BlastEvaluator",
     "BlastKey",
     "BlastLoads",
+    "Case",
+    "Comparison",
     "DiskCache",
     "Estimate",
+    "Evaluators",
     "LayoutEvaluation",
     "LoadsCache",
+    "Objective",
+    "SeedRange",
     "StructureLoad",
     "Threat",
     "ThreatOutcome",
+    "compare",
     "conditional_value_at_risk",
     "draw_threats",
     "evaluate_against",

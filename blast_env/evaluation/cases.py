@@ -1,14 +1,19 @@
-"""Threats: the blasts that layouts are compared on."""
+"""Cases: the threats that layouts are compared on, who is told what, and which seeds are whose."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
 from blast_env.scenario.build_scene import draw_charge
+from blast_env.statistics import MeanRisk, Risk
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,210 @@ def draw_threats(scenario: Scenario, seeds: Iterable[int]) -> tuple[Threat, ...]
         if seed in plain[:index]:
             raise BlastEnvError(f"seeds[{index}] is {seed}, is there already: must be none twice")
     return tuple(Threat(draw_charge(scenario, seed), seed) for seed in plain)
+
+
+class SeedRange(Enum):
+    """Which seeds belong to what: no blast that something was chosen by ever judges it.
+
+    The ranges are disjoint. A threat's seed decides its fan and air and, where it is drawn, its
+    charge.
+    """
+
+    TRAINING = range(2**31)
+    """Episodes of the environments, and what people name by hand."""
+    JUDGEMENT = range(2**31, 2**33)
+    """What layouts and agents are judged on in the end: league, evaluation, checks of a search."""
+    SEARCH = range(2**33, 2**33 + 2**31)
+    """What searches spend their blasts on."""
+    SELECTION = range(2**33 + 2**31, 2**34)
+    """What the best weights of a training are chosen by."""
+
+    def seeds(self, first: int, count: int) -> range:
+        """Return consecutive seeds of the range.
+
+        Args:
+            first: The first one, counted from the start of the range.
+            count: How many.
+
+        Raises:
+            BlastEnvError: If they are not all in the range.
+        """
+        if first < 0 or count < 1 or first + count > len(self.value):
+            raise BlastEnvError(
+                f"seeds {first} to {first + count - 1} of {self.name.lower()}: must be at least "
+                f"one, from 0 to {len(self.value) - 1}"
+            )
+        return self.value[first : first + count]
+
+    def draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.int64]:
+        """Draw seeds of the range, an array of the shape; one may come twice."""
+        return self.value.start + rng.integers(len(self.value), size=shape)
+
+    def draw_distinct(self, rng: np.random.Generator, count: int) -> list[int]:
+        """Draw so many different seeds of the range."""
+        drawn = rng.choice(len(self.value), size=count, replace=False)
+        return [self.value.start + int(each) for each in drawn]
+
+
+MEAN: Final = MeanRisk()
+"""All charges count alike: the risk measure unless another is given."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What layouts are held against each other on: a scenario and the threats that each meets.
+
+    All layouts meet the same charges, fans and air (common random numbers), so that what differs
+    is due to the layouts.
+
+    Attributes:
+        scenario: The scenario.
+        threats: What layouts meet, at least one. With several realisations first one of each
+            charge, then another of each, and so on: threat k is of charge k modulo the number of
+            charges.
+        realisations: How many threats there are of each charge.
+        risk: How the impulses of several charges become one.
+        charge: The charge, where whoever proposes a layout is told it; `None` where it is hidden.
+        name: For people.
+        seed: Decides what a search or a random layout draws.
+        practice: What a search for this case may spend its blasts on: none of `threats`.
+
+    Raises:
+        BlastEnvError: If there are no threats, they are not as many for each charge, or one of
+            `practice` is among them.
+    """
+
+    scenario: Scenario
+    threats: tuple[Threat, ...]
+    realisations: int = 1
+    risk: Risk = MEAN
+    charge: Charge | None = None
+    name: str = ""
+    seed: int = 0
+    practice: "Case | None" = None
+
+    def __post_init__(self) -> None:
+        """Check the threats."""
+        if not self.threats:
+            raise BlastEnvError("threats: there are none, must be at least one")
+        charges = self.charges
+        for index, threat in enumerate(self.threats):
+            if (
+                len(self.threats) % self.realisations
+                or threat.charge != charges[index % len(charges)]
+            ):
+                raise BlastEnvError(
+                    f"threats[{index}] is {threat}, must be one of {self.realisations} "
+                    f"realisations of each charge, in the order of the charges"
+                )
+        if self.practice is not None:
+            both = set(self.threats) & set(self.practice.threats)
+            if both:
+                raise BlastEnvError(f"a search may not meet {both.pop()}: layouts are judged on it")
+
+    @property
+    def charges(self) -> tuple[Charge, ...]:
+        """The charges, each as often as it was drawn."""
+        count = max(len(self.threats) // self.realisations, 1)
+        return tuple(threat.charge for threat in self.threats[:count])
+
+    def combined(self, impulses: Sequence[float] | FloatArray) -> float:
+        """Return the one impulse that counts: the mean per charge, then the risk over the charges.
+
+        Args:
+            impulses: One a threat, in their order; at least one, perhaps only the first ones.
+        """
+        values = np.asarray(impulses, dtype=np.float64)
+        count = min(len(self.charges), len(values))
+        means = [float(values[index :: len(self.charges)].mean()) for index in range(count)]
+        return self.risk(np.array(means))
+
+
+def visible_case(
+    scenario: Scenario, charge: Charge, seeds: Sequence[int], risk: Risk = MEAN
+) -> Case:
+    """Return the case of a known charge: it goes off once a seed, with another fan and air."""
+    threats = tuple(Threat(charge, seed) for seed in seeds)
+    return Case(scenario, threats, realisations=len(threats), risk=risk, charge=charge)
+
+
+def practice_visible(
+    scenario: Scenario,
+    charge: Charge,
+    realisations: int,
+    seed: int,
+    risk: Risk = MEAN,
+) -> Case:
+    """Return what a search for a known charge may spend its blasts on.
+
+    Args:
+        scenario: The scenario.
+        charge: The charge.
+        realisations: How many fans and airs, at least one.
+        seed: Decides the seeds of the blasts, and what the search draws.
+        risk: As for `Case`.
+
+    Raises:
+        BlastEnvError: If there are to be none.
+    """
+    _at_least_one("realisations", realisations)
+    drawn = SeedRange.SEARCH.draw_distinct(np.random.default_rng(seed), realisations)
+    return replace(visible_case(scenario, charge, drawn, risk), seed=seed)
+
+
+def practice_hidden(
+    scenario: Scenario, charges: int, realisations: int, seed: int, risk: Risk = MEAN
+) -> Case:
+    """Return what a search for a hidden charge may spend its blasts on.
+
+    Args:
+        scenario: The scenario; the charges are drawn from where it lets them be.
+        charges: How many charges, at least one.
+        realisations: How many fans and airs for each of them, at least one.
+        seed: Decides the charges, the seeds of the blasts, and what the search draws.
+        risk: As for `Case`.
+
+    Returns:
+        A case whose first charge is the one in the middle of all, and each further one as far as
+        possible from those before it, so that the first few stand for all.
+
+    Raises:
+        BlastEnvError: If there are to be none.
+    """
+    _at_least_one("charges", charges)
+    _at_least_one("realisations", realisations)
+    rng = np.random.default_rng(seed)
+    drawn = _spread_first([scenario.sample_charge(rng) for _ in range(charges)])
+    seeds = SeedRange.SEARCH.draw_distinct(rng, realisations * charges)
+    threats = [Threat(drawn[index % charges], each) for index, each in enumerate(seeds)]
+    return Case(scenario, tuple(threats), realisations, risk, seed=seed)
+
+
+def check_distinct(threats: Sequence[Threat]) -> None:
+    """Refuse a threat that is there twice: it would count as evidence twice (`BlastEnvError`)."""
+    for index, threat in enumerate(threats):
+        if threat in threats[:index]:
+            raise BlastEnvError(
+                f"threats[{index}] is {threat}, is there already: must be none twice"
+            )
+
+
+def _spread_first(charges: Sequence[Charge]) -> list[Charge]:
+    """Return charges, each as far as possible from those before it, the middle one first."""
+    places_m = np.array([charge.position_m for charge in charges]).reshape(-1, 2)
+    apart_m = np.hypot(*(places_m[:, np.newaxis] - places_m).T)
+    order: list[int] = []
+    nearest_m = -apart_m.sum(axis=0)
+    while len(order) < len(charges):
+        order.append(int(np.argmax(nearest_m)))
+        nearest_m = apart_m[order].min(axis=0)
+        nearest_m[order] = -np.inf
+    return [charges[index] for index in order]
+
+
+def _at_least_one(name: str, count: int) -> None:
+    if count < 1:
+        raise BlastEnvError(f"{name} is {count}, must be at least 1")
 
 
 def _seed(seed: int, place: str) -> int:

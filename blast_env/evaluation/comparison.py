@@ -1,538 +1,335 @@
-"""Layouts against no barrier on the same threats."""
+"""The one comparison: what the blast does with a barrier and without it, on the same threats.
 
-import json
-import math
-import platform
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+One rule for nothing: where nothing arrives without a barrier there is no reduction (NaN), and a
+comparison that is to say how good layouts are is refused for a case in which nothing arrives at all
+(`check_something_arrives`).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.metadata import version
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-import pandas as pd
 
-from blast_env.arrays import FloatArray
-from blast_env.calibration.model import Calibration
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Threat, draw_threats
-from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.loads import BlastLoads, StructureLoad
-from blast_env.evaluation.store import BlastCache
-from blast_env.files import write_atomically
-from blast_env.geometry import Cell
-from blast_env.physics.engine import Engine
-from blast_env.recording.tables import module_table
-from blast_env.scenario import Scenario, check_layout
-from blast_env.scenario.build_scene import build_scene
+from blast_env.evaluation.cases import Case, check_distinct
+from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
+from blast_env.evaluation.loads import BlastLoads
+from blast_env.geometry import Cell, Layout
+from blast_env.scenario import check_layout
 from blast_env.statistics import (
     Estimate,
     check_cvar_level,
     conditional_value_at_risk,
     mean_estimate,
     reduction_estimate,
+    reductions,
 )
-from blast_env.tables import Column
 from blast_env.units import PA_PER_PSI
-
-STRUCTURE_COLUMNS: Final = (
-    Column("structure", "", "name of the structure"),
-    Column("protected", "", "whether its load counts"),
-    Column("weight", "", "its weight among the protected structures"),
-    Column("impulse_pa_s", "Pa s", "calibrated impulse per area with the barrier"),
-    Column("unprotected_impulse_pa_s", "Pa s", "calibrated impulse per area without it"),
-    Column("reduction", "", "of the calibrated impulse"),
-    Column("reduction_low", "", "lower end of its 95 % confidence interval"),
-    Column("reduction_high", "", "upper end of its 95 % confidence interval"),
-    Column("impulse_psi_s", "psi s", "calibrated impulse per area with the barrier"),
-    Column("unprotected_impulse_psi_s", "psi s", "calibrated impulse per area without it"),
-    Column("impulse_sim", "sim", "sum of m |v| with the barrier"),
-    Column("unprotected_impulse_sim", "sim", "sum of m |v| without it"),
-    Column("transferred_impulse_sim", "sim", "momentum really transferred with the barrier"),
-    Column("unprotected_transferred_impulse_sim", "sim", "momentum transferred without it"),
-    Column("threats_in_range", "", "threats that the calibration was made for"),
-)
-
-
-MODULE_COLUMNS: Final = (
-    Column("module_id", "", "name of the module, made from its centre in metres"),
-    Column("structure", "", "structure that the module is part of"),
-    Column("x_m", "m", "centre, from the left border"),
-    Column("y_m", "m", "centre, from the lower border"),
-    Column("impulse_sim", "sim", "sum of m |v| with the barrier"),
-    Column("unprotected_impulse_sim", "sim", "sum of m |v| without it"),
-    Column("reduction", "", "of the sum of m |v|"),
-)
-
-
-THREAT_COLUMNS: Final = (
-    Column("seed", "", "seed of fan and air"),
-    Column("charge_x_m", "m", "centre of the charge, from the left border"),
-    Column("charge_y_m", "m", "centre of the charge, from the lower border"),
-    Column("tnt_kg", "kg", "TNT-equivalent mass of the charge"),
-    Column("impulse_pa_s", "Pa s", "protected structures, with the barrier"),
-    Column("unprotected_impulse_pa_s", "Pa s", "protected structures, without it"),
-    Column("reduction", "", "of that impulse"),
-    Column("in_range", "", "whether the calibration was made for this threat"),
-)
-
-
-def structure_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
-    """Return one row a structure; see `STRUCTURE_COLUMNS`."""
-    pairs = zip(_by_structure(evaluation.loads), _by_structure(evaluation.unprotected), strict=True)
-    return _table([_structure_row(loads, bare) for loads, bare in pairs], STRUCTURE_COLUMNS)
-
-
-def module_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
-    """Return one row a module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
-    threat = evaluation.threats[0]
-    scene = build_scene(evaluation.scenario, (), threat.seed, threat.charge)
-    impulse, bare = (
-        np.mean([load.module_impulse_sim for load in loads], axis=0)
-        for loads in (evaluation.loads, evaluation.unprotected)
-    )
-    table = module_table(scene.obstacles()).assign(
-        impulse_sim=impulse, unprotected_impulse_sim=bare, reduction=_share_gone(impulse, bare)
-    )
-    return table[[column.name for column in MODULE_COLUMNS]]
-
-
-def threat_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
-    """Return one row a threat; see `THREAT_COLUMNS`."""
-    rows = [
-        (
-            outcome.threat.seed,
-            *outcome.threat.charge.position_m,
-            outcome.threat.charge.tnt_kg,
-            outcome.impulse_pa_s,
-            outcome.unprotected_impulse_pa_s,
-            outcome.reduction,
-            outcome.in_range,
-        )
-        for outcome in evaluation.outcomes
-    ]
-    return _table(rows, THREAT_COLUMNS)
-
-
-def _table(rows: Sequence[Sequence[object]], columns: Sequence[Column]) -> pd.DataFrame:
-    return pd.DataFrame(rows, columns=[column.name for column in columns])
-
-
-def _by_structure(loads: Sequence[BlastLoads]) -> list[tuple[StructureLoad, ...]]:
-    """Return the loads of each structure, one a threat."""
-    return list(zip(*(load.structures for load in loads), strict=True))
-
-
-def _structure_row(
-    loads: Sequence[StructureLoad], bare: Sequence[StructureLoad]
-) -> tuple[object, ...]:
-    first = loads[0]
-    pa_s, bare_pa_s = (np.array([load.impulse_pa_s for load in each]) for each in (loads, bare))
-    means = [
-        float(np.mean([getattr(load, name) for load in each]))
-        for name in ("impulse_psi_s", "impulse_sim", "transferred_impulse_sim")
-        for each in (loads, bare)
-    ]
-    return (
-        first.name,
-        first.protected,
-        first.weight,
-        float(pa_s.mean()),
-        float(bare_pa_s.mean()),
-        *reduction_estimate(pa_s, bare_pa_s),
-        *means,
-        sum(load.in_range for load in loads),
-    )
-
-
-def _share_gone(impulse: FloatArray, bare: FloatArray) -> FloatArray:
-    """Return 1 - impulse / bare for each module (modules,); NaN where `bare` is 0."""
-    reached = bare > 0.0
-    gone = np.full(len(bare), np.nan)
-    gone[reached] = 1.0 - impulse[reached] / bare[reached]
-    return gone
-
-
-SCHEMA_VERSION: Final = 1
-"""The version of the file that `LayoutEvaluation.to_json` writes."""
-
-
-def evaluation_record(evaluation: "LayoutEvaluation") -> dict[str, Any]:
-    """Return everything about an evaluation as what JSON knows; NaN is `None`."""
-    scenario = evaluation.scenario
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "scenario": scenario.model_dump(mode="json", exclude_none=True),
-        "scenario_hash": scenario.content_hash,
-        "layout": [list(cell) for cell in evaluation.layout],
-        "engine": evaluation.engine_name,
-        "calibration": evaluation.calibration.name,
-        "versions": {
-            "blast_env": version("blast-env"),
-            "engine": evaluation.engine_version,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-        },
-        "result": _result(evaluation),
-        "notes": list(evaluation.notes),
-        "threats": _rows(evaluation.threat_table),
-        "structures": _rows(evaluation.table),
-        "modules": _rows(evaluation.module_table),
-    }
-
-
-def _result(evaluation: "LayoutEvaluation") -> dict[str, Any]:
-    return {
-        "reduction": _estimate(evaluation.reduction),
-        "impulse_pa_s": _estimate(evaluation.impulse_pa_s),
-        "impulse_psi_s": _estimate(evaluation.impulse_psi_s),
-        "unprotected_impulse_pa_s": _estimate(evaluation.unprotected_impulse_pa_s),
-        "unprotected_impulse_psi_s": _estimate(evaluation.unprotected_impulse_psi_s),
-        "cvar_level": evaluation.cvar_level,
-        "cvar_pa_s": evaluation.cvar,
-        "cvar_psi_s": evaluation.cvar / PA_PER_PSI,
-        "unprotected_cvar_pa_s": evaluation.unprotected_cvar,
-        "unprotected_cvar_psi_s": evaluation.unprotected_cvar / PA_PER_PSI,
-        "worst": _worst(evaluation.worst),
-        "in_range": evaluation.in_range,
-    }
-
-
-def _estimate(estimate: Estimate) -> dict[str, float | None]:
-    value, low, high = map(_or_none, estimate)
-    return {"value": value, "ci95_low": low, "ci95_high": high}
-
-
-def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
-    return {
-        "seed": outcome.threat.seed,
-        "charge_position_m": list(outcome.threat.charge.position_m),
-        "tnt_kg": outcome.threat.charge.tnt_kg,
-        "impulse_pa_s": outcome.impulse_pa_s,
-        "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
-        "reduction": _or_none(outcome.reduction),
-        "in_range": outcome.in_range,
-    }
-
-
-def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
-    return [
-        {str(name): _or_none(value) for name, value in row.items()}
-        for row in table.to_dict("records")
-    ]
-
-
-def _or_none(value: Any) -> Any:
-    """Return the value, or `None` for a number that does not exist."""
-    return None if isinstance(value, float) and math.isnan(value) else value
-
-
-@dataclass(frozen=True)
-class ThreatOutcome:
-    """What a layout does against one threat; impulses as in `BlastLoads.protected_impulse_psi_s`.
-
-    Attributes:
-        threat: The threat.
-        impulse_psi_s: Impulse on the protected structures with the barrier, psi*s.
-        unprotected_impulse_psi_s: The same without it, psi*s.
-        in_range: Whether the calibration was made for such a threat.
-    """
-
-    threat: Threat
-    impulse_psi_s: float
-    unprotected_impulse_psi_s: float
-    in_range: bool
-
-    @property
-    def impulse_pa_s(self) -> float:
-        """Impulse on the protected structures with the barrier, Pa*s."""
-        return self.impulse_psi_s * PA_PER_PSI
-
-    @property
-    def unprotected_impulse_pa_s(self) -> float:
-        """Impulse on the protected structures without the barrier, Pa*s."""
-        return self.unprotected_impulse_psi_s * PA_PER_PSI
-
-    @property
-    def reduction(self) -> float:
-        """Share of the impulse that is gone; NaN if there is none without a barrier."""
-        if self.unprotected_impulse_psi_s <= 0.0:
-            return np.nan
-        return 1.0 - self.impulse_psi_s / self.unprotected_impulse_psi_s
-
-
-@dataclass(frozen=True, eq=False)
-class LayoutEvaluation:
-    """A layout against no barrier, on the same threats.
-
-    Impulses are those of `BlastLoads.protected_impulse_psi_s`: per area, by weight, added up over
-    the protected structures. Intervals are 95 % confidence intervals of the mean over all threats
-    that the scenario can draw; they say nothing about how right the model is.
-
-    Attributes:
-        scenario: The scenario.
-        layout: The layout's cells, sorted.
-        threats: What both were exposed to.
-        loads: Loads with the layout, one a threat.
-        unprotected: Loads without any barrier, one a threat.
-        calibration: What converted simulated impulses.
-        engine_name: Name of the engine.
-        engine_version: Version of the library that did the physics.
-        cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
-    """
-
-    scenario: Scenario
-    layout: tuple[Cell, ...]
-    threats: tuple[Threat, ...]
-    loads: tuple[BlastLoads, ...]
-    unprotected: tuple[BlastLoads, ...]
-    calibration: Calibration
-    engine_name: str
-    engine_version: str
-    cvar_level: float
-
-    @cached_property
-    def outcomes(self) -> tuple[ThreatOutcome, ...]:
-        """What the layout does against each threat."""
-        return tuple(
-            ThreatOutcome(
-                threat, load.protected_impulse_psi_s, bare.protected_impulse_psi_s, load.in_range
-            )
-            for threat, load, bare in zip(self.threats, self.loads, self.unprotected, strict=True)
-        )
-
-    @cached_property
-    def reduction(self) -> Estimate:
-        """1 - mean impulse with the barrier / without; see `reduction_estimate`."""
-        return reduction_estimate(self._impulse_psi_s, self._unprotected_psi_s)
-
-    @property
-    def mean_reduction(self) -> float:
-        """The value of `reduction`: 0 changes nothing, 1 keeps everything off."""
-        return self.reduction.value
-
-    @property
-    def ci95(self) -> tuple[float, float]:
-        """95 % confidence interval of `mean_reduction`; NaN with a single threat."""
-        return self.reduction.low, self.reduction.high
-
-    @cached_property
-    def impulse_psi_s(self) -> Estimate:
-        """Mean impulse with the barrier, psi*s."""
-        return mean_estimate(self._impulse_psi_s)
-
-    @property
-    def impulse_pa_s(self) -> Estimate:
-        """Mean impulse with the barrier, Pa*s."""
-        return self.impulse_psi_s.scaled(PA_PER_PSI)
-
-    @cached_property
-    def unprotected_impulse_psi_s(self) -> Estimate:
-        """Mean impulse without the barrier, psi*s."""
-        return mean_estimate(self._unprotected_psi_s)
-
-    @property
-    def unprotected_impulse_pa_s(self) -> Estimate:
-        """Mean impulse without the barrier, Pa*s."""
-        return self.unprotected_impulse_psi_s.scaled(PA_PER_PSI)
-
-    @cached_property
-    def worst(self) -> ThreatOutcome:
-        """The threat with the largest impulse in spite of the barrier."""
-        return max(self.outcomes, key=lambda outcome: outcome.impulse_psi_s)
-
-    @property
-    def cvar(self) -> float:
-        """Mean impulse of the worst threats with the barrier, Pa*s; see `cvar_level`."""
-        return PA_PER_PSI * conditional_value_at_risk(self._impulse_psi_s, self.cvar_level)
-
-    @property
-    def unprotected_cvar(self) -> float:
-        """Mean impulse of the worst threats without the barrier, Pa*s."""
-        return PA_PER_PSI * conditional_value_at_risk(self._unprotected_psi_s, self.cvar_level)
-
-    @cached_property
-    def table(self) -> pd.DataFrame:
-        """One row a structure; the columns are `tables.STRUCTURE_COLUMNS`."""
-        return structure_reductions(self)
-
-    @cached_property
-    def module_table(self) -> pd.DataFrame:
-        """One row a module of the structures; the columns are `tables.MODULE_COLUMNS`."""
-        return module_reductions(self)
-
-    @cached_property
-    def threat_table(self) -> pd.DataFrame:
-        """One row a threat; the columns are `tables.THREAT_COLUMNS`."""
-        return threat_reductions(self)
-
-    @property
-    def in_range(self) -> bool:
-        """Whether the calibration was made for every threat and protected structure."""
-        return all(outcome.in_range for outcome in self.outcomes)
-
-    @cached_property
-    def notes(self) -> tuple[str, ...]:
-        """What the calibration was not made for, a sentence a structure."""
-        notes = []
-        for of_structure in zip(*(load.structures for load in self.loads), strict=True):
-            outside = [load for load in of_structure if not load.in_range]
-            if outside:
-                notes.append(
-                    f"{outside[0].name}: {len(outside)} of {len(self.threats)} threats are outside "
-                    f"the range of calibration {self.calibration.name!r}, "
-                    f"e.g. {'; '.join(outside[0].notes)}"
-                )
-        return tuple(notes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain data: what was asked, with which versions, and the answer.
-
-        The same arguments and versions give the same data; numbers that do not exist are `None`.
-        """
-        return evaluation_record(self)
-
-    def to_json(self, path: str | Path) -> Path:
-        """Write `to_dict` to a file.
-
-        Returns:
-            The path.
-
-        Raises:
-            BlastEnvError: If it cannot be written there; nothing is left behind then.
-        """
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
-        with write_atomically(path) as temporary:
-            temporary.write_text(text + "\n", encoding="utf-8")
-        return Path(path)
-
-    def figure(self, path: str | Path) -> Path:
-        """Save a figure of the evaluation: `.png`, `.svg` or `.pdf`.
-
-        Returns:
-            The path.
-
-        Raises:
-            BlastEnvError: If it cannot be written there, or the extra `render` is missing.
-        """
-        from blast_env.rendering.evaluation_figures import evaluation_figure
-        from blast_env.rendering.figures import save_figure
-
-        return save_figure(evaluation_figure(self), path)
-
-    @cached_property
-    def _impulse_psi_s(self) -> FloatArray:
-        return np.array([outcome.impulse_psi_s for outcome in self.outcomes])
-
-    @cached_property
-    def _unprotected_psi_s(self) -> FloatArray:
-        return np.array([outcome.unprotected_impulse_psi_s for outcome in self.outcomes])
-
 
 CVAR_LEVEL: Final = 0.8
 """The mean of the worst 20 % of the threats."""
 
 
-def evaluate_layout(
-    scenario: Scenario,
-    layout: Sequence[Cell],
-    seeds: Iterable[int] = range(16),
-    processes: int = 1,
-    engine: str | Engine = "event",
-    *,
-    threats: Iterable[Threat] | None = None,
-    cvar_level: float = CVAR_LEVEL,
-    cache: str | Path | BlastCache | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> LayoutEvaluation:
-    """Return how much a layout takes off the protected structures, and how sure that is.
+@dataclass(frozen=True)
+class Assessment:
+    """The impulse on the protected structures with one layout.
 
-    Every seed draws a threat from the scenario; the layout and the empty site meet the same
-    threats. Use seeds that the layout was not chosen on: on the others it looks better than it is.
+    Each is the mean over the realisations of a charge, then by the risk measure over the charges.
+
+    Attributes:
+        impulse_psi_s: Calibrated impulses per area of the protected structures, by weight, added
+            up, psi*s.
+        impulse_sim: The same in simulation units.
+        in_range: Whether the calibration was made for every one of the blasts.
+    """
+
+    impulse_psi_s: float
+    impulse_sim: float
+    in_range: bool
+
+    @property
+    def impulse_pa_s(self) -> float:
+        """The calibrated impulse, Pa*s."""
+        return self.impulse_psi_s * PA_PER_PSI
+
+    def reduction_from(self, unprotected: "Assessment") -> float:
+        """Return by which share the impulse is below that without a barrier; NaN if that is 0."""
+        return reductions(self.impulse_psi_s, unprotected.impulse_psi_s).item()
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """What layouts are worth on a case, each worked out once.
+
+    Attributes:
+        evaluator: Runs the blasts and remembers them; it has the scenario.
+        case: The threats, and how they become one number.
+        processes: Worker processes; they change nothing but the time.
+    """
+
+    evaluator: BlastEvaluator
+    case: Case
+    processes: int = 1
+    _assessed: dict[Layout, Assessment] = field(default_factory=dict, init=False)
+
+    def assess(self, layout: Sequence[Cell]) -> Assessment:
+        """Return what a layout is worth; a blast for each threat, unless known.
+
+        Args:
+            layout: (row, column) of the cells that hold a module, in any order.
+
+        Raises:
+            LayoutError: If the layout does not fit the build zone.
+        """
+        key = tuple(sorted(layout))
+        if key not in self._assessed:
+            loads = self.loads(key)
+            self._assessed[key] = Assessment(
+                impulse_psi_s=self.case.combined([each.protected_impulse_psi_s for each in loads]),
+                impulse_sim=self.case.combined([each.protected_impulse_sim for each in loads]),
+                in_range=all(each.in_range for each in loads),
+            )
+        return self._assessed[key]
+
+    def loads(self, layout: Sequence[Cell]) -> list[BlastLoads]:
+        """Return the loads with a layout, one a threat of the case.
+
+        Raises:
+            LayoutError: If the layout does not fit the build zone.
+        """
+        pairs = [(layout, threat) for threat in self.case.threats]
+        return self.evaluator.loads_of_many(pairs, self.processes)
+
+    def impulses_pa_s(self, layout: Sequence[Cell]) -> tuple[float, ...]:
+        """Return the impulse on the protected structures with a layout, Pa*s, one a threat."""
+        return tuple(each.protected_impulse_pa_s for each in self.loads(layout))
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Layouts, one a case, against no barrier on the same threats.
+
+    Where there are several cases, each counts alike: a case's reduction is 1 - mean impulse with
+    the barrier / without it over its threats, and the intervals are those of the mean over cases.
+    With a single case they are those over its threats. Intervals are 95 % confidence intervals;
+    they say nothing about how right the model is.
+
+    Attributes:
+        cases: The cases; each has as many threats.
+        layouts: One a case.
+        impulse_pa_s: On the protected structures with the layouts, Pa*s (cases, threats); see
+            `BlastLoads.protected_impulse_pa_s`.
+        unprotected_pa_s: The same without a barrier, Pa*s (cases, threats).
+        in_range: Whether the calibration was made for it (cases, threats); all, unless given.
+        cvar_level: Level of `cvar_pa_s`: 0.8 is the mean of the worst 20 %.
+
+    Raises:
+        BlastEnvError: If nothing arrives at the protected structures of a case without a barrier.
+    """
+
+    cases: tuple[Case, ...]
+    layouts: tuple[Layout, ...]
+    impulse_pa_s: FloatArray
+    unprotected_pa_s: FloatArray
+    in_range: BoolArray
+    cvar_level: float = CVAR_LEVEL
+
+    def __post_init__(self) -> None:
+        """Check that there is something to reduce."""
+        check_cvar_level(self.cvar_level)
+        check_something_arrives(self.cases, self.unprotected_pa_s)
+
+    @property
+    def has_one_case(self) -> bool:
+        """Whether there is but one case, so that intervals and worst are over its threats."""
+        return len(self.cases) == 1
+
+    @cached_property
+    def case_reductions(self) -> FloatArray:
+        """The reduction in each case (cases,)."""
+        return reductions(self.impulse_pa_s.mean(axis=1), self.unprotected_pa_s.mean(axis=1))
+
+    @cached_property
+    def reduction(self) -> Estimate:
+        """The mean reduction with its 95 % interval."""
+        if self.has_one_case:
+            return reduction_estimate(self.impulse_pa_s[0], self.unprotected_pa_s[0])
+        value, low, high = mean_estimate(self.case_reductions)
+        return Estimate(value, low, min(high, 1.0))  # no reduction is above 1
+
+    def difference(self, other: "Comparison") -> Estimate:
+        """Return by how much the mean reduction is above another's, with its paired interval.
+
+        Args:
+            other: Other layouts on the same cases.
+        """
+        if self.has_one_case:
+            # As a reduction: of what is left if all that this takes off more is taken off.
+            bare = self.unprotected_pa_s[0]
+            left = bare + self.impulse_pa_s[0] - other.impulse_pa_s[0]
+            return reduction_estimate(left, bare)
+        return mean_estimate(self.case_reductions - other.case_reductions)
+
+    @property
+    def worst_reduction(self) -> float:
+        """The least reduction in any case; with a single one, under any threat.
+
+        Threats that do nothing without a barrier are left out.
+        """
+        if not self.has_one_case:
+            return float(self.case_reductions.min())
+        return float(np.nanmin(reductions(self.impulse_pa_s[0], self.unprotected_pa_s[0])))
+
+    @property
+    def mean_pa_s(self) -> Estimate:
+        """Mean impulse with the layouts, Pa*s."""
+        return mean_estimate(self._samples(self.impulse_pa_s))
+
+    @property
+    def unprotected_mean_pa_s(self) -> Estimate:
+        """Mean impulse without a barrier, Pa*s."""
+        return mean_estimate(self._samples(self.unprotected_pa_s))
+
+    @property
+    def cvar_pa_s(self) -> float:
+        """Mean impulse of the worst cases (threats of a single one) with the layouts, Pa*s."""
+        return conditional_value_at_risk(self._samples(self.impulse_pa_s), self.cvar_level)
+
+    @property
+    def unprotected_cvar_pa_s(self) -> float:
+        """The same without a barrier, Pa*s."""
+        return conditional_value_at_risk(self._samples(self.unprotected_pa_s), self.cvar_level)
+
+    def _samples(self, impulse_pa_s: FloatArray) -> FloatArray:
+        """Return what means and tails are over: the cases, or the threats of a single one."""
+        samples: FloatArray = impulse_pa_s[0] if self.has_one_case else impulse_pa_s.mean(axis=1)
+        return samples
+
+
+def compare(
+    evaluators: Evaluators,
+    cases: Sequence[Case],
+    layouts: Sequence[Sequence[Cell]],
+    processes: int = 1,
+    *,
+    cvar_level: float = CVAR_LEVEL,
+    progress: Callable[[float], None] | None = None,
+) -> Comparison:
+    """Hold layouts against no barrier, each on the threats of its case.
 
     Args:
-        scenario: The scenario; it must name a calibration.
-        layout: (row, column) of the build-zone cells that hold a barrier module, in any order.
-        seeds: At least one, none twice; 16 or more for an interval worth having.
+        evaluators: Run the blasts and remember them.
+        cases: At least one; each has as many threats.
+        layouts: One a case: (row, column) of the cells that hold a module, in any order.
         processes: Worker processes; they change nothing but the time.
-        engine: Name of an engine, or an engine.
-        threats: Used instead of threats drawn with `seeds`.
-        cvar_level: The worst share 1 - `cvar_level` of the threats makes the CVaR.
-        cache: Folder or cache of blasts that were run before; see `BlastEvaluator`.
+        cvar_level: The worst share 1 - `cvar_level` makes the CVaR.
         progress: Called with the share of the blasts that is done.
 
     Raises:
-        LayoutError: If the layout does not fit the build zone.
-        CalibrationError: If the scenario names no calibration, or one that was made with other
+        LayoutError: If a layout does not fit the build zone of its case.
+        CalibrationError: If a scenario names no calibration, or one that was made with other
             parameters or another engine.
-        UnknownNameError: If there is no such engine.
-        ScenarioError: If a threat's charge is not clear of a structure or the border.
-        BlastEnvError: If there are no seeds or threats, one is repeated or a seed is negative, if
-            `processes` or `cvar_level` is out of bounds, or if nothing arrives at the protected
-            structures even without a barrier.
-    """
-    evaluator = BlastEvaluator(scenario, engine, cache=cache)
-    drawn = draw_threats(scenario, seeds) if threats is None else tuple(threats)
-    return evaluate_against(
-        evaluator, layout, drawn, processes, cvar_level=cvar_level, progress=progress
-    )
-
-
-def evaluate_against(
-    evaluator: BlastEvaluator,
-    layout: Sequence[Cell],
-    threats: Sequence[Threat],
-    processes: int = 1,
-    *,
-    cvar_level: float = CVAR_LEVEL,
-    progress: Callable[[float], None] | None = None,
-) -> LayoutEvaluation:
-    """Return what `evaluate_layout` returns, with blasts that an evaluator may remember.
-
-    For several layouts on the same threats: the empty site is simulated only once.
-
-    Args:
-        evaluator: Runs the blasts.
-        layout: As for `evaluate_layout`.
-        threats: At least one, none twice.
-        processes: As for `evaluate_layout`.
-        cvar_level: As for `evaluate_layout`.
-        progress: As for `evaluate_layout`.
-
-    Raises:
-        BlastEnvError: As for `evaluate_layout`.
+        BlastEnvError: If there are no cases, a threat is there twice, `processes` or `cvar_level`
+            is out of bounds, or nothing arrives in a case even without a barrier.
     """
     check_cvar_level(cvar_level)
-    _check_threats(threats)
-    cells = tuple(sorted(check_layout(evaluator.scenario, layout)))
-    pairs = [(each, threat) for threat in threats for each in (cells, ())]
-    loads = evaluator.loads_of_many(pairs, processes, progress)
-    evaluation = LayoutEvaluation(
-        scenario=evaluator.scenario,
-        layout=cells,
-        threats=tuple(threats),
-        loads=tuple(loads[0::2]),
-        unprotected=tuple(loads[1::2]),
-        calibration=evaluator.calibration,
-        engine_name=evaluator.engine.name,
-        engine_version=evaluator.engine.version,
+    if not cases:
+        raise BlastEnvError("cases: there are none, must be at least one")
+    cells = [
+        tuple(check_layout(case.scenario, layout))
+        for case, layout in zip(cases, layouts, strict=True)
+    ]
+    blasts = list(_both(evaluators, cases, cells, processes, progress))
+    return Comparison(
+        cases=tuple(cases),
+        layouts=tuple(cells),
+        impulse_pa_s=_impulses([protected for protected, _ in blasts]),
+        unprotected_pa_s=_impulses([bare for _, bare in blasts]),
+        in_range=np.array([[load.in_range for load in protected] for protected, _ in blasts]),
         cvar_level=cvar_level,
     )
-    if not evaluation.unprotected_impulse_psi_s.value > 0.0:
-        raise BlastEnvError(
-            f"{evaluator.scenario.name}: nothing arrives at the protected structures without a "
-            f"barrier ({len(threats)} threats): there is nothing to reduce"
-        )
-    return evaluation
 
 
-def _check_threats(threats: Sequence[Threat]) -> None:
-    """Refuse no threats, and the same one twice: it would count as evidence twice."""
-    if not threats:
-        raise BlastEnvError("threats: there are none, must be at least one")
-    for index, threat in enumerate(threats):
-        if threat in threats[:index]:
+def loads_of_both(
+    evaluator: BlastEvaluator,
+    case: Case,
+    layout: Sequence[Cell],
+    processes: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]:
+    """Return the loads with a layout and without a barrier, one a threat of the case each.
+
+    Raises:
+        BlastEnvError: As for `compare`.
+    """
+    check_distinct(case.threats)
+    pairs = [(each, threat) for threat in case.threats for each in (layout, ())]
+    loads = evaluator.loads_of_many(pairs, processes, progress)
+    return tuple(loads[0::2]), tuple(loads[1::2])
+
+
+def check_something_arrives(cases: Sequence[Case], unprotected: FloatArray) -> None:
+    """Refuse a case in which there is nothing to reduce.
+
+    Args:
+        cases: The cases.
+        unprotected: Impulse on the protected structures without a barrier (cases, threats).
+
+    Raises:
+        BlastEnvError: If it is 0 under every threat of a case; the message says of which.
+    """
+    for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
+        if not mean > 0.0:
             raise BlastEnvError(
-                f"threats[{index}] is {threat}, is there already: must be none twice"
+                f"{case.name or case.scenario.name}: nothing arrives at the protected structures "
+                f"without a barrier ({len(case.threats)} threats): there is nothing to reduce"
             )
+
+
+def _both(
+    evaluators: Evaluators,
+    cases: Sequence[Case],
+    layouts: Sequence[Layout],
+    processes: int,
+    progress: Callable[[float], None] | None,
+) -> Iterator[tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]]:
+    """Yield the loads with and without the layout of each case.
+
+    The blasts of cases that follow each other on one scenario are run together.
+    """
+    done = 0
+    for first, last in _runs_of_one_scenario(cases):
+        together = range(first, last)
+        pairs = [
+            (cells, threat)
+            for index in together
+            for threat in cases[index].threats
+            for cells in (layouts[index], ())
+        ]
+
+        def tell(share: float, done: int = done, count: int = last - first) -> None:
+            if progress is not None:
+                progress((done + share * count) / len(cases))
+
+        loads = iter(evaluators.of(cases[first].scenario).loads_of_many(pairs, processes, tell))
+        for index in together:
+            check_distinct(cases[index].threats)
+            own = [next(loads) for _ in range(2 * len(cases[index].threats))]
+            yield tuple(own[0::2]), tuple(own[1::2])
+        done = last
+
+
+def _runs_of_one_scenario(cases: Sequence[Case]) -> Iterator[tuple[int, int]]:
+    """Yield where runs of cases on one scenario begin and end."""
+    first = 0
+    for index in range(1, len(cases) + 1):
+        if index == len(cases) or cases[index].scenario is not cases[first].scenario:
+            yield first, index
+            first = index
+
+
+def _impulses(loads: Sequence[Sequence[BlastLoads]]) -> FloatArray:
+    return np.array([[each.protected_impulse_pa_s for each in of_case] for of_case in loads])

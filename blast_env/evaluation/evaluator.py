@@ -1,12 +1,12 @@
 """The loads of layouts under threats, each blast simulated once."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
-
-import joblib
+from typing import Final
 
 from blast_env.calibration.model import Calibration, scenario_calibration
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.loads import BlastLoads, blast_loads
 from blast_env.evaluation.store import (
@@ -14,13 +14,15 @@ from blast_env.evaluation.store import (
     BlastKey,
     LoadsCache,
     calibration_digest,
-    code_version,
     engine_text,
     find_cache,
 )
 from blast_env.geometry import Cell
-from blast_env.physics.engine import Engine, find_engine
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
+from blast_env.provenance import code_version
+from blast_env.runner import as_completed, check_workers
 from blast_env.scenario import Scenario, check_layout
 from blast_env.simulation import Blast
 
@@ -119,18 +121,18 @@ class BlastEvaluator:
             LayoutError: If a layout does not fit the build zone; nothing is simulated then.
             ScenarioError: If a charge is not clear of a structure or the border.
         """
-        if processes < 1:
-            raise BlastEnvError(f"processes is {processes}, must be at least 1")
+        check_workers("processes", processes)
         keys = [self._key(layout, threat) for layout, threat in pairs]
         asked = dict.fromkeys(keys)
         found = {key: loads for key in asked if (loads := self._known(key)) is not None}
         missing = [key for key in asked if key not in found]
-        simulated = _run(map(self._blast, missing), self.calibration, min(processes, len(missing)))
-        for done, (key, loads) in enumerate(zip(missing, simulated, strict=True), start=1):
-            found[key] = loads
-            self._remember(key, loads)
+        run = partial(_run_one, calibration=self.calibration)
+        blasts = [self._blast(key) for key in missing]
+        for done, (index, loads) in enumerate(as_completed(run, blasts, processes), start=1):
+            found[missing[index]] = loads
+            self._remember(missing[index], loads)
             if self._cache is not None:
-                self._cache.add(key, loads)
+                self._cache.add(missing[index], loads)
             self.blasts += 1
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(keys))
@@ -158,15 +160,82 @@ class BlastEvaluator:
         return Blast(self.scenario, key.layout, key.seed, self.engine, key.charge)
 
 
-def _run(blasts: Iterable[Blast], calibration: Calibration, processes: int) -> Iterator[BlastLoads]:
-    """Run blasts; their loads come in the order of the blasts, each as soon as it is there."""
-    if processes <= 1:
-        return (_run_one(blast, calibration) for blast in blasts)
-    jobs = (joblib.delayed(_run_one)(blast, calibration) for blast in blasts)
-    results: Iterator[BlastLoads] = joblib.Parallel(n_jobs=processes, return_as="generator")(jobs)
-    return results
-
-
 def _run_one(blast: Blast, calibration: Calibration) -> BlastLoads:
     """Run one blast, perhaps in a worker process."""
     return blast_loads(blast.run(), calibration)
+
+
+_MOST_EVALUATORS: Final = 4
+_LOADS_PER_EVALUATOR: Final = 1024
+
+
+class Evaluators:
+    """The evaluators of the scenarios that were met last.
+
+    A fresh site at every reset must not fill the memory: only few are kept, and the counts of
+    those that go stay.
+
+    Args:
+        engine: Name of an engine, or an engine.
+        cache: Folder or cache that all of them share; see `BlastEvaluator`.
+        most: How many are kept.
+
+    Attributes:
+        engine: The engine.
+
+    Raises:
+        BlastEnvError: If the cache is of no use.
+        UnknownNameError: If there is no such engine.
+    """
+
+    def __init__(
+        self,
+        engine: str | Engine,
+        cache: str | Path | BlastCache | None = None,
+        most: int = _MOST_EVALUATORS,
+    ) -> None:
+        self.engine = find_engine(engine)
+        self._most = most
+        self._cache = find_cache(cache)
+        self._kept: OrderedDict[str, BlastEvaluator] = OrderedDict()
+        self._gone_blasts = 0
+        self._gone_cache_hits = 0
+
+    @property
+    def blasts(self) -> int:
+        """Number of blasts that were really simulated so far."""
+        return self._gone_blasts + sum(each.blasts for each in self._kept.values())
+
+    @property
+    def cache_hits(self) -> int:
+        """Number of loads that were asked for so far and needed no blast."""
+        return self._gone_cache_hits + sum(each.cache_hits for each in self._kept.values())
+
+    @property
+    def cache_hit_rate(self) -> float:
+        """Share of the loads asked for so far that needed no blast; 0 if none were."""
+        asked = self.blasts + self.cache_hits
+        return self.cache_hits / asked if asked else 0.0
+
+    def of(self, scenario: Scenario) -> BlastEvaluator:
+        """Return the evaluator of a scenario.
+
+        Raises:
+            CalibrationError: If the scenario names no calibration, or one that was made with other
+                parameters or another engine.
+            UnknownNameError: If there is no such engine or calibration.
+        """
+        newest = next(reversed(self._kept.values()), None)
+        if newest is not None and newest.scenario is scenario:
+            return newest  # the usual case, without the time that a content hash takes
+        key = scenario.content_hash
+        if key not in self._kept:
+            self._kept[key] = BlastEvaluator(
+                scenario, self.engine, _LOADS_PER_EVALUATOR, self._cache
+            )
+        self._kept.move_to_end(key)
+        if len(self._kept) > self._most:
+            _, gone = self._kept.popitem(last=False)
+            self._gone_blasts += gone.blasts
+            self._gone_cache_hits += gone.cache_hits
+        return self._kept[key]

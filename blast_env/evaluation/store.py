@@ -2,29 +2,22 @@
 
 import dataclasses
 import json
-import os
 import warnings
 from collections import OrderedDict
-from collections.abc import Iterator
 from dataclasses import asdict
-from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
 from blast_env.calibration.model import Calibration
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
-from blast_env.files import make_folder, write_atomically
+from blast_env.files import FolderStore
 from blast_env.geometry import Cell
 from blast_env.physics.engine import Engine
 from blast_env.physics.scene import Charge
-
-_NO_INFLUENCE: Final = frozenset({"cli", "envs", "export", "recording", "rendering", "sites"})
-"""Parts of the package that cannot change the loads of a blast."""
 
 
 class BlastKey(NamedTuple):
@@ -37,7 +30,7 @@ class BlastKey(NamedTuple):
         seed: Seed of fan and air.
         engine: The engine with its version; see `engine_text`.
         calibration: Digest of the calibration, for the loads in psi*s.
-        code: Version of the package; see `code_version`.
+        code: Version of the package; see `provenance.code_version`.
     """
 
     scenario_hash: str
@@ -112,21 +105,6 @@ def calibration_digest(calibration: Calibration) -> str:
     return sha256(calibration.model_dump_json().encode()).hexdigest()
 
 
-@cache
-def code_version() -> str:
-    """Return the version of the package, with a digest of the code that loads depend on.
-
-    The digest, because whoever changes the model does not change the version at once.
-    """
-    folder = Path(__file__).resolve().parents[1]
-    digest = sha256()
-    for path in sorted(folder.rglob("*.py")):
-        name = path.relative_to(folder)
-        if name.parts[0] not in _NO_INFLUENCE:
-            digest.update(f"{name.as_posix()}\n".encode() + path.read_bytes())
-    return f"{version('blast-env')}+{digest.hexdigest()[:16]}"
-
-
 SUFFIX: Final = ".loads"
 """Files with this suffix belong to the cache; it touches no others."""
 
@@ -135,115 +113,46 @@ MOST_BYTES: Final = 256_000_000
 """Size of a cache unless an argument says otherwise; a blast in the courtyard takes 2 kB."""
 
 
-_CHECKSUM_BYTES: Final = 32
-
-
-_KEPT_SHARE: Final = 0.9  # when something has to go, so that not every blast tidies up
-
-
-_UNSEEN_SHARE: Final = 1.0 / 32.0
-
-
-class _Entry(NamedTuple):
-    """A file of the cache: when it was last used, its size in bytes, and where it is."""
-
-    used_ns: int
-    size: int
-    path: str
-
-
 class DiskCache:
-    """Keeps loads in files of a folder; what was not asked for longest goes first.
+    """Keeps loads in files of a folder, for other processes and the next run; see `FolderStore`.
 
-    Any number of processes may use one folder at once. A file that was damaged, or is not what
-    its name says, is deleted and counts as not there. Where the folder cannot be written (any
-    more), a warning says so and the work goes on.
-
-    It can be pickled; the copy uses the same folder.
+    Where the folder cannot be written (any more), a warning says so and the work goes on.
 
     Args:
         folder: The folder; it is made if need be.
-        most_bytes: Most that the files take together. Each process looks after every 32nd part of
-            it that it has written, so several may exceed it by as much for a moment.
-
-    Attributes:
-        folder: The folder, as an absolute path.
-        most_bytes: As given.
-        damaged: Number of damaged files that this object has found.
+        most_bytes: Most that the files take together.
 
     Raises:
         BlastEnvError: If the folder cannot be made, or `most_bytes` is negative.
     """
 
     def __init__(self, folder: str | Path, most_bytes: int = MOST_BYTES) -> None:
-        if most_bytes < 0:
-            raise BlastEnvError(f"most_bytes is {most_bytes}, must be at least 0")
-        self.folder = Path(folder).absolute()
-        self.most_bytes = most_bytes
-        self.damaged = 0
-        self._unseen_bytes = most_bytes  # nobody has looked yet
-        make_folder(self.folder)
+        self._store = FolderStore(folder, SUFFIX, most_bytes)
+
+    @property
+    def folder(self) -> Path:
+        """The folder, as an absolute path."""
+        return self._store.folder
+
+    @property
+    def damaged(self) -> int:
+        """Number of damaged files that this object has found."""
+        return self._store.damaged
 
     def get(self, key: BlastKey) -> BlastLoads | None:
         """Return the loads of a blast, or `None` if they are not there in one piece."""
-        path = self._path(key)
-        try:
-            content = path.read_bytes()
-        except OSError:
-            return None
-        loads = _decoded(content, key)
-        try:
-            if loads is None:
-                self.damaged += 1
-                path.unlink(missing_ok=True)
-            else:
-                os.utime(path)
-        except OSError:  # a folder that may only be read
-            pass
-        return loads
+        content = self._store.get(_key_text(key))
+        return None if content is None else _decoded(content)
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast; the ones that were asked for longest ago may have to go."""
-        content = _encoded(key, loads)
         try:
-            with write_atomically(self._path(key)) as temporary:
-                temporary.write_bytes(content)
-        except (BlastEnvError, OSError) as error:
+            self._store.put(_key_text(key), _encoded(loads))
+        except BlastEnvError as error:
             warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=2)
-            return
-        self._unseen_bytes += len(content)
-        if self._unseen_bytes > _UNSEEN_SHARE * self.most_bytes:
-            self._unseen_bytes = 0
-            self._tidy_up()
 
     def __len__(self) -> int:
-        return sum(1 for _ in self._entries())
-
-    def _path(self, key: BlastKey) -> Path:
-        return self.folder / f"{sha256(_key_text(key).encode()).hexdigest()}{SUFFIX}"
-
-    def _entries(self) -> Iterator[_Entry]:
-        """Yield the files, those that a killed process left unfinished among them."""
-        with os.scandir(self.folder) as listed:
-            for item in listed:
-                if item.name.endswith(SUFFIX):
-                    try:
-                        status = item.stat()
-                    except OSError:  # another process has deleted it
-                        continue
-                    yield _Entry(status.st_mtime_ns, status.st_size, item.path)
-
-    def _tidy_up(self) -> None:
-        """Delete files until the rest is small enough, if all together are too large."""
-        entries = sorted(self._entries())
-        size = sum(entry.size for entry in entries)
-        if size <= self.most_bytes:
-            return
-        for entry in entries:
-            if size <= _KEPT_SHARE * self.most_bytes:
-                return
-            Path(entry.path).unlink(missing_ok=True)
-            size -= entry.size
+        return len(self._store)
 
 
 def find_cache(value: str | Path | BlastCache | None) -> BlastCache | None:
@@ -266,24 +175,15 @@ def _key_text(key: BlastKey) -> str:
     return json.dumps(key)
 
 
-def _encoded(key: BlastKey, loads: BlastLoads) -> bytes:
-    """Return the content of a file: checksum, a line of JSON, the impulses on the modules."""
-    header = {"key": _key_text(key), "structures": [asdict(load) for load in loads.structures]}
-    impulses = loads.module_impulse_sim.astype("<f8").tobytes()
-    body = json.dumps(header).encode() + b"\n" + impulses
-    return sha256(body).digest() + body
+def _encoded(loads: BlastLoads) -> bytes:
+    """Return a line of JSON, and the impulses on the modules."""
+    header = [asdict(load) for load in loads.structures]
+    return json.dumps(header).encode() + b"\n" + loads.module_impulse_sim.astype("<f8").tobytes()
 
 
-def _decoded(content: bytes, key: BlastKey) -> BlastLoads | None:
-    """Return the loads that a file holds, or `None` if it is damaged or of another blast."""
-    checksum, body = content[:_CHECKSUM_BYTES], content[_CHECKSUM_BYTES:]
-    if sha256(body).digest() != checksum:
-        return None
-    line, _, impulses = body.partition(b"\n")
-    header: dict[str, Any] = json.loads(line)
-    if header["key"] != _key_text(key):
-        return None
+def _decoded(content: bytes) -> BlastLoads:
+    line, _, impulses = content.partition(b"\n")
     structures = tuple(
-        StructureLoad(**{**each, "notes": tuple(each["notes"])}) for each in header["structures"]
+        StructureLoad(**{**each, "notes": tuple(each["notes"])}) for each in json.loads(line)
     )
     return BlastLoads(structures, np.frombuffer(impulses, dtype="<f8").astype(np.float64))

@@ -4,7 +4,7 @@ from math import ceil, pi, tan
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import import_extra
 from blast_env.export.plan import Feature, FeatureKind, LayoutPlan
 from blast_env.files import write_atomically
 from blast_env.geometry import Rectangle
@@ -101,16 +101,12 @@ def _rounded_outline(rectangle: Rectangle, radius: float) -> tuple[CornerM, ...]
     )
 
 
-try:
+with import_extra("export", "DXF files"):
     from ezdxf import units
     from ezdxf.document import Drawing
     from ezdxf.enums import MTextEntityAlignment, TextEntityAlignment
     from ezdxf.filemanagement import new
     from ezdxf.layouts.layout import Modelspace
-except ImportError as error:
-    raise BlastEnvError(
-        f"DXF files need {error.name!r}, which is not installed: pip install blast-env[agents]"
-    ) from error
 
 
 VERSION: Final = "R2010"

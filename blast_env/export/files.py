@@ -117,6 +117,7 @@ def _write_json(plan: LayoutPlan, path: Path) -> None:
 
 
 def _write_dxf(plan: LayoutPlan, path: Path) -> None:
+    # Here, because the other forms do not need the extra `export`.
     from blast_env.export.dxf import write_dxf
 
     write_dxf(plan, path)

@@ -11,7 +11,7 @@ from typing import Any
 
 from blast_env.geometry import Cell, Rectangle
 from blast_env.physics.scene import Charge
-from blast_env.physics.structure import BARRIER_NAME, ModularObstacle, ModularPart
+from blast_env.physics.structure import ModularPart
 from blast_env.scenario import (
     AnySource,
     BuildZone,
@@ -20,6 +20,7 @@ from blast_env.scenario import (
     SegmentSource,
     check_layout,
 )
+from blast_env.scenario.build_scene import barrier_outline
 from blast_env.units import UNITS_PER_M
 
 _DIGITS = 9  # of a metre: what is beyond is rounding
@@ -89,14 +90,7 @@ class LayoutPlan:
         zone = self.scenario.build_zone
         if zone is None:
             return ()
-        barrier = ModularObstacle(
-            name=BARRIER_NAME,
-            corner=(zone.corner_m[0] * UNITS_PER_M, zone.corner_m[1] * UNITS_PER_M),
-            rows=zone.rows,
-            columns=zone.columns,
-            cells=self.layout,
-        )
-        return tuple(barrier.parts)
+        return tuple(barrier_outline(zone, self.layout).build().parts)
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:

@@ -2,19 +2,15 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.errors import UnknownNameError
 from blast_env.physics.collisions import CollisionLog
 from blast_env.physics.particles import distance_to_rectangle
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
-
-ENGINE_NAMES: Final = ("pymunk", "event")
-"""The engines that come with the package; the first one is the reference."""
 
 
 class EndReason(StrEnum):
@@ -121,22 +117,3 @@ class Engine(Protocol):
 
     def start(self, scene: Scene) -> BlastRun:
         """Return a run of the scene at time 0, independent of every other run."""
-
-
-def find_engine(engine: str | Engine) -> Engine:
-    """Return an engine by its name, or the engine itself.
-
-    Raises:
-        UnknownNameError: If there is no engine of that name.
-    """
-    if not isinstance(engine, str):
-        return engine
-    if engine not in ENGINE_NAMES:
-        raise UnknownNameError("engine", engine, ENGINE_NAMES)
-    if engine == "event":
-        from blast_env.physics.event.engine import EventEngine
-
-        return EventEngine()
-    from blast_env.physics.pymunk.engine import PymunkEngine
-
-    return PymunkEngine()

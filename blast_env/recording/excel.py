@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import pandas as pd
 import xlsxwriter
@@ -16,12 +16,13 @@ from xlsxwriter.exceptions import XlsxFileError
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.structure import BARRIER_NAME
-from blast_env.recording.tables import COLLISION_COLUMNS, MODULE_COLUMNS, STRUCTURE_COLUMNS
+from blast_env.recording.tables import (
+    COLLISION_COLUMNS,
+    MODULE_COLUMNS,
+    STRUCTURE_COLUMNS,
+    RecordedBlast,
+)
 from blast_env.tables import Column
-
-if TYPE_CHECKING:
-    from blast_env.simulation import BlastResult
-
 
 LONGEST_VALUE: Final = 400
 """The most characters of the run record in one cell; the rest goes on in the next row."""
@@ -200,14 +201,14 @@ class ChartData(NamedTuple):
     table: pd.DataFrame
 
 
-def chart_data(result: "BlastResult") -> ChartData:
+def chart_data(blast: RecordedBlast) -> ChartData:
     """Return what there is to chart of a blast."""
-    rankings = tuple(_rankings(result))
+    rankings = tuple(_rankings(blast))
     # The empty head gives the columns when nothing was hit.
-    ranked = pd.concat([result.modules.head(0), *(ranking.modules for ranking in rankings)])
+    ranked = pd.concat([blast.modules.head(0), *(ranking.modules for ranking in rankings)])
     # In the order of the scenario, so that the colours do not depend on who is hit most.
-    present = result.structures["structure"].isin(ranked["structure"])
-    structures = tuple(result.structures.loc[present, "structure"])
+    present = blast.structures["structure"].isin(ranked["structure"])
+    structures = tuple(blast.structures.loc[present, "structure"])
     impulses = tuple(
         Column(f"impulse_on_{structure}_sim", "sim", "sum of m |v| over the collisions")
         for structure in structures
@@ -240,17 +241,17 @@ def add_charts(workbook: Any, sheet: Any, column: int, data_sheet: str, data: Ch
         first += len(ranking.modules)
 
 
-def _rankings(result: "BlastResult") -> Iterator[Ranking]:
+def _rankings(blast: RecordedBlast) -> Iterator[Ranking]:
     """Yield a ranking of the protected structures and one of the barrier, as far as hit."""
-    structures = result.structures
+    structures = blast.structures
     is_barrier = structures["structure"] == BARRIER_NAME
     protected = structures["protected"] & ~is_barrier
     groups = {"protected structures": protected, "barrier": is_barrier}
     if not protected.any():  # a study of the model, not of protection
         groups = {"structures": ~is_barrier, "barrier": is_barrier}
     for name, rows in groups.items():
-        in_group = result.modules["structure"].isin(structures.loc[rows, "structure"])
-        hit = result.modules[in_group & (result.modules["hits"] > 0)]
+        in_group = blast.modules["structure"].isin(structures.loc[rows, "structure"])
+        hit = blast.modules[in_group & (blast.modules["hits"] > 0)]
         if len(hit):
             yield _ranking(name, hit)
 
@@ -356,17 +357,17 @@ _UNITS: Final = (
 
 
 def write_workbook(
-    result: "BlastResult", path: str | Path, max_rows_per_sheet: int = EXCEL_ROWS
+    blast: RecordedBlast, path: str | Path, max_rows_per_sheet: int = EXCEL_ROWS
 ) -> Path:
     """Write a workbook with the run record, the tables and charts of the impulse per module.
 
     Its sheets are `Run` (with the charts), `Structures`, `Modules`, `Collisions`, `Most loaded`
     (what the charts show) and `Columns`, which explains every column. A table that is too long
     for one sheet goes on in `Collisions 2` and so on. The file is written whole or not at all,
-    and two workbooks of the same result are the same to the last byte.
+    and two workbooks of the same blast are the same to the last byte.
 
     Args:
-        result: The blast.
+        blast: The blast.
         path: The file, with the suffix `.xlsx`; an existing one is replaced.
         max_rows_per_sheet: The most rows that a table has on one sheet, its header included.
 
@@ -394,7 +395,7 @@ def write_workbook(
                 ) as workbook,
             ):
                 workbook.use_zip64()
-                _WorkbookWriter(workbook, max_rows_per_sheet).write(result)
+                _WorkbookWriter(workbook, max_rows_per_sheet).write(blast)
         except (OSError, XlsxFileError) as error:
             raise BlastEnvError(f"{path}: cannot be written: {error}") from error
     return path
@@ -418,9 +419,9 @@ class _WorkbookWriter:
         self._text_heading = workbook.add_format(heading)
         self._number_heading = workbook.add_format(heading | {"align": "right", "indent": 0})
 
-    def write(self, result: "BlastResult") -> None:
+    def write(self, blast: RecordedBlast) -> None:
         """Write all sheets and the properties."""
-        record = result.run_record
+        record = blast.run_record
         self._workbook.set_properties(
             {
                 "title": f"Blast {record['scenario']}, seed {record['seed']}",
@@ -429,10 +430,10 @@ class _WorkbookWriter:
             }
         )
         run = self._write_run(record)
-        self._write_table("Structures", result.structures, STRUCTURE_COLUMNS)
-        self._write_table("Modules", result.modules, MODULE_COLUMNS)
-        self._write_table("Collisions", result.collisions, COLLISION_COLUMNS)
-        data = chart_data(result)
+        self._write_table("Structures", blast.structures, STRUCTURE_COLUMNS)
+        self._write_table("Modules", blast.modules, MODULE_COLUMNS)
+        self._write_table("Collisions", blast.collisions, COLLISION_COLUMNS)
+        data = chart_data(blast)
         self._write_sheet(_CHART_SHEET, data.table, data.columns)
         add_charts(self._workbook, run, _CHART_COLUMN, _CHART_SHEET, data)
         self._write_columns()

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import pandas as pd
 import pyarrow as pa
@@ -10,10 +10,7 @@ import pyarrow.parquet as pq
 
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.recording.tables import COLLISION_COLUMNS
-
-if TYPE_CHECKING:
-    from blast_env.simulation import BlastResult
+from blast_env.recording.tables import COLLISION_COLUMNS, RecordedBlast
 
 METADATA_KEY: Final = b"blast_env"
 """Key of the run record, as JSON, in the metadata of the file."""
@@ -21,14 +18,14 @@ METADATA_KEY: Final = b"blast_env"
 SUFFIX: Final = ".parquet"
 
 
-def write_parquet(result: "BlastResult", path: str | Path) -> Path:
+def write_parquet(blast: RecordedBlast, path: str | Path) -> Path:
     """Write the collision table, exact to the last bit, with the run record in the metadata.
 
     The metadata of each field has its `unit` and its `meaning`. The file is written whole or not
     at all.
 
     Args:
-        result: The blast.
+        blast: The blast.
         path: The file, with the suffix `.parquet`; an existing one is replaced.
 
     Returns:
@@ -40,7 +37,7 @@ def write_parquet(result: "BlastResult", path: str | Path) -> Path:
     path = Path(path)
     if path.suffix.lower() != SUFFIX:
         raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
-    table = _arrow_table(result)
+    table = _arrow_table(blast)
     with write_atomically(path) as temporary:
         try:
             pq.write_table(table, temporary)
@@ -74,9 +71,9 @@ def read_parquet(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
     return table.to_pandas(), _run_record(path, table.schema.metadata or {})
 
 
-def _arrow_table(result: "BlastResult") -> pa.Table:
+def _arrow_table(blast: RecordedBlast) -> pa.Table:
     """Return the collision table with all its metadata."""
-    table = pa.Table.from_pandas(result.collisions, preserve_index=False)
+    table = pa.Table.from_pandas(blast.collisions, preserve_index=False)
     columns = {column.name: column for column in COLLISION_COLUMNS}
     fields = [
         field.with_metadata(
@@ -84,7 +81,7 @@ def _arrow_table(result: "BlastResult") -> pa.Table:
         )
         for field in table.schema
     ]
-    record = json.dumps(result.run_record, ensure_ascii=False).encode()
+    record = json.dumps(blast.run_record, ensure_ascii=False).encode()
     metadata = {**table.schema.metadata, METADATA_KEY: record}
     return table.cast(pa.schema(fields, metadata=metadata))
 

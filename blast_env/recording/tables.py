@@ -1,7 +1,7 @@
 """The tables of a blast as data frames, with the unit and the meaning of every column."""
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,30 @@ from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import ModularObstacle
 from blast_env.tables import Column
 from blast_env.units import UNITS_PER_M
+
+RunRecord = dict[str, str | int | float]
+"""What was run, with which versions, and how it ended; names and plain values."""
+
+
+class RecordedBlast(Protocol):
+    """What is written of a blast: its tables, and what repeats it."""
+
+    @property
+    def collisions(self) -> pd.DataFrame:
+        """One row a collision; the columns are `COLLISION_COLUMNS`."""
+
+    @property
+    def modules(self) -> pd.DataFrame:
+        """One row a module; the columns are `MODULE_COLUMNS`."""
+
+    @property
+    def structures(self) -> pd.DataFrame:
+        """One row a structure; the columns are `STRUCTURE_COLUMNS`."""
+
+    @property
+    def run_record(self) -> RunRecord:
+        """What was run, with which versions, and how it ended."""
+
 
 COLLISION_COLUMNS: Final = (
     Column("time_s", "s", "time of the collision, from the detonation"),

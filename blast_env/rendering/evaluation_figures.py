@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation import ThreatOutcome
-from blast_env.evaluation.comparison import LayoutEvaluation
-from blast_env.geometry import Cell
+from blast_env.evaluation.cases import Case
+from blast_env.evaluation.comparison import Comparison
+from blast_env.evaluation.report import LayoutEvaluation
+from blast_env.geometry import Layout
 from blast_env.physics.scene import Scene, StructureOutline
 from blast_env.physics.structure import ModularObstacle
 from blast_env.rendering.site_plan import (
@@ -38,7 +38,7 @@ from blast_env.rendering.style import (
     render_extra,
     unit_interval,
 )
-from blast_env.scenario import BuildZone, Scenario
+from blast_env.scenario import BuildZone
 from blast_env.scenario.build_scene import build_scene
 from blast_env.statistics import Estimate
 
@@ -243,7 +243,7 @@ def _interval(reduction: Estimate) -> str:
 
 def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
     """Draw the impulse of each threat without and with the barrier, the worst first."""
-    outcomes = sorted(evaluation.outcomes, key=lambda outcome: -outcome.impulse_psi_s)
+    outcomes = sorted(evaluation.outcomes, key=lambda outcome: -outcome.impulse_pa_s)
     place = np.arange(1, len(outcomes) + 1)
     bare = np.array([outcome.unprotected_impulse_pa_s for outcome in outcomes])
     impulse = np.array([outcome.impulse_pa_s for outcome in outcomes])
@@ -367,63 +367,77 @@ _OUT_OF_RANGE: Final = " ~"
 
 
 @dataclass(frozen=True, eq=False)
-class ProtectedCase:
-    """A layout, and what it does against the threat of its case.
+class _Panel:
+    """One case of a comparison.
 
     Attributes:
-        scenario: The site.
-        layout: (row, column) of each module.
-        outcome: With the layout and without a barrier.
+        case: The case.
+        layout: Its layout.
+        reduction: What that takes off; NaN where nothing arrives without it.
+        in_range: Whether the calibration was made for it.
     """
 
-    scenario: Scenario
-    layout: tuple[Cell, ...]
-    outcome: ThreatOutcome
+    case: Case
+    layout: Layout
+    reduction: float
+    in_range: bool
 
     def scene(self) -> Scene:
-        """Return the site with the layout and the charge."""
-        threat = self.outcome.threat
-        return build_scene(self.scenario, self.layout, threat.seed, threat.charge)
+        """Return the site with the layout and the first charge."""
+        threat = self.case.threats[0]
+        return build_scene(self.case.scenario, self.layout, threat.seed, threat.charge)
 
 
-def cases_figure(cases: Sequence[ProtectedCase], reduction: Estimate) -> Figure:
+def comparison_figure(comparison: Comparison) -> Figure:
     """Return a picture of layouts and of how much each takes off, four in a row.
 
-    Args:
-        cases: At least one. The first `MOST_SHOWN` are drawn, numbered from 1; if there are more,
-            the picture says so.
-        reduction: Of the mean impulse on the protected structures over all cases.
+    The first `MOST_SHOWN` cases are drawn, numbered from 1; if there are more, the picture says so.
 
-    Raises:
-        BlastEnvError: If there is no case.
+    Args:
+        comparison: Layouts, one a case.
     """
-    if not cases:
-        raise BlastEnvError("cases: there are none, must be at least one")
-    shown = cases[:MOST_SHOWN]
+    panels = [
+        _Panel(case, layout, float(reduction), bool(in_range.all()))
+        for case, layout, reduction, in_range in zip(
+            comparison.cases,
+            comparison.layouts,
+            comparison.case_reductions,
+            comparison.in_range,
+            strict=True,
+        )
+    ]
+    shown = panels[:MOST_SHOWN]
     columns = min(len(shown), _COLUMNS)
-    figure, panels = _empty_panels(shown, columns)
-    is_one_site = len({case.scenario.content_hash for case in cases}) == 1
-    scenes = [case.scene() for case in shown]
-    for number, (axes, case, scene) in enumerate(zip(panels, shown, scenes, strict=True), start=1):
-        _draw_case(axes, case, scene, f"case {number}")
-        _write_threat(axes, case, "" if is_one_site else f"{case.scenario.name}, ")
+    figure, all_axes = _empty_panels(shown, columns)
+    is_one_site = len({panel.case.scenario.content_hash for panel in panels}) == 1
+    scenes = [panel.scene() for panel in shown]
+    for number, (axes, panel, scene) in enumerate(
+        zip(all_axes, shown, scenes, strict=True), start=1
+    ):
+        _draw_case(axes, panel, scene, f"case {number}")
+        _write_threat(axes, panel, "" if is_one_site else f"{panel.case.scenario.name}, ")
         axes.set_xlabel("x (m)" if number > len(shown) - columns else "")
         axes.set_ylabel("y (m)" if number % columns == 1 or columns == 1 else "")
-    zones = [case.scenario.build_zone for case in shown if case.scenario.build_zone is not None]
+    all_zones = [panel.case.scenario.build_zone for panel in shown]
+    zones = [zone for zone in all_zones if zone is not None]
     richest = max(zones, key=lambda zone: len(zone.keep_outs), default=None)
     structures = [outline for scene in scenes for outline in scene.structures]
     handles = layout_legend(structures, richest)
     figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9, frameon=False)
-    place = cases[0].scenario.name if is_one_site else "different sites"
-    write_heading(figure, f"{place}: {_headline(len(cases), reduction)}", _cases_subtitle(cases))
+    place = panels[0].case.scenario.name if is_one_site else "different sites"
+    write_heading(
+        figure,
+        f"{place}: {_headline(len(panels), comparison.reduction)}",
+        _cases_subtitle(panels),
+    )
     return figure
 
 
-def _empty_panels(shown: Sequence[ProtectedCase], columns: int) -> tuple[Figure, list[Axes]]:
+def _empty_panels(shown: Sequence[_Panel], columns: int) -> tuple[Figure, list[Axes]]:
     """Return a figure with a panel a case, high enough for the highest site."""
     rows = ceil(len(shown) / columns)
     width_in = max(columns * _PANEL_IN, _LEAST_WIDTH_IN)
-    sites = [case.scenario.site for case in shown]
+    sites = [panel.case.scenario.site for panel in shown]
     slenderness = max(site.height_m / site.width_m for site in sites)
     least_in, most_in = _PANEL_HEIGHTS_IN
     plan_in = slenderness * (width_in / columns - _NUMBERS_IN)
@@ -435,13 +449,13 @@ def _empty_panels(shown: Sequence[ProtectedCase], columns: int) -> tuple[Figure,
     return figure, panels[: len(shown)]
 
 
-def _draw_case(axes: Axes, case: ProtectedCase, scene: Scene, name: str) -> None:
-    draw_layout(axes, case.scenario.build_zone, scene)
-    draw_charge(axes, case.outcome.threat.charge.position_m)
+def _draw_case(axes: Axes, panel: _Panel, scene: Scene, name: str) -> None:
+    draw_layout(axes, panel.case.scenario.build_zone, scene)
+    draw_charge(axes, panel.case.threats[0].charge.position_m)
     axes.tick_params(labelsize=7.5)
-    mark = "" if case.outcome.in_range else _OUT_OF_RANGE
+    mark = "" if panel.in_range else _OUT_OF_RANGE
     axes.set_title(
-        f"{name}: reduction {_percent_or_dash(case.outcome.reduction)}{mark}",
+        f"{name}: reduction {_percent_or_dash(panel.reduction)}{mark}",
         fontsize=10.5,
         fontweight="bold",
         color=unit_interval(INK),
@@ -449,12 +463,12 @@ def _draw_case(axes: Axes, case: ProtectedCase, scene: Scene, name: str) -> None
     )
 
 
-def _write_threat(axes: Axes, case: ProtectedCase, site: str) -> None:
+def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
     """Write two quiet lines between title and panel."""
-    (x_m, y_m), tnt_kg = case.outcome.threat.charge
+    (x_m, y_m), tnt_kg = panel.case.threats[0].charge
     charge = f"{tnt_kg:g} kg TNT at ({x_m:.1f}, {y_m:.1f}) m"
     axes.annotate(
-        f"{site}{count_of('module', len(case.layout))}\n{charge}",
+        f"{site}{count_of('module', len(panel.layout))}\n{charge}",
         (0.5, 1.0),
         xycoords="axes fraction",
         xytext=(0.0, 2.0),
@@ -475,14 +489,16 @@ def _headline(count: int, reduction: Estimate) -> str:
     return f"{text} (95 %: {_percent_or_dash(reduction.low)} to {_percent_or_dash(reduction.high)})"
 
 
-def _cases_subtitle(cases: Sequence[ProtectedCase]) -> str:
+def _cases_subtitle(panels: Sequence[_Panel]) -> str:
     """Return what the numbers are, how many cases are shown, and which are to be distrusted."""
     parts = ["reduction of the impulse on the protected structures"]
-    if len(cases) > MOST_SHOWN:
-        parts.append(f"mean over all {len(cases)} cases, of which the first {MOST_SHOWN} are shown")
+    if len(panels) > MOST_SHOWN:
+        parts.append(
+            f"mean over all {len(panels)} cases, of which the first {MOST_SHOWN} are shown"
+        )
     else:
-        parts.append(count_of("case", len(cases)))
-    if not all(case.outcome.in_range for case in cases):
+        parts.append(count_of("case", len(panels)))
+    if not all(panel.in_range for panel in panels):
         parts.append("~ outside the calibration's range")
     return "; ".join(parts)
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import import_extra
 from blast_env.physics.particles import CollisionType, distance_to_rectangle
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import Colour
@@ -21,18 +21,12 @@ def render_extra() -> Iterator[None]:
     """Import packages of the extra `render` in this block.
 
     Raises:
-        BlastEnvError: If one of them is not installed; the message says how to get it.
+        MissingExtraError: If one of them is not installed; the message says how to get it.
     """
     # pygame greets on standard output, which belongs to the program that imports us.
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-    try:
+    with import_extra("render", "pictures and films"):
         yield
-    except ImportError as error:
-        missing = error.name or str(error)
-        raise BlastEnvError(
-            f"pictures and films need {missing!r}, which is not installed: "
-            "pip install blast-env[render]"
-        ) from error
 
 
 PAGE: Final[Colour] = (255, 255, 255)

@@ -9,7 +9,7 @@ from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.presets import for_charge
 from blast_env.physics.scene import Charge, Scene, StructureOutline
 from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
-from blast_env.scenario import Scenario, check_layout
+from blast_env.scenario import BuildZone, Scenario, check_layout, usable_cells
 from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
 from blast_env.units import UNITS_PER_M
 
@@ -59,14 +59,14 @@ def build_scene(
     """
     cells = check_layout(scenario, layout)
     if charge is not None:
-        check_layout(scenario.with_charge(charge), cells)
+        _check_clear(scenario.with_charge(charge), cells)
     charge_rng, fan_rng, air_rng = random_streams(seed)
     charge = scenario.sample_charge(charge_rng) if charge is None else charge
     parameters = for_charge(scenario.parameters, charge.tnt_kg)
     site = scenario.site.rectangle_m.scaled(UNITS_PER_M)
     structures = tuple(_outline(section) for section in scenario.structures)
     if cells:
-        structures += (_barrier_outline(scenario, cells),)
+        structures += (barrier_outline(scenario.zone, cells),)
     centre = (charge.position_m[0] * UNITS_PER_M, charge.position_m[1] * UNITS_PER_M)
     air = air_lattice(
         parameters.air,
@@ -85,6 +85,17 @@ def build_scene(
         structures=structures,
         parameters=parameters,
     )
+
+
+def _check_clear(scenario: Scenario, cells: tuple[Cell, ...]) -> None:
+    """Refuse a layout with a module on the charge; nothing else depends on where that is.
+
+    Raises:
+        LayoutError: If there is one.
+    """
+    usable = usable_cells(scenario)
+    if not all(usable[cell] for cell in cells):
+        check_layout(scenario, cells)
 
 
 def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]:
@@ -113,10 +124,8 @@ def _outline(section: AnyStructure) -> StructureOutline:
     )
 
 
-def _barrier_outline(scenario: Scenario, cells: tuple[Cell, ...]) -> StructureOutline:
-    zone = scenario.build_zone
-    if zone is None:  # check_layout refuses a layout without a zone
-        raise AssertionError("a layout was accepted without a build zone")
+def barrier_outline(zone: BuildZone, cells: tuple[Cell, ...]) -> StructureOutline:
+    """Return the barrier that the modules on these cells of a zone make."""
     return StructureOutline(
         kind=ModularObstacle,
         name=BARRIER_NAME,

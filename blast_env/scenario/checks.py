@@ -74,7 +74,7 @@ def _access_way_problem(
     zone: BuildZone, way: AccessWay, passable: NDArray[np.bool_], usable: NDArray[np.bool_]
 ) -> Problem | None:
     """Return why the access way and the zone do not fit each other, or `None` if they do."""
-    widest_m = min(zone.rows, zone.columns) * MODULE_SIDE_M
+    widest_m = min(zone.shape) * MODULE_SIDE_M
     if way.width_m > widest_m:
         message = f"is {way.width_m:g}, must be at most {widest_m:g}, the zone's shorter side"
         return Problem("build_zone.access_way.width_m", message)
@@ -169,6 +169,17 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
         *_build_zone_problems(parts),
         *_simulation_problems(parts),
     )
+
+
+def check_sources(parts: Parts) -> tuple[Problem, ...]:
+    """Return what is wrong between the sources of the charge and the other sections.
+
+    Those are what `check_parts` finds if the other sections fit each other.
+    """
+    problems = (*_charge_problems(parts), *_build_zone_problems(parts))
+    if parts.parameters is None:
+        return problems
+    return (*problems, *_charge_scaling_problems(parts.parameters, parts.sources))
 
 
 def _sound(adapter: TypeAdapter[Item], value: object) -> Item | None:

@@ -4,18 +4,31 @@ All lengths are in metres, x to the right and y upwards from the lower left corn
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from typing import Annotated, Any, Final, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, StrictInt, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    StrictInt,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.scene import Charge
-from blast_env.scenario.checks import Parts, charge_radius_m, check_parts, sound_parts
+from blast_env.scenario.checks import (
+    Parts,
+    charge_radius_m,
+    check_parts,
+    check_sources,
+    sound_parts,
+)
 from blast_env.scenario.problems import ScenarioError, problems_from
 from blast_env.scenario.sections import (
     AnySource,
@@ -69,6 +82,10 @@ _LATER_KEYS: Final = ("clearance_m", "module_cost", "cost_areas", "budget", "acc
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
 
+Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
+"""Where the charge comes from."""
+
+
 def _check_version(version: int) -> int:
     """Refuse a file of another version of the format."""
     if version != SCHEMA_VERSION:
@@ -95,11 +112,24 @@ class Scenario(Section):
     name: Name
     description: Annotated[str, Field(max_length=2000)] = ""
     site: Site
-    charge: Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
+    charge: Sources
     structures: Annotated[tuple[AnyStructure, ...], Field(min_length=1, max_length=100)]
     build_zone: BuildZone | None = None
     simulation: SimulationSection = SimulationSection()
     calibration: Name | None = None
+
+    @property
+    def zone(self) -> BuildZone:
+        """The build zone, for what cannot do without one.
+
+        Raises:
+            BlastEnvError: If there is none.
+        """
+        if self.build_zone is None:
+            raise BlastEnvError(
+                f"scenario {self.name!r} has no build zone, so nothing can be placed in it"
+            )
+        return self.build_zone
 
     @property
     def parameters(self) -> SimulationParameters:
@@ -180,9 +210,37 @@ class Scenario(Section):
         Raises:
             ScenarioError: If the charge would not be clear of a structure or the border.
         """
-        document = self.model_dump()
-        document["charge"] = [{"kind": "point", **charge._asdict()}]
-        return Scenario.from_document(document, self.name)
+        return self._with_points((), (charge,))
+
+    def with_possible_charges(self, charges: Sequence[Charge]) -> "Scenario":
+        """Return the scenario in which these charges are possible as well.
+
+        A module must keep clear of a charge that was put where the scenario has none.
+
+        Raises:
+            ScenarioError: If a charge is out of bounds, or not clear of a structure or the border.
+        """
+        return self._with_points(self.charge, tuple(dict.fromkeys(charges)))
+
+    def _with_points(
+        self, sources: tuple[AnySource, ...], charges: tuple[Charge, ...]
+    ) -> "Scenario":
+        """Return the scenario with other sources, those given and charges at fixed points.
+
+        The other sections are sound, and need no check but that of the charge against them.
+        """
+        document = [{"kind": "point", **charge._asdict()} for charge in charges]
+        try:
+            together = _SOURCES.validate_python((*sources, *document))
+        except ValidationError:  # all that is wrong is in the error of the whole
+            own = [source.model_dump() for source in sources]
+            return Scenario.from_document(
+                self.model_dump() | {"charge": [*own, *document]}, self.name
+            )
+        problems = check_sources(self._parts(together))
+        if problems:
+            raise ScenarioError(self.name, dict.fromkeys(problems))
+        return self.model_copy(update={"charge": together})
 
     def with_simulation(
         self, preset: str | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
@@ -215,19 +273,24 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _check_sections_together(self) -> Self:
         """Refuse a scenario whose sections do not fit each other."""
-        problems = check_parts(
-            Parts(
-                site=self.site,
-                sources=dict(enumerate(self.charge)),
-                structures=dict(enumerate(self.structures)),
-                all_structures=True,
-                build_zone=self.build_zone,
-                parameters=self.parameters,
-            )
-        )
+        problems = check_parts(self._parts(self.charge))
         if problems:
             raise ScenarioError(self.name, problems)
         return self
+
+    def _parts(self, sources: Sequence[AnySource]) -> Parts:
+        """Return the sections for the checks between them, with these sources."""
+        return Parts(
+            site=self.site,
+            sources=dict(enumerate(sources)),
+            structures=dict(enumerate(self.structures)),
+            all_structures=True,
+            build_zone=self.build_zone,
+            parameters=self.parameters,
+        )
+
+
+_SOURCES: Final = TypeAdapter(Sources)
 
 
 def _without_words(zone: BuildZone) -> dict[str, Any]:

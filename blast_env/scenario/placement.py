@@ -16,6 +16,7 @@ from blast_env.geometry import Cell
 from blast_env.scenario.models import Scenario
 from blast_env.scenario.problems import type_word, value_text
 from blast_env.scenario.zone import (
+    NO_ZONE,
     BuildZone,
     EmptyZone,
     Surroundings,
@@ -54,6 +55,8 @@ def cell_from(item: Any, place: str) -> Cell:
     Raises:
         LayoutError: If it is anything else.
     """
+    if type(item) is tuple and tuple(map(type, item)) == (int, int):
+        return item  # the usual case
     listed = item.tolist() if isinstance(item, np.ndarray | np.generic) else item
     if not isinstance(listed, list | tuple):
         raise LayoutError(f"{place}: is {type_word(listed)}, {_PAIR}")
@@ -155,7 +158,7 @@ class Placement:
 
         (0, 0) without a build zone.
         """
-        free = np.zeros(self._empty_zone.usable.shape, dtype=bool)
+        free = np.zeros(self._zone.shape, dtype=bool)
         if self.stock_left > 0:
             affordable = self._empty_zone.module_costs <= self._spendable
             free = self._empty_zone.usable & affordable & ~self._taken & ~self._closing
@@ -183,8 +186,7 @@ class Placement:
     @property
     def stock_left(self) -> int:
         """How many modules of the stock are left."""
-        zone = self.scenario.build_zone
-        return 0 if zone is None else zone.stock - len(self.cells)
+        return self._zone.stock - len(self.cells)
 
     @cached_property
     def cost(self) -> float:
@@ -195,27 +197,35 @@ class Placement:
     @property
     def budget_left(self) -> float | None:
         """What is left of the budget; `None` without one."""
-        zone = self.scenario.build_zone
-        if zone is None or zone.budget is None:
-            return None
-        return max(0.0, zone.budget - self.cost)
+        budget = self._zone.budget
+        return None if budget is None else max(0.0, budget - self.cost)
+
+    @property
+    def _zone(self) -> BuildZone:
+        """The build zone; one without cells where the scenario has none."""
+        return self.scenario.build_zone or NO_ZONE
 
     @property
     def _spendable(self) -> float:
         """What the next module may cost."""
-        zone = self.scenario.build_zone
-        return 0.0 if zone is None else zone.cost_limit - self.cost
+        return self._zone.cost_limit - self.cost
 
     @cached_property
     def _empty_zone(self) -> EmptyZone:
         """What holds for the cells without the modules."""
-        zone = self.scenario.build_zone
-        return _NO_ZONE if zone is None else empty_zone(_surroundings(self.scenario, zone))
+        return empty_zone(self._surroundings)
+
+    @property
+    def _surroundings(self) -> Surroundings:
+        scenario = self.scenario
+        return Surroundings(
+            self._zone, scenario.structures, scenario.charge, scenario.charge_radius_m
+        )
 
     @cached_property
     def _taken(self) -> BoolArray:
         """Which cells hold a module, shape (rows, columns)."""
-        taken = np.zeros(self._empty_zone.usable.shape, dtype=bool)
+        taken = np.zeros(self._zone.shape, dtype=bool)
         if self.cells:
             taken[tuple(zip(*self.cells, strict=True))] = True
         return taken
@@ -223,20 +233,20 @@ class Placement:
     @cached_property
     def _closing(self) -> BoolArray:
         """On which cells a module would close the access way, shape (rows, columns)."""
-        zone = self.scenario.build_zone
-        if zone is None or zone.access_way is None:
-            return np.zeros(self._empty_zone.usable.shape, dtype=bool)
-        return closing_cells(zone.access_way, self._empty_zone.passable & ~self._taken)
+        way = self._zone.access_way
+        if way is None:
+            return np.zeros(self._zone.shape, dtype=bool)
+        return closing_cells(way, self._empty_zone.passable & ~self._taken)
 
     @property
     def _is_sound(self) -> bool:
         """Whether all cells together keep every condition."""
-        zone = self.scenario.build_zone
-        if zone is None or not self.cells:
-            return not self.cells
+        zone = self._zone
+        if not self.cells:
+            return True
         if self.stock_left < 0 or len(set(self.cells)) < len(self.cells):
             return False
-        if not all(_is_on_grid(zone, cell) for cell in self.cells):
+        if not all(map(zone.has, self.cells)):
             return False
         if self._spendable < 0.0 or not self._empty_zone.usable[self._taken].all():
             return False
@@ -245,47 +255,36 @@ class Placement:
 
     def _reason_against_site(self, cell: Cell) -> str | None:
         """Return why a cell may not be used even without modules, or `None` if it may."""
-        zone = self.scenario.build_zone
-        if zone is None:
+        zone = self._zone
+        if zone is NO_ZONE:
             return "is not usable: the scenario has no build zone"
-        if not _is_on_grid(zone, cell):
+        if not zone.has(cell):
             return f"is outside the build zone of {zone.rows} rows and {zone.columns} columns"
         if self._empty_zone.usable[cell]:
             return None
-        return reason_against(_surroundings(self.scenario, zone), cell)
+        return reason_against(self._surroundings, cell)
 
     def _reason_against_cost(self, cell: Cell) -> str | None:
         """Return why a module on a cell cannot be paid for, or `None` if it can."""
         cost = self._empty_zone.module_costs[cell]
-        zone = self.scenario.build_zone
-        if zone is None or zone.budget is None or cost <= self._spendable:
+        budget = self._zone.budget
+        if budget is None or cost <= self._spendable:
             return None
         return (
             f"costs {cost:.10g}, but only {self.budget_left:.10g} of the budget of"
-            f" {zone.budget:.10g} is left"
+            f" {budget:.10g} is left"
         )
 
     def _reason_against_closing(self, cell: Cell) -> str | None:
         """Return why a module on a cell would be in the way, or `None` if it would not."""
-        zone = self.scenario.build_zone
-        if zone is None or zone.access_way is None or not self._closing[cell]:
+        way = self._zone.access_way
+        if way is None or not self._closing[cell]:
             return None
-        return f"would close the {zone.access_way.description}"
+        return f"would close the {way.description}"
 
     def __reduce__(self) -> tuple[Callable[..., "Placement"], tuple[Any, ...]]:
         """Pickle only what cannot be worked out again: arrays would come back writeable."""
         return Placement, (self.scenario, self.cells)
-
-
-_NO_ZONE: Final = EmptyZone(
-    usable=np.zeros((0, 0), dtype=bool),
-    passable=np.zeros((0, 0), dtype=bool),
-    module_costs=np.zeros((0, 0)),
-)
-
-
-def _surroundings(scenario: Scenario, zone: BuildZone) -> Surroundings:
-    return Surroundings(zone, scenario.structures, scenario.charge, scenario.charge_radius_m)
 
 
 def _placed_one_by_one(scenario: Scenario, layout: tuple[Cell, ...]) -> Placement:
@@ -302,11 +301,6 @@ def _placed_one_by_one(scenario: Scenario, layout: tuple[Cell, ...]) -> Placemen
             )
         placement = placement.place(cell)
     return placement
-
-
-def _is_on_grid(zone: BuildZone, cell: Cell) -> bool:
-    """Whether the grid has the cell."""
-    return 0 <= cell[0] < zone.rows and 0 <= cell[1] < zone.columns
 
 
 def _counted_modules(count: int) -> str:

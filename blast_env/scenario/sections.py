@@ -5,6 +5,7 @@ All lengths are in metres, x to the right and y upwards from the lower left corn
 
 import re
 from collections.abc import Mapping
+from functools import cached_property
 from itertools import chain
 from typing import Annotated, Any, Literal
 
@@ -256,7 +257,7 @@ class SimulationSection(Section):
         default_factory=dict
     )
 
-    @property
+    @cached_property
     def parameters(self) -> SimulationParameters:
         """The preset with the overrides applied."""
         return with_overrides(preset(self.preset), self.overrides)

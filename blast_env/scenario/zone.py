@@ -18,6 +18,7 @@ from blast_env.scenario.sections import (
     AnyStructure,
     Count,
     PointM,
+    PointSource,
     RectangleSource,
     Section,
     SizeM,
@@ -131,6 +132,19 @@ class BuildZone(Section):
         return Rectangle.from_corner(self.corner_m, size)
 
     @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and of columns."""
+        return self.rows, self.columns
+
+    @property
+    def centres_m(self) -> tuple[FloatArray, FloatArray]:
+        """X and y of the cells' centres, (rows, columns) each."""
+        x = self.corner_m[0] + (np.arange(self.columns) + 0.5) * MODULE_SIDE_M
+        y = self.corner_m[1] + (np.arange(self.rows) + 0.5) * MODULE_SIDE_M
+        grid_x, grid_y = np.meshgrid(x, y)
+        return grid_x, grid_y
+
+    @property
     def cost_limit(self) -> float:
         """What the modules may cost together, rounding allowed for; infinite without a budget."""
         return inf if self.budget is None else self.budget * (1.0 + BUDGET_TOLERANCE)
@@ -148,6 +162,18 @@ class BuildZone(Section):
         )
         return Rectangle.from_corner(corner, (MODULE_SIDE_M, MODULE_SIDE_M))
 
+    def cell_centre_m(self, cell: Cell) -> PointM:
+        """Return the middle of the square that a cell covers."""
+        return self.cell_rectangle_m(cell).centre
+
+    def has(self, cell: Cell) -> bool:
+        """Whether the grid has a cell."""
+        return 0 <= cell[0] < self.rows and 0 <= cell[1] < self.columns
+
+
+NO_ZONE: Final = BuildZone.model_construct(corner_m=(0.0, 0.0), rows=0, columns=0, stock=0)
+"""What stands for the zone of a scenario without one where that is no error: it has no cells."""
+
 
 Boxes = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """Left, bottom, right and top of many rectangles; the four arrays broadcast."""
@@ -163,8 +189,8 @@ def source_bounds_m(source: AnySource) -> Rectangle:
 
 def distances_m(source: AnySource, boxes: Boxes) -> FloatArray:
     """Return how near the centre of a charge from this source can come to each rectangle."""
-    if isinstance(source, RectangleSource):
-        return box_distances_m(source.rectangle_m, boxes)
+    if isinstance(source, PointSource | RectangleSource):
+        return box_distances_m(source_bounds_m(source), boxes)
     return _segment_distances(*source.segment_m, boxes)
 
 
@@ -253,7 +279,7 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
     """Return what holds for the cells; for the same surroundings, the same object."""
     zone = surroundings.zone
     boxes = _boxes(zone, np.arange(zone.rows), np.arange(zone.columns))
-    usable = np.ones((zone.rows, zone.columns), dtype=bool)
+    usable = np.ones(zone.shape, dtype=bool)
     for _, blocked in _blocked(surroundings, boxes):
         usable &= ~blocked
     passable = np.ones_like(usable)
@@ -265,7 +291,7 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
     return EmptyZone(usable, passable, costs)
 
 
-def reason_against(surroundings: Surroundings, cell: tuple[int, int]) -> str | None:
+def reason_against(surroundings: Surroundings, cell: Cell) -> str | None:
     """Return why a cell of the grid may not be used, or `None` if it may."""
     boxes = _boxes(surroundings.zone, np.array([cell[0]]), np.array([cell[1]]))
     for reason, blocked in _blocked(surroundings, boxes):
@@ -313,7 +339,7 @@ def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, 
 
 def _module_costs(zone: BuildZone, boxes: Boxes) -> NDArray[np.float64]:
     """Return what a module on each cell costs: the highest cost of the areas around it."""
-    highest = np.zeros((zone.rows, zone.columns))
+    highest = np.zeros(zone.shape)
     for area in zone.cost_areas:
         inside = _overlapping(area.rectangle_m, boxes)
         highest[inside] = np.maximum(highest[inside], area.module_cost)

@@ -7,7 +7,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Cell
-from blast_env.scenario import BuildZone, Placement, Scenario, usable_cells
+from blast_env.scenario import Placement, Scenario, usable_cells
 from blast_env.sites.visibility import SightLines
 
 
@@ -70,7 +70,7 @@ def sight_line_layout(scenario: Scenario, lines: SightLines) -> tuple[Cell, ...]
 
 def _wall_share(scenario: Scenario, lines: SightLines) -> float:
     """Return the share of the lines that the best straight run of modules cuts."""
-    zone, usable = _zone(scenario), usable_cells(scenario)
+    zone, usable = scenario.zone, usable_cells(scenario)
     cut = lines.cut & usable
     best = 0.0
     for along_rows in (cut, cut.transpose(0, 2, 1)):
@@ -90,7 +90,7 @@ def _any_in_runs(cut: BoolArray, run: int) -> BoolArray:
 
 def _random_share(scenario: Scenario, lines: SightLines) -> float:
     """Return the expected share of the lines that modules on random usable cells cut."""
-    zone, usable = _zone(scenario), usable_cells(scenario)
+    zone, usable = scenario.zone, usable_cells(scenario)
     cells = int(usable.sum())
     modules = zone.stock
     if zone.budget is not None:
@@ -103,12 +103,6 @@ def _random_share(scenario: Scenario, lines: SightLines) -> float:
         missed *= np.maximum(harmless - placed, 0) / (cells - placed)
     share = 1.0 - float(lines.weight @ missed) / max(float(lines.weight.sum()), 1e-300)
     return round(share, 9)  # so that the last bit, which differs between machines, never decides
-
-
-def _zone(scenario: Scenario) -> BuildZone:
-    if scenario.build_zone is None:  # SightLines.of refuses a scenario without a zone
-        raise AssertionError("a scenario without a build zone has sight lines")
-    return scenario.build_zone
 
 
 class Objection(NamedTuple):

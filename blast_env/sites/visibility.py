@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Rectangle
 from blast_env.scenario import AnySource, PointSource, Scenario, SegmentSource
 from blast_env.scenario.sections import PointM
@@ -120,14 +119,9 @@ def _cut(
     scenario: Scenario, origin: FloatArray, direction: FloatArray, length_m: FloatArray
 ) -> BoolArray:
     """Return which lines a module on each cell would cut, (lines, rows, columns)."""
-    zone = scenario.build_zone
-    if zone is None:
-        raise BlastEnvError(f"scenario {scenario.name!r} has no build zone, so nothing cuts a line")
-    left, bottom = zone.corner_m
-    x = left + (np.arange(zone.columns) + 0.5) * MODULE_SIDE_M
-    y = bottom + (np.arange(zone.rows) + 0.5) * MODULE_SIDE_M
-    to_x = x - origin[:, :1]  # (lines, columns)
-    to_y = y - origin[:, 1:]  # (lines, rows)
+    x, y = scenario.zone.centres_m
+    to_x = x[0] - origin[:, :1]  # (lines, columns)
+    to_y = y[:, 0] - origin[:, 1:]  # (lines, rows)
     along_x, along_y = direction[:, :1], direction[:, 1:]
     along = (to_y * along_y)[:, :, np.newaxis] + (to_x * along_x)[:, np.newaxis, :]
     beside = (to_y * along_x)[:, :, np.newaxis] - (to_x * along_y)[:, np.newaxis, :]

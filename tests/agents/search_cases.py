@@ -3,10 +3,11 @@
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
-from blast_agents.search import Layout, LayoutProblem, visible_threats
+from blast_agents.search import Layout, LayoutProblem
 
 from blast_env import load_scenario
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
+from blast_env.evaluation.cases import visible_case
 from blast_env.geometry import Cell
 from blast_env.scenario import Scenario
 from tests.agents.sites import site
@@ -35,7 +36,9 @@ def small_problem(
     """Return the problem of the small site's own charge: 299 layouts, 598 blasts."""
     evaluator = evaluator or BlastEvaluator(small_scenario(), "event")
     charge = evaluator.scenario.sample_charge(np.random.default_rng(0))
-    return LayoutProblem(evaluator, visible_threats(charge, realisations, 5), processes=processes)
+    seeds = np.random.default_rng(5).choice(2**31, realisations, replace=False)
+    case = visible_case(evaluator.scenario, charge, seeds.tolist())
+    return LayoutProblem(evaluator, case, processes)
 
 
 class WatchedEvaluator(BlastEvaluator):

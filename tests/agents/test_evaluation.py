@@ -2,15 +2,14 @@
 
 from itertools import pairwise
 
-import numpy as np
 import pytest
-from blast_agents.evaluation import evaluate_layouts
+from blast_agents.training.cases import Selection, unseen_cases
 from blast_agents.training.run_folder import TrainingSettings
-from blast_agents.unseen_cases import FIRST_SEED, unseen_cases
 
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import draw_threats, evaluate_layout
+from blast_env.evaluation import Evaluators, SeedRange, compare, draw_threats, evaluate_layout
+from blast_env.evaluation.report import case_table, comparison_record
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.agents.training_runs import small_scenario
 
@@ -20,58 +19,62 @@ WALLS = (((2, 0), (3, 0), (4, 0)), (), ((4, 5), (5, 5)))
 
 
 def test_each_layout_meets_the_threat_of_its_case_alone() -> None:
-    cases = unseen_cases(SETTINGS, SOURCE, range(3), "event")
-    evaluation = evaluate_layouts(cases, WALLS)
+    cases = unseen_cases(SETTINGS, SOURCE, range(3))
+    comparison = compare(Evaluators("event"), cases, WALLS)
     threats = draw_threats(small_scenario(), range(3))
-    for each, threat, layout in zip(evaluation.outcomes, threats, WALLS, strict=True):
+    for index, (threat, layout) in enumerate(zip(threats, WALLS, strict=True)):
         expected = evaluate_layout(small_scenario(), layout, threats=[threat])
-        assert each.outcome.impulse_pa_s == pytest.approx(expected.impulse_pa_s.value)
-        assert each.case.told_charge == threat.charge
-    assert evaluation.outcomes[1].outcome.reduction == 0.0
+        assert comparison.impulse_pa_s[index, 0] == pytest.approx(expected.impulse_pa_s.value)
+        assert cases[index].charge == threat.charge
+    assert comparison.case_reductions[1] == 0.0
 
 
-def test_one_layout_for_all_cases_is_what_evaluate_layout_says() -> None:
-    cases = unseen_cases(SETTINGS, SOURCE, range(4), "event")
-    evaluation = evaluate_layouts(cases, [WALLS[0]] * 4, cvar_level=0.5)
+def test_the_record_has_what_the_comparison_found() -> None:
+    cases = unseen_cases(SETTINGS, SOURCE, range(4))
+    evaluators = Evaluators("event")
+    comparison = compare(evaluators, cases, [WALLS[0]] * 4, cvar_level=0.5)
     expected = evaluate_layout(small_scenario(), WALLS[0], range(4), cvar_level=0.5)
-    assert evaluation.reduction == pytest.approx(expected.reduction)
-    assert evaluation.impulse_pa_s == pytest.approx(expected.impulse_pa_s)
-    assert evaluation.unprotected_impulse_pa_s == pytest.approx(expected.unprotected_impulse_pa_s)
-    assert (evaluation.cvar, evaluation.unprotected_cvar) == pytest.approx(
+    assert comparison.mean_pa_s == pytest.approx(expected.impulse_pa_s)
+    assert comparison.unprotected_mean_pa_s == pytest.approx(expected.unprotected_impulse_pa_s)
+    assert (comparison.cvar_pa_s, comparison.unprotected_cvar_pa_s) == pytest.approx(
         (expected.cvar, expected.unprotected_cvar)
     )
-    assert evaluation.worst.outcome.threat == expected.worst.threat
-    record = evaluation.to_dict()
-    assert record["result"]["reduction"]["value"] == evaluation.reduction.value
+    each = [outcome.reduction for outcome in expected.outcomes]
+    assert comparison.reduction.value == pytest.approx(sum(each) / 4)  # every case counts alike
+    record = comparison_record(comparison, evaluators.engine)
+    assert record["result"]["reduction"]["value"] == comparison.reduction.value
     assert [case["layout"] for case in record["cases"]] == [[list(cell) for cell in WALLS[0]]] * 4
+    assert case_table(comparison)["reduction"].tolist() == pytest.approx(each)
 
 
 def test_generated_sites_are_held_out_and_not_those_that_the_weights_were_chosen_by() -> None:
     settings = SETTINGS.model_copy(update={"scenario": "sites", "threat": "hidden"})
-    cases = unseen_cases(settings, SiteSource.training(), range(7, 10), "event")
-    sites = [case.evaluator.scenario for case in cases]
+    cases = unseen_cases(settings, SiteSource.training(), range(7, 10))
+    sites = [case.scenario for case in cases]
     assert sites == list(SiteSource.held_out(3))
-    assert [case.threat.seed for case in cases] == [7, 8, 9]
-    assert all(case.told_charge is None for case in cases)
+    assert [case.threats[0].seed for case in cases] == [7, 8, 9]
+    assert all(case.charge is None for case in cases)
     with pytest.raises(BlastEnvError, match=f"must be 1 to {HELD_OUT_SITES - 16}, a site each"):
-        unseen_cases(settings, SiteSource.training(), range(HELD_OUT_SITES), "event")
+        unseen_cases(settings, SiteSource.training(), range(HELD_OUT_SITES))
 
 
 def test_sites_are_evaluated_in_the_order_of_their_cases_with_progress() -> None:
-    """Cases of two evaluators, in turns, must not change places."""
-    first = unseen_cases(SETTINGS, SOURCE, range(2), "event")
-    second = unseen_cases(SETTINGS, SOURCE, range(2, 4), "event")
+    """Cases of two scenarios, in turns, must not change places."""
+    first = unseen_cases(SETTINGS, SOURCE, range(2))
+    second = unseen_cases(SETTINGS, SingleScenario(small_scenario()), range(2, 4))
     mixed = [first[0], second[0], first[1], second[1]]
     shares: list[float] = []
-    evaluation = evaluate_layouts(mixed, [WALLS[0]] * 4, progress=shares.append)
-    assert [each.case for each in evaluation.outcomes] == mixed
+    evaluators = Evaluators("event")
+    comparison = compare(evaluators, mixed, [WALLS[0]] * 4, progress=shares.append)
+    assert list(comparison.cases) == mixed
     assert all(early <= late for early, late in pairwise(shares))
     assert shares[-1] == pytest.approx(1.0)
-    alone = evaluate_layouts(first, [WALLS[0]] * 2)
-    impulses = [each.outcome.impulse_psi_s for each in evaluation.outcomes]
-    assert impulses[0::2] == [each.outcome.impulse_psi_s for each in alone.outcomes]
+    alone = compare(evaluators, first, [WALLS[0]] * 2)
+    assert comparison.impulse_pa_s[0::2].tolist() == alone.impulse_pa_s.tolist()
 
 
-def test_no_training_draws_the_seeds_of_unseen_threats() -> None:
-    assert SETTINGS.evaluation_first_seed + SETTINGS.evaluation_cases < FIRST_SEED
-    assert np.iinfo(np.int32).max < FIRST_SEED  # seeds of blasts are drawn below
+def test_the_weights_are_chosen_by_seeds_of_their_own() -> None:
+    cases = Selection.of(SETTINGS, SOURCE).cases
+    assert len(cases) == SETTINGS.evaluation_cases
+    for case in cases:
+        assert all(threat.seed in SeedRange.SELECTION.value for threat in case.threats)

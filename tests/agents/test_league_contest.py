@@ -18,6 +18,7 @@ from blast_agents.league import (
     standard_entries,
 )
 from blast_agents.league.store import search_key
+from blast_agents.league.tracks import practice_of
 from blast_agents.rules import wall_near_charge
 from blast_agents.search import (
     LayoutProblem,
@@ -78,11 +79,11 @@ def test_every_entry_meets_the_same_threats_as_no_barrier(tmp_path: Path) -> Non
     ]
     evaluator = BlastEvaluator(SCENARIO)
     for result in standings.results:
-        reductions = standings.case_reductions(result)
+        reductions = standings.comparison(result).case_reductions
         for case, proposal, reduction in zip(
             TRACK.cases, result.proposals, reductions, strict=True
         ):
-            expected = evaluate_against(evaluator, proposal.layout, case.held_out)
+            expected = evaluate_against(evaluator, proposal.layout, case.threats)
             assert reduction == pytest.approx(expected.mean_reduction, abs=1e-12)
     assert standings.reduction(standings.results[0]) == (0.0, 0.0, 0.0)
     assert standings.reduction(standings.results[-1]).value > 0.05
@@ -93,7 +94,7 @@ def test_a_search_finds_what_it_finds_alone(tmp_path: Path) -> None:
     entries = (NoBarrier(), Search(find_search_method("genetic"), BUDGET))
     proposals = Contest(TRACK, entries, store(tmp_path)).play().results[1].proposals
     for case, proposal in zip(TRACK.cases, proposals, strict=True):
-        problem = LayoutProblem(BlastEvaluator(SCENARIO), case.search_threats)
+        problem = LayoutProblem(BlastEvaluator(SCENARIO), practice_of(case))
         expected = find_search_method("genetic").search(problem, BUDGET, case.seed)
         assert proposal.layout == expected.layout
         assert 0 < proposal.blasts == expected.blasts <= BUDGET
@@ -112,7 +113,7 @@ def test_an_agent_is_told_the_charge_only_where_it_is_known(tmp_path: Path) -> N
 
 def test_a_rule_stands_in_the_middle_of_a_hidden_threat() -> None:
     (case,) = hidden_track(SCENARIO, 1).cases
-    middle = case.search_threats[0].charge._replace(position_m=(5.0, 20.0))
+    middle = practice_of(case).threats[0].charge._replace(position_m=(5.0, 20.0))
     assert Rule(wall_near_charge, "rule").propose(case) == wall_near_charge(SCENARIO, middle)
 
 

@@ -55,12 +55,12 @@ def test_every_case_counts_alike() -> None:
     """Though one has forty times the impulse of another; the interval is Student's."""
     it = three_cases()
     _, agent, _ = it.results
-    assert it.case_reductions(agent) == pytest.approx([0.6, 0.4, 0.2])
+    assert it.comparison(agent).case_reductions == pytest.approx([0.6, 0.4, 0.2])
     value, low, high = it.reduction(agent)
     assert value == pytest.approx(0.4)
     assert value - low == pytest.approx(T_2 * 0.2 / 3**0.5)
     assert high == pytest.approx(value + T_2 * 0.2 / 3**0.5)
-    assert it.worst(agent) == pytest.approx(0.2)
+    assert it.comparison(agent).worst_reduction == pytest.approx(0.2)
 
 
 def test_no_interval_is_above_a_reduction_of_everything() -> None:
@@ -86,7 +86,9 @@ def test_with_one_case_the_threats_are_what_intervals_are_over() -> None:
     it = one_case(agent, search, bare)
     _, first, second = it.results
     assert it.reduction(first) == reduction_estimate(np.array(agent), np.array(bare))
-    assert it.worst(first) == pytest.approx(0.2)  # not the threat that does nothing
+    assert it.comparison(first).worst_reduction == pytest.approx(
+        0.2
+    )  # not the threat that does nothing
     difference = it.difference(first, second)
     assert difference.value == pytest.approx(it.reduction(first).value - it.reduction(second).value)
     spread = np.array([10.0, 60.0, -10.0, 0.0]) - difference.value * np.array(bare)
@@ -140,7 +142,7 @@ def test_there_is_no_verdict_without_agent_or_reference() -> None:
 
 
 def test_a_case_without_anything_to_reduce_is_refused() -> None:
-    with pytest.raises(BlastEnvError, match=r"case 'road 1': nothing arrives .*\(2 threats\)"):
+    with pytest.raises(BlastEnvError, match=r"road 1: nothing arrives .*\(2 threats\)"):
         standings([[1.0, 1.0], [0.0, 0.0]])
 
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 from blast_agents.league import Track, find_tracks, hidden_track, known_track, sites_track
-from blast_agents.league.tracks import MOST_CASES, MOST_LEAGUE_SEED, MOST_SEEDS
-from blast_agents.search.problem import SEED_SPAN
+from blast_agents.league.tracks import MOST_CASES, MOST_LEAGUE_SEED, MOST_SEEDS, practice_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import SeedRange
 from blast_env.scenario import save_scenario
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.agents.league_cases import ROAD, road_scenario
@@ -18,24 +18,25 @@ SCENARIO = road_scenario()
 
 
 def seeds_of(track: Track) -> list[int]:
-    return [threat.seed for case in track.cases for threat in case.held_out]
+    return [threat.seed for case in track.cases for threat in case.threats]
 
 
 @settings(max_examples=20, deadline=None)
 @given(cases=st.integers(1, 6), seeds=st.integers(1, 6), seed=st.integers(0, MOST_LEAGUE_SEED))
 def test_held_out_blasts_are_met_once_and_never_before(cases: int, seeds: int, seed: int) -> None:
-    """Training and search draw their seeds below SEED_SPAN; here all are above, none twice."""
+    """No blast is met twice, and each kind has its own range of seeds."""
     for track in (known_track(SCENARIO, cases, seeds, seed), hidden_track(SCENARIO, seeds, seed)):
         held_out = seeds_of(track)
-        assert min(held_out) >= SEED_SPAN
+        assert all(seed in SeedRange.JUDGEMENT.value for seed in held_out)
         assert len(set(held_out)) == len(held_out)
-        assert all(t.seed < SEED_SPAN for case in track.cases for t in case.search_threats)
+        practised = [t.seed for case in track.cases for t in practice_of(case).threats]
+        assert all(seed in SeedRange.SEARCH.value for seed in practised)
 
 
 def test_seeds_of_different_leagues_and_cases_cannot_meet() -> None:
     """The stride from case to case, and from league to league, holds the most there may be."""
-    last = known_track(SCENARIO, MOST_CASES, 1, 0).cases[-1].held_out[0].seed
-    assert hidden_track(SCENARIO, 1, 1).cases[0].held_out[0].seed - last >= 4 * MOST_SEEDS
+    last = known_track(SCENARIO, MOST_CASES, 1, 0).cases[-1].threats[0].seed
+    assert hidden_track(SCENARIO, 1, 1).cases[0].threats[0].seed - last >= 4 * MOST_SEEDS
 
 
 def test_a_known_threat_is_the_same_charge_in_search_and_judgement() -> None:
@@ -45,16 +46,16 @@ def test_a_known_threat_is_the_same_charge_in_search_and_judgement() -> None:
     (x_m, low_m), (_, high_m) = ROAD.start_m, ROAD.end_m
     assert all(x == x_m and low_m <= y <= high_m for x, y in places)
     for case in track.cases:
-        threats = (*case.search_threats, *case.held_out)
+        threats = (*practice_of(case).threats, *case.threats)
         assert {threat.charge for threat in threats} == {case.charge}
 
 
 def test_a_hidden_threat_is_judged_at_places_of_its_own() -> None:
     (case,) = hidden_track(SCENARIO, 3).cases
     assert case.charge is None
-    assert len(case.held_out) == 12
-    searched = {threat.charge for threat in case.search_threats}
-    judged = {threat.charge for threat in case.held_out}
+    assert len(case.threats) == 12
+    searched = {threat.charge for threat in practice_of(case).threats}
+    judged = {threat.charge for threat in case.threats}
     assert len(searched) == 16
     assert len(judged) == 12
     assert not searched & judged
@@ -74,8 +75,8 @@ def test_more_cases_and_seeds_keep_the_first_ones() -> None:
     few, many = known_track(SCENARIO, 2, 3), known_track(SCENARIO, 4, 5)
     for one, other in zip(few.cases, many.cases, strict=False):
         assert one.charge == other.charge
-        assert one.search_threats == other.search_threats
-        assert one.held_out == other.held_out[:3]
+        assert practice_of(one).threats == practice_of(other).threats
+        assert one.threats == other.threats[:3]
 
 
 def test_another_seed_asks_something_else() -> None:

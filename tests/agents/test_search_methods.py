@@ -13,12 +13,12 @@ from blast_agents.search import (
     LayoutProblem,
     SearchResult,
     find_search_method,
-    hidden_threats,
 )
 from blast_agents.search.methods import every_layout
 
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation import BlastEvaluator, Case, Threat
+from blast_env.evaluation.cases import practice_hidden
 from blast_env.scenario import Placement, Scenario
 from tests.agents.search_cases import WatchedEvaluator, ballistic, small_problem, small_scenario
 
@@ -87,7 +87,7 @@ def test_exhaustive_search_is_for_small_instances(problem: LayoutProblem) -> Non
     with pytest.raises(BlastEnvError, match=r"299 layouts \(12 .* 598 blasts; the budget is 597"):
         find_search_method("exhaustive").search(problem, ALL_BLASTS - 1, 0)
     scenario = ballistic("courtyard")
-    large = LayoutProblem(BlastEvaluator(scenario, "event"), problem.threats)
+    large = LayoutProblem(BlastEvaluator(scenario, "event"), Case(scenario, problem.threats, 2))
     with pytest.raises(BlastEnvError, match=r"e\+\d\d layouts .* for small instances"):
         find_search_method("exhaustive").search(large, 1000, 0)
 
@@ -97,7 +97,9 @@ def test_exhaustive_search_leaves_out_what_is_not_legal() -> None:
     document = small_scenario(rows=3, columns=2, stock=2).model_dump()
     document["build_zone"]["access_way"] = {"width_m": 1.0, "between": "left_right"}
     scenario = Scenario.from_document(document, "with a way")
-    problem = LayoutProblem(BlastEvaluator(scenario, "event"), small_problem().threats)
+    problem = LayoutProblem(
+        BlastEvaluator(scenario, "event"), Case(scenario, small_problem().threats, 2)
+    )
     lower, upper = ((0, 0), (0, 1)), ((2, 0), (2, 1))
     single = {(cell,) for cell in (*lower, *upper)}
     assert set(every_layout(problem)) == {(), lower, upper, *single}
@@ -180,7 +182,7 @@ def test_layouts_are_legal_on_real_sites(method: str, name: str) -> None:
     """With keep-outs, a budget and an access way, against a hidden charge."""
     scenario = ballistic(name)
     evaluator = BlastEvaluator(scenario, "event")
-    problem = LayoutProblem(evaluator, hidden_threats(scenario, 3, 1, 0))
+    problem = LayoutProblem(evaluator, practice_hidden(scenario, 3, 1, 0))
     result = find_search_method(method).search(problem, 10, 0)
     assert Placement.of(scenario, result.layout).cells == result.layout == (*sorted(result.layout),)
 
@@ -234,7 +236,7 @@ def test_rules_spend_nothing(
 def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    problem = LayoutProblem(evaluator, hidden_threats(scenario, 8, 1, 0))
+    problem = LayoutProblem(evaluator, practice_hidden(scenario, 8, 1, 0))
     assert problem.charge.position_m == pytest.approx((5.0, 15.0))
 
 
@@ -264,7 +266,7 @@ def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
     evaluator = BlastEvaluator(scenario, "event", cache_size=10_000)
     better_pa_s = []
     for seed in (0, 1):
-        problem = LayoutProblem(evaluator, hidden_threats(scenario, 1, 2, seed))
+        problem = LayoutProblem(evaluator, practice_hidden(scenario, 1, 2, seed))
         genetic, drawn = (
             problem.impulse_pa_s(find_search_method(name).search(problem, 100, seed).layout)
             for name in ("genetic", "random")

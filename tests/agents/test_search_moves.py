@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from blast_agents.rules import random_layout
 from blast_agents.search import Layout
-from blast_agents.search.evolution import cut, individual, layout_of, mixed, repaired
 from blast_agents.search.moves import Moves, legal_part, random_part, random_walls
+from blast_agents.search.operators import cut, individual, layout_of, mixed, repaired
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

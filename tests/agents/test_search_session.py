@@ -7,17 +7,15 @@ import pytest
 from blast_agents.search.problem import (
     LayoutProblem,
     Plan,
-    Unprotected,
-    hidden_threats,
-    visible_threats,
 )
 from blast_agents.search.session import SearchEndedError, SearchSession
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.envs.objective import Objective
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation import BlastEvaluator, Case, Threat
+from blast_env.evaluation.cases import practice_hidden, practice_visible
+from blast_env.evaluation.comparison import Objective
 from blast_env.physics.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
 from tests.agents.search_cases import ballistic, small_problem, small_scenario
@@ -41,12 +39,10 @@ def test_the_number_is_the_environments(risk: MeanRisk | ConditionalValueAtRisk)
     """Mean over the realisations of a charge, then risk over the charges, as agents are paid."""
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    threats = hidden_threats(scenario, 3, 2, seed=1)
-    charges = list(dict.fromkeys(threat.charge for threat in threats))
-    nested = tuple(tuple(each for each in threats if each.charge == c) for c in charges)
+    case = practice_hidden(scenario, 3, 2, 1, risk)
     layout = ((9, 0), (10, 0), (11, 0))
-    expected = Objective(evaluator, nested, risk).assess(layout).impulse_pa_s
-    found = LayoutProblem(evaluator, threats, risk).impulse_pa_s(layout)
+    expected = Objective(evaluator, case).assess(layout).impulse_pa_s
+    found = LayoutProblem(evaluator, case).impulse_pa_s(layout)
     assert found == pytest.approx(expected, rel=1e-12)
 
 
@@ -158,7 +154,7 @@ def test_it_reports_every_batch(problem: LayoutProblem) -> None:
 def test_few_blasts_go_into_layouts_and_many_into_threats_as_well() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    problem = LayoutProblem(evaluator, hidden_threats(scenario, 16, 1, 0))
+    problem = LayoutProblem(evaluator, practice_hidden(scenario, 16, 1, 0))
     plans = [Plan.of(problem, budget) for budget in (1, 10, 50, 200, 1000, 100_000)]
     assert all(plan.exploring_blasts >= 1 for plan in plans)
     threats = [plan.threats for plan in plans]
@@ -170,7 +166,7 @@ def test_few_blasts_go_into_layouts_and_many_into_threats_as_well() -> None:
 def test_hidden_charges_come_first_and_spread() -> None:
     """A search that looks at the first three charges of the road has its middle and both ends."""
     scenario = ballistic("courtyard")
-    threats = hidden_threats(scenario, 16, 2, seed=3)
+    threats = practice_hidden(scenario, 16, 2, seed=3).threats
     assert [t.charge for t in threats[:16]] == [t.charge for t in threats[16:]]
     assert len({threat.seed for threat in threats}) == 32
     first, *others = (threat.charge.position_m[1] for threat in threats[:16])
@@ -179,35 +175,38 @@ def test_hidden_charges_come_first_and_spread() -> None:
 
 
 def test_a_known_charge_has_its_realisations() -> None:
-    threats = visible_threats(WEST, 3, seed=1)
+    scenario = small_scenario()
+    threats = practice_visible(scenario, WEST, 3, seed=1).threats
     assert {threat.charge for threat in threats} == {WEST}
     assert len({threat.seed for threat in threats}) == 3
-    assert threats == visible_threats(WEST, 3, seed=1)
-    assert threats != visible_threats(WEST, 3, seed=2)
+    assert threats == practice_visible(scenario, WEST, 3, seed=1).threats
+    assert threats != practice_visible(scenario, WEST, 3, seed=2).threats
 
 
 def test_reductions_refer_to_the_threats_that_were_met(problem: LayoutProblem) -> None:
-    unprotected = Unprotected.of(problem)
     it = session(problem, 100)
     for threats in (1, 4):
         it.assess([()], threats)
         assert it.best is not None
-        assert unprotected.reduction(it.best) == 0.0
+        assert problem.reduction(it.best) == 0.0
 
 
 @pytest.mark.parametrize(
     ("threats", "words"),
-    [((), "there are none"), ((Threat(WEST, 1), Threat(WEST, 1)), "one is there twice")],
+    [((), "there are none"), ((Threat(WEST, 1), Threat(WEST, 1)), "is there already")],
 )
 def test_threats_that_are_no_use_are_refused(threats: tuple[Threat, ...], words: str) -> None:
     with pytest.raises(BlastEnvError, match=words):
-        LayoutProblem(BlastEvaluator(small_scenario(), "event"), threats)
+        LayoutProblem(
+            BlastEvaluator(small_scenario(), "event"),
+            Case(small_scenario(), threats, realisations=len(threats)),
+        )
 
 
 def test_a_site_without_a_build_zone_is_refused() -> None:
     scenario = small_scenario().model_copy(update={"build_zone": None})
     with pytest.raises(BlastEnvError, match="no build zone"):
-        LayoutProblem(BlastEvaluator(scenario, "event"), (Threat(WEST, 1),))
+        LayoutProblem(BlastEvaluator(scenario, "event"), Case(scenario, (Threat(WEST, 1),)))
 
 
 def test_a_layout_that_does_not_fit_is_refused(problem: LayoutProblem) -> None:

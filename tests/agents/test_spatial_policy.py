@@ -44,13 +44,12 @@ def observed(env: BlastBarrierEnv, charge_m: tuple[float, float], **options: Any
 def test_cells_are_measured_along_the_line_of_sight(charge_m: tuple[float, float]) -> None:
     """Against the geometry of the scenario: the observation has to give it to half a square."""
     scenario = load_scenario("courtyard")
-    zone = scenario.build_zone
-    assert zone is not None
+    zone = scenario.zone
     view = zone_view(observed(environment(), charge_m), zone.rows, zone.columns)
     middle_m = np.array(scenario.structures[0].rectangle_m.centre)
     unit = (middle_m - charge_m) / np.hypot(*(middle_m - charge_m))
     for cell in ((0, 0), (39, 0), (17, 15)):
-        offset_m = np.array(zone.cell_rectangle_m(cell).centre) - charge_m
+        offset_m = np.array(zone.cell_centre_m(cell)) - charge_m
         along_m, aside_m = offset_m @ unit, offset_m @ (-unit[1], unit[0])
         assert LENGTH_M * float(view.cells[0, *cell, ALONG]) == pytest.approx(along_m, abs=0.05)
         assert LENGTH_M * float(view.cells[0, *cell, ASIDE]) == pytest.approx(aside_m, abs=0.05)
@@ -162,8 +161,7 @@ def test_what_modules_hide_is_what_sight_lines_say(seed: int) -> None:
     bare_site = site.model_copy(  # the features do not say what a neighbouring building hides
         update={"structures": tuple(each for each in site.structures if each.protected)}
     )
-    zone = bare_site.build_zone
-    assert zone is not None
+    zone = bare_site.zone
     env = gym.make("BlastBarrier-v0", scenario=bare_site, engine="event", threat="hidden")
     planes, _ = env.reset(seed=0)
     view = zone_view(torch.as_tensor(planes)[None], zone.rows, zone.columns, places=9)

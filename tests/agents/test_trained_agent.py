@@ -35,8 +35,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def untrained(scenario: Scenario) -> TrainedAgent:
-    zone = scenario.build_zone
-    assert zone is not None
+    zone = scenario.zone
     torch.manual_seed(0)
     chosen = hyperparameters().model_copy(
         update={

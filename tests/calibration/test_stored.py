@@ -19,7 +19,7 @@ from blast_env.calibration.model import (
 )
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
-from blast_env.physics.engine import ENGINE_NAMES
+from blast_env.physics.engines import ENGINE_NAMES
 from blast_env.physics.parameters import with_overrides
 from blast_env.physics.presets import preset
 from blast_env.scenario import Scenario

@@ -1,6 +1,9 @@
 """The command line, run in this process."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import matplotlib
@@ -8,13 +11,23 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
+import blast_env
 from blast_env import load_scenario, save_scenario, simulate
 from blast_env.calibration.model import load_calibration
 from blast_env.cli import app
 from blast_env.physics.pymunk.engine import PymunkRun
 from tests.scenarios import BALLISTIC_COURTYARD
 
-COMMANDS = ("simulate", "validate", "calibrate", "bench")
+COMMANDS = (
+    "simulate",
+    "validate",
+    "calibrate",
+    "evaluate",
+    "search",
+    "bench",
+    "train",
+    "league",
+)
 
 
 def run(*arguments: str | Path) -> Result:
@@ -34,6 +47,22 @@ def test_every_command_has_help(command: str) -> None:
     result = run(command, "--help")
     assert result.exit_code == 0
     assert command in result.stdout
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    assert run("--version").output == f"blast-env {blast_env.__version__}\n"
+
+
+def test_the_module_is_the_command_and_completes_its_words() -> None:
+    """As a shell asks for it, so that what `--install-completion` installs works."""
+    words = {"COMP_WORDS": "blast-env sim", "COMP_CWORD": "1"}
+    done = subprocess.run(
+        [sys.executable, "-m", "blast_env"],
+        env=os.environ | words | {"_BLAST_ENV_COMPLETE": "complete_bash"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.split() == ["simulate"]
 
 
 def test_simulate_prints_loads_with_units_and_writes_all_files(

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from blast_agents.search import LayoutProblem, find_search_method, hidden_threats, visible_threats
+from blast_agents.search import LayoutProblem, find_search_method
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
 from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.cases import practice_hidden, practice_visible
 from blast_env.physics.event.engine import EventRun
 from blast_env.physics.scene import Charge
 from blast_env.scenario import LayoutFile, SegmentSource, load_layout
@@ -44,7 +45,7 @@ def test_it_finds_what_the_library_finds_and_writes_all_files(site: Path, tmp_pa
     result = search("--method", "nsga2", "--scenario", site, *options)
     assert result.exit_code == 0, result.output
     evaluator = BlastEvaluator(load_scenario(site), "event")
-    problem = LayoutProblem(evaluator, visible_threats(CHARGE, 2, 3))
+    problem = LayoutProblem(evaluator, practice_visible(evaluator.scenario, CHARGE, 2, 3))
     expected = find_search_method("nsga2").search(problem, 60, 3)
     assert load_layout(out / "layout.json", evaluator.scenario) == expected.layout
     assert f"{expected.blasts} of 60 blasts spent" in result.stdout
@@ -80,7 +81,7 @@ def test_a_hidden_threat_is_searched_for_wherever_it_may_be(tmp_path: Path) -> N
     result = search("--scenario", site, "--method", "random", "--risk", "cvar", *options)
     assert result.exit_code == 0, result.output
     assert "mean of the worst 20 %" in result.stdout
-    threats = hidden_threats(scenario, 3, 1, 0)
+    threats = practice_hidden(scenario, 3, 1, 0).threats
     listed = json.loads((out / "layout.json").read_text())["provenance"]["threats"]
     assert [each["seed"] for each in listed] == [threat.seed for threat in threats]
     assert len({tuple(each["charge_position_m"]) for each in listed}) == 3
@@ -137,12 +138,11 @@ def test_bad_input_is_one_clear_message(
 
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in [name for name in sys.modules if name.startswith("blast_agents.search")]:
-        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delitem(sys.modules, "blast_agents.search.operators", raising=False)
     monkeypatch.setitem(sys.modules, "pymoo.algorithms.soo.nonconvex.ga", None)
     result = search("--budget", 4)
     assert result.exit_code == 2
-    assert "pip install blast-env[agents,render]" in result.stderr
+    assert "pip install blast-env[search]" in result.stderr
 
 
 def test_an_interruption_keeps_the_best_so_far(

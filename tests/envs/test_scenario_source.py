@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from blast_env.envs.objective import Evaluators
 from blast_env.envs.strategies import zone_of
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import Evaluators
 from blast_env.scenario import Scenario
 from tests.envs.small import ThinEngine, make, play, same, small_document, small_scenario
 

@@ -181,7 +181,7 @@ def test_layouts_and_process_counts_are_checked_before_any_blast() -> None:
     evaluator = BlastEvaluator(COURTYARD)
     with pytest.raises(LayoutError, match=r"\(0, 99\)"):
         evaluator.loads_of_many([((), THREATS[0]), ([(0, 99)], THREATS[0])])
-    with pytest.raises(BlastEnvError, match="processes is 0, must be at least 1"):
+    with pytest.raises(BlastEnvError, match="processes is 0, must be a whole number of at least 1"):
         evaluator.loads_of_many([((), THREATS[0])], processes=0)
     assert evaluator.blasts == 0
 

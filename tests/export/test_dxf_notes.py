@@ -180,8 +180,7 @@ def test_without_a_clearance_the_layer_is_empty(name: str, tmp_path: Path) -> No
 
 def test_the_line_is_the_scenario_s_own_rule(tmp_path: Path) -> None:
     """A cell is refused for its clearance exactly if it comes inside a drawn line."""
-    zone = GATE.build_zone
-    assert zone is not None
+    zone = GATE.zone
     document = drawn(LayoutPlan(GATE, ()), tmp_path)
     polygons = [
         [point for piece in line_pieces(outline) for point in piece[:-1]]

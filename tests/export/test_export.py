@@ -204,7 +204,7 @@ def test_without_ezdxf_the_message_says_how_to_get_it(
     """The other forms need nothing but the package itself."""
     monkeypatch.setitem(sys.modules, "ezdxf", None)
     monkeypatch.delitem(sys.modules, "blast_env.export.dxf", raising=False)
-    with pytest.raises(BlastEnvError, match=r"'ezdxf', .* pip install blast-env\[agents\]"):
+    with pytest.raises(BlastEnvError, match=r"'ezdxf': pip install blast-env\[export\]"):
         export_layout(plan(), tmp_path / "layout.dxf")
     for suffix in (".json", ".csv", ".geojson"):
         assert export_layout(plan(), tmp_path / f"layout{suffix}").exists()

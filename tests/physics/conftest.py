@@ -2,7 +2,8 @@
 
 import pytest
 
-from blast_env.physics.engine import ENGINE_NAMES, Engine, find_engine
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import ENGINE_NAMES, find_engine
 
 
 @pytest.fixture(params=ENGINE_NAMES)

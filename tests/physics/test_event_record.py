@@ -5,7 +5,7 @@ import pytest
 
 from blast_env import load_scenario, simulate
 from blast_env.physics.collisions import COLLISION_DTYPE, incidence_angle_rad
-from blast_env.physics.engine import ENGINE_NAMES, find_engine
+from blast_env.physics.engines import ENGINE_NAMES, find_engine
 from blast_env.simulation import Blast
 from tests.physics.scenes import EVENT, KEEP_MASS, closed_box, hot_cloud, parameters
 
@@ -98,3 +98,7 @@ def test_both_engines_agree_on_a_blast_without_air() -> None:
     same_module = stepped["module"] == exact["module"]
     assert same_module.mean() > 0.95
     assert stepped["impulse"] == pytest.approx(exact["impulse"], rel=1e-9)
+
+
+def test_every_engine_of_the_package_has_the_name_that_it_is_found_by() -> None:
+    assert [find_engine(name).name for name in ENGINE_NAMES] == list(ENGINE_NAMES)

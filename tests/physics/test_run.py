@@ -8,13 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle
-from blast_env.physics.engine import (
-    ENGINE_NAMES,
-    BlastRun,
-    EndReason,
-    Engine,
-    find_engine,
-)
+from blast_env.physics.engine import BlastRun, EndReason, Engine
+from blast_env.physics.engines import ENGINE_NAMES, find_engine
 from blast_env.physics.particles import (
     Balls,
     CollisionType,

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from blast_env import Charge, load_scenario
 from blast_env.evaluation import LayoutEvaluation, Threat, evaluate_layout
 from blast_env.rendering.evaluation_figures import evaluation_figure
+from blast_env.rendering.figures import save_figure
 
 WALL = [(row, 0) for row in range(22, 32)]
 THREATS = (
@@ -109,5 +110,5 @@ def test_an_empty_layout_and_a_single_threat_can_be_drawn(tmp_path: Path) -> Non
     figure = evaluation_figure(evaluation)
     assert "no barrier: reduction of the impulse 0 %" in figure.get_suptitle()
     assert "95 %" not in figure.get_suptitle()
-    path = evaluation.figure(tmp_path / "empty.png")
+    path = save_figure(figure, tmp_path / "empty.png")
     assert path.stat().st_size > 10_000

@@ -61,8 +61,7 @@ def test_gap_of_the_gate_stays_open() -> None:
     scenario = load_scenario("perimeter_gate")
     south, north = (scenario.structures[i].rectangle_m for i in (0, 1))
     assert (south.bottom, north.top) == (0.0, scenario.site.height_m)
-    zone = scenario.build_zone
-    assert zone is not None
+    zone = scenario.zone
     lane = zone.keep_outs[0].rectangle_m
     assert (lane.bottom, lane.top) == (south.top, north.bottom)
     assert lane.left <= south.left

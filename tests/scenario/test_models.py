@@ -1,6 +1,7 @@
 import json
 import math
 import pickle
+from functools import partial
 from hashlib import sha256
 
 import numpy as np
@@ -18,6 +19,7 @@ from blast_env.scenario import (
     SegmentSource,
     Site,
     load_scenario,
+    usable_cells,
 )
 from tests.scenario.documents import (
     Document,
@@ -247,3 +249,33 @@ def test_other_parameters_are_added_to_the_scenario_s_own() -> None:
         scenario.with_simulation(overrides={"air": {"mas": 0.2}})
     with pytest.raises(ScenarioError, match="did you mean 'ballistic'"):
         scenario.with_simulation(preset="balistic")
+
+
+@pytest.mark.parametrize(
+    "charge",
+    [
+        Charge((20.5, 8.5), 50.0),  # in a structure
+        Charge((0.0, 15.0), 50.0),  # on the border
+        Charge((10.0, 8.0), 50.0),  # in the build zone: fewer usable cells than modules
+        Charge((8.0, 15.0), -1.0),
+        Charge((8.0, 15.0), 1e-6),  # the parameters do not reach so far
+        Charge((float("nan"), 15.0), 50.0),
+        Charge((20.5, 8.5), float("inf")),
+    ],
+)
+def test_a_charge_that_does_not_fit_has_the_problems_of_the_whole_document(charge: Charge) -> None:
+    """`with_charge` checks the charge alone, and must find all that a file with it would have."""
+    full = full_document()
+    full["build_zone"]["stock"] = usable_cells(scenario_from(full)).sum().item()
+    scenario = scenario_from(full)
+    document = scenario.model_dump()
+    point = {"kind": "point", **charge._asdict()}
+    for change, sources in (
+        (partial(scenario.with_charge, charge), [point]),
+        (partial(scenario.with_possible_charges, [charge]), [*document["charge"], point]),
+    ):
+        with pytest.raises(ScenarioError) as expected:
+            Scenario.from_document(document | {"charge": sources}, scenario.name)
+        with pytest.raises(ScenarioError) as found:
+            change()
+        assert str(found.value) == str(expected.value)

@@ -59,8 +59,7 @@ def assert_free_explain_and_place_agree(placement: Placement, cells: list[Cell])
 @settings(max_examples=400, deadline=None, derandomize=True)
 def test_free_cells_are_those_that_the_rules_allow(document: Document, seed: int) -> None:
     scenario = buildable(document)
-    zone = scenario.build_zone
-    assert zone is not None
+    zone = scenario.zone
     rng = np.random.default_rng(seed)
     placement = Placement.empty(scenario)
     # The checks of a scenario promise this.
@@ -107,8 +106,7 @@ def test_bundled_scenarios_are_placed_without_contradiction(
         return
     document["build_zone"].update(conditions)
     scenario = Scenario.from_document(document, name)
-    zone = scenario.build_zone
-    assert zone is not None
+    zone = scenario.zone
     every, rng = list(zone.cells()), np.random.default_rng(0)
     for _ in range(20):
         placement = Placement.empty(scenario)

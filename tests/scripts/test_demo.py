@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from blast_agents.league import RandomLayout
 from blast_agents.training.run_folder import RunFolder
-from blast_agents.unseen_cases import FIRST_SEED
 
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import SeedRange
 from blast_env.export import SUFFIXES
 from blast_env.scenario import Placement
 from scripts.demo import AGENT, DemoSettings, demonstrate
@@ -55,9 +55,9 @@ def test_it_trains_compares_and_films(tmp_path: Path, capsys: pytest.CaptureFixt
     for name in files:
         assert f"wrote {settings.out / name}" in printed
         assert (settings.out / name).stat().st_size > 0
-    seeds = {case.held_out[0].seed for case in comparison.standings.track.cases}
+    seeds = {case.threats[0].seed for case in comparison.standings.track.cases}
     assert len(seeds) == 4
-    assert min(seeds) >= FIRST_SEED
+    assert all(seed in SeedRange.JUDGEMENT.value for seed in seeds)
     for proposal in comparison.agent.proposals:
         assert set(Placement.of(small_scenario(), proposal.layout).cells) == set(proposal.layout)
 

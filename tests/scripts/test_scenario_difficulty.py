@@ -5,17 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from blast_agents.rules import line_of_sight_wall
 from typer import Typer
 from typer.testing import CliRunner
 
 from blast_env import load_scenario
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import evaluate_against
+from blast_env.evaluation import SeedRange, evaluate_against
 from scripts import scenario_difficulty
 from scripts.difficulty_figure import difficulty_figure
 from scripts.difficulty_outcomes import Outcome, TaskResult
-from scripts.difficulty_study import FIRST_HELD_OUT_SEED, Effort, Study
+from scripts.difficulty_study import STAND_OFFS, Effort, Study
 from scripts.difficulty_verdict import difficulty_criteria
 from scripts.scenario_difficulty import (
     PAGE,
@@ -90,9 +91,10 @@ def test_one_layout_for_all_is_judged_as_evaluate_layout_judges_it(
     assert hidden.bare.reduction == (0.0, 0.0, 0.0)
 
 
-def test_every_visible_charge_gets_a_wall_of_its_own(visible: TaskResult) -> None:
-    for wall in visible.walls:
-        assert len(set(wall.layouts)) == SMALL.charges
+def test_every_visible_charge_gets_a_wall_of_its_own(study: Study, visible: TaskResult) -> None:
+    scenario, charges = study.evaluator.scenario, [each.charge for each in study._tried]
+    for wall, share in zip(visible.walls, STAND_OFFS, strict=True):
+        assert list(wall.layouts) == [line_of_sight_wall(scenario, at, share) for at in charges]
         assert wall.impulse_pa_s.shape == (1, SMALL.charges)
     assert visible.random.impulse_pa_s.shape == (SMALL.random_visible, SMALL.charges)
 
@@ -103,8 +105,9 @@ def test_it_costs_what_it_says(study: Study, hidden: TaskResult, visible: TaskRe
 
 
 def test_held_out_seeds_are_not_those_of_training(study: Study) -> None:
-    training = SMALL.charges + max(Effort().hidden_round, Effort().visible_round)
-    assert training < FIRST_HELD_OUT_SEED <= min(threat.seed for threat in study.held_out)
+    assert all(threat.seed in SeedRange.JUDGEMENT.value for threat in study.held_out)
+    tried = (*study._tried, *study._again(study._tried[0].charge))
+    assert all(threat.seed in SeedRange.SEARCH.value for threat in tried)
 
 
 def test_the_search_prefers_what_does_best_on_training(monkeypatch: pytest.MonkeyPatch) -> None:

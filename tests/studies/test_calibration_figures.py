@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blast_env import load_scenario, simulate
-from blast_env.calibration import Friedlander, facade_history
+from blast_env.calibration import Friedlander
 from blast_env.studies.calibration.figure import calibration_figure
 from blast_env.studies.calibration.study import (
     CalibrationReport,
@@ -13,6 +13,7 @@ from blast_env.studies.calibration.study import (
     kingery_bulmash_reference,
 )
 from blast_env.studies.pressure.figure import PressureCase, pressure_figure
+from blast_env.studies.pressure.pulses import facade_history
 
 SMALL = load_scenario("free_field").with_simulation(
     overrides={"explosive": {"ball_count": 180}, "stepping": {"time_limit_s": 0.12}}

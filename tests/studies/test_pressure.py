@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blast_env.calibration import Friedlander, PressureHistory, facade_history
+from blast_env.calibration import Friedlander
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.physics.collisions import COLLISION_DTYPE
 from blast_env.physics.particles import CollisionType
 from blast_env.recording.tables import faces_hit
 from blast_env.scenario import Scenario
 from blast_env.simulation import Blast, BlastResult
-from blast_env.studies.pressure.pulses import Face
+from blast_env.studies.pressure.pulses import Face, PressureHistory, facade_history
 
 FACES: tuple[Face, ...] = ("left", "right", "bottom", "top")
 NORMALS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "bottom": (0.0, -1.0), "top": (0.0, 1.0)}

@@ -14,7 +14,7 @@ from blast_env.studies.shielding.reflection import (
     head_on_load,
     reference_near_field,
 )
-from blast_env.studies.shielding.report import BlockGeometry
+from blast_env.studies.shielding.report import BlockGeometry, ShieldingStudy
 from blast_env.studies.shielding.scenes import facade_scenario
 from tests.studies.shielding_cases import DENSE
 
@@ -120,8 +120,6 @@ def test_bad_distances_are_refused(distances: tuple[float, ...], words: str) -> 
 
 def test_side_on_loads_are_the_transferred_ones(report: ReflectionReport) -> None:
     """The same blasts in the open as the shielding study's, so that the two can be compared."""
-    from blast_env.studies.shielding.report import ShieldingStudy
-
     study = report.study
     shielding = ShieldingStudy(DENSE, seeds=study.seeds, geometry=GEOMETRY).run()
     assert shielding.wall[:, LoadKind.TRANSFERRED].tobytes() == report.side_on.tobytes()

@@ -17,7 +17,6 @@ from blast_agents.league.store import ResultStore
 from blast_agents.league.tracks import (
     TRACKS,
     Track,
-    TrackCase,
     find_tracks,
     hidden_track,
     known_track,
@@ -39,7 +38,6 @@ __all__ = [
     "SightLineLayout",
     "Standings",
     "Track",
-    "TrackCase",
     "Training",
     "Verdict",
     "find_tracks",

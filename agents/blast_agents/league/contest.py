@@ -6,18 +6,18 @@ from functools import cached_property, partial
 from time import perf_counter
 from typing import TypeVar
 
-import joblib
 import numpy as np
 
 from blast_agents.league.entries import Agent, Entry, Instant, NoBarrier, Search
 from blast_agents.league.standings import Result, Standings
 from blast_agents.league.store import ResultStore, evaluation_key, search_key
-from blast_agents.league.tracks import Track, TrackCase
+from blast_agents.league.tracks import Track, practice_of
 from blast_agents.proposal import Proposal, timed_proposal
 from blast_agents.search import LayoutProblem
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation import BlastEvaluator, Case, Objective
 from blast_env.geometry import Layout
+from blast_env.runner import as_completed, check_workers
 
 Found = TypeVar("Found")
 
@@ -32,7 +32,7 @@ class SearchJob:
         engine: Name of the engine.
     """
 
-    case: TrackCase
+    case: Case
     search: Search
     engine: str
 
@@ -48,12 +48,11 @@ class SearchJob:
             KeyboardInterrupt: If the search was interrupted: what it has by then is not its
                 answer.
         """
+        practice = practice_of(self.case)
         # What the first blast of a process has to load is no part of the search's time.
-        BlastEvaluator(self.case.scenario, self.engine).loads((), self.case.search_threats[0])
+        BlastEvaluator(practice.scenario, self.engine).loads((), practice.threats[0])
         began_s = perf_counter()
-        problem = LayoutProblem(
-            BlastEvaluator(self.case.scenario, self.engine), self.case.search_threats
-        )
+        problem = LayoutProblem(BlastEvaluator(practice.scenario, self.engine), practice)
         result = self.search.method.search(problem, self.search.budget, self.case.seed)
         seconds = perf_counter() - began_s
         if result.interrupted:
@@ -71,38 +70,22 @@ class EvaluationJob:
         engine: Name of the engine.
     """
 
-    case: TrackCase
+    case: Case
     layout: Layout
     engine: str
 
     @property
     def blasts(self) -> int:
         """Blasts that it takes."""
-        return len(self.case.held_out)
+        return len(self.case.threats)
 
     def __call__(self) -> tuple[float, ...]:
         """Return the impulses on the protected structures, Pa*s, one a held-out threat."""
         evaluator = BlastEvaluator(self.case.scenario, self.engine)
-        loads = evaluator.loads_of_many([(self.layout, threat) for threat in self.case.held_out])
-        return tuple(load.protected_impulse_pa_s for load in loads)
+        return Objective(evaluator, self.case).impulses_pa_s(self.layout)
 
 
-def run_jobs(jobs: Sequence[Callable[[], Found]], processes: int) -> Iterator[tuple[int, Found]]:
-    """Run jobs; each result comes with the job's index, as soon as it is there.
-
-    Args:
-        jobs: They can be pickled.
-        processes: Worker processes.
-    """
-    if processes == 1 or len(jobs) < 2:
-        yield from (_numbered(index, job) for index, job in enumerate(jobs))
-        return
-    calls = (joblib.delayed(_numbered)(index, job) for index, job in enumerate(jobs))
-    workers = joblib.Parallel(min(processes, len(jobs)), return_as="generator_unordered")
-    yield from workers(calls)
-
-
-def propose_at_once(entry: Instant, cases: Sequence[TrackCase]) -> tuple[Proposal, ...]:
+def propose_at_once(entry: Instant, cases: Sequence[Case]) -> tuple[Proposal, ...]:
     """Return an entry's proposals, none of which takes a blast.
 
     The time of one more proposal before these is not counted: it loads what has to be loaded.
@@ -112,8 +95,8 @@ def propose_at_once(entry: Instant, cases: Sequence[TrackCase]) -> tuple[Proposa
     return tuple(replace(each, layout=tuple(sorted(each.layout))) for each in proposals)
 
 
-def _numbered(index: int, job: Callable[[], Found]) -> tuple[int, Found]:
-    return index, job()
+def _done(job: Callable[[], Found]) -> Found:
+    return job()
 
 
 Progress = Callable[[float], None]
@@ -191,7 +174,7 @@ class Contest:
         """
         searches = [entry for entry in self.entries if isinstance(entry, Search)]
         missing = self._missing_searches()
-        held_out = sum(len(job.case.held_out) for job in missing)
+        held_out = sum(len(job.case.threats) for job in missing)
         return Outlook(
             search_blasts=sum(job.blasts for job in missing),
             held_out_blasts=held_out + sum(job.blasts for job in self._missing_evaluations()),
@@ -210,16 +193,15 @@ class Contest:
             BlastEnvError: If `processes` is below 1, or nothing arrives at the protected
                 structures of a case even without a barrier.
         """
-        if processes < 1:
-            raise BlastEnvError(f"processes is {processes}, must be at least 1")
+        check_workers("processes", processes)
         meter = _Meter(self.outlook().blasts, progress)
         searches = self._missing_searches()
-        for index, proposal in run_jobs(searches, processes):
+        for index, proposal in as_completed(_done, searches, processes):
             job = searches[index]
             self.store.keep_proposal(search_key(job.case, job.search, self.engine), proposal)
             meter.add(job.blasts)
         evaluations = self._missing_evaluations()
-        for index, impulses_pa_s in run_jobs(evaluations, processes):
+        for index, impulses_pa_s in as_completed(_done, evaluations, processes):
             asked = evaluations[index]
             key = evaluation_key(asked.case, asked.layout, self.engine)
             self.store.keep_impulses(key, impulses_pa_s)
@@ -259,7 +241,7 @@ class Contest:
         cases = self.track.cases
         return [self.store.proposal(search_key(case, entry, self.engine)) for case in cases]
 
-    def _impulses_pa_s(self, case: TrackCase, layout: Layout) -> tuple[float, ...] | None:
+    def _impulses_pa_s(self, case: Case, layout: Layout) -> tuple[float, ...] | None:
         return self.store.impulses_pa_s(evaluation_key(case, layout, self.engine))
 
     def _standings(self) -> Standings:

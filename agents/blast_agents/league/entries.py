@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blast_agents.league.tracks import TrackCase
 from blast_agents.proposal import LayoutAgent
 from blast_agents.rules import RULES, expected_charge, random_layout
 from blast_agents.search import SearchMethod, find_search_method
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import Case
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import PointSource, Scenario
@@ -35,7 +35,7 @@ class NoBarrier:
 
     name: str = "no barrier"
 
-    def propose(self, case: TrackCase) -> Layout:  # noqa: ARG002
+    def propose(self, case: Case) -> Layout:  # noqa: ARG002
         """Return the empty layout."""
         return ()
 
@@ -46,7 +46,7 @@ class RandomLayout:
 
     name: str = "random layout"
 
-    def propose(self, case: TrackCase) -> Layout:
+    def propose(self, case: Case) -> Layout:
         """Return a layout that the case's seed decides."""
         return random_layout(case.scenario, np.random.default_rng(case.seed))
 
@@ -63,7 +63,7 @@ class Rule:
     rule: Callable[[Scenario, Charge], Layout]
     name: str
 
-    def propose(self, case: TrackCase) -> Layout:
+    def propose(self, case: Case) -> Layout:
         """Return the rule's layout.
 
         Raises:
@@ -82,7 +82,7 @@ class SightLineLayout:
 
     name: str = "most sight lines cut"
 
-    def propose(self, case: TrackCase) -> Layout:
+    def propose(self, case: Case) -> Layout:
         """Return the layout for the charge, or for all the places where a hidden one may be."""
         scenario = case.scenario
         if case.charge is not None:
@@ -105,7 +105,7 @@ class Agent:
     name: str
     training: Training
 
-    def propose(self, case: TrackCase) -> Layout:
+    def propose(self, case: Case) -> Layout:
         """Return the agent's layout; it is told the charge unless that is hidden."""
         return self.agent.propose(case.scenario, case.charge)
 

@@ -12,13 +12,14 @@ import pandas as pd
 from blast_agents.league.entries import Training
 from blast_agents.league.figure import league_figure
 from blast_agents.league.standings import REFERENCE_METHOD, Result, Standings, verdicts
-from blast_agents.league.tracks import TrackCase
 from blast_agents.proposal import Proposal
 from blast_env.arrays import FloatArray
+from blast_env.evaluation import Case
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.style import count_of
+from blast_env.statistics import reductions
 
 
 def summary_table(standings: Standings) -> pd.DataFrame:
@@ -59,7 +60,7 @@ def _summary(standings: Standings, result: Result) -> dict[str, Any]:
         "reduction": reduction.value,
         "reduction_low": reduction.low,
         "reduction_high": reduction.high,
-        "worst_reduction": standings.worst(result),
+        "worst_reduction": standings.comparison(result).worst_reduction,
         "blasts": result.blasts,
         "blasts_per_case": result.blasts_per_case,
         "training_blasts": training.blasts,
@@ -78,7 +79,7 @@ def _summary(standings: Standings, result: Result) -> dict[str, Any]:
 
 
 def _case(
-    case: TrackCase, proposal: Proposal, impulses_pa_s: FloatArray, bare_pa_s: FloatArray
+    case: Case, proposal: Proposal, impulses_pa_s: FloatArray, bare_pa_s: FloatArray
 ) -> dict[str, Any]:
     x_m, y_m = (np.nan, np.nan) if case.charge is None else case.charge.position_m
     return {
@@ -86,10 +87,10 @@ def _case(
         "scenario_hash": case.scenario.content_hash,
         "charge_x_m": x_m,
         "charge_y_m": y_m,
-        "first_held_out_seed": case.held_out[0].seed,
+        "first_held_out_seed": case.threats[0].seed,
         "impulse_pa_s": float(impulses_pa_s.mean()),
         "unprotected_impulse_pa_s": float(bare_pa_s.mean()),
-        "reduction": 1.0 - float(impulses_pa_s.mean() / bare_pa_s.mean()),
+        "reduction": reductions(impulses_pa_s.mean(), bare_pa_s.mean()).item(),
         "blasts": proposal.blasts,
         "seconds": proposal.seconds,
         "modules": len(proposal.layout),
@@ -195,7 +196,7 @@ def _row(standings: Standings, result: Result) -> tuple[str, ...]:
         result.name,
         _percent(value),
         "-" if isnan(low) else f"{100.0 * low:.1f} to {_percent(high)}",
-        _percent(standings.worst(result)),
+        _percent(standings.comparison(result).worst_reduction),
         f"{result.blasts_per_case:,.0f}",
         f"{result.blasts:,}",
         f"{result.seconds:,.1f}",

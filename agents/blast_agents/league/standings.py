@@ -5,12 +5,14 @@ from math import isnan
 from statistics import median
 from typing import Final
 
+import numpy as np
+
 from blast_agents.league.entries import Training, search_name
 from blast_agents.league.tracks import Track
 from blast_agents.proposal import Proposal
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError
-from blast_env.statistics import Estimate, mean_estimate, reduction_estimate
+from blast_env.evaluation.comparison import Comparison, check_something_arrives
+from blast_env.statistics import Estimate
 
 REFERENCE_METHOD: Final = "genetic"
 """Agents are held against this search."""
@@ -63,9 +65,7 @@ class Result:
 class Standings:
     """The results of a track; barrier and no barrier met the same threats.
 
-    Where there are several cases, each counts alike: a case's reduction is 1 - mean impulse with
-    the barrier / without it over its held-out threats, and the intervals are those of the mean
-    over cases. With a single case they are those over its held-out threats.
+    How means, intervals and differences are formed: see `Comparison`.
 
     Attributes:
         track: The track.
@@ -84,14 +84,7 @@ class Standings:
 
     def __post_init__(self) -> None:
         """Check that there is something to reduce."""
-        for case, mean_pa_s in zip(
-            self.track.cases, self.unprotected_pa_s.mean(axis=1), strict=True
-        ):
-            if not mean_pa_s > 0.0:
-                raise BlastEnvError(
-                    f"case {case.name!r}: nothing arrives at the protected structures without a "
-                    f"barrier ({len(case.held_out)} threats): there is nothing to reduce"
-                )
+        check_something_arrives(self.track.cases, self.unprotected_pa_s)
 
     @property
     def has_one_case(self) -> bool:
@@ -104,37 +97,23 @@ class Standings:
         name = search_name(REFERENCE_METHOD, self.track.reference_budget)
         return next((result for result in self.results if result.name == name), None)
 
-    def case_reductions(self, result: Result) -> FloatArray:
-        """Return the reduction in each case (cases,)."""
-        ratio: FloatArray = result.impulse_pa_s.mean(axis=1) / self.unprotected_pa_s.mean(axis=1)
-        return 1.0 - ratio
+    def comparison(self, result: Result) -> Comparison:
+        """Return an entry's layouts against no barrier."""
+        return Comparison(
+            cases=self.track.cases,
+            layouts=tuple(proposal.layout for proposal in result.proposals),
+            impulse_pa_s=result.impulse_pa_s,
+            unprotected_pa_s=self.unprotected_pa_s,
+            in_range=np.ones(self.unprotected_pa_s.shape, dtype=bool),
+        )
 
     def reduction(self, result: Result) -> Estimate:
         """Return the mean reduction with its 95 % interval."""
-        if self.has_one_case:
-            return reduction_estimate(result.impulse_pa_s[0], self.unprotected_pa_s[0])
-        value, low, high = mean_estimate(self.case_reductions(result))
-        return Estimate(value, low, min(high, 1.0))  # no reduction is above 1
+        return self.comparison(result).reduction
 
     def difference(self, result: Result, other: Result) -> Estimate:
         """Return by how much the mean reduction is above another's, with its paired interval."""
-        if self.has_one_case:
-            # As a reduction: of what is left if all that the result takes off more is taken off.
-            bare = self.unprotected_pa_s[0]
-            left = bare + result.impulse_pa_s[0] - other.impulse_pa_s[0]
-            return reduction_estimate(left, bare)
-        return mean_estimate(self.case_reductions(result) - self.case_reductions(other))
-
-    def worst(self, result: Result) -> float:
-        """Return the least reduction in any case; with a single one, under any threat.
-
-        Threats that do nothing without a barrier are left out.
-        """
-        if not self.has_one_case:
-            return float(self.case_reductions(result).min())
-        bare = self.unprotected_pa_s[0]
-        arrives = bare > 0.0
-        return float((1.0 - result.impulse_pa_s[0][arrives] / bare[arrives]).min())
+        return self.comparison(result).difference(self.comparison(other))
 
 
 @dataclass(frozen=True)

@@ -1,38 +1,33 @@
 """What a league has found out, kept in a folder so that an interrupted one goes on.
 
-One file a result, named after all that the result depends on: a change of the code, the versions,
-the scenario or the case makes it another result.
+A change of the code, the versions, the scenario or the case makes it another result.
 """
 
 import json
 import re
-from dataclasses import asdict
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
-from typing import Final, Generic, NamedTuple, TypeVar
+from typing import Final, NamedTuple
 
-from pydantic import TypeAdapter, ValidationError
-from pydantic.dataclasses import dataclass
+from pydantic import TypeAdapter
 
 import blast_agents
 from blast_agents.league.entries import Search
-from blast_agents.league.tracks import TrackCase
+from blast_agents.league.tracks import practice_of
 from blast_agents.proposal import Proposal
 from blast_env.calibration.model import scenario_calibration
-from blast_env.evaluation import Threat
-from blast_env.evaluation.store import calibration_digest, code_version, engine_text
-from blast_env.files import make_folder, write_atomically
+from blast_env.evaluation import Case, Threat
+from blast_env.evaluation.store import calibration_digest, engine_text
+from blast_env.files import FolderStore
 from blast_env.geometry import Layout
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
+from blast_env.provenance import code_version, versions
 
 _PACKAGES: Final = ("numpy", "pymoo")
 """What a search draws its numbers with."""
 _NO_INFLUENCE: Final = ("figure.py",)
 _ADDRESS: Final = re.compile(r" at 0x[0-9a-f]+")
-
-Value = TypeVar("Value", Proposal, tuple[float, ...])
 
 
 class Model(NamedTuple):
@@ -85,7 +80,7 @@ class EvaluationKey(NamedTuple):
     layout: Layout
 
 
-def search_key(case: TrackCase, search: Search, engine: str) -> SearchKey:
+def search_key(case: Case, search: Search, engine: str) -> SearchKey:
     """Return the key of a search for a case.
 
     Raises:
@@ -94,7 +89,7 @@ def search_key(case: TrackCase, search: Search, engine: str) -> SearchKey:
     """
     return SearchKey(
         model=_model(case, engine),
-        threats=case.search_threats,
+        threats=practice_of(case).threats,
         # Functions among the settings: their names, and not where this process has them.
         method=_ADDRESS.sub("", repr(search.method)),
         budget=search.budget,
@@ -103,33 +98,22 @@ def search_key(case: TrackCase, search: Search, engine: str) -> SearchKey:
     )
 
 
-def evaluation_key(case: TrackCase, layout: Layout, engine: str) -> EvaluationKey:
+def evaluation_key(case: Case, layout: Layout, engine: str) -> EvaluationKey:
     """Return the key of the impulses with a layout on a case's held-out threats.
 
     Raises:
         CalibrationError: If the scenario has no calibration for the engine.
         UnknownNameError: If there is no such engine.
     """
-    return EvaluationKey(_model(case, engine), case.held_out, tuple(sorted(layout)))
+    return EvaluationKey(_model(case, engine), case.threats, tuple(sorted(layout)))
 
 
-@dataclass(frozen=True)
-class _Record(Generic[Value]):
-    """The content of a file."""
-
-    key: str
-    value: Value
-
-
-_PROPOSAL: Final = TypeAdapter(_Record[Proposal])
-_IMPULSES: Final = TypeAdapter(_Record[tuple[float, ...]])
+_PROPOSAL: Final = TypeAdapter(Proposal)
+_IMPULSES: Final = TypeAdapter(tuple[float, ...])
 
 
 class ResultStore:
-    """Keeps results in the files of a folder.
-
-    Several processes may use one folder. A file that is damaged, or is not what its name says,
-    counts as not there and is written anew.
+    """Keeps results in the files of a folder; see `FolderStore`.
 
     Args:
         folder: The folder; it is made if need be.
@@ -139,12 +123,17 @@ class ResultStore:
     """
 
     def __init__(self, folder: str | Path) -> None:
-        self.folder = Path(folder)
-        make_folder(self.folder)
+        self._store = FolderStore(folder, ".result")
+
+    @property
+    def folder(self) -> Path:
+        """The folder, as an absolute path."""
+        return self._store.folder
 
     def proposal(self, key: SearchKey) -> Proposal | None:
         """Return what a search proposed, or `None` if that is not known."""
-        return self._read(_text(key), _PROPOSAL)
+        content = self._store.get(_text(key))
+        return None if content is None else _PROPOSAL.validate_json(content)
 
     def keep_proposal(self, key: SearchKey, proposal: Proposal) -> None:
         """Keep what a search proposed.
@@ -152,11 +141,12 @@ class ResultStore:
         Raises:
             BlastEnvError: If it cannot be written.
         """
-        self._write(_text(key), asdict(proposal))
+        self._store.put(_text(key), _PROPOSAL.dump_json(proposal))
 
     def impulses_pa_s(self, key: EvaluationKey) -> tuple[float, ...] | None:
         """Return the impulses under the threats, Pa*s, or `None` if they are not known."""
-        return self._read(_text(key), _IMPULSES)
+        content = self._store.get(_text(key))
+        return None if content is None else _IMPULSES.validate_json(content)
 
     def keep_impulses(self, key: EvaluationKey, impulses_pa_s: tuple[float, ...]) -> None:
         """Keep the impulses under the threats, Pa*s.
@@ -164,22 +154,7 @@ class ResultStore:
         Raises:
             BlastEnvError: If they cannot be written.
         """
-        self._write(_text(key), impulses_pa_s)
-
-    def _read(self, key: str, adapter: TypeAdapter[_Record[Value]]) -> Value | None:
-        try:
-            record = adapter.validate_json(self._path(key).read_bytes())
-        except (OSError, ValidationError):
-            return None
-        return record.value if record.key == key else None
-
-    def _write(self, key: str, value: object) -> None:
-        content = json.dumps({"key": key, "value": value}, allow_nan=False)
-        with write_atomically(self._path(key)) as temporary:
-            temporary.write_text(f"{content}\n", encoding="utf-8")
-
-    def _path(self, key: str) -> Path:
-        return self.folder / f"{sha256(key.encode()).hexdigest()}.json"
+        self._store.put(_text(key), _IMPULSES.dump_json(impulses_pa_s))
 
 
 def _text(key: SearchKey | EvaluationKey) -> str:
@@ -193,14 +168,15 @@ def _search_code() -> str:
     folder = Path(blast_agents.__file__).parent
     paths = sorted((folder / "search").glob("*.py"))
     digest = sha256()
-    for path in (*paths, folder / "rules.py", folder / "random_layouts.py"):
+    for path in (*paths, folder / "rules.py"):
         if path.name not in _NO_INFLUENCE:
             digest.update(f"{path.name}\n".encode() + path.read_bytes())
-    versions = " ".join(f"{name} {version(name)}" for name in _PACKAGES)
-    return f"{digest.hexdigest()[:16]} {versions}"
+    known = versions(packages=_PACKAGES)
+    drawn_with = " ".join(f"{name} {known[name]}" for name in _PACKAGES)
+    return f"{digest.hexdigest()[:16]} {drawn_with}"
 
 
-def _model(case: TrackCase, engine: str) -> Model:
+def _model(case: Case, engine: str) -> Model:
     found = find_engine(engine)
     calibration = scenario_calibration(case.scenario, found.name)
     return Model(

@@ -1,17 +1,15 @@
 """What the entries of a league are asked: cases, and the blasts that their layouts meet."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from blast_agents.search import hidden_threats, visible_threats
-from blast_agents.search.problem import SEED_SPAN
 from blast_env.envs.arguments import check_names, whole_number
 from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
 from blast_env.envs.strategies import zone_of
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Threat, draw_threats
-from blast_env.physics.scene import Charge
+from blast_env.evaluation import Case, SeedRange, draw_threats
+from blast_env.evaluation.cases import practice_hidden, practice_visible, visible_case
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.sites import SiteSource
@@ -30,30 +28,11 @@ HIDDEN_SEEDS: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
-class TrackCase:
-    """One layout that is asked for.
-
-    Attributes:
-        name: Of the case.
-        scenario: The scenario.
-        charge: Where the charge is; `None` where it is hidden.
-        search_threats: What a search may spend its blasts on.
-        held_out: What the layouts are judged on. Their seeds are `SEED_SPAN` and more, those of
-            training and search less: no blast is ever met before.
-        seed: Decides what a search or a random layout draws.
-    """
-
-    name: str
-    scenario: Scenario
-    charge: Charge | None
-    search_threats: tuple[Threat, ...]
-    held_out: tuple[Threat, ...]
-    seed: int
-
-
-@dataclass(frozen=True, eq=False)
 class Track:
     """Cases of one kind; each of them meets as many held-out threats.
+
+    Layouts are judged on the threats of a case (`SeedRange.JUDGEMENT`), a search may spend its
+    blasts on those of its `practice` (`SeedRange.SEARCH`).
 
     Attributes:
         name: Of the track's files.
@@ -68,7 +47,7 @@ class Track:
     title: str
     threat: Literal["visible", "hidden"]
     scenario_hash: str | None
-    cases: tuple[TrackCase, ...]
+    cases: tuple[Case, ...]
     reference_budget: int
 
 
@@ -90,15 +69,15 @@ def known_track(scenario: Scenario, cases: int, seeds: int, seed: int = 0) -> Tr
     drawn = []
     for index, first in enumerate(_first_seeds(cases, seeds, seed)):
         charge, search_seed = draw_charge(scenario, first), seed * MOST_CASES + index
-        case = TrackCase(
-            name=f"{scenario.name} {index}",
-            scenario=scenario,
-            charge=charge,
-            search_threats=visible_threats(charge, VISIBLE_REALISATIONS, search_seed),
-            held_out=tuple(Threat(charge, each) for each in range(first, first + seeds)),
-            seed=search_seed,
+        judged = visible_case(scenario, charge, range(first, first + seeds))
+        drawn.append(
+            replace(
+                judged,
+                name=f"{scenario.name} {index}",
+                seed=search_seed,
+                practice=practice_visible(scenario, charge, VISIBLE_REALISATIONS, search_seed),
+            )
         )
-        drawn.append(case)
     return Track(
         name=f"known_{scenario.name}",
         title=f"Known threat at an unseen position: {scenario.name}",
@@ -161,6 +140,17 @@ def sites_track(sites: Sequence[Scenario], seeds: int, seed: int = 0) -> Track:
     )
 
 
+def practice_of(case: Case) -> Case:
+    """Return what a search for a case may spend its blasts on.
+
+    Raises:
+        BlastEnvError: If the case has none.
+    """
+    if case.practice is None:
+        raise BlastEnvError(f"case {case.name!r} has no threats for a search")
+    return case.practice
+
+
 def find_tracks(
     name: str, cases: int, seeds: int, seed: int = 0, scenarios: Sequence[str] = ()
 ) -> tuple[Track, ...]:
@@ -199,16 +189,13 @@ def find_tracks(
     return tuple(tracks)
 
 
-def _hidden_case(
-    name: str, scenario: Scenario, first: int, seeds: int, search_seed: int
-) -> TrackCase:
-    return TrackCase(
-        name=name,
+def _hidden_case(name: str, scenario: Scenario, first: int, seeds: int, search_seed: int) -> Case:
+    return Case(
         scenario=scenario,
-        charge=None,
-        search_threats=hidden_threats(scenario, HIDDEN_THREATS, 1, search_seed),
-        held_out=draw_threats(scenario, range(first, first + seeds)),
+        threats=draw_threats(scenario, range(first, first + seeds)),
+        name=name,
         seed=search_seed,
+        practice=practice_hidden(scenario, HIDDEN_THREATS, 1, search_seed),
     )
 
 
@@ -218,4 +205,7 @@ def _first_seeds(cases: int, seeds: int, seed: int) -> list[int]:
     whole_number("seeds", seeds, 1, MOST_SEEDS)
     whole_number("seed", seed, 0, MOST_LEAGUE_SEED)
     stride = HIDDEN_SEEDS * MOST_SEEDS
-    return [SEED_SPAN + (seed * MOST_CASES + index) * stride for index in range(cases)]
+    return [
+        SeedRange.JUDGEMENT.seeds((seed * MOST_CASES + index) * stride, stride).start
+        for index in range(cases)
+    ]

@@ -15,8 +15,6 @@ from blast_agents.search.problem import (
     Report,
     SearchMethod,
     SearchResult,
-    hidden_threats,
-    visible_threats,
 )
 from blast_agents.search.registry import SEARCH_METHODS, find_search_method
 from blast_env.geometry import Layout
@@ -38,6 +36,4 @@ __all__ = [
     "SearchMethod",
     "SearchResult",
     "find_search_method",
-    "hidden_threats",
-    "visible_threats",
 ]

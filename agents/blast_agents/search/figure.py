@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from blast_agents.search.problem import Candidate, SearchResult, Unprotected
+from blast_agents.search.problem import Candidate, LayoutProblem, SearchResult
 from blast_env.rendering.site_plan import write_heading
 from blast_env.rendering.style import (
     QUIET_INK,
@@ -30,35 +30,35 @@ _COLOURS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#0072B2")
 _BEST = "#0072B2"
 
 
-def search_figure(result: SearchResult, unprotected: Unprotected) -> Figure:
+def search_figure(result: SearchResult, problem: LayoutProblem) -> Figure:
     """Return a figure of a search.
 
     Args:
         result: What the search found; it has spent blasts.
-        unprotected: The impulse without a barrier under the same threats.
+        problem: What it was asked.
     """
     panels = 2 if result.front else 1
     figure = Figure(figsize=(2.0 + 5.6 * panels, 5.4), layout="constrained")
     axes = figure.subplots(1, panels, squeeze=False)[0]
-    _draw_history(axes[0], result, unprotected)
+    _draw_history(axes[0], result, problem)
     if result.front:
-        _draw_front(axes[1], result.front, unprotected)
+        _draw_front(axes[1], result.front, problem)
     best = result.history[-1]
-    scenario = unprotected.problem.scenario
+    scenario = problem.scenario
     write_heading(
         figure,
         f"{scenario.name}, {result.method} search: reduction "
-        f"{100.0 * unprotected.reduction(best):.0f} % with "
+        f"{100.0 * problem.reduction(best):.0f} % with "
         f"{count_of('module', len(best.layout))}",
         f"{result.blasts:,} of {count_of('blast', result.budget)} spent"
         f"{', interrupted' if result.interrupted else ''}; engine "
-        f"{unprotected.problem.evaluator.engine.name}, seed {result.seed}; reductions are "
+        f"{problem.evaluator.engine.name}, seed {result.seed}; reductions are "
         f"on the threats that the search chose by",
     )
     return figure
 
 
-def _draw_history(axes: Axes, result: SearchResult, unprotected: Unprotected) -> None:
+def _draw_history(axes: Axes, result: SearchResult, problem: LayoutProblem) -> None:
     """Draw the best reduction over the blasts spent, in a colour for each number of threats."""
     history = result.history
     ends = [*(each.blasts for each in history[1:]), max(result.blasts, history[-1].blasts)]
@@ -67,7 +67,7 @@ def _draw_history(axes: Axes, result: SearchResult, unprotected: Unprotected) ->
         chosen = [(each, end) for each, end in zip(history, ends, strict=True)]
         chosen = [(each, end) for each, end in chosen if each.threats == count]
         blasts = np.array([(each.blasts, end) for each, end in chosen]).ravel()
-        reduction = np.repeat([unprotected.reduction(each) for each, _ in chosen], 2)
+        reduction = np.repeat([problem.reduction(each) for each, _ in chosen], 2)
         axes.plot(blasts, reduction, color=colour, linewidth=2.2, zorder=3)
         starts = [each.blasts for each, _ in chosen]
         axes.plot(
@@ -90,10 +90,10 @@ def _draw_history(axes: Axes, result: SearchResult, unprotected: Unprotected) ->
     axes.legend(loc="lower right", fontsize=9, frameon=False)
 
 
-def _draw_front(axes: Axes, front: Sequence[Candidate], unprotected: Unprotected) -> None:
+def _draw_front(axes: Axes, front: Sequence[Candidate], problem: LayoutProblem) -> None:
     """Draw the reduction that can be had with so many modules."""
     modules = [len(each.layout) for each in front]
-    reduction = [unprotected.reduction(each) for each in front]
+    reduction = [problem.reduction(each) for each in front]
     axes.step(modules, reduction, where="post", color=unit_interval(QUIET_INK), linewidth=1.0)
     axes.plot(modules, reduction, "o", color=_BEST, markersize=6.0, zorder=3)
     axes.set_xlabel("modules")

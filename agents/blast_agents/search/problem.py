@@ -1,7 +1,8 @@
 """What a search is asked, and what it answers."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
@@ -9,67 +10,61 @@ import pandas as pd
 
 from blast_agents.rules import expected_charge
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation import BlastEvaluator, Case, Threat
+from blast_env.evaluation.cases import check_distinct
+from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Cell, Layout
 from blast_env.physics.scene import Charge
+from blast_env.runner import check_workers
 from blast_env.scenario import Scenario
-from blast_env.statistics import MeanRisk, Risk
-
-SEED_SPAN = 2**31
-"""Seeds of blasts are drawn below this, as the environment does."""
+from blast_env.statistics import reductions
 
 
 @dataclass(frozen=True, eq=False)
 class LayoutProblem:
-    """One scenario, the threats that a layout has to stand, and how they become one number.
-
-    All layouts meet the same charges, fans and air (common random numbers), so that what differs
-    is due to the layouts. The number is the environment's: the mean over the realisations of each
-    charge, then the risk measure over the charges.
+    """A case to search a layout for, and what runs its blasts.
 
     Attributes:
-        evaluator: Runs the blasts and remembers them; it has the scenario.
-        threats: At least one, none twice; threats with the same charge are realisations of it.
-            A search may look at the first few alone, so different charges should come first.
-        risk: How the charges become one number.
+        evaluator: Runs the blasts and remembers them.
+        case: What layouts meet, and how that becomes one number. A search may look at the first
+            few threats alone, so different charges should come first.
         processes: Worker processes; they change nothing but the time.
 
     Raises:
-        BlastEnvError: If there are no threats, one is there twice, the scenario has no build zone,
-            or `processes` is below 1.
+        BlastEnvError: If a threat is there twice, the scenario has no build zone, or `processes` is
+            below 1.
     """
 
     evaluator: BlastEvaluator
-    threats: tuple[Threat, ...]
-    risk: Risk = field(default_factory=MeanRisk)
+    case: Case
     processes: int = 1
 
     def __post_init__(self) -> None:
         """Check that there is something to search."""
-        if not self.threats:
-            raise BlastEnvError("threats: there are none, must be at least one")
-        if len(set(self.threats)) < len(self.threats):
-            raise BlastEnvError("threats: one is there twice, must be none twice")
+        check_distinct(self.case.threats)
         if self.scenario.build_zone is None:
             raise BlastEnvError(f"{self.scenario.name} has no build zone: no layout to search for")
-        if self.processes < 1:
-            raise BlastEnvError(f"processes is {self.processes}, must be at least 1")
+        check_workers("processes", self.processes)
 
     @property
     def scenario(self) -> Scenario:
         """The scenario."""
-        return self.evaluator.scenario
+        return self.case.scenario
+
+    @property
+    def threats(self) -> tuple[Threat, ...]:
+        """What layouts meet."""
+        return self.case.threats
 
     @property
     def stock(self) -> int:
         """Most modules that a layout may have."""
-        zone = self.scenario.build_zone
-        return 0 if zone is None else zone.stock
+        return self.scenario.zone.stock
 
     @property
     def charge(self) -> Charge:
         """The charge if it is known, else the middle of where the scenario lets one be."""
-        known = {threat.charge for threat in self.threats}
+        known = set(self.case.charges)
         return known.pop() if len(known) == 1 else expected_charge(self.scenario.charge)
 
     def loads_pa_s(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
@@ -81,84 +76,30 @@ class LayoutProblem:
         loads = self.evaluator.loads_of_many(pairs, self.processes)
         return [each.protected_impulse_pa_s for each in loads]
 
-    def combined_pa_s(self, impulses_pa_s: Sequence[float]) -> float:
-        """Return the one number for the impulses under the first threats, Pa*s.
-
-        Args:
-            impulses_pa_s: One a threat, in the order of `threats`; at least one, perhaps not all.
-        """
-        of_charge: dict[Charge, list[float]] = {}
-        for threat, impulse_pa_s in zip(self.threats, impulses_pa_s, strict=False):
-            of_charge.setdefault(threat.charge, []).append(impulse_pa_s)
-        return self.risk(np.array([float(np.mean(each)) for each in of_charge.values()]))
-
     def impulse_pa_s(self, layout: Sequence[Cell]) -> float:
         """Return the impulse with a layout over all threats, Pa*s; outside any budget.
 
         Raises:
             LayoutError: If the layout does not fit the build zone.
         """
-        return self.combined_pa_s(self.loads_pa_s([(tuple(layout), each) for each in self.threats]))
+        pairs = [(tuple(layout), threat) for threat in self.threats]
+        return self.case.combined(self.loads_pa_s(pairs))
 
+    @cached_property
+    def unprotected_pa_s(self) -> tuple[float, ...]:
+        """The impulse without a barrier, Pa*s, one a threat; it counts in no search's budget.
 
-def visible_threats(charge: Charge, realisations: int, seed: int) -> tuple[Threat, ...]:
-    """Return threats for a known charge: the same charge with different fans and air.
+        Raises:
+            BlastEnvError: If nothing arrives: there is nothing to reduce.
+        """
+        impulses_pa_s = self.loads_pa_s([((), threat) for threat in self.threats])
+        check_something_arrives([self.case], np.array(impulses_pa_s))
+        return tuple(impulses_pa_s)
 
-    Args:
-        charge: The charge.
-        realisations: How many, at least one.
-        seed: Decides the seeds of the blasts.
-
-    Raises:
-        BlastEnvError: If there are to be none.
-    """
-    return _threats([charge], realisations, np.random.default_rng(seed))
-
-
-def hidden_threats(
-    scenario: Scenario, charges: int, realisations: int, seed: int
-) -> tuple[Threat, ...]:
-    """Return threats for a hidden charge, drawn from where the scenario lets it be.
-
-    Args:
-        scenario: The scenario.
-        charges: How many charges, at least one.
-        realisations: How many fans and airs for each of them, at least one.
-        seed: Decides the charges and the seeds of the blasts.
-
-    Returns:
-        First one realisation of each charge, then another of each, and so on. The first charge is
-        the one in the middle of all, and each further one as far as possible from those before it,
-        so that the first few stand for all.
-
-    Raises:
-        BlastEnvError: If there are to be none.
-    """
-    rng = np.random.default_rng(seed)
-    drawn = [scenario.sample_charge(rng) for _ in range(charges)]
-    return _threats(_spread_first(drawn), realisations, rng)
-
-
-def _spread_first(charges: Sequence[Charge]) -> list[Charge]:
-    """Return charges, each as far as possible from those before it, the middle one first."""
-    places_m = np.array([charge.position_m for charge in charges]).reshape(-1, 2)
-    apart_m = np.hypot(*(places_m[:, np.newaxis] - places_m).T)
-    order: list[int] = []
-    nearest_m = -apart_m.sum(axis=0)
-    while len(order) < len(charges):
-        order.append(int(np.argmax(nearest_m)))
-        nearest_m = apart_m[order].min(axis=0)
-        nearest_m[order] = -np.inf
-    return [charges[index] for index in order]
-
-
-def _threats(
-    charges: Sequence[Charge], realisations: int, rng: np.random.Generator
-) -> tuple[Threat, ...]:
-    if realisations < 1:
-        raise BlastEnvError(f"realisations is {realisations}, must be at least 1")
-    seeds = iter(rng.choice(SEED_SPAN, size=realisations * len(charges), replace=False).tolist())
-    return tuple(Threat(charge, next(seeds)) for _ in range(realisations) for charge in charges)
+    def reduction(self, candidate: "Candidate") -> float:
+        """Return by which share a layout lowers the impulse under the threats that it has met."""
+        bare_pa_s = self.case.combined(self.unprotected_pa_s[: candidate.threats])
+        return reductions(candidate.impulse_pa_s, bare_pa_s).item()
 
 
 @dataclass(frozen=True)
@@ -345,43 +286,3 @@ class SearchMethod(Protocol):
         Raises:
             BlastEnvError: If the method cannot do anything with the budget.
         """
-
-
-@dataclass(frozen=True, eq=False)
-class Unprotected:
-    """What arrives at the protected structures without a barrier.
-
-    Its blasts are for the reader of a result; they count in no search's budget.
-
-    Attributes:
-        problem: The threats and how they become one number.
-        impulses_pa_s: One a threat, Pa*s.
-    """
-
-    problem: LayoutProblem
-    impulses_pa_s: tuple[float, ...]
-
-    @classmethod
-    def of(cls, problem: LayoutProblem) -> "Unprotected":
-        """Simulate the threats without a barrier.
-
-        Raises:
-            BlastEnvError: If nothing arrives under the first threat: there is nothing to reduce.
-        """
-        impulses_pa_s = tuple(problem.loads_pa_s([((), threat) for threat in problem.threats]))
-        if not impulses_pa_s[0] > 0.0:
-            raise BlastEnvError(
-                f"{problem.scenario.name}: nothing arrives at the protected structures without a "
-                f"barrier under {problem.threats[0]}: there is nothing to reduce"
-            )
-        return cls(problem, impulses_pa_s)
-
-    @property
-    def impulse_pa_s(self) -> float:
-        """The one number for all threats, Pa*s."""
-        return self.problem.combined_pa_s(self.impulses_pa_s)
-
-    def reduction(self, candidate: Candidate) -> float:
-        """Return by which share a layout lowers the impulse under the threats that it has met."""
-        bare_pa_s = self.problem.combined_pa_s(self.impulses_pa_s[: candidate.threats])
-        return 1.0 - candidate.impulse_pa_s / bare_pa_s

@@ -234,4 +234,4 @@ class SearchSession:
             self._history.append(candidate)
 
     def _impulse_pa_s(self, key: Layout, threats: int) -> float:
-        return self.problem.combined_pa_s(self._known[key][:threats])
+        return self.problem.case.combined(self._known[key][:threats])

@@ -25,10 +25,10 @@ from torch import nn
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
 from blast_agents.training.hyperparameters import Hyperparameters, schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
-from blast_env.envs.objective import Evaluators
 from blast_env.envs.observations import Array, GridEpisode, GridObservation, Sight
-from blast_env.envs.strategies import check_size, zone_of
+from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.evaluator import Evaluators
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
@@ -167,7 +167,7 @@ def fitted(
     Raises:
         BlastEnvError: If the policy is not one for the algorithm.
     """
-    zone = zone_of(scenario)
+    zone = scenario.zone
     places = hyperparameters.policy_kwargs.places or _PLACES[settings.threat]
     changes = {"rows": zone.rows, "columns": zone.columns, "places": places}
     spatial = _SPATIAL[settings.algorithm]
@@ -305,7 +305,7 @@ class TrainedAgent:
         self, scenario: Scenario, charge: Charge | None, draw: torch.Generator | None, count: int
     ) -> tuple[Layout, ...]:
         episode = self._episode(scenario, charge)
-        columns = zone_of(scenario).columns
+        columns = scenario.zone.columns
         placements = [Placement.empty(scenario)] * count
         open_ones = [index for index in range(count) if not placements[index].is_full]
         while open_ones:
@@ -368,7 +368,7 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     configuration = folder.configuration()
     scenario = folder.scenario(configuration)
     checkpoint = Checkpoint.load(folder.best if weights == "best" else folder.last)
-    zone = zone_of(scenario)
+    zone = scenario.zone
     actions = spaces.Discrete(zone.rows * zone.columns + 1)
     policy = make_policy(configuration, GridObservation().space(scenario), actions)
     checkpoint.load_policy(policy, folder.path)

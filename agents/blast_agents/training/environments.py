@@ -16,10 +16,10 @@ from blast_env.envs.arguments import real_number, whole_number
 from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
 from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
-from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
+from blast_env.envs.strategies import ScenarioSource, scenario_source
 from blast_env.evaluation.store import LoadsCache
-from blast_env.scenario import Scenario, bundled_scenarios
-from blast_env.sites import HELD_OUT_SITES, SiteSource
+from blast_env.scenario import bundled_scenarios
+from blast_env.sites import SiteSource
 
 _Env = gym.Env[Array, np.int64]
 
@@ -49,7 +49,8 @@ class RelativeReward(_Wrapper):
     def step(self, action: np.int64) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
         """Place a module or finish."""
         observation, _, ended, truncated, info = self.env.step(action)
-        reward = info["reduction"] if ended else 0.0
+        # Where nothing arrives without a barrier there is no reduction, and nothing to be paid.
+        reward = float(np.nan_to_num(info["reduction"])) if ended else 0.0
         if info["reward_terms"][ILLEGAL_TERM] < 0.0:
             reward -= self.illegal_action_cost
         return observation, reward, ended, truncated, info
@@ -127,13 +128,6 @@ def training_source(scenario: str) -> ScenarioSource:
         BlastEnvError: If it has no build zone.
     """
     return SiteSource.training() if scenario == SITES else scenario_source(scenario)
-
-
-def held_out_scenarios(source: ScenarioSource, count: int) -> tuple[Scenario, ...]:
-    """Return scenarios to evaluate on: of sites, the last of those that training never sees."""
-    if isinstance(source, SingleScenario):
-        return (source.scenario,) * count
-    return tuple(SiteSource(HELD_OUT_SITES - count, count))
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
+from blast_agents.training.recorder import Progress
 from blast_agents.training.run_folder import RunConfiguration
-from blast_agents.training.train import Progress
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.site_plan import write_heading
 from blast_env.rendering.style import number_on_axis, render_extra

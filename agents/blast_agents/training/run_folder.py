@@ -53,7 +53,8 @@ class TrainingSettings(BaseModel):
             same for any number; with few, more layouts are tried for the same number of blasts.
         evaluation_interval: Rollouts from one evaluation to the next.
         evaluation_cases: Held-out threats that the layouts are evaluated on.
-        evaluation_first_seed: The seeds of these threats count from here.
+        evaluation_first_seed: The seeds of these threats count from here, within those that
+            belong to the choice of weights (`SeedRange.SELECTION`).
         torch_threads: Threads for the network.
     """
 
@@ -68,7 +69,7 @@ class TrainingSettings(BaseModel):
     hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
     evaluation_interval: Annotated[int, Field(ge=1)] = 5
     evaluation_cases: Annotated[int, Field(ge=2, le=100)] = 16
-    evaluation_first_seed: Annotated[int, Field(ge=0)] = 1_000_000
+    evaluation_first_seed: Annotated[int, Field(ge=0, lt=2**30)] = 0
     torch_threads: Annotated[int, Field(ge=1, le=256)] = 1
 
 

@@ -20,7 +20,7 @@ from blast_env.arrays import FloatArray
 from blast_env.files import write_atomically
 from blast_env.geometry import Cell
 from blast_env.physics.collisions import incidence_angle_rad
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
 from blast_env.rendering.site_plan import write_heading
 from blast_env.rendering.style import render_extra

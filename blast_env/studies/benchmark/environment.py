@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from blast_env.calibration.model import calibrated_engines
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.physics.collisions import CollisionLog
-from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, find_engine
+from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Placement, Scenario

@@ -4,7 +4,6 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Literal
@@ -29,8 +28,9 @@ from blast_env.calibration.model import (
 )
 from blast_env.calibration.references import kingery_bulmash, paper_ufc_column
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import parameters_digest
+from blast_env.provenance import package_version
 from blast_env.runner import as_completed
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.simulation import simulate
@@ -372,7 +372,7 @@ class CalibrationReport:
             parameters_digest=parameters_digest(study.scenario.parameters, study.engine),
             engine=study.engine,
             engine_version=find_engine(study.engine).version,
-            blast_env_version=version("blast-env"),
+            blast_env_version=package_version(),
             facade_width_m=structure.rectangle_m.top - structure.rectangle_m.bottom,
             ball_radius_m=study.scenario.parameters.air.radius_units / UNITS_PER_M,
             simulated=self.simulated,

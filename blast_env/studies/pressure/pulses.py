@@ -7,7 +7,7 @@ until a calibration gives the scale. It is the mean over seeds.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from typing import Final, Literal, get_args
 
 import numpy as np
 import pandas as pd
@@ -17,11 +17,8 @@ from blast_env.calibration.laws import checked_array
 from blast_env.calibration.references import Friedlander, fit_friedlander
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.recording.tables import faces_hit
+from blast_env.simulation import BlastResult
 from blast_env.units import UNITS_PER_M
-
-if TYPE_CHECKING:
-    from blast_env.simulation import BlastResult
-
 
 Face = Literal["left", "right", "bottom", "top"]
 """A facade of a structure, by the side that its normal points to."""
@@ -147,7 +144,7 @@ class PressureHistory:
 
 
 def facade_history(
-    results: Sequence["BlastResult"],
+    results: Sequence[BlastResult],
     structure: str,
     face: Face,
     bin_s: float,
@@ -184,7 +181,7 @@ def facade_history(
     return PressureHistory(structure, face, length_m, scale, edges_s, pressure)
 
 
-def _facade_length_m(results: Sequence["BlastResult"], structure: str, face: Face) -> float:
+def _facade_length_m(results: Sequence[BlastResult], structure: str, face: Face) -> float:
     """Return the length of a facade that all blasts share."""
     if not len(results):
         raise BlastEnvError("results is empty, must have at least one blast")

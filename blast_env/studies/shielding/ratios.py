@@ -178,6 +178,30 @@ One corner away they gave 0.48 to 0.67, near and far from the edge.
 """
 
 
+def gauge_loads(faces: FloatArray) -> FloatArray:
+    """Return the loads on the gauges of a block, symmetric ones folded (kinds, gauges).
+
+    Args:
+        faces: Loads on all faces (kinds, faces, rows, columns).
+    """
+    # Along the sides a gauge is a column of modules, at the back it is a row.
+    side = (faces[:, Face.LEFT] + faces[:, Face.RIGHT]).sum(axis=1) / 2.0
+    back = faces[:, Face.BACK].sum(axis=2)
+    back = (back + back[:, ::-1]) / 2.0
+    half = (back.shape[1] + 1) // 2
+    return np.concatenate((side, back[:, :half]), axis=1)
+
+
+def wall_loads(faces: FloatArray) -> FloatArray:
+    """Return the loads on the wall in the open, mean of its two faces (kinds, modules).
+
+    Args:
+        faces: Loads on all faces (kinds, faces, rows, columns).
+    """
+    loads: FloatArray = (faces[:, Face.LEFT] + faces[:, Face.RIGHT]).sum(axis=1) / 2.0
+    return loads
+
+
 @dataclass(frozen=True, eq=False)
 class DrawnLoads:
     """Mean loads over all seeds (row 0), and over draws of seeds with replacement (the others).

@@ -25,8 +25,8 @@ from blast_env.studies.shielding.ratios import (
     face_loads,
     faces_hit,
     fitted_modules,
+    wall_loads,
 )
-from blast_env.studies.shielding.report import wall_loads
 from blast_env.studies.shielding.scenes import StudySettings, facade_scenario, wall_scenario
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 

@@ -2,13 +2,11 @@
 
 import json
 import math
-import platform
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from importlib.metadata import version
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,23 +14,26 @@ import pandas as pd
 from blast_env.arrays import FloatArray
 from blast_env.calibration.references import kingery_bulmash
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engine import find_engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import parameters_digest
+from blast_env.provenance import versions
 from blast_env.statistics import Estimate
 from blast_env.studies.shielding.ratios import (
     EXPERIMENT,
     REGIONS,
     DrawnLoads,
-    Face,
     LoadKind,
     Region,
     draw_loads,
     estimate,
     face_loads,
     fitted_modules,
+    gauge_loads,
     region_weight,
     scaled_ratio,
+    wall_loads,
 )
+from blast_env.studies.shielding.reflection import ReflectionReport
 from blast_env.studies.shielding.scenes import (
     BlockGeometry,
     StudySettings,
@@ -40,15 +41,12 @@ from blast_env.studies.shielding.scenes import (
     wall_scenario,
 )
 
-if TYPE_CHECKING:
-    from blast_env.studies.shielding.reflection import ReflectionReport
-
 SCHEMA_VERSION: Final = 1
 """The version of the file that `ShieldingReport.to_json` writes."""
 
 
 def shielding_record(
-    report: "ShieldingReport", exponent: float | None, reflection: "ReflectionReport | None"
+    report: "ShieldingReport", exponent: float | None, reflection: ReflectionReport | None
 ) -> dict[str, Any]:
     """Return everything about a shielding study as what JSON knows; NaN is `None`."""
     study = report.study
@@ -59,12 +57,7 @@ def shielding_record(
         "parameters": study.parameters.model_dump(mode="json"),
         "parameters_digest": parameters_digest(study.parameters, engine.name),
         "engine": engine.name,
-        "versions": {
-            "blast_env": version("blast-env"),
-            "engine": engine.version,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-        },
+        "versions": versions(engine.version),
         "seeds": list(study.seeds),
         "time_limit_s": study.time_limit_s,
         "geometry": asdict(study.geometry),
@@ -268,7 +261,7 @@ class ShieldingReport:
         return pd.DataFrame(rows)
 
     def to_json(
-        self, exponent: float | None = None, reflection: "ReflectionReport | None" = None
+        self, exponent: float | None = None, reflection: ReflectionReport | None = None
     ) -> str:
         """Return the whole study as JSON: what repeats it, and what came out.
 
@@ -352,27 +345,3 @@ class ShieldingStudy(StudySettings):
             np.array([gauge_loads(faces) for faces in block]),
             np.array([wall_loads(faces) for faces in wall]),
         )
-
-
-def gauge_loads(faces: FloatArray) -> FloatArray:
-    """Return the loads on the gauges of a block, symmetric ones folded (kinds, gauges).
-
-    Args:
-        faces: Loads on all faces (kinds, faces, rows, columns).
-    """
-    # Along the sides a gauge is a column of modules, at the back it is a row.
-    side = (faces[:, Face.LEFT] + faces[:, Face.RIGHT]).sum(axis=1) / 2.0
-    back = faces[:, Face.BACK].sum(axis=2)
-    back = (back + back[:, ::-1]) / 2.0
-    half = (back.shape[1] + 1) // 2
-    return np.concatenate((side, back[:, :half]), axis=1)
-
-
-def wall_loads(faces: FloatArray) -> FloatArray:
-    """Return the loads on the wall in the open, mean of its two faces (kinds, modules).
-
-    Args:
-        faces: Loads on all faces (kinds, faces, rows, columns).
-    """
-    loads: FloatArray = (faces[:, Face.LEFT] + faces[:, Face.RIGHT]).sum(axis=1) / 2.0
-    return loads

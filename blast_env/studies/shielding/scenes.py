@@ -10,7 +10,8 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engine import EndReason, find_engine
+from blast_env.physics.engine import EndReason
+from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import preset
 from blast_env.runner import run_all

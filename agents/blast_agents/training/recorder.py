@@ -1,0 +1,209 @@
+"""What happens between two rollouts: seeds, evaluation, tables, checkpoint."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from statistics import fmean
+from time import perf_counter
+
+import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.utils import set_random_seed
+
+from blast_agents.training.agent import (
+    Checkpoint,
+    Counters,
+    Model,
+    TrainedAgent,
+)
+from blast_agents.training.cases import Selection
+from blast_agents.training.run_folder import (
+    EvaluationRow,
+    RolloutRow,
+    RunFolder,
+    TrainingSettings,
+    write_rows,
+)
+from blast_env.scenario import Scenario
+
+
+@dataclass
+class Episodes:
+    """The episodes that ended in a rollout.
+
+    Attributes:
+        rewards: One an episode.
+        reductions: One an episode.
+        modules: One an episode.
+    """
+
+    rewards: list[float] = field(default_factory=list)
+    reductions: list[float] = field(default_factory=list)
+    modules: list[int] = field(default_factory=list)
+
+
+@dataclass
+class Progress:
+    """What a run has come to so far.
+
+    Attributes:
+        counters: How far it is.
+        rollouts: A row each.
+        evaluations: A row each.
+    """
+
+    counters: Counters = field(default_factory=Counters)
+    rollouts: list[RolloutRow] = field(default_factory=list)
+    evaluations: list[EvaluationRow] = field(default_factory=list)
+
+
+class Recorder(BaseCallback):
+    """Makes each rollout a unit of its own, and writes down what it brought.
+
+    A rollout begins with fresh episodes and with seeds that follow from the seed of the run and
+    the number of the rollout. So a run that goes on from a checkpoint is the same, to the last
+    bit, as one that was never interrupted.
+
+    Args:
+        folder: Where everything is written.
+        settings: Of the run.
+        scenario: A scenario of the size that the policy is for.
+        selection: What the best weights are chosen by.
+        progress: What the run has come to so far; goes on from here.
+        show: Called with the share of the steps that is done.
+    """
+
+    def __init__(
+        self,
+        folder: RunFolder,
+        settings: TrainingSettings,
+        scenario: Scenario,
+        selection: Selection,
+        progress: Progress,
+        show: Callable[[float], None],
+    ) -> None:
+        super().__init__()
+        self.folder, self.settings, self.scenario = folder, settings, scenario
+        self.selection, self.progress, self.show = selection, progress, show
+        self.algorithm: Model
+        self._episodes = Episodes()
+        self._is_pending = False
+        self._blasts: dict[int, tuple[int, int]] = {}
+        self._before = progress.counters
+        self._began = perf_counter()
+
+    def _on_rollout_start(self) -> None:
+        if self._is_pending:
+            self._finish_rollout()
+        number = self.progress.counters.rollouts
+        sequence = np.random.SeedSequence((self.settings.seed, number))
+        seed, environment_seed = (int(state) >> 1 for state in sequence.generate_state(2))
+        set_random_seed(seed)
+        self.training_env.seed(environment_seed)
+        self.algorithm._last_obs = self.training_env.reset()  # type: ignore[assignment]
+        self.algorithm._last_episode_starts = np.ones(self.training_env.num_envs, dtype=bool)
+        self._episodes = Episodes()
+
+    def _on_step(self) -> bool:
+        for index, info in enumerate(self.locals["infos"]):
+            if "reduction" not in info:
+                continue
+            self._episodes.rewards.append(float(info["episode"]["r"]))
+            self._episodes.reductions.append(float(info["reduction"]))
+            self._episodes.modules.append(len(info["layout"]))
+            self._blasts[index] = (info["blasts"], info["cache_hits"])
+        self.show(min(self.num_timesteps / self.settings.steps, 1.0))
+        return True
+
+    def _on_rollout_end(self) -> None:
+        counters = self._counted()
+        episodes = self._episodes
+        row = RolloutRow(
+            steps=counters.steps,
+            episodes=len(episodes.rewards),
+            reward=_mean(episodes.rewards),
+            reduction=_mean(episodes.reductions),
+            modules=_mean(episodes.modules),
+            blasts=counters.blasts,
+            cache_hits=counters.cache_hits,
+            seconds=counters.seconds,
+        )
+        self._log_rollout(row)
+        self.progress.counters = counters
+        self.progress.rollouts.append(row)
+        self._is_pending = True
+
+    def _on_training_end(self) -> None:
+        if self._is_pending:
+            self._finish_rollout()
+
+    def _finish_rollout(self) -> None:
+        """Write down a rollout and its update; the checkpoint comes last."""
+        counters = self.progress.counters
+        counters = replace(
+            counters,
+            rollouts=counters.rollouts + 1,
+            updates=self.algorithm._n_updates,
+            seconds=self._seconds(),
+        )
+        self.progress.counters = counters
+        is_last = counters.steps >= self.settings.steps
+        if is_last or counters.rollouts % self.settings.evaluation_interval == 0:
+            self._evaluate()
+        write_rows(self.folder.rollouts, RolloutRow, self.progress.rollouts)
+        self._checkpoint().save(self.folder.last)
+        self._is_pending = False
+
+    def _evaluate(self) -> None:
+        agent = TrainedAgent(self.algorithm.policy, self.scenario, self.settings.engine)
+        reduction = self.selection.reduction(agent)
+        counters = self.progress.counters
+        row = EvaluationRow(
+            counters.steps, counters.episodes, *reduction, counters.blasts, counters.seconds
+        )
+        self.progress.evaluations.append(row)
+        write_rows(self.folder.evaluations, EvaluationRow, self.progress.evaluations)
+        self.logger.record("evaluation/reduction", reduction.value)
+        self.logger.dump(counters.steps)
+        if reduction.value > counters.best_reduction:
+            self.progress.counters = replace(
+                counters, best_reduction=reduction.value, best_steps=counters.steps
+            )
+            self._checkpoint().save(self.folder.best)
+
+    def _checkpoint(self) -> Checkpoint:
+        policy = self.algorithm.policy
+        return Checkpoint(
+            policy.state_dict(), policy.optimizer.state_dict(), self.progress.counters
+        )
+
+    def _counted(self) -> Counters:
+        """Return the counters at the end of a rollout."""
+        before, now = self._before, self.progress.counters
+        return replace(
+            now,
+            steps=self.num_timesteps,
+            episodes=now.episodes + len(self._episodes.rewards),
+            blasts=before.blasts + sum(blasts for blasts, _ in self._blasts.values()),
+            cache_hits=before.cache_hits + sum(hits for _, hits in self._blasts.values()),
+            seconds=self._seconds(),
+        )
+
+    def _log_rollout(self, row: RolloutRow) -> None:
+        """Hand the scalars to TensorBoard, which are written with those of stable-baselines3."""
+        before = self.progress.rollouts[-1] if self.progress.rollouts else None
+        blasts = row.blasts - (before.blasts if before else 0)
+        seconds = row.seconds - (before.seconds if before else 0.0)
+        self.logger.record("rollout/reward", row.reward)
+        self.logger.record("rollout/reduction", row.reduction)
+        self.logger.record("rollout/modules", row.modules)
+        self.logger.record("blasts/per_second", blasts / max(seconds, 1e-9))
+        self.logger.record("blasts/simulated", row.blasts)
+        self.logger.record("blasts/cache_hits", row.cache_hits)
+
+    def _seconds(self) -> float:
+        return self._before.seconds + perf_counter() - self._began
+
+
+def _mean(values: list[float] | list[int]) -> float:
+    """Return the mean; NaN where no episode ended."""
+    return fmean(values) if values else float("nan")

@@ -1,0 +1,248 @@
+"""The options of `blast-env evaluate`, and what it prints and writes."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan
+from pathlib import Path
+from typing import Final
+
+import pandas as pd
+
+from blast_env.cli.output import (
+    make_table,
+    print_line,
+    progress_bar,
+    result_console,
+    save_pictures,
+)
+from blast_env.evaluation import (
+    BlastEvaluator,
+    Evaluators,
+    LayoutEvaluation,
+    SeedRange,
+    draw_threats,
+    evaluate_against,
+)
+from blast_env.export import LayoutPlan, check_target, export_layouts
+from blast_env.files import make_folder, write_atomically
+from blast_env.statistics import Estimate
+from blast_env.units import PA_PER_PSI
+
+_PERCENT = 100.0
+
+
+@dataclass(frozen=True)
+class EvaluateOptions:
+    """The options that a layout's file and a run have in common; see `evaluate`."""
+
+    seeds: int
+    first_seed: int | None
+    processes: int
+    engine: str | None
+    cvar_level: float
+    cache: Path | None
+    export: Path | None
+    out: Path | None
+    as_json: bool
+
+    @property
+    def seed_range(self) -> range:
+        """The seeds of the threats: those that judge, unless the user wants others."""
+        if self.first_seed is None:
+            return SeedRange.JUDGEMENT.seeds(0, self.seeds)
+        return range(self.first_seed, self.first_seed + self.seeds)
+
+    def prepare_files(self, layouts: int) -> None:
+        """Refuse targets of no use before the blasts, so that no result is lost for want of one.
+
+        Args:
+            layouts: How many layouts there are to be.
+
+        Raises:
+            BlastEnvError: If `out` cannot be a folder, or `export` is of no use.
+        """
+        if self.export is not None:
+            check_target(self.export, layouts)
+        if self.out is None:
+            return
+        make_folder(self.out)
+
+
+def write_table(table: pd.DataFrame, path: Path) -> Path:
+    """Write a table as CSV; return the path."""
+    with write_atomically(path) as temporary:
+        table.to_csv(temporary, index=False)
+    return path
+
+
+def cache_record(evaluator: BlastEvaluator | Evaluators) -> dict[str, float]:
+    """Return how many blasts were run and how many were known already."""
+    blasts, hits = evaluator.blasts, evaluator.cache_hits
+    return {"blasts": blasts, "hits": hits, "hit_rate": evaluator.cache_hit_rate}
+
+
+def cache_text(evaluator: BlastEvaluator | Evaluators) -> str:
+    """Return the same for people."""
+    record = cache_record(evaluator)
+    return (
+        f"{record['blasts']:g} blasts run, {record['hits']:g} known already "
+        f"(cache hit rate {percent(record['hit_rate'])})"
+    )
+
+
+def percent(share: float) -> str:
+    """Return a share for people; a dash for one that does not exist."""
+    return "-" if isnan(share) else f"{_PERCENT * share:.1f} %"
+
+
+def interval(estimate: Estimate) -> str:
+    """Return an interval of shares; a dash where one threat says nothing about the others."""
+    if isnan(estimate.low):
+        return "-"
+    return f"{percent(estimate.low)} to {percent(estimate.high)}"
+
+
+def seeds_text(seeds: range) -> str:
+    """Return what the means are over."""
+    if len(seeds) == 1:
+        return f"seed {seeds[0]}"
+    return f"means over {len(seeds)} threats (seeds {seeds[0]} to {seeds[-1]})"
+
+
+_HEADERS: Final = (
+    "structure",
+    "protected",
+    "without (Pa s)",
+    "with (Pa s)",
+    "reduction",
+    "95 % interval",
+    "threats in range",
+)
+
+
+def report_layout(
+    plan: LayoutPlan, evaluator: BlastEvaluator, seeds: range, options: EvaluateOptions
+) -> None:
+    """Evaluate a layout on threats that the seeds draw; print and write the result."""
+    threats = draw_threats(plan.scenario, seeds)
+    options.prepare_files(1)
+    with progress_bar(f"{2 * len(seeds)} blasts in {plan.scenario.name}") as progress:
+        evaluation = evaluate_against(
+            evaluator,
+            plan.layout,
+            threats,
+            options.processes,
+            cvar_level=options.cvar_level,
+            progress=progress,
+        )
+    written = [] if options.out is None else _write(evaluation, options.out)
+    if options.export is not None:
+        written += export_layouts({"layout": plan}, options.export)
+    if options.as_json:
+        content = {
+            **evaluation.to_dict(),
+            "provenance": dict(plan.provenance),
+            "cache": cache_record(evaluator),
+            "files": [str(path) for path in written],
+        }
+        print_line(json.dumps(content, indent=2))
+        return
+    _print_evaluation(evaluation, seeds)
+    for path in written:
+        print_line(f"wrote {path}")
+    print_line(cache_text(evaluator))
+
+
+def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
+    written = [evaluation.to_json(out / "evaluation.json")]
+    tables = {
+        "structures.csv": evaluation.table,
+        "modules.csv": evaluation.module_table,
+        "threats.csv": evaluation.threat_table,
+    }
+    written += [write_table(table, out / name) for name, table in tables.items()]
+    return written + save_pictures(lambda: _save_figure(evaluation, out))
+
+
+def _save_figure(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
+    # Here, because pictures need the extra `render`.
+    from blast_env.rendering.evaluation_figures import evaluation_figure
+    from blast_env.rendering.figures import save_figure
+
+    return [save_figure(evaluation_figure(evaluation), out / "evaluation.png")]
+
+
+def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
+    """Print the structures' mean loads, and what the layout does over all threats."""
+    count = len(evaluation.threats)
+    table = make_table(
+        f"{evaluation.scenario.name}: {len(evaluation.layout)} barrier modules against none, "
+        f"{seeds_text(seeds)}",
+        _HEADERS,
+        text_columns=2,
+    )
+    for row in evaluation.table.to_dict("records"):
+        reduction = Estimate(row["reduction"], row["reduction_low"], row["reduction_high"])
+        table.add_row(
+            str(row["structure"]),
+            "yes" if row["protected"] else "no",
+            f"{row['unprotected_impulse_pa_s']:,.0f}",
+            f"{row['impulse_pa_s']:,.0f}",
+            percent(reduction.value),
+            interval(reduction),
+            f"{row['threats_in_range']} of {count}",
+        )
+    result_console().print(table)
+    _print_totals(evaluation)
+    for note in evaluation.notes:
+        print_line(f"note: {note}")
+
+
+def _print_totals(evaluation: LayoutEvaluation) -> None:
+    """Print what there is to say about the protected structures together."""
+    worst = evaluation.worst
+    print_means(
+        evaluation.reduction,
+        (evaluation.unprotected_impulse_pa_s, evaluation.impulse_pa_s),
+        (evaluation.unprotected_cvar, evaluation.cvar),
+        evaluation.cvar_level,
+    )
+    charge = worst.threat.charge
+    print_line(
+        f"worst threat: {charge.tnt_kg:g} kg TNT at ({charge.position_m[0]:.2f}, "
+        f"{charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: {worst.impulse_pa_s:,.0f} Pa s, "
+        f"reduction {percent(worst.reduction)}"
+    )
+    print_line(
+        f"engine {evaluation.engine_name} ({evaluation.engine_version}), calibration "
+        f"{evaluation.calibration.name}, scenario hash {evaluation.scenario.content_hash[:12]}"
+    )
+
+
+def print_means(
+    reduction: Estimate,
+    impulses_pa_s: Sequence[Estimate],
+    cvars_pa_s: Sequence[float],
+    cvar_level: float,
+) -> None:
+    """Print the reduction, and the mean impulses without and with barrier.
+
+    Args:
+        reduction: Of the protected structures, by weight.
+        impulses_pa_s: Without, with.
+        cvars_pa_s: Without, with.
+        cvar_level: Of these.
+    """
+    print_line(
+        f"protected structures, by weight: mean reduction {percent(reduction.value)} "
+        f"(95 % interval {interval(reduction)})"
+    )
+    names = ("without barrier", "with barrier")
+    for words, impulse, cvar in zip(names, impulses_pa_s, cvars_pa_s, strict=True):
+        half_width = "" if isnan(impulse.low) else f" +- {impulse.high - impulse.value:,.0f}"
+        print_line(
+            f"{words}: mean {impulse.value:,.0f}{half_width} Pa s "
+            f"({impulse.value / PA_PER_PSI:.4f} psi s), mean of the worst "
+            f"{100.0 * (1.0 - cvar_level):.3g} % {cvar:,.0f} Pa s"
+        )

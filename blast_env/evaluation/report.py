@@ -1,0 +1,550 @@
+"""A layout against no barrier, in full: by structure, module and threat, as tables and as JSON."""
+
+import json
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from blast_env.calibration.model import Calibration
+from blast_env.evaluation.cases import Case, Threat, draw_threats
+from blast_env.evaluation.comparison import (
+    CVAR_LEVEL,
+    Comparison,
+    loads_of_both,
+)
+from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.evaluation.loads import BlastLoads, StructureLoad
+from blast_env.evaluation.store import BlastCache
+from blast_env.files import write_atomically
+from blast_env.geometry import Cell, Layout
+from blast_env.physics.engine import Engine
+from blast_env.provenance import versions
+from blast_env.recording.tables import module_table
+from blast_env.scenario import Scenario, check_layout
+from blast_env.scenario.build_scene import build_scene
+from blast_env.statistics import (
+    Estimate,
+    check_cvar_level,
+    reduction_estimate,
+    reductions,
+)
+from blast_env.tables import Column, table_of
+from blast_env.units import PA_PER_PSI
+
+STRUCTURE_COLUMNS: Final = (
+    Column("structure", "", "name of the structure"),
+    Column("protected", "", "whether its load counts"),
+    Column("weight", "", "its weight among the protected structures"),
+    Column("impulse_pa_s", "Pa s", "calibrated impulse per area with the barrier"),
+    Column("unprotected_impulse_pa_s", "Pa s", "calibrated impulse per area without it"),
+    Column("reduction", "", "of the calibrated impulse"),
+    Column("reduction_low", "", "lower end of its 95 % confidence interval"),
+    Column("reduction_high", "", "upper end of its 95 % confidence interval"),
+    Column("impulse_psi_s", "psi s", "calibrated impulse per area with the barrier"),
+    Column("unprotected_impulse_psi_s", "psi s", "calibrated impulse per area without it"),
+    Column("impulse_sim", "sim", "sum of m |v| with the barrier"),
+    Column("unprotected_impulse_sim", "sim", "sum of m |v| without it"),
+    Column("transferred_impulse_sim", "sim", "momentum really transferred with the barrier"),
+    Column("unprotected_transferred_impulse_sim", "sim", "momentum transferred without it"),
+    Column("threats_in_range", "", "threats that the calibration was made for"),
+)
+
+
+MODULE_COLUMNS: Final = (
+    Column("module_id", "", "name of the module, made from its centre in metres"),
+    Column("structure", "", "structure that the module is part of"),
+    Column("x_m", "m", "centre, from the left border"),
+    Column("y_m", "m", "centre, from the lower border"),
+    Column("impulse_sim", "sim", "sum of m |v| with the barrier"),
+    Column("unprotected_impulse_sim", "sim", "sum of m |v| without it"),
+    Column("reduction", "", "of the sum of m |v|"),
+)
+
+
+THREAT_COLUMNS: Final = (
+    Column("seed", "", "seed of fan and air"),
+    Column("charge_x_m", "m", "centre of the charge, from the left border"),
+    Column("charge_y_m", "m", "centre of the charge, from the lower border"),
+    Column("tnt_kg", "kg", "TNT-equivalent mass of the charge"),
+    Column("impulse_pa_s", "Pa s", "protected structures, with the barrier"),
+    Column("unprotected_impulse_pa_s", "Pa s", "protected structures, without it"),
+    Column("reduction", "", "of that impulse"),
+    Column("in_range", "", "whether the calibration was made for this threat"),
+)
+
+
+CASE_COLUMNS: Final = (
+    Column("scenario", "", "name of the scenario"),
+    Column("seed", "", "seed of the first threat's fan and air"),
+    Column("charge_x_m", "m", "centre of its charge, from the left border"),
+    Column("charge_y_m", "m", "centre of its charge, from the lower border"),
+    Column("tnt_kg", "kg", "TNT-equivalent mass of its charge"),
+    Column("modules", "", "modules of the layout"),
+    Column("impulse_pa_s", "Pa s", "protected structures, with the layout, mean over the threats"),
+    Column("unprotected_impulse_pa_s", "Pa s", "the same without a barrier"),
+    Column("reduction", "", "of that impulse"),
+    Column("in_range", "", "whether the calibration was made for every threat"),
+)
+
+
+def structure_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
+    """Return one row a structure; see `STRUCTURE_COLUMNS`."""
+    pairs = zip(_by_structure(evaluation.loads), _by_structure(evaluation.unprotected), strict=True)
+    return table_of([_structure_row(loads, bare) for loads, bare in pairs], STRUCTURE_COLUMNS)
+
+
+def module_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
+    """Return one row a module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
+    threat = evaluation.threats[0]
+    scene = build_scene(evaluation.scenario, (), threat.seed, threat.charge)
+    impulse, bare = (
+        np.mean([load.module_impulse_sim for load in loads], axis=0)
+        for loads in (evaluation.loads, evaluation.unprotected)
+    )
+    table = module_table(scene.obstacles()).assign(
+        impulse_sim=impulse, unprotected_impulse_sim=bare, reduction=reductions(impulse, bare)
+    )
+    return table[[column.name for column in MODULE_COLUMNS]]
+
+
+def threat_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
+    """Return one row a threat; see `THREAT_COLUMNS`."""
+    return table_of([_threat_row(outcome) for outcome in evaluation.outcomes], THREAT_COLUMNS)
+
+
+def _threat_row(outcome: "ThreatOutcome") -> dict[str, object]:
+    charge = outcome.threat.charge
+    return {
+        "seed": outcome.threat.seed,
+        "charge_x_m": charge.position_m[0],
+        "charge_y_m": charge.position_m[1],
+        "tnt_kg": charge.tnt_kg,
+        "impulse_pa_s": outcome.impulse_pa_s,
+        "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
+        "reduction": outcome.reduction,
+        "in_range": outcome.in_range,
+    }
+
+
+def _by_structure(loads: Sequence[BlastLoads]) -> list[tuple[StructureLoad, ...]]:
+    """Return the loads of each structure, one a threat."""
+    return list(zip(*(load.structures for load in loads), strict=True))
+
+
+def _structure_row(
+    loads: Sequence[StructureLoad], bare: Sequence[StructureLoad]
+) -> dict[str, object]:
+    first = loads[0]
+    pa_s, bare_pa_s = (np.array([load.impulse_pa_s for load in each]) for each in (loads, bare))
+    reduction = reduction_estimate(pa_s, bare_pa_s)
+    row: dict[str, object] = {
+        "structure": first.name,
+        "protected": first.protected,
+        "weight": first.weight,
+        "reduction": reduction.value,
+        "reduction_low": reduction.low,
+        "reduction_high": reduction.high,
+        "threats_in_range": sum(load.in_range for load in loads),
+    }
+    for name in ("impulse_pa_s", "impulse_psi_s", "impulse_sim", "transferred_impulse_sim"):
+        for column, each in ((name, loads), (f"unprotected_{name}", bare)):
+            row[column] = float(np.mean([getattr(load, name) for load in each]))
+    return row
+
+
+SCHEMA_VERSION: Final = 1
+"""The version of the file that `LayoutEvaluation.to_json` writes."""
+
+
+def evaluation_record(evaluation: "LayoutEvaluation") -> dict[str, Any]:
+    """Return everything about an evaluation as what JSON knows; NaN is `None`."""
+    scenario = evaluation.scenario
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "scenario": scenario.model_dump(mode="json", exclude_none=True),
+        "scenario_hash": scenario.content_hash,
+        "layout": [list(cell) for cell in evaluation.layout],
+        "engine": evaluation.engine_name,
+        "calibration": evaluation.calibration.name,
+        "versions": versions(evaluation.engine_version),
+        "result": _result(evaluation),
+        "notes": list(evaluation.notes),
+        "threats": _rows(evaluation.threat_table),
+        "structures": _rows(evaluation.table),
+        "modules": _rows(evaluation.module_table),
+    }
+
+
+def case_table(comparison: Comparison) -> pd.DataFrame:
+    """Return one row a case; see `CASE_COLUMNS`."""
+    rows = []
+    for index, (case, layout) in enumerate(zip(comparison.cases, comparison.layouts, strict=True)):
+        threat = case.threats[0]
+        rows.append(
+            {
+                "scenario": case.scenario.name,
+                "seed": threat.seed,
+                "charge_x_m": threat.charge.position_m[0],
+                "charge_y_m": threat.charge.position_m[1],
+                "tnt_kg": threat.charge.tnt_kg,
+                "modules": len(layout),
+                "impulse_pa_s": float(comparison.impulse_pa_s[index].mean()),
+                "unprotected_impulse_pa_s": float(comparison.unprotected_pa_s[index].mean()),
+                "reduction": float(comparison.case_reductions[index]),
+                "in_range": bool(comparison.in_range[index].all()),
+            }
+        )
+    return table_of(rows, CASE_COLUMNS)
+
+
+def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
+    """Return a comparison as what JSON knows; NaN is `None`."""
+    cases = [
+        {
+            **row,
+            "scenario_hash": case.scenario.content_hash,
+            "calibration": case.scenario.calibration,
+            "layout": [list(cell) for cell in layout],
+        }
+        for row, case, layout in zip(
+            _rows(case_table(comparison)), comparison.cases, comparison.layouts, strict=True
+        )
+    ]
+    return {
+        "engine": engine.name,
+        "versions": versions(engine.version),
+        "result": {
+            "reduction": _estimate(comparison.reduction),
+            "impulse_pa_s": _estimate(comparison.mean_pa_s),
+            "unprotected_impulse_pa_s": _estimate(comparison.unprotected_mean_pa_s),
+            "cvar_level": comparison.cvar_level,
+            "cvar_pa_s": comparison.cvar_pa_s,
+            "unprotected_cvar_pa_s": comparison.unprotected_cvar_pa_s,
+        },
+        "cases": cases,
+    }
+
+
+def _result(evaluation: "LayoutEvaluation") -> dict[str, Any]:
+    return {
+        "reduction": _estimate(evaluation.reduction),
+        "impulse_pa_s": _estimate(evaluation.impulse_pa_s),
+        "impulse_psi_s": _estimate(evaluation.impulse_pa_s.scaled(1.0 / PA_PER_PSI)),
+        "unprotected_impulse_pa_s": _estimate(evaluation.unprotected_impulse_pa_s),
+        "unprotected_impulse_psi_s": _estimate(
+            evaluation.unprotected_impulse_pa_s.scaled(1.0 / PA_PER_PSI)
+        ),
+        "cvar_level": evaluation.cvar_level,
+        "cvar_pa_s": evaluation.cvar,
+        "cvar_psi_s": evaluation.cvar / PA_PER_PSI,
+        "unprotected_cvar_pa_s": evaluation.unprotected_cvar,
+        "unprotected_cvar_psi_s": evaluation.unprotected_cvar / PA_PER_PSI,
+        "worst": _worst(evaluation.worst),
+        "in_range": evaluation.in_range,
+    }
+
+
+def _estimate(estimate: Estimate) -> dict[str, float | None]:
+    value, low, high = map(_or_none, estimate)
+    return {"value": value, "ci95_low": low, "ci95_high": high}
+
+
+def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
+    return {
+        "seed": outcome.threat.seed,
+        "charge_position_m": list(outcome.threat.charge.position_m),
+        "tnt_kg": outcome.threat.charge.tnt_kg,
+        "impulse_pa_s": outcome.impulse_pa_s,
+        "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
+        "reduction": _or_none(outcome.reduction),
+        "in_range": outcome.in_range,
+    }
+
+
+def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
+    return [
+        {str(name): _or_none(value) for name, value in row.items()}
+        for row in table.to_dict("records")
+    ]
+
+
+def _or_none(value: Any) -> Any:
+    """Return the value, or `None` for a number that does not exist."""
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+@dataclass(frozen=True)
+class ThreatOutcome:
+    """What a layout does against one threat; impulses as in `BlastLoads.protected_impulse_pa_s`.
+
+    Attributes:
+        threat: The threat.
+        impulse_pa_s: Impulse on the protected structures with the barrier, Pa*s.
+        unprotected_impulse_pa_s: The same without it, Pa*s.
+        in_range: Whether the calibration was made for such a threat.
+    """
+
+    threat: Threat
+    impulse_pa_s: float
+    unprotected_impulse_pa_s: float
+    in_range: bool
+
+    @property
+    def reduction(self) -> float:
+        """Share of the impulse that is gone; NaN if there is none without a barrier."""
+        return reductions(self.impulse_pa_s, self.unprotected_impulse_pa_s).item()
+
+
+@dataclass(frozen=True, eq=False)
+class LayoutEvaluation:
+    """A layout against no barrier, on the threats of one case.
+
+    Impulses are those of `BlastLoads.protected_impulse_pa_s`: per area, by weight, added up over
+    the protected structures. Intervals are 95 % confidence intervals of the mean over all threats
+    that the scenario can draw; they say nothing about how right the model is.
+
+    Attributes:
+        case: The scenario, and what both were exposed to.
+        layout: The layout's cells, sorted.
+        loads: Loads with the layout, one a threat.
+        unprotected: Loads without any barrier, one a threat.
+        calibration: What converted simulated impulses.
+        engine_name: Name of the engine.
+        engine_version: Version of the library that did the physics.
+        cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
+
+    Raises:
+        BlastEnvError: If nothing arrives at the protected structures without a barrier.
+    """
+
+    case: Case
+    layout: Layout
+    loads: tuple[BlastLoads, ...]
+    unprotected: tuple[BlastLoads, ...]
+    calibration: Calibration
+    engine_name: str
+    engine_version: str
+    cvar_level: float
+
+    def __post_init__(self) -> None:
+        """Check that there is something to reduce, and the level."""
+        self.comparison  # noqa: B018
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        return self.case.scenario
+
+    @property
+    def threats(self) -> tuple[Threat, ...]:
+        """What layout and empty site were exposed to."""
+        return self.case.threats
+
+    @cached_property
+    def comparison(self) -> Comparison:
+        """The numbers behind all estimates."""
+        return Comparison(
+            cases=(self.case,),
+            layouts=(self.layout,),
+            impulse_pa_s=np.array([[load.protected_impulse_pa_s for load in self.loads]]),
+            unprotected_pa_s=np.array([[load.protected_impulse_pa_s for load in self.unprotected]]),
+            in_range=np.array([[load.in_range for load in self.loads]]),
+            cvar_level=self.cvar_level,
+        )
+
+    @cached_property
+    def outcomes(self) -> tuple[ThreatOutcome, ...]:
+        """What the layout does against each threat."""
+        return tuple(
+            ThreatOutcome(
+                threat, load.protected_impulse_pa_s, bare.protected_impulse_pa_s, load.in_range
+            )
+            for threat, load, bare in zip(self.threats, self.loads, self.unprotected, strict=True)
+        )
+
+    @property
+    def reduction(self) -> Estimate:
+        """1 - mean impulse with the barrier / without; see `reduction_estimate`."""
+        return self.comparison.reduction
+
+    @property
+    def mean_reduction(self) -> float:
+        """The value of `reduction`: 0 changes nothing, 1 keeps everything off."""
+        return self.reduction.value
+
+    @property
+    def ci95(self) -> tuple[float, float]:
+        """95 % confidence interval of `mean_reduction`; NaN with a single threat."""
+        return self.reduction.low, self.reduction.high
+
+    @property
+    def impulse_pa_s(self) -> Estimate:
+        """Mean impulse with the barrier, Pa*s."""
+        return self.comparison.mean_pa_s
+
+    @property
+    def unprotected_impulse_pa_s(self) -> Estimate:
+        """Mean impulse without the barrier, Pa*s."""
+        return self.comparison.unprotected_mean_pa_s
+
+    @cached_property
+    def worst(self) -> ThreatOutcome:
+        """The threat with the largest impulse in spite of the barrier."""
+        return max(self.outcomes, key=lambda outcome: outcome.impulse_pa_s)
+
+    @property
+    def cvar(self) -> float:
+        """Mean impulse of the worst threats with the barrier, Pa*s; see `cvar_level`."""
+        return self.comparison.cvar_pa_s
+
+    @property
+    def unprotected_cvar(self) -> float:
+        """Mean impulse of the worst threats without the barrier, Pa*s."""
+        return self.comparison.unprotected_cvar_pa_s
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """One row a structure; the columns are `tables.STRUCTURE_COLUMNS`."""
+        return structure_reductions(self)
+
+    @cached_property
+    def module_table(self) -> pd.DataFrame:
+        """One row a module of the structures; the columns are `tables.MODULE_COLUMNS`."""
+        return module_reductions(self)
+
+    @cached_property
+    def threat_table(self) -> pd.DataFrame:
+        """One row a threat; the columns are `tables.THREAT_COLUMNS`."""
+        return threat_reductions(self)
+
+    @property
+    def in_range(self) -> bool:
+        """Whether the calibration was made for every threat and protected structure."""
+        return all(outcome.in_range for outcome in self.outcomes)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What the calibration was not made for, a sentence a structure."""
+        notes = []
+        for of_structure in zip(*(load.structures for load in self.loads), strict=True):
+            outside = [load for load in of_structure if not load.in_range]
+            if outside:
+                notes.append(
+                    f"{outside[0].name}: {len(outside)} of {len(self.threats)} threats are outside "
+                    f"the range of calibration {self.calibration.name!r}, "
+                    f"e.g. {'; '.join(outside[0].notes)}"
+                )
+        return tuple(notes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data: what was asked, with which versions, and the answer.
+
+        The same arguments and versions give the same data; numbers that do not exist are `None`.
+        """
+        return evaluation_record(self)
+
+    def to_json(self, path: str | Path) -> Path:
+        """Write `to_dict` to a file.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
+        with write_atomically(path) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+        return Path(path)
+
+
+def evaluate_layout(
+    scenario: Scenario,
+    layout: Sequence[Cell],
+    seeds: Iterable[int] = range(16),
+    processes: int = 1,
+    engine: str | Engine = "event",
+    *,
+    threats: Iterable[Threat] | None = None,
+    cvar_level: float = CVAR_LEVEL,
+    cache: str | Path | BlastCache | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> LayoutEvaluation:
+    """Return how much a layout takes off the protected structures, and how sure that is.
+
+    Every seed draws a threat from the scenario; the layout and the empty site meet the same
+    threats. Use seeds that the layout was not chosen on: on the others it looks better than it is.
+
+    Args:
+        scenario: The scenario; it must name a calibration.
+        layout: (row, column) of the build-zone cells that hold a barrier module, in any order.
+        seeds: At least one, none twice; 16 or more for an interval worth having.
+        processes: Worker processes; they change nothing but the time.
+        engine: Name of an engine, or an engine.
+        threats: Used instead of threats drawn with `seeds`.
+        cvar_level: The worst share 1 - `cvar_level` of the threats makes the CVaR.
+        cache: Folder or cache of blasts that were run before; see `BlastEvaluator`.
+        progress: Called with the share of the blasts that is done.
+
+    Raises:
+        LayoutError: If the layout does not fit the build zone.
+        CalibrationError: If the scenario names no calibration, or one that was made with other
+            parameters or another engine.
+        UnknownNameError: If there is no such engine.
+        ScenarioError: If a threat's charge is not clear of a structure or the border.
+        BlastEnvError: If there are no seeds or threats, one is repeated or a seed is negative, if
+            `processes` or `cvar_level` is out of bounds, or if nothing arrives at the protected
+            structures even without a barrier.
+    """
+    evaluator = BlastEvaluator(scenario, engine, cache=cache)
+    drawn = draw_threats(scenario, seeds) if threats is None else tuple(threats)
+    return evaluate_against(
+        evaluator, layout, drawn, processes, cvar_level=cvar_level, progress=progress
+    )
+
+
+def evaluate_against(
+    evaluator: BlastEvaluator,
+    layout: Sequence[Cell],
+    threats: Sequence[Threat],
+    processes: int = 1,
+    *,
+    cvar_level: float = CVAR_LEVEL,
+    progress: Callable[[float], None] | None = None,
+) -> LayoutEvaluation:
+    """Return what `evaluate_layout` returns, with blasts that an evaluator may remember.
+
+    For several layouts on the same threats: the empty site is simulated only once.
+
+    Args:
+        evaluator: Runs the blasts.
+        layout: As for `evaluate_layout`.
+        threats: At least one, none twice.
+        processes: As for `evaluate_layout`.
+        cvar_level: As for `evaluate_layout`.
+        progress: As for `evaluate_layout`.
+
+    Raises:
+        BlastEnvError: As for `evaluate_layout`.
+    """
+    check_cvar_level(cvar_level)
+    scenario = evaluator.scenario
+    cells = tuple(sorted(check_layout(scenario, layout)))
+    case = Case(scenario, tuple(threats))
+    loads, unprotected = loads_of_both(evaluator, case, cells, processes, progress)
+    return LayoutEvaluation(
+        case=case,
+        layout=cells,
+        loads=loads,
+        unprotected=unprotected,
+        calibration=evaluator.calibration,
+        engine_name=evaluator.engine.name,
+        engine_version=evaluator.engine.version,
+        cvar_level=cvar_level,
+    )

@@ -1,0 +1,123 @@
+"""Threats are the charges that `simulate` would draw; every purpose has seeds of its own."""
+
+from itertools import pairwise
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from blast_env import Blast, Charge, load_scenario
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.cases import practice_hidden
+from blast_env.statistics import ConditionalValueAtRisk
+from tests.evaluation.cases import COURTYARD, SEEDS
+
+
+def test_a_seed_draws_the_charge_of_its_blast() -> None:
+    for seed, threat in zip(SEEDS, draw_threats(COURTYARD, SEEDS), strict=True):
+        assert threat.seed == seed
+        assert threat.charge == Blast(COURTYARD, seed=seed).scene.charge
+
+
+def test_numbers_of_other_types_make_the_same_threat() -> None:
+    """They become keys of a cache and go into JSON files."""
+    plain = Threat(Charge((5.0, 15.0), 100.0), 3)
+    numpy_charge: Any = (np.array([5, 15]), np.float32(100.0))
+    numpy_seed: Any = np.int64(3)
+    other = Threat(numpy_charge, numpy_seed)
+    assert other == plain
+    assert hash(other) == hash(plain)
+    assert type(other.seed) is int
+    assert draw_threats(COURTYARD, np.arange(2)) == draw_threats(COURTYARD, range(2))
+
+
+@pytest.mark.parametrize(
+    ("seeds", "words"),
+    [
+        ([], "there are none, must be at least one"),
+        ([4, 2, 4], r"seeds\[2\] is 4, is there already"),
+        ([0, -7], r"seeds\[1\] is -7, must be at least 0"),
+        ([0.5], r"seeds\[0\] is 0.5, must be an integer"),
+        ([True], r"seeds\[0\] is True, must be an integer"),
+    ],
+)
+def test_unusable_seeds_are_named(seeds: list, words: str) -> None:
+    with pytest.raises(BlastEnvError, match=words):
+        draw_threats(COURTYARD, seeds)
+
+
+@pytest.mark.parametrize("charge", [5.0, ((1.0, 2.0, 3.0), 1.0), (("left", 1.0), 1.0)])
+def test_unusable_charges_are_named(charge: Any) -> None:
+    with pytest.raises(BlastEnvError, match="must be"):
+        Threat(charge, 0)
+    with pytest.raises(BlastEnvError, match="seed is -1, must be at least 0"):
+        Threat(Charge((5.0, 15.0), 100.0), -1)
+
+
+def test_ranges_of_seeds_are_disjoint() -> None:
+    """Training, choice of weights, search and judgement never share a blast."""
+    ranges = sorted((each.value.start, each.value.stop) for each in SeedRange)
+    assert all(len(range(*each)) >= 2**31 for each in ranges)
+    assert all(low[1] <= high[0] for low, high in pairwise(ranges))
+
+
+@pytest.mark.parametrize("purpose", SeedRange)
+def test_seeds_stay_in_their_range(purpose: SeedRange) -> None:
+    rng = np.random.default_rng(0)
+    drawn = [*purpose.draw(rng, (3, 2)).ravel().tolist(), *purpose.draw_distinct(rng, 5)]
+    assert all(seed in purpose.value for seed in drawn)
+    first = purpose.seeds(3, 2)
+    assert list(first) == [purpose.value.start + 3, purpose.value.start + 4]
+    with pytest.raises(BlastEnvError, match="must be at least one, from 0 to"):
+        purpose.seeds(len(purpose.value) - 1, 2)
+    with pytest.raises(BlastEnvError, match="must be at least one"):
+        purpose.seeds(0, 0)
+
+
+def test_an_environment_draws_seeds_for_training() -> None:
+    env = gym.make("BlastBarrier-v0", disable_env_checker=True)
+    env.reset(seed=0)
+    assert isinstance(env.action_space, gym.spaces.Discrete)
+    finish = env.action_space.n - 1
+    info = env.step(finish)[4]
+    assert all(seed in SeedRange.TRAINING.value for each in info["blast_seeds"] for seed in each)
+
+
+def test_a_search_meets_none_of_the_threats_that_judge() -> None:
+    scenario = load_scenario("courtyard")
+    practice = practice_hidden(scenario, 3, 2, seed=1)
+    assert all(threat.seed in SeedRange.SEARCH.value for threat in practice.threats)
+    with pytest.raises(BlastEnvError, match="a search may not meet"):
+        Case(scenario, practice.threats[:1], practice=practice)
+
+
+def test_realisations_are_averaged_before_the_risk() -> None:
+    """Three charges, two realisations: charge by charge, then again; the risk sees means."""
+    scenario = load_scenario("courtyard")
+    charges = [Charge((5.0, y_m), 100.0) for y_m in (10.0, 15.0, 20.0)]
+    threats = tuple(Threat(charges[k % 3], k) for k in range(6))
+    worst = ConditionalValueAtRisk(0.9)
+    impulses = [1.0, 2.0, 6.0, 3.0, 4.0, 2.0]
+    assert Case(scenario, threats, 2).combined(impulses) == pytest.approx(3.0)
+    assert Case(scenario, threats, 2, worst).combined(impulses) == pytest.approx(4.0)
+    assert Case(scenario, threats, 2, worst).combined(impulses[:2]) == pytest.approx(2.0)
+
+
+def test_a_charge_that_is_drawn_twice_counts_twice() -> None:
+    """A risk over draws, not over places: a likely place weighs more."""
+    scenario = load_scenario("courtyard")
+    same, other = Charge((5.0, 10.0), 100.0), Charge((5.0, 20.0), 100.0)
+    case = Case(scenario, (Threat(same, 1), Threat(same, 2), Threat(other, 3)))
+    assert case.combined([1.0, 2.0, 6.0]) == pytest.approx(3.0)
+
+
+def test_threats_out_of_order_are_refused() -> None:
+    scenario = load_scenario("courtyard")
+    first, second = Charge((5.0, 10.0), 100.0), Charge((5.0, 20.0), 100.0)
+    threats = (Threat(first, 1), Threat(first, 2), Threat(second, 3), Threat(second, 4))
+    with pytest.raises(BlastEnvError, match=r"threats\[2\] .* in the order of the charges"):
+        Case(scenario, threats, realisations=2)
+    with pytest.raises(BlastEnvError, match="2 realisations of each charge"):
+        Case(scenario, threats[:3], realisations=2)

@@ -1,0 +1,171 @@
+"""Results to the last bit, so that a change of results is a decision.
+
+A digest here fails where the same blast, the same file or the same scenario has become another. If
+nobody meant to change results, the change at hand is wrong: find it. If somebody did, then
+
+- raise the version of the package, or of the engine, so that stored results, run folders and
+  caches of before are not taken for those of now;
+- make the stored calibrations of that engine anew (`blast-env calibrate`), and their checksums;
+- write the change into CHANGELOG.md, and the new digests here, in one commit that says why.
+
+Each digest stands beside what it depends on, the engine's version and the parameters' digest: if
+one of those differs as well, that is the cause. The digests were made on x86-64; another machine's
+`sin` and `cos` may differ in the last bit.
+"""
+
+from hashlib import sha256
+from importlib.resources import files
+from typing import Final, NamedTuple
+
+import pytest
+
+from blast_env.physics.parameters import parameters_digest
+from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
+from blast_env.simulation import simulate
+
+LAYOUT: Final = ((4, 0), (5, 0), (6, 1))
+
+
+class Golden(NamedTuple):
+    """The outcome of a blast, and what it depends on.
+
+    Attributes:
+        engine_version: With which the digest was made; another Numba may well give the same.
+        parameters: Digest of the parameters that the engine heeds.
+        digest: Of the outcome.
+    """
+
+    engine_version: str
+    parameters: str
+    digest: str
+
+
+def sparse_courtyard() -> Scenario:
+    """Return the courtyard in sparse air; the charge is drawn along the road."""
+    return load_scenario("courtyard").with_simulation("ballistic")
+
+
+def dense_yard() -> Scenario:
+    """Return a small yard in dense air, with friction, spin and modules that break."""
+    return Scenario.from_document(
+        {
+            "schema_version": 1,
+            "name": "dense_yard",
+            "site": {"width_m": 24.0, "height_m": 18.0},
+            "charge": [
+                {"kind": "rectangle", "corner_m": (4.0, 7.0), "size_m": (1.0, 4.0), "tnt_kg": 20.0}
+            ],
+            "structures": [
+                {
+                    "kind": "ModularObstacle",
+                    "name": "house",
+                    "corner_m": (14.0, 6.0),
+                    "rows": 12,
+                    "columns": 4,
+                    "protected": True,
+                    "module_capacity": 2000.0,
+                },
+                {
+                    "kind": "ConcreteSquare",
+                    "name": "shed",
+                    "corner_m": (8.0, 14.0),
+                    "side_modules": 4,
+                },
+            ],
+            "build_zone": {
+                "corner_m": (8.0, 5.0),
+                "rows": 12,
+                "columns": 4,
+                "stock": 6,
+                "module_capacity": 1000.0,
+            },
+            "simulation": {
+                "preset": "ballistic",
+                "overrides": {
+                    "air": {"spacing_units": 3.4, "mass": 0.2, "elasticity": 0.97, "friction": 0.6},
+                    "explosive": {"ball_count": 240, "elasticity": 0.97, "friction": 0.4},
+                    "contact": {"module_friction": 0.5, "base_impulse": 1.0},
+                    "stepping": {"time_limit_s": 0.1},
+                },
+            },
+        },
+        "dense_yard",
+    )
+
+
+SCENES: Final = {"sparse_courtyard": sparse_courtyard, "dense_yard": dense_yard}
+BLASTS: Final = {
+    ("sparse_courtyard", "pymunk"): Golden(
+        engine_version="pymunk 7.3.1",
+        parameters="26d44c291cdc5c98f83eda50f68490c22eb0779341bae1db5e6c40ab431d44aa",
+        digest="cb9c2de33daa75854592c07fa861267937a483f012cbc3cd4486c04c3bf82c30",
+    ),
+    ("sparse_courtyard", "event"): Golden(
+        engine_version="event 1 (numba 0.68.1)",
+        parameters="582a7d9bdce6d9f62fd19f90ad16f01b039396a847aa9d807c37b585c25e88f8",
+        digest="b8ca7e57cb19356ffc5c2ea03c32134e33ee4ce3b555ac39ccb5cbbdfd921cb1",
+    ),
+    ("dense_yard", "pymunk"): Golden(
+        engine_version="pymunk 7.3.1",
+        parameters="b0bb2e379ec4eee3b6bee9041e32bae74a3b15c6cd7779f627a34f75a1a7c316",
+        digest="205f919c4e76e4c9547f4f3c3a60055288ef1432f98730f778f04164fe9de27a",
+    ),
+    ("dense_yard", "event"): Golden(
+        engine_version="event 1 (numba 0.68.1)",
+        parameters="8e27747f9833bf85c7652150841b4c7d883a4d858929124846e7ddefae02caec",
+        digest="42a94c16b09787aee297dcab0da7984d4d87fc030b09811a9e8d4e28b08e7082",
+    ),
+}
+
+
+@pytest.mark.parametrize(("scene", "engine"), BLASTS)
+def test_a_blast_is_what_it_was(scene: str, engine: str) -> None:
+    scenario = SCENES[scene]()
+    result = simulate(scenario, LAYOUT, seed=3, engine=engine)
+    assert result.impulse_sim("barrier") > 0.0  # or the digest would say little
+    golden = BLASTS[scene, engine]
+    found = Golden(
+        result.engine_version, parameters_digest(scenario.parameters, engine), result.digest
+    )
+    assert found[1:] == golden[1:], f"{found.engine_version}, was {golden.engine_version}"
+
+
+CONTENT_HASHES: Final = {
+    "courtyard": "76c48339ea3f457b906e152fbc0abd85ec13b276c4ecda0be3a9c6dcc0131cb7",
+    "free_field": "2356d490bee5e2af05f7c80a219c16f8ceb886210f1e0a53aa86954cd4b1ac54",
+    "perimeter_gate": "06955a399c03dbe9aad722de7981e16cb7405f389b4c56d1034d496c08e1a94d",
+    "street_junction": "57291072154f0caa826fe1cb6e4e0682b528042494dd445e303e23d0f1557ff2",
+}
+
+
+def test_the_bundled_scenarios_are_what_they_were() -> None:
+    assert {name: load_scenario(name).content_hash for name in bundled_scenarios()} == (
+        CONTENT_HASHES
+    )
+
+
+DATA: Final = {
+    "ballistic_kb_100kg.event.json": "73c0093c99eb55db396460eb68f76b7d",
+    "ballistic_kb_100kg.pymunk.json": "55f36cfd974f803625f8e8e64b8a14b6",
+    "ballistic_ufc.event.json": "cd80f3d8e32913e34b5fda0b74216939",
+    "ballistic_ufc.pymunk.json": "a679736a659cba77672144860911ab84",
+    "collisional_fine_kb.event.json": "7150162b624fa65d6827f96a34829759",
+    "collisional_kb.event.json": "25691f05b6a25db6594e55984bd9050e",
+    "collisional_kb.pymunk.json": "b694d6b01615d1ff73bb311a0f65ec60",
+    "collisional_kb_1000kg.event.json": "aebcfaf86875f61538ba77e5d42ef5b2",
+    "collisional_kb_20kg.event.json": "033479cf0fce4cf31b854576bf8febf6",
+    "kingery_bulmash.json": "3e08a2fc57a92b7c8ff8aba851d2eafa",
+    "paper_tables.csv": "35786679504739d998d0ed93ddd66445",
+}
+"""First half of the SHA-256 of the calibrations, and of the files that they are made from."""
+
+
+def test_the_stored_calibrations_are_what_they_were() -> None:
+    folder = files("blast_env.calibration")
+    stored = [*(folder / "stored").iterdir(), *(folder / "data").iterdir()]
+    found = {
+        entry.name: sha256(entry.read_bytes()).hexdigest()[:32]
+        for entry in stored
+        if entry.name.endswith((".json", ".csv"))
+    }
+    assert found == DATA
