@@ -343,16 +343,22 @@ def simulate_many(
     check_workers("threads", threads)
     results: list[BlastResult] = []
     for result in in_order(_run_numbered, list(enumerate(blasts)), threads, "threads"):
+        if isinstance(result, BlastEnvError):
+            raise result
         results.append(result)
         if progress is not None:
             progress(len(results) / len(blasts))
     return results
 
 
-def _run_numbered(numbered: tuple[int, Blast]) -> BlastResult:
-    """Run a blast; an error of the user's says which one it was."""
+def _run_numbered(numbered: tuple[int, Blast]) -> BlastResult | BlastEnvError:
+    """Run a blast; an error of the user's says which one it was.
+
+    It is returned, not raised: the first one in the order of the blasts counts, whichever thread
+    comes to one first.
+    """
     number, blast = numbered
     try:
         return blast.run()
     except ValueError as error:  # what unusable arguments cause, `BlastEnvError` among it
-        raise BlastEnvError(f"blasts[{number}]: {error}") from error
+        return BlastEnvError(f"blasts[{number}]: {error}")

@@ -1,9 +1,15 @@
 """The built wheel, installed where nothing of the checkout is."""
 
+import json
+import os
+import re
 import subprocess
 import sys
 import sysconfig
+import tarfile
 from pathlib import Path
+
+import pytest
 
 REPOSITORY = Path(__file__).parents[1]
 CALIBRATIONS = (
@@ -16,25 +22,44 @@ CALIBRATIONS = (
 )
 
 
-def call(*command: str | Path, cwd: Path) -> str:
+def started(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command that finds nothing of the checkout through the environment."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     return subprocess.run(
-        [str(part) for part in command], cwd=cwd, capture_output=True, text=True, check=True
-    ).stdout
-
-
-def test_a_wheel_in_a_clean_environment_loads_the_scenarios_by_name(tmp_path: Path) -> None:
-    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "-q")
-    call(
-        *pip, "wheel", REPOSITORY, "--no-deps", "--no-build-isolation", "-w", tmp_path, cwd=tmp_path
+        [str(part) for part in command], cwd=cwd, env=environment, capture_output=True, text=True
     )
-    (wheel,) = tmp_path.glob("*.whl")
-    call(sys.executable, "-m", "venv", "--without-pip", "clean", cwd=tmp_path)
-    clean = tmp_path / "clean"
-    (site,) = clean.glob("lib/python*/site-packages")
-    call(*pip, "install", "--no-deps", "--target", site, wheel, cwd=tmp_path)
+
+
+def call(*command: str | Path, cwd: Path) -> str:
+    done = started(*command, cwd=cwd)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment with the wheel, the dependencies, and none of the extras that matter here."""
+    folder = tmp_path_factory.mktemp("installed")
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "-q")
+    call(*pip, "wheel", REPOSITORY, "--no-deps", "--no-build-isolation", "-w", folder, cwd=folder)
+    (wheel,) = folder.glob("*.whl")
+    call(sys.executable, "-m", "venv", "--without-pip", "clean", cwd=folder)
+    (site,) = (folder / "clean").glob("lib/python*/site-packages")
+    call(*pip, "install", "--no-deps", "--target", site, wheel, cwd=folder)
     # The dependencies only: an editable install of the checkout would be found through a .pth
     # file, and .pth files count only in a site folder, not in one that another .pth file names.
     (site / "dependencies.pth").write_text(sysconfig.get_path("purelib"))
+    for name in ("pymoo", "matplotlib", "torch", "ezdxf"):  # found first, as if not installed
+        (site / f"{name}.py").write_text(f"raise ModuleNotFoundError(name={name!r})\n")
+    # A popular library is imported by this name.
+    (site / "agents").mkdir()
+    (site / "agents" / "__init__.py").write_text("class Agent:\n    pass\n")
+    return folder / "clean"
+
+
+def test_a_wheel_in_a_clean_environment_loads_the_scenarios_by_name(
+    clean: Path, tmp_path: Path
+) -> None:
     code = (
         "import blast_env; print(blast_env.__file__);"
         "print([blast_env.load_scenario(n).name for n in blast_env.bundled_scenarios()]);"
@@ -46,3 +71,42 @@ def test_a_wheel_in_a_clean_environment_loads_the_scenarios_by_name(tmp_path: Pa
     assert Path(where).is_relative_to(clean)
     assert names == "['courtyard', 'free_field', 'perimeter_gate', 'street_junction']"
     assert data == f"{list(CALIBRATIONS)} 8 1543"
+
+
+def test_a_search_runs_beside_a_package_named_agents_and_without_extras(
+    clean: Path, tmp_path: Path
+) -> None:
+    python = clean / "bin" / "python"
+    command = (python, "-m", "blast_env", "search", "--budget", "4", "--held-out", "2")
+    done = started(*command, "--method", "random", "--out", "found", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads((tmp_path / "found" / "layout.json").read_text())["cells"]
+    assert "pip install blast-env[render]" in done.stderr  # no picture, and no blast lost for it
+    genetic = started(*command, "--method", "genetic", cwd=tmp_path)
+    assert genetic.returncode == 2
+    assert "'pymoo': pip install blast-env[search]" in genetic.stderr
+    training = started(python, "-m", "blast_env", "train", "--run", "run", cwd=tmp_path)
+    assert training.returncode == 2
+    assert "'torch': pip install blast-env[agents,render]" in training.stderr
+    assert call(python, "-c", "import agents; print(agents.Agent)", cwd=tmp_path)
+
+
+def test_the_description_on_a_package_page_links_to_no_file(clean: Path) -> None:
+    (metadata,) = clean.glob("lib/python*/site-packages/blast_env-*.dist-info/METADATA")
+    description = metadata.read_text(encoding="utf-8").partition("\n\n")[2]
+    links = re.findall(r"\]\(([^)]*)\)", description)
+    assert links
+    assert all(link.startswith("https://") for link in links)
+    assert "docs/validity.md" in description  # named, though not linked
+
+
+def test_the_source_archive_has_what_its_tests_read(tmp_path: Path) -> None:
+    """Whoever packages it for a distribution builds and tests from the archive alone."""
+    call(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path, cwd=REPOSITORY)
+    (archive,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as opened:
+        names = {name.partition("/")[2] for name in opened.getnames()}
+    for folder in ("blast_env", "agents", "scenarios", "scripts", "tests", "docs"):
+        here = {str(path.relative_to(REPOSITORY)) for path in (REPOSITORY / folder).rglob("*.*")}
+        assert {name for name in here if "__pycache__" not in name} <= names
+    assert {"Makefile", "README.md", "constraints.txt", "hatch_build.py"} <= names

@@ -17,7 +17,14 @@ from blast_env.calibration.model import (
     save_calibration,
 )
 from blast_env.calibration.references import paper_table
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
+from blast_env.cli.output import (
+    make_table,
+    print_line,
+    progress_bar,
+    result_console,
+    save_pictures,
+    user_errors,
+)
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
 from blast_env.physics.engines import find_engine
@@ -109,10 +116,10 @@ def calibrate_free_field(options: FreeFieldOptions) -> None:
     report = fit_laws(study, runs, reference, options.simulated)
     stored = report.calibration(options.name, options.law)
     stored = stored.model_copy(update={"tnt_range_kg": tnt_range_kg})
-    _write(report, stored, options.stem)
+    written = _write(report, stored, options.stem)
     _print(report, stored)
-    for suffix in (".json", ".csv", ".png", ".runs.jsonl"):
-        print_line(f"wrote {options.stem}{suffix}")
+    for path in (*written, f"{options.stem}.runs.jsonl"):
+        print_line(f"wrote {path}")
 
 
 def _scenario(options: FreeFieldOptions) -> Scenario:
@@ -152,14 +159,19 @@ def _reference(name: ReferenceName, study: FreeFieldStudy, burst: Burst) -> Refe
     return kingery_bulmash_reference(study.distances_m, charge_kg, name, burst)
 
 
-def _write(report: CalibrationReport, stored: Calibration, stem: str) -> None:
+def _write(report: CalibrationReport, stored: Calibration, stem: str) -> list[Path]:
+    record, picture = Path(f"{stem}.json"), Path(f"{stem}.png")
+    save_calibration(stored, record)
+    table = write_csv(report.table(), f"{stem}.csv")
+    return [record, table, *save_pictures(lambda: _save_figure(report, stored, picture))]
+
+
+def _save_figure(report: CalibrationReport, stored: Calibration, path: Path) -> list[Path]:
     # Here, because pictures need the extra `render`.
     from blast_env.rendering.figures import save_figure
     from blast_env.studies.calibration.figure import calibration_figure
 
-    save_calibration(stored, Path(f"{stem}.json"))
-    write_csv(report.table(), f"{stem}.csv")
-    save_figure(calibration_figure(report, stored.name), Path(f"{stem}.png"))
+    return [save_figure(calibration_figure(report, stored.name), path)]
 
 
 def _print(report: CalibrationReport, stored: Calibration) -> None:
@@ -297,17 +309,21 @@ def _write_shielding(
     exponent: float | None,
     options: ShieldingOptions,
 ) -> list[Path]:
-    # Here, because pictures need the extra `render`.
-    from blast_env.rendering.figures import save_figure
-    from blast_env.studies.shielding.figure import shielding_figure
-
     stem = f"shielding.{options.preset}.{options.engine}"
     record = options.out / f"{stem}.json"
     with write_atomically(record) as temporary:
         temporary.write_text(report.to_json(exponent, reflection), encoding="utf-8")
     gauges = write_csv(report.gauges, options.out / f"{stem}.csv")
-    figure = save_figure(shielding_figure(report, exponent), options.out / f"{stem}.png")
-    return [record, gauges, figure]
+    picture = options.out / f"{stem}.png"
+    return [record, gauges, *save_pictures(lambda: _save_shielding(report, exponent, picture))]
+
+
+def _save_shielding(report: ShieldingReport, exponent: float | None, path: Path) -> list[Path]:
+    # Here, because pictures need the extra `render`.
+    from blast_env.rendering.figures import save_figure
+    from blast_env.studies.shielding.figure import shielding_figure
+
+    return [save_figure(shielding_figure(report, exponent), path)]
 
 
 def _print_ratios(report: ShieldingReport, exponent: float | None) -> None:

@@ -26,6 +26,7 @@ from blast_env.cli.output import (
     user_errors,
 )
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
+from blast_env.envs.strategies import HiddenThreat
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -276,13 +277,12 @@ def _practice(scenario: Scenario, options: SearchOptions) -> Case:
     model = find_threat_model(options.threat, options.threats)
     realisations = find_realisations(options.realisations, options.threat)
     risk = find_risk(options.risk, options.cvar_level)
-    if options.threat == "visible":
+    if not isinstance(model, HiddenThreat):
         charge = _visible_charge(scenario, options)
         return practice_visible(scenario, charge, realisations, options.seed, risk)
     if options.charge_position_m is not None:
         raise BlastEnvError("--charge-position is for a visible threat: a hidden one is drawn")
-    count = len(model.draw(scenario, np.random.default_rng(options.seed)))
-    return practice_hidden(scenario, count, realisations, options.seed, risk)
+    return practice_hidden(scenario, model.threats, realisations, options.seed, risk)
 
 
 def _visible_charge(scenario: Scenario, options: SearchOptions) -> Charge:

@@ -46,6 +46,13 @@ def train(
     engine: Annotated[
         str | None, typer.Option(help="Engine that runs the blasts.", show_default="event")
     ] = None,
+    observation: Annotated[
+        str | None,
+        typer.Option(
+            help="What the agent sees: grid, grid_with_load, or features (with an MlpPolicy).",
+            show_default="grid",
+        ),
+    ] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", help="key=value, e.g. ent_coef=0.01; may be given again."),
@@ -63,6 +70,7 @@ def train(
         "run": run,
         "threat": threat,
         "engine": engine,
+        "observation": observation,
         "set": set_ or None,
     }
     given = {name: value for name, value in fresh.items() if value is not None}
@@ -101,7 +109,10 @@ def _train(
 
     algorithm = str(given.get("algo", _DEFAULT_ALGORITHM))
     changes = parse_options(options, [*HYPERPARAMETER_KEYS, *SETTING_KEYS])
-    values = {name: given[name] for name in ("steps", "seed", "threat", "engine") if name in given}
+    names = ("steps", "seed", "threat", "engine", "observation")
+    values = {name: given[name] for name in names if name in given}
+    if given.get("observation") == "features":  # no planes, which the YAML file's policy looks at
+        changes.setdefault("policy", "MlpPolicy")
     values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
     hyperparameters = load_hyperparameters(algorithm, environment_id(scenario), changes, envs)
     settings = settings_from(

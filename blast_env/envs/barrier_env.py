@@ -19,7 +19,6 @@ from blast_env.envs.arguments import (
 )
 from blast_env.envs.display import Display
 from blast_env.envs.episode import (
-    OBSERVATIONS,
     Episode,
     IllegalActions,
     Task,
@@ -28,7 +27,7 @@ from blast_env.envs.episode import (
     find_threat_model,
     total,
 )
-from blast_env.envs.observations import Array, Observation, Sight
+from blast_env.envs.observations import OBSERVATIONS, Array, Observable, Observation
 from blast_env.envs.strategies import (
     REWARDS,
     Reward,
@@ -280,9 +279,9 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
         return self._episode.placement
 
     @property
-    def sight(self) -> Sight:
-        """What may be known of the episode before the charge goes off."""
-        return self._episode.sight
+    def observable(self) -> Observable:
+        """What may be observed of the episode before the charge goes off."""
+        return self._episode.observable
 
     def render(self) -> Any:
         """Return a frame (`"rgb_array"`) or text (`"ansi"`), or show a frame (`"human"`)."""

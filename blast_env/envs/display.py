@@ -127,7 +127,7 @@ class Display:
             return self._final_frame(episode) if episode.ended else self._placing_frame(episode)
         if self._render_mode == "ansi":
             lines = [*_state_lines(episode), *([_outcome(episode)] if episode.ended else [])]
-            return placing_text(episode.placement, episode.sight.sources, lines)
+            return placing_text(episode.placement, episode.observable.sources, lines)
         if self._render_mode == "human":
             self._show(
                 self._final_frame(episode) if episode.ended else self._placing_frame(episode)
@@ -165,8 +165,8 @@ class Display:
         if self._painter is None or self._episode is not episode:
             if self._episode is not episode:
                 self._last_frame = None
-            sight = episode.sight
-            self._painter = PlacingPainter(sight.scenario, sight.sources)
+            observable = episode.observable
+            self._painter = PlacingPainter(observable.scenario, observable.sources)
             self._episode = episode
         return self._painter
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import fsum
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -18,11 +17,9 @@ from blast_env.envs.arguments import (
 from blast_env.envs.observations import (
     Array,
     EpisodeObservation,
-    FeaturesObservation,
-    GridObservation,
-    GridWithLoadObservation,
+    Observable,
     Observation,
-    Sight,
+    SimulatedModuleLoads,
 )
 from blast_env.envs.strategies import (
     HiddenThreat,
@@ -64,7 +61,7 @@ class Episode:
     """The state of an episode.
 
     Attributes:
-        sight: What may be known before the end.
+        observable: What may be observed before the end.
         objective: Assesses layouts.
         observation: Observes the episode.
         initial: The layout at the start.
@@ -73,7 +70,7 @@ class Episode:
         ended: Whether the charge has gone off.
     """
 
-    sight: Sight
+    observable: Observable
     objective: Objective
     observation: EpisodeObservation
     initial: tuple[Cell, ...]
@@ -139,7 +136,7 @@ class Episode:
             "unprotected_impulse_pa_s": unprotected.impulse_pa_s,
             "reduction": protected.reduction_from(unprotected),
             "layout": self.placement.cells,
-            "scenario_hash": self.sight.scenario.content_hash,
+            "scenario_hash": self.observable.scenario.content_hash,
             "calibration": self.objective.evaluator.calibration.name,
             "calibration_in_range": protected.in_range,
             "charges": case.charges,
@@ -163,16 +160,6 @@ def _with_illegal_term(terms: Mapping[str, float], illegal: float) -> dict[str, 
 def total(terms: Mapping[str, float]) -> float:
     """Return the sum of the terms of a reward."""
     return fsum(terms.values())
-
-
-OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(
-    {
-        "grid": GridObservation(),
-        "grid_with_load": GridWithLoadObservation(),
-        "features": FeaturesObservation(),
-    }
-)
-"""The observations that have names."""
 
 
 VISIBLE_REALISATIONS: Final = 2
@@ -220,12 +207,16 @@ class Task:
         charges = tuple(options.charge(each) for each in drawn)
         possible = scenario.with_possible_charges(charges) if options.fix_charge else scenario
         evaluator = self.evaluators.of(scenario)
-        sight = Sight(scenario, self.threat_model.shown(scenario, charges), evaluator)
+        observable = Observable(
+            scenario,
+            self.threat_model.shown(scenario, charges),
+            SimulatedModuleLoads(self.evaluators),
+        )
         placement = Placement.of(possible, options.layout)
         return Episode(
-            sight=sight,
+            observable=observable,
             objective=Objective(evaluator, self._case(scenario, charges, seeds)),
-            observation=self.observation.episode(sight),
+            observation=self.observation.episode(observable),
             initial=placement.cells,
             placement=placement,
         )

@@ -1,7 +1,9 @@
 """What an agent sees: the observations and what they are made of."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil
+from types import MappingProxyType
 from typing import Any, ClassVar, Final, Protocol
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import draw_threats
-from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Rectangle
 from blast_env.scenario import AnySource, Placement, RectangleSource, Scenario, Site
 from blast_env.scenario.models import AnyStructure
@@ -29,9 +31,49 @@ FULL_STOCK: Final = 100
 """Number of modules in stock that is shown as 1; larger ones as well."""
 
 
+class ModuleLoads(Protocol):
+    """Gives the loads on the structures without a barrier, at the cost of blasts."""
+
+    def __call__(
+        self, scenario: Scenario, sources: tuple[AnySource, ...], blasts: int
+    ) -> NDArray[np.float64]:
+        """Return the load on each module of the structures without a barrier.
+
+        Args:
+            scenario: The scenario.
+            sources: Where the charge is, or may be.
+            blasts: How many blasts the loads are the mean of.
+
+        Returns:
+            Simulation units (modules,), in the order of the scenario's structures, row by row.
+        """
+
+
+@dataclass(frozen=True)
+class SimulatedModuleLoads:
+    """Loads of blasts of charges from the sources, with seeds from 0 on.
+
+    Those are not the blasts that the layout is assessed with.
+
+    Attributes:
+        evaluators: Run the blasts; nothing is asked of them before the loads are.
+    """
+
+    evaluators: Evaluators
+
+    def __call__(
+        self, scenario: Scenario, sources: tuple[AnySource, ...], blasts: int
+    ) -> NDArray[np.float64]:
+        """Return the mean load on each module, simulation units (modules,)."""
+        threats = draw_threats(scenario.model_copy(update={"charge": sources}), range(blasts))
+        loads = self.evaluators.of(scenario).loads_of_many([((), threat) for threat in threats])
+        mean: NDArray[np.float64] = np.mean([each.module_impulse_sim for each in loads], axis=0)
+        return mean
+
+
 @dataclass(frozen=True, eq=False)
-class Sight:
-    """What may be known of an episode before the charge goes off.
+class Observable:
+    """What may be observed of an episode before the charge goes off.
 
     Observations are made from this and from the modules placed so far, so that nothing else can
     slip into them: with a hidden threat, `sources` are those of the scenario.
@@ -39,30 +81,26 @@ class Sight:
     Attributes:
         scenario: The scenario.
         sources: Where the charge is, or may be.
-        evaluator: Runs blasts of the scenario.
+        module_loads: For observations that show loads; they alone need an engine and a
+            calibration, and only they call it.
     """
 
     scenario: Scenario
     sources: tuple[AnySource, ...]
-    evaluator: BlastEvaluator
+    module_loads: ModuleLoads | None = None
 
-    def unprotected_module_impulse_sim(self, blasts: int) -> NDArray[np.float64]:
+    def unprotected_loads(self, blasts: int) -> NDArray[np.float64]:
         """Return the load on each module of the structures without a barrier.
 
-        The mean over blasts of charges from `sources`, with seeds from 0 on: not those that the
-        layout is assessed with.
-
         Args:
-            blasts: Number of blasts.
+            blasts: How many blasts the loads are the mean of.
 
-        Returns:
-            Simulation units (modules,), in the order of the scenario's structures, row by row.
+        Raises:
+            BlastEnvError: If there is nothing that gives them.
         """
-        shown = self.scenario.model_copy(update={"charge": self.sources})
-        threats = draw_threats(shown, range(blasts))
-        loads = self.evaluator.loads_of_many([((), threat) for threat in threats])
-        mean: NDArray[np.float64] = np.mean([each.module_impulse_sim for each in loads], axis=0)
-        return mean
+        if self.module_loads is None:
+            raise BlastEnvError("module_loads is None, must be given for what shows the loads")
+        return self.module_loads(self.scenario, self.sources, blasts)
 
 
 class EpisodeObservation(Protocol):
@@ -78,7 +116,7 @@ class Observation(Protocol):
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space, a `Box` that depends on the sizes of site and build zone alone."""
 
-    def episode(self, sight: Sight) -> EpisodeObservation:
+    def episode(self, observable: Observable) -> EpisodeObservation:
         """Prepare the observations of an episode; what does not change is worked out here."""
 
 
@@ -230,12 +268,6 @@ def _covered(
     return covered
 
 
-_PROTECTED, _OTHER, _COST, _CHARGE = 0, 1, 2, 3
-
-
-_FIRST_CHANGING: Final = 4  # barrier, free, stock share, stock, budget
-
-
 @dataclass(frozen=True)
 class GridObservation:
     """Planes of (rows, columns) squares of 0.5 m over the site, uint8: 255 stands for 1.
@@ -283,16 +315,22 @@ class GridObservation:
         grid = SiteGrid.of(scenario.site)
         return spaces.Box(0, 255, (len(self.channels), grid.rows, grid.columns), np.uint8)
 
-    def episode(self, sight: Sight) -> "GridEpisode":
+    def episode(self, observable: Observable) -> "GridEpisode":
         """Draw the planes that do not change."""
-        grid = SiteGrid.of(sight.scenario.site)
-        planes = np.zeros((len(self.channels), grid.rows, grid.columns), dtype=np.float32)
-        _draw_structures(planes, grid, sight.scenario)
-        zone = sight.scenario.zone
+        grid = SiteGrid.of(observable.scenario.site)
+        scenario, zone = observable.scenario, observable.scenario.zone
         lattice = grid.lattice(zone.corner_m, zone.rows, zone.columns)
-        planes[_COST] = lattice.plane(cost_shares(sight.scenario))
-        planes[_CHARGE] = _charge_plane(grid, sight.sources)
-        return GridEpisode(_levels(planes), lattice)
+        protected, others = _structure_planes(grid, scenario)
+        planes = {
+            "protected": protected,
+            "other_structures": others,
+            "cost": lattice.plane(cost_shares(scenario)),
+            "charge": _charge_plane(grid, observable.sources),
+        }
+        static = np.zeros((len(self.channels), grid.rows, grid.columns), dtype=np.uint8)
+        for name, plane in planes.items():
+            static[self.channels.index(name)] = _levels(plane)
+        return GridEpisode(static, lattice, self.channels)
 
 
 @dataclass(frozen=True)
@@ -311,22 +349,22 @@ class GridWithLoadObservation(GridObservation):
     blasts: int = 4
     channels: ClassVar[tuple[str, ...]] = (*GridObservation.channels, "unprotected_load")
 
-    def episode(self, sight: Sight) -> "GridEpisode":
+    def episode(self, observable: Observable) -> "GridEpisode":
         """Draw the planes that do not change, with the loads."""
-        episode = super().episode(sight)
-        grid = SiteGrid.of(sight.scenario.site)
-        impulses = sight.unprotected_module_impulse_sim(self.blasts)
+        episode = super().episode(observable)
+        grid = SiteGrid.of(observable.scenario.site)
+        impulses = observable.unprotected_loads(self.blasts)
         shares = impulses / max(impulses.max(), np.finfo(float).tiny)
         plane = np.zeros((grid.rows, grid.columns), dtype=np.float32)
         first = 0
-        for structure in sight.scenario.structures:
+        for structure in observable.scenario.structures:
             modules = structure.rows * structure.columns
             values = shares[first : first + modules].reshape(structure.rows, structure.columns)
             plane += grid.lattice(structure.corner_m, structure.rows, structure.columns).plane(
                 values
             )
             first += modules
-        episode.static[-1] = _levels(plane)
+        episode.static[self.channels.index("unprotected_load")] = _levels(plane)
         return episode
 
 
@@ -337,20 +375,25 @@ class GridEpisode:
     Attributes:
         static: What does not change (channels, rows, columns); the rest is 0.
         zone: Where the build zone lies on the grid.
+        channels: Names of the planes.
     """
 
     static: NDArray[np.uint8]
     zone: Lattice
+    channels: tuple[str, ...]
 
     def observe(self, placement: Placement) -> NDArray[np.uint8]:
         """Return all planes for the modules placed so far, (channels, rows, columns)."""
         planes = self.static.copy()
-        first = _FIRST_CHANGING
         cells = np.stack((occupied_cells(placement), placement.free))
-        planes[first : first + 2] = _levels(self.zone.plane(cells))
+        planes[self._of("barrier", "free")] = _levels(self.zone.plane(cells))
         shares = np.array(stock_shares(placement), dtype=np.float32)
-        planes[first + 2 : first + 5] = _levels(shares)[:, np.newaxis, np.newaxis]
+        levels = _levels(shares)[:, np.newaxis, np.newaxis]
+        planes[self._of("stock_share", "stock", "budget_share")] = levels
         return planes
+
+    def _of(self, *names: str) -> list[int]:
+        return [self.channels.index(name) for name in names]
 
 
 def _levels(values: Plane) -> NDArray[np.uint8]:
@@ -358,14 +401,17 @@ def _levels(values: Plane) -> NDArray[np.uint8]:
     return np.rint(255.0 * np.minimum(values, 1.0)).astype(np.uint8)
 
 
-def _draw_structures(planes: Plane, grid: SiteGrid, scenario: Scenario) -> None:
+def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane]:
+    """Return the planes of the protected structures, by weight, and of the others."""
+    protected, others = np.zeros((2, grid.rows, grid.columns), dtype=np.float32)
     weights = [structure.weight for structure in scenario.structures if structure.protected]
     for structure in scenario.structures:
         covered = grid.rectangle(structure.rectangle_m)
         if structure.protected:
-            planes[_PROTECTED] += np.float32(structure.weight / max(weights)) * covered
+            protected += np.float32(structure.weight / max(weights)) * covered
         else:
-            planes[_OTHER] += covered
+            others += covered
+    return protected, others
 
 
 def _charge_plane(grid: SiteGrid, sources: tuple[AnySource, ...]) -> Plane:
@@ -415,16 +461,16 @@ class FeaturesObservation:
         zone = scenario.zone
         return spaces.Box(0.0, 1.0, (_FIXED + 3 * zone.rows * zone.columns,), np.float32)
 
-    def episode(self, sight: Sight) -> "FeaturesEpisode":
+    def episode(self, observable: Observable) -> "FeaturesEpisode":
         """Work out the values that do not change.
 
         Raises:
             BlastEnvError: If the scenario has more structures than there is room for.
         """
-        scenario, zone = sight.scenario, sight.scenario.zone
+        scenario, zone = observable.scenario, observable.scenario.zone
         size = np.array([scenario.site.width_m, scenario.site.height_m])
-        boxes = np.array([source_bounds_m(source) for source in sight.sources])
-        charges = [charge_share(source.tnt_kg) for source in sight.sources]
+        boxes = np.array([source_bounds_m(source) for source in observable.sources])
+        charges = [charge_share(source.tnt_kg) for source in observable.sources]
         fixed = [
             np.zeros(3),
             boxes[:, :2].min(axis=0) / size,
@@ -480,3 +526,13 @@ def _structure(structure: AnyStructure, site: Rectangle, largest_weight: float) 
     weight = structure.weight / largest_weight if structure.protected else 0.0
     sides = [left / site.right, bottom / site.top, right / site.right, top / site.top]
     return [*sides, 1.0, weight]
+
+
+OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(
+    {
+        "grid": GridObservation(),
+        "grid_with_load": GridWithLoadObservation(),
+        "features": FeaturesObservation(),
+    }
+)
+"""The observations that have names."""

@@ -72,7 +72,7 @@ class Window:
             # Without a screen SDL quietly falls back to a driver that shows nothing.
             if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
                 raise pygame.error("there is no screen")
-            fitting = _fit(size_px, pygame.display.get_desktop_sizes()[0])
+            fitting = fit(size_px, pygame.display.get_desktop_sizes()[0])
             if self._screen is None or self._screen.get_size() != fitting:
                 pygame.display.set_caption(self._title)
                 self._screen = pygame.display.set_mode(fitting)
@@ -83,7 +83,7 @@ class Window:
         return self._screen
 
 
-def _fit(size_px: tuple[int, int], screen_px: tuple[int, int]) -> tuple[int, int]:
+def fit(size_px: tuple[int, int], screen_px: tuple[int, int]) -> tuple[int, int]:
     """Return the size of the window: the frame's, or a smaller one that fits on the screen."""
     factors = (_SHARE_OF_SCREEN * on / of for on, of in zip(screen_px, size_px, strict=True))
     factor = min(1.0, *factors)

@@ -110,7 +110,7 @@ def test_an_archive_of_rl_zoo_is_read_where_rl_zoo_is_missing(
     agent = load_archive(archive, "ppo", scenario, trust_archive=True)
     layout = agent.propose(scenario)
     assert layout
-    assert layout == TrainedAgent(model.policy, scenario, "event").propose(scenario)
+    assert layout == TrainedAgent(model.policy, scenario).propose(scenario)
 
 
 def test_an_archive_with_an_unknown_policy_is_refused_with_the_reason(
@@ -144,7 +144,7 @@ def test_options_are_read_as_yaml_and_reach_the_policy() -> None:
         ("learning_rate=lin_fast", "'lin_' and a number"),
         ("learning_rate=0", "above 0"),
         ("batch_size=100", "must divide n_steps * n_envs = 512"),
-        ("policy=MlpPolicy", "CnnPolicy"),
+        ("policy=MlpPolcy", "CnnPolicy"),
         ("env_wrapper=[os.system]", "RelativeReward"),
     ],
 )

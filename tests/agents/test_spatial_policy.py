@@ -6,7 +6,13 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
-from blast_agents.policies.features import ZoneGeometry, ZoneView
+from blast_agents.policies.features import (
+    CELL_FEATURES,
+    SITE_FEATURES,
+    Planes,
+    ZoneGeometry,
+    ZoneView,
+)
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
 from blast_agents.rules import RULES
 from blast_agents.training.agent import logits_of
@@ -20,8 +26,10 @@ from blast_env.sites import SightLines, generate_site
 from blast_env.sites.turning import turned
 
 LENGTH_M = 10.0  # what the features of length are divided by
-ALONG, ASIDE, CUT, OPEN_CUT, COVERED = 0, 3, 7, 8, 9
-OPEN_FACADE = 6  # of the features of the whole
+ALONG, ASIDE, CUT, OPEN_CUT, COVERED = (
+    CELL_FEATURES.index(name) for name in ("along", "aside", "cut", "open_cut", "covered")
+)
+OPEN_FACADE = SITE_FEATURES.index("open_facade")
 SHARE_GAIN = 10.0  # what the features of shares of the facade are multiplied by
 
 
@@ -32,7 +40,8 @@ def environment(scenario: Scenario | str = "courtyard") -> BlastBarrierEnv:
 
 
 def zone_view(planes: torch.Tensor, rows: int, columns: int, places: int = 1) -> ZoneView:
-    return ZoneGeometry.of(planes, rows, columns, places).view(planes)
+    named = Planes(planes)
+    return ZoneGeometry.of(named, rows, columns, places).view(named)
 
 
 def observed(env: BlastBarrierEnv, charge_m: tuple[float, float], **options: Any) -> torch.Tensor:
@@ -100,7 +109,7 @@ def test_acting_and_learning_agree_and_observations_do_not_mix(
 def test_another_charge_is_not_taken_for_the_one_before() -> None:
     """What stays the same in an episode is kept: it must not outlive the episode."""
     env = environment()
-    arguments = {"rows": 40, "columns": 16, "width": 8}
+    arguments: dict[str, Any] = {"rows": 40, "columns": 16, "width": 8}
     used, fresh = (
         SpatialPolicy(env.observation_space, env.action_space, lambda _: 1e-3, **arguments)
         for _ in range(2)

@@ -1,15 +1,17 @@
 """A trained agent proposes legal layouts at once, and loading one never runs code."""
 
 import io
+from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
 
 import numpy as np
 import pytest
 import torch
+from blast_agents.policies.spatial import SpatialPolicy
 from blast_agents.proposal import LayoutAgent
 from blast_agents.training import TrainedAgent, load_agent, load_archive, train
-from blast_agents.training.agent import Checkpoint, make_model, make_policy
+from blast_agents.training.agent import Checkpoint, logits_of, make_model, make_policy
 from blast_agents.training.environments import make_environments, training_source
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from gymnasium import spaces
@@ -17,10 +19,10 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from sb3_contrib import MaskablePPO
 
 from blast_env import load_scenario
-from blast_env.envs.observations import GridObservation
-from blast_env.errors import BlastEnvError
+from blast_env.envs.observations import GridObservation, GridWithLoadObservation, Observable
+from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, Scenario
+from blast_env.scenario import Placement, PointSource, Scenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 
 CHARGES = (Charge((2.0, 5.5), 100.0), Charge((2.0, 8.5), 100.0), None)
@@ -54,7 +56,7 @@ def untrained(scenario: Scenario) -> TrainedAgent:
         GridObservation().space(scenario),
         spaces.Discrete(zone.rows * zone.columns + 1),
     )
-    return TrainedAgent(policy, scenario, "event")
+    return TrainedAgent(policy, scenario)
 
 
 def test_proposals_are_legal_and_always_the_same(run: Path) -> None:
@@ -71,6 +73,75 @@ def test_proposals_keep_every_condition_of_a_bundled_site(name: str) -> None:
     scenario = load_scenario(name)
     layout = untrained(scenario).propose(scenario)
     assert Placement.of(scenario, layout).cells == layout
+
+
+def test_a_grid_agent_needs_no_engine_and_no_calibration() -> None:
+    """Whoever has but a site and an agent gets a layout; only the loads ask for more."""
+    scenario = load_scenario("courtyard")
+    bare = scenario.model_copy(update={"calibration": None})
+    agent = replace(untrained(scenario), engine="there is none")
+    assert agent.propose(bare) == untrained(scenario).propose(scenario)
+    with pytest.raises(UnknownNameError, match="there is none"):
+        replace(agent, observation="grid_with_load").propose(bare)
+    with pytest.raises(UnknownNameError, match="did you mean 'grid'"):
+        replace(agent, observation="gird")
+
+
+SPATIAL = "blast_agents.policies.spatial.SpatialMaskablePolicy"
+
+
+@pytest.mark.parametrize(
+    ("observation", "policy"),
+    [("grid_with_load", SPATIAL), ("grid_with_load", "MlpPolicy"), ("features", "MlpPolicy")],
+)
+def test_an_agent_of_another_observation_learns_is_chosen_and_proposes(
+    observation: str, policy: str, tmp_path: Path
+) -> None:
+    chosen = settings(scenario_file(tmp_path), steps=16, observation=observation)
+    result = train(chosen, hyperparameters({"policy": policy}), tmp_path / "run")
+    assert len(result.progress.evaluations) == 1
+    assert f"observation: {observation}\n" in (tmp_path / "run" / "config.yaml").read_text()
+    agent = load_agent(tmp_path / "run")
+    assert agent.observation == observation
+    for charge in CHARGES:
+        layout = agent.propose(small_scenario(), charge)
+        assert layout == Placement.of(small_scenario(), layout).cells
+
+
+def test_the_spatial_policy_sees_the_loads_and_finds_channels_by_their_names() -> None:
+    """Planes in another order are the same site; the load is seen where there is one."""
+    scenario = load_scenario("courtyard")
+    space = GridWithLoadObservation().space(scenario)
+    assert isinstance(space, spaces.Box)
+    channels = GridWithLoadObservation.channels
+    policies = []
+    for names in (channels, channels[::-1]):
+        torch.manual_seed(0)
+        policies.append(
+            SpatialPolicy(
+                space,
+                spaces.Discrete(641),
+                lambda _: 1e-3,
+                rows=40,
+                columns=16,
+                width=8,
+                channels=names,
+            )
+        )
+    charge = PointSource(position_m=(5.0, 12.0), tnt_kg=100.0)
+    observable = Observable(scenario, (charge,), lambda *_: np.arange(1.0, 161.0))
+    seen = GridWithLoadObservation().episode(observable).observe(Placement.empty(scenario))
+    planes = torch.as_tensor(seen)[None]
+    logits = logits_of(policies[0], planes)
+    torch.testing.assert_close(logits_of(policies[1], planes.flip(1)), logits)
+    planes[:, channels.index("unprotected_load")] = 0
+    assert not torch.equal(logits_of(policies[0], planes), logits)
+
+
+def test_a_policy_that_looks_at_planes_is_refused_where_there_are_none(tmp_path: Path) -> None:
+    chosen = settings(scenario_file(tmp_path), observation="features")
+    with pytest.raises(BlastEnvError, match=r"must be one of MlpPolicy for .* 'features'"):
+        train(chosen, hyperparameters(), tmp_path / "run")
 
 
 def test_time_of_a_proposal(benchmark: BenchmarkFixture) -> None:
@@ -158,7 +229,7 @@ def test_an_archive_needs_trust(run: Path, tmp_path: Path) -> None:
     with pytest.raises(BlastEnvError, match="trust_archive is False, must be True"):
         load_archive(archive, "maskable_ppo", small_scenario())
     agent = load_archive(archive, "maskable_ppo", small_scenario(), trust_archive=True)
-    expected = TrainedAgent(model.policy, small_scenario(), "event")
+    expected = TrainedAgent(model.policy, small_scenario())
     charge = CHARGES[0]
     assert agent.propose(small_scenario(), charge) == expected.propose(small_scenario(), charge)
 

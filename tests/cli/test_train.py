@@ -42,6 +42,16 @@ def test_a_run_says_what_it_came_to_and_can_be_taken_up_again(tmp_path: Path) ->
     assert "32 steps, 8 episodes" in again.stdout
 
 
+def test_an_agent_of_the_features_is_trained_and_evaluated(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    options = ("--steps", "16", "--observation", "features", "--run", folder)
+    result = run(*options, *small(tmp_path))
+    assert result.exit_code == 0, result.output
+    evaluated = CliRunner().invoke(app, ["evaluate", "--run", str(folder), "--seeds", "2"])
+    assert evaluated.exit_code == 0, evaluated.output
+    assert "mean reduction" in evaluated.output
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -51,6 +61,7 @@ def test_a_run_says_what_it_came_to_and_can_be_taken_up_again(tmp_path: Path) ->
         (("--run", "run", "--set", "gamma=2"), "gamma is 2: Input should be less than or equal"),
         (("--run", "run", "--set", "torch_threads=0"), "torch_threads is 0: Input should be"),
         (("--run", "run", "--threat", "visble"), "did you mean 'visible'"),
+        (("--run", "run", "--observation", "gird"), "did you mean 'grid'"),
         (("--run", "run", "--scenario", "cortyard"), "did you mean 'courtyard'"),
         (("--run", "run", "--scenario", "free_field"), "no build zone"),
         (("--run", "run", "--engine", "evnt"), "did you mean 'event'"),

@@ -129,7 +129,7 @@ def test_the_loads_without_a_barrier_lie_on_the_modules_that_bear_them() -> None
     scenario = small_scenario()
     env = make(scenario, observation=GridWithLoadObservation(blasts=2))
     load = plane(env, "unprotected_load", charge_position_m=(3.0, 9.0), tnt_kg=100.0)
-    at_charge = scenario.model_copy(update={"charge": env.sight.sources})
+    at_charge = scenario.model_copy(update={"charge": env.observable.sources})
     evaluator = BlastEvaluator(scenario, ThinEngine())
     blasts = evaluator.loads_of_many([((), each) for each in draw_threats(at_charge, range(2))])
     mean = np.mean([each.module_impulse_sim for each in blasts], axis=0)

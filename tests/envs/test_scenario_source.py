@@ -49,7 +49,7 @@ def test_every_reset_draws_a_site_by_the_seed() -> None:
         first, second = play(env, seed), play(twin, seed)
         assert same(first, second)
         hashes.append(first[-1][4]["scenario_hash"])
-        assert len(first[-1][4]["layout"]) == zone_of(env.sight.scenario).stock
+        assert len(first[-1][4]["layout"]) == zone_of(env.observable.scenario).stock
     assert len(set(hashes)) > 3
 
 

@@ -5,7 +5,7 @@ import pygame
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.rendering.window import Window, _fit
+from blast_env.rendering.window import Window, fit
 
 FRAME = np.full((120, 200, 3), 77, dtype=np.uint8)
 
@@ -49,8 +49,8 @@ def test_close_may_be_called_again_and_before_any_frame(window: Window) -> None:
 
 
 def test_a_frame_larger_than_the_screen_is_made_smaller() -> None:
-    assert _fit((960, 916), (1920, 1080)) == (960, 916)
-    assert _fit((1000, 2000), (1920, 1000)) == (450, 900)
+    assert fit((960, 916), (1920, 1080)) == (960, 916)
+    assert fit((1000, 2000), (1920, 1000)) == (450, 900)
 
 
 def test_without_a_screen_the_error_names_another_way(

@@ -30,7 +30,7 @@ def test_every_reset_gives_another_site_to_train_on() -> None:
         observation, info = env.reset()
         assert env.observation_space.contains(observation)
         assert info["action_mask"].shape == (FINISH + 1,)
-        names.append(env.sight.scenario.name)
+        names.append(env.observable.scenario.name)
     assert len(set(names)) == 10
     assert all(int(name.removeprefix("site_")) >= HELD_OUT_SITES for name in names)
 
@@ -47,7 +47,7 @@ def test_a_seed_gives_the_same_episode_again(observation: str) -> None:
 def test_it_can_be_given_the_sites_held_out() -> None:
     env = make(scenario=SiteSource.held_out(1))
     env.reset(seed=4)
-    assert env.sight.scenario.name == "site_0"
+    assert env.observable.scenario.name == "site_0"
 
 
 def test_it_survives_a_pickle_in_mid_episode() -> None:

@@ -1,5 +1,7 @@
 """What the policy looks at on each cell."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import torch
@@ -300,25 +302,108 @@ def _sums(values: Tensor, first: Tensor, last: Tensor) -> Tensor:
     return up_to.gather(2, last) - up_to.gather(2, first)
 
 
-CHANNELS: Final = GridObservation.channels
+SHARES: Final = ("stock_share", "stock", "budget_share")
+"""Channels with the same value everywhere."""
 
 
-PROTECTED, CHARGE, COST, BARRIER, FREE = (
-    CHANNELS.index(name) for name in ("protected", "charge", "cost", "barrier", "free")
+STATIC: Final = ("protected", "cost", "charge")
+"""Channels of which `ZoneGeometry` is made."""
+
+
+class StaticCellFeatures(NamedTuple):
+    """What stays the same on each cell while modules are placed, (batch, cells) each.
+
+    Attributes:
+        along: How far the cell is along the line of sight, over 10 m.
+        remaining: How far it is from there to the structures, likewise.
+        along_share: `along` as a share of the whole way.
+        aside: How far the cell is aside of the line, to the left, over 10 m.
+        aside_size: The same without its sign.
+        shade: See `Bearings`.
+        shade_size: Likewise.
+        cut: Share of the facade that a module hides, times 10.
+    """
+
+    along: Tensor
+    remaining: Tensor
+    along_share: Tensor
+    aside: Tensor
+    aside_size: Tensor
+    shade: Tensor
+    shade_size: Tensor
+    cut: Tensor
+
+
+class ChangingCellFeatures(NamedTuple):
+    """What there is to say of each cell once modules stand, (batch, cells) each.
+
+    Attributes:
+        open_cut: Share of the facade that a module hides and nothing else does, times 10.
+        covered: See `Shadow`.
+        depth: Likewise.
+        cost: Cost of a module, from 0 to 1.
+        free: Whether it may take a module, 0 or 1.
+    """
+
+    open_cut: Tensor
+    covered: Tensor
+    depth: Tensor
+    cost: Tensor
+    free: Tensor
+
+
+CELL_FEATURES: Final = (*StaticCellFeatures._fields, *ChangingCellFeatures._fields)
+"""Names of the features of a cell, in their order."""
+
+
+class SiteMeasures(NamedTuple):
+    """What there is to say of charge and structures, of the order of 1, (batch, 1) each.
+
+    Attributes:
+        distance: From the middle of where the charge may be to that of the structures, over 20 m.
+        half_facade: Half their width across the line of sight, over 10 m.
+        half_depth: Half their depth along it, likewise.
+        charge_half_length: Half of how far the places of the charge spread along it, likewise.
+        charge_half_width: Likewise across it.
+        charge: Largest value of the charge's plane.
+    """
+
+    distance: Tensor
+    half_facade: Tensor
+    half_depth: Tensor
+    charge_half_length: Tensor
+    charge_half_width: Tensor
+    charge: Tensor
+
+
+SITE_FEATURES: Final = (
+    *SiteMeasures._fields,
+    "open_facade",
+    *SHARES,
+    *(f"hidden_{bearing}" for bearing in range(BEARINGS)),
 )
+"""Names of the features of the whole, in their order."""
 
 
-SHARES: Final = tuple(CHANNELS.index(name) for name in ("stock_share", "stock", "budget_share"))
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """The planes of an observation by the names of their channels.
 
+    Attributes:
+        values: From 0 to 255 (batch, channels, height, width).
+        channels: Their names; those of `GridObservation`, in any order and among others.
+    """
 
-STATIC: Final = tuple(CHANNELS.index(name) for name in ("protected", "cost", "charge"))
-"""The planes of which `ZoneGeometry` is made."""
+    values: Tensor
+    channels: tuple[str, ...] = GridObservation.channels
 
+    def __getitem__(self, name: str) -> Tensor:
+        """Return a plane (batch, height, width)."""
+        return self.values[:, self.channels.index(name)]
 
-CELL_FEATURES: Final = 13
-
-
-SITE_FEATURES: Final = 7 + len(SHARES) + BEARINGS
+    def of(self, names: Sequence[str]) -> Tensor:
+        """Return several planes (batch, names, height, width)."""
+        return self.values[:, [self.channels.index(name) for name in names]]
 
 
 _LEVELS: Final = 255.0
@@ -336,10 +421,10 @@ class ZoneView(NamedTuple):
     """What a policy knows of the cells of the build zone, and of the site as a whole.
 
     Attributes:
-        cells: Features of each cell (batch, rows, columns, CELL_FEATURES).
+        cells: Features of each cell (batch, rows, columns, features), named in `CELL_FEATURES`.
         barrier: Which cells hold a module, 0 or 1 (batch, rows, columns).
         free: Which may take one, 0 or 1 (batch, rows, columns).
-        site: Features of the whole (batch, SITE_FEATURES).
+        site: Features of the whole (batch, features), named in `SITE_FEATURES`.
     """
 
     cells: Tensor
@@ -357,9 +442,9 @@ class ZoneGeometry(NamedTuple):
         rows: Rows of the zone.
         columns: Its columns.
         bearings: On which bearings the cells are seen.
-        cells: Features of each cell (batch, cells, 8).
+        cells: Features of each cell (batch, cells, features), those of `StaticCellFeatures`.
         cost: Cost of a module, from 0 to 1 (batch, cells).
-        site: Features of the whole (batch, 6).
+        site: Features of the whole (batch, features), those of `SiteMeasures`.
     """
 
     row: Tensor
@@ -372,7 +457,7 @@ class ZoneGeometry(NamedTuple):
     site: Tensor
 
     @classmethod
-    def of(cls, planes: Tensor, rows: int, columns: int, places: int = 1) -> "ZoneGeometry":
+    def of(cls, planes: Planes, rows: int, columns: int, places: int = 1) -> "ZoneGeometry":
         """Read the build zone off as seen along the lines of sight from charge to structures.
 
         The features of a cell turn with the site: how far it is along the line of sight and aside
@@ -382,33 +467,33 @@ class ZoneGeometry(NamedTuple):
         it may be at.
 
         Args:
-            planes: A `"grid"` observation, from 0 to 255 (batch, channels, height, width).
+            planes: Those of the observation.
             rows: Rows of the build zone.
             columns: Its columns.
             places: Places that stand for where the charge may be; 1 takes the middle.
         """
-        row, column = _corner(planes[:, COST])
-        cost = _crop(planes[:, COST], row, column, rows, columns).float() / _LEVELS
+        row, column = _corner(planes["cost"])
+        cost = _crop(planes["cost"], row, column, rows, columns).float() / _LEVELS
         # The plane shows the root of how likely the charge is in a square.
-        likely = planes[:, CHARGE].float().square()
-        target = Spread.of(planes[:, PROTECTED].float())
+        likely = planes["charge"].float().square()
+        target = Spread.of(planes["protected"].float())
         lines = LinesOfSight.between(*likely_places(likely, places), target)
-        x = (column[:, None, None] + torch.arange(columns, device=planes.device) + 0.5).float()
-        y = (row[:, None, None] + torch.arange(rows, device=planes.device)[:, None] + 0.5).float()
-        shape = (len(planes), rows, columns)
+        x = (column[:, None, None] + torch.arange(columns, device=row.device) + 0.5).float()
+        y = (row[:, None, None] + torch.arange(rows, device=row.device)[:, None] + 0.5).float()
+        shape = (len(row), rows, columns)
         x, y = x.expand(shape).flatten(1), y.expand(shape).flatten(1)
         along, aside = lines.coordinates(x, y)
         bearings = Bearings.of(lines, along, aside, stands_before(lines, along, x, y, target))
         distance = lines.distance[..., None]
-        cells = (
-            along.mean(dim=1) / _LENGTH,
-            (distance - along).mean(dim=1) / _LENGTH,
-            (along / distance).mean(dim=1),
-            aside.mean(dim=1) / _LENGTH,
-            aside.abs().mean(dim=1) / _LENGTH,
-            bearings.shade,
-            bearings.shade_size,
-            bearings.cut * _SHARE_GAIN,
+        cells = StaticCellFeatures(
+            along=along.mean(dim=1) / _LENGTH,
+            remaining=(distance - along).mean(dim=1) / _LENGTH,
+            along_share=(along / distance).mean(dim=1),
+            aside=aside.mean(dim=1) / _LENGTH,
+            aside_size=aside.abs().mean(dim=1) / _LENGTH,
+            shade=bearings.shade,
+            shade_size=bearings.shade_size,
+            cut=bearings.cut * _SHARE_GAIN,
         )
         return cls(
             row=row,
@@ -418,46 +503,48 @@ class ZoneGeometry(NamedTuple):
             bearings=bearings,
             cells=torch.stack(cells, dim=-1),
             cost=cost.flatten(1),
-            site=_measures(planes, likely, target),
+            site=torch.cat(_measures(planes, likely, target), dim=1),
         )
 
-    def view(self, planes: Tensor) -> ZoneView:
+    def view(self, planes: Planes) -> ZoneView:
         """Return what the policy sees now.
 
         For each cell there is more to say once modules stand: how much of the facade a module
         would hide there that nothing hides yet, and what stands on its bearing already.
 
         Args:
-            planes: The observation of these sites (batch, channels, height, width).
+            planes: Those of the observation of these sites.
         """
         barrier, free = (
-            _crop(planes[:, channel], self.row, self.column, self.rows, self.columns).float()
-            / _LEVELS
-            for channel in (BARRIER, FREE)
+            _crop(planes[name], self.row, self.column, self.rows, self.columns).float() / _LEVELS
+            for name in ("barrier", "free")
         )
         seen = Shadow.of(self.bearings, barrier.flatten(1))
-        shaded = (seen.open_cut * _SHARE_GAIN, seen.covered, seen.depth, self.cost, free.flatten(1))
-        cells = torch.cat((self.cells, torch.stack(shaded, dim=-1)), dim=-1)
-        shares = planes[:, SHARES, 0, 0].float() / _LEVELS
+        changing = ChangingCellFeatures(
+            open_cut=seen.open_cut * _SHARE_GAIN,
+            covered=seen.covered,
+            depth=seen.depth,
+            cost=self.cost,
+            free=free.flatten(1),
+        )
+        cells = torch.cat((self.cells, torch.stack(changing, dim=-1)), dim=-1)
+        shares = planes.of(SHARES)[:, :, 0, 0].float() / _LEVELS
         site = (self.site, seen.open_facade[:, None], shares, seen.hidden)
         return ZoneView(cells.view(*barrier.shape, -1), barrier, free, torch.cat(site, dim=1))
 
 
-def _measures(planes: Tensor, likely: Tensor, target: Spread) -> Tensor:
-    """Return what there is to say of charge and structures, of the order of 1 (batch, 6)."""
+def _measures(planes: Planes, likely: Tensor, target: Spread) -> SiteMeasures:
+    """Return what there is to say of charge and structures."""
     charge = Spread.of(likely)
     line = LinesOfSight.between(charge.x[:, None], charge.y[:, None], target)
     along_x, along_y = line.along_x, line.along_y
-    return torch.cat(
-        (
-            line.distance / (2.0 * _LENGTH),
-            target.half_width(-along_y, along_x).clamp(min=1.0) / _LENGTH,
-            target.half_width(along_x, along_y) / _LENGTH,
-            charge.half_width(along_x, along_y) / _LENGTH,
-            charge.half_width(-along_y, along_x) / _LENGTH,
-            planes[:, CHARGE].float().amax(dim=(1, 2))[:, None] / _LEVELS,
-        ),
-        dim=1,
+    return SiteMeasures(
+        distance=line.distance / (2.0 * _LENGTH),
+        half_facade=target.half_width(-along_y, along_x).clamp(min=1.0) / _LENGTH,
+        half_depth=target.half_width(along_x, along_y) / _LENGTH,
+        charge_half_length=charge.half_width(along_x, along_y) / _LENGTH,
+        charge_half_width=charge.half_width(-along_y, along_x) / _LENGTH,
+        charge=planes["charge"].float().amax(dim=(1, 2))[:, None] / _LEVELS,
     )
 
 

@@ -12,33 +12,34 @@ from torch import Tensor, nn
 
 from blast_agents.policies.features import (
     CELL_FEATURES,
-    CHANNELS,
     SITE_FEATURES,
     STATIC,
+    Planes,
     ZoneGeometry,
 )
+from blast_env.envs.observations import GridObservation
 
 _LOGIT_GAIN: Final = 0.01
 
 
-_OVERVIEW: Final = tuple(
-    CHANNELS.index(name) for name in ("protected", "other_structures", "charge", "barrier")
-)
+_OVERVIEW: Final = ("protected", "other_structures", "charge", "barrier", "unprotected_load")
+"""Channels of which the network sees the whole site, those of them that the observation has."""
 
 
 class ZoneExtractor(BaseFeaturesExtractor):
     """Convolutions over the build zone and over the site: features of every cell and of the whole.
 
-    A cell's features come from where it lies on the line of sight (`geometry.zone_view`), from the
-    25 cells around it, and from an overview of the site. The result is flat: `width` features of
-    each cell, cell by cell, then `width` features of the whole.
+    A cell's features come from where it lies on the line of sight (`features.ZoneGeometry`), from
+    the 25 cells around it, and from an overview of the site. The result is flat: `width` features
+    of each cell, cell by cell, then `width` features of the whole.
 
     Args:
-        observation_space: Of a `"grid"` observation.
+        observation_space: Of an observation of planes.
         rows: Rows of the build zone.
         columns: Its columns.
         places: Places that stand for where the charge may be.
         width: Number of features.
+        channels: Names of the planes.
     """
 
     def __init__(
@@ -48,22 +49,25 @@ class ZoneExtractor(BaseFeaturesExtractor):
         columns: int,
         places: int,
         width: int,
+        channels: tuple[str, ...],
     ) -> None:
         super().__init__(observation_space, width * (rows * columns + 1))
+        self.channels = tuple(channels)
+        self.shown = tuple(name for name in _OVERVIEW if name in self.channels)
         self.rows, self.columns, self.places, self.width = rows, columns, places, width
         self._known: tuple[Tensor, ZoneGeometry] | None = None
         self.near = nn.Conv2d(2, width, 5, padding=2)
         self.overview = nn.Sequential(
             nn.AvgPool2d(4, ceil_mode=True),
-            nn.Conv2d(len(_OVERVIEW), 16, 3, stride=2, padding=1),
+            nn.Conv2d(len(self.shown), 16, 3, stride=2, padding=1),
             nn.ReLU(),
             nn.Conv2d(16, width, 3, stride=2, padding=1),
             nn.ReLU(),
             nn.AdaptiveAvgPool2d(1),
             nn.Flatten(),
         )
-        self.cells = nn.Linear(CELL_FEATURES, width)
-        self.site = nn.Linear(SITE_FEATURES + width, width)
+        self.cells = nn.Linear(len(CELL_FEATURES), width)
+        self.site = nn.Linear(len(SITE_FEATURES) + width, width)
         self.mixed = nn.Linear(width, width)
         self.whole = nn.Linear(3 * width, width)
 
@@ -74,8 +78,9 @@ class ZoneExtractor(BaseFeaturesExtractor):
             observations: From 0 to 255 (batch, channels, height, width).
         """
         with torch.no_grad():  # nothing in here has weights
-            view = self._geometry(observations).view(observations)
-            planes = observations[:, _OVERVIEW].float() / 255.0
+            named = Planes(observations, self.channels)
+            view = self._geometry(named).view(named)
+            planes = named.of(self.shown).float() / 255.0
             around = torch.stack((view.barrier, view.free), dim=1)
         site = self.site(torch.cat((view.site, self.overview(planes)), dim=1))
         near = self.near(around).permute(0, 2, 3, 1)
@@ -84,11 +89,11 @@ class ZoneExtractor(BaseFeaturesExtractor):
         whole = torch.cat((torch.relu(site), cells.mean(dim=1), cells.amax(dim=1)), dim=1)
         return torch.cat((cells.flatten(1), torch.relu(self.whole(whole))), dim=1)
 
-    def _geometry(self, observations: Tensor) -> ZoneGeometry:
+    def _geometry(self, planes: Planes) -> ZoneGeometry:
         """Return the geometry; while sites and charges stay the same, it is not worked out anew."""
-        static = observations[:, STATIC]
+        static = planes.of(STATIC)
         if self._known is None or not torch.equal(self._known[0], static):
-            geometry = ZoneGeometry.of(observations, self.rows, self.columns, self.places)
+            geometry = ZoneGeometry.of(planes, self.rows, self.columns, self.places)
             self._known = static, geometry
         return self._known[1]
 
@@ -143,7 +148,7 @@ class ZonePolicy(BasePolicy):
     """What the spatial policies of both algorithms have in common.
 
     Args:
-        observation_space: Of a `"grid"` observation.
+        observation_space: Of an observation of planes.
         action_space: Of the environment.
         lr_schedule: Learning rate by the share of the training that is left.
         rows: Rows of the build zone.
@@ -153,6 +158,7 @@ class ZonePolicy(BasePolicy):
         width: Number of features of a cell.
         critic_width: Neurons of the critic's hidden layer.
         finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
+        channels: Names of the planes; those of a `"grid"` observation unless given.
         **others: For stable-baselines3's policy.
     """
 
@@ -169,6 +175,7 @@ class ZonePolicy(BasePolicy):
         width: int = 24,
         critic_width: int = 64,
         finish_bias: float = -3.0,
+        channels: tuple[str, ...] = GridObservation.channels,
         **others: Any,
     ) -> None:
         self.width, self.critic_width, self.finish_bias = width, critic_width, finish_bias
@@ -180,6 +187,7 @@ class ZonePolicy(BasePolicy):
                 "columns": columns,
                 "places": places or 1,
                 "width": width,
+                "channels": channels,
             },
             "normalize_images": False,  # the extractor does it, for the planes that it needs
         }

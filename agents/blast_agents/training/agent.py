@@ -25,14 +25,21 @@ from torch import nn
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
 from blast_agents.training.hyperparameters import Hyperparameters, schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
-from blast_env.envs.observations import Array, GridEpisode, GridObservation, Sight
+from blast_env.envs.arguments import check_names
+from blast_env.envs.observations import (
+    OBSERVATIONS,
+    Array,
+    EpisodeObservation,
+    Observable,
+    SimulatedModuleLoads,
+)
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, PointSource, Scenario
+from blast_env.scenario import AnySource, Placement, PointSource, Scenario
 
 CHECKPOINT_FORMAT: Final = 1
 
@@ -153,7 +160,13 @@ Policy = ActorCriticPolicy | MaskableActorCriticPolicy
 _SPATIAL = {"ppo": SpatialPolicy, "maskable_ppo": SpatialMaskablePolicy}
 
 
-_FLAT = {"ppo": ActorCriticCnnPolicy, "maskable_ppo": MaskableActorCriticCnnPolicy}
+_PLAIN = {
+    ("ppo", "CnnPolicy"): ActorCriticCnnPolicy,
+    ("ppo", "MlpPolicy"): ActorCriticPolicy,
+    ("maskable_ppo", "CnnPolicy"): MaskableActorCriticCnnPolicy,
+    ("maskable_ppo", "MlpPolicy"): MaskableActorCriticPolicy,
+}
+"""The policies of stable-baselines3 and sb3-contrib."""
 
 
 _PLACES: Final = {"visible": 1, "hidden": 9}
@@ -165,20 +178,28 @@ def fitted(
     """Return hyperparameters with what follows from the scenario's build zone and the threat.
 
     Raises:
-        BlastEnvError: If the policy is not one for the algorithm.
+        BlastEnvError: If the policy is not one for the algorithm and the observation.
     """
     zone = scenario.zone
     places = hyperparameters.policy_kwargs.places or _PLACES[settings.threat]
     changes = {"rows": zone.rows, "columns": zone.columns, "places": places}
     spatial = _SPATIAL[settings.algorithm]
-    names = (f"{spatial.__module__}.{spatial.__name__}", "CnnPolicy")
+    names = ["MlpPolicy"]
+    if channels_of(settings.observation):
+        names = [f"{spatial.__module__}.{spatial.__name__}", "CnnPolicy", *names]
     if hyperparameters.policy not in names:
         raise BlastEnvError(
             f"policy is {hyperparameters.policy}, must be one of {', '.join(names)} for "
-            f"{settings.algorithm}"
+            f"{settings.algorithm} on the observation {settings.observation!r}"
         )
     arguments = hyperparameters.policy_kwargs.model_copy(update=changes)
     return hyperparameters.model_copy(update={"policy_kwargs": arguments})
+
+
+def channels_of(observation: str) -> tuple[str, ...]:
+    """Return the names of an observation's planes; none for one that is no planes."""
+    channels: tuple[str, ...] = getattr(OBSERVATIONS[observation], "channels", ())
+    return channels
 
 
 def make_model(configuration: RunConfiguration, environments: VecEnv) -> Model:
@@ -228,10 +249,12 @@ def torch_threads(count: int) -> Iterator[None]:
 
 def _policy_class(configuration: RunConfiguration) -> tuple[type[Any], dict[str, Any]]:
     """Return the class of the policy, and the arguments beside spaces and schedule."""
-    algorithm = configuration.settings.algorithm
-    if configuration.hyperparameters.policy == "CnnPolicy":
-        return _FLAT[algorithm], {}
-    return _SPATIAL[algorithm], configuration.hyperparameters.policy_kwargs.model_dump()
+    settings, hyperparameters = configuration.settings, configuration.hyperparameters
+    plain = _PLAIN.get((settings.algorithm, hyperparameters.policy))
+    if plain is not None:
+        return plain, {}
+    arguments = hyperparameters.policy_kwargs.model_dump()
+    return _SPATIAL[settings.algorithm], arguments | {"channels": channels_of(settings.observation)}
 
 
 _ARCHIVE: Final = ".zip"
@@ -249,18 +272,34 @@ class TrainedAgent:
     """Places modules one after the other as a policy says; a `LayoutAgent`.
 
     Attributes:
-        policy: The policy, of PPO or MaskablePPO, on `"grid"` observations.
+        policy: The policy, of PPO or MaskablePPO.
         representative: A scenario of the size that the policy is for.
-        engine: Engine of the training; no blast is run with it.
+        observation: Name of the observation that the policy is for.
+        engine: Engine for the blasts of an observation that shows loads; others need none, and no
+            calibration.
+
+    Raises:
+        UnknownNameError: If there is no such observation.
     """
 
     policy: Policy
     representative: Scenario
-    engine: str
+    observation: str = "grid"
+    engine: str = "event"
+
+    def __post_init__(self) -> None:
+        """Refuse an observation that there is none of."""
+        check_names("observation", [self.observation], OBSERVATIONS)
 
     @cached_property
     def _evaluators(self) -> Evaluators:
         return Evaluators(self.engine)
+
+    def _module_loads(
+        self, scenario: Scenario, sources: tuple[AnySource, ...], blasts: int
+    ) -> NDArray[np.float64]:
+        """Return loads as the observation asks for them; nothing is made ready before."""
+        return SimulatedModuleLoads(self._evaluators)(scenario, sources, blasts)
 
     def propose(self, scenario: Scenario, charge: Charge | None = None) -> Layout:
         """Return the layout of the most likely legal actions.
@@ -323,11 +362,12 @@ class TrainedAgent:
             open_ones = going_on
         return tuple(placement.cells for placement in placements)
 
-    def _episode(self, scenario: Scenario, charge: Charge | None) -> GridEpisode:
+    def _episode(self, scenario: Scenario, charge: Charge | None) -> EpisodeObservation:
         sources = scenario.charge
         if charge is not None:
             sources = (PointSource(position_m=charge.position_m, tnt_kg=charge.tnt_kg),)
-        return GridObservation().episode(Sight(scenario, sources, self._evaluators.of(scenario)))
+        observable = Observable(scenario, sources, self._module_loads)
+        return OBSERVATIONS[self.observation].episode(observable)
 
     def _actions(
         self, observations: Array, free: NDArray[np.bool_], draw: torch.Generator | None
@@ -370,10 +410,12 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     checkpoint = Checkpoint.load(folder.best if weights == "best" else folder.last)
     zone = scenario.zone
     actions = spaces.Discrete(zone.rows * zone.columns + 1)
-    policy = make_policy(configuration, GridObservation().space(scenario), actions)
+    settings = configuration.settings
+    space = OBSERVATIONS[settings.observation].space(scenario)
+    policy = make_policy(configuration, space, actions)
     checkpoint.load_policy(policy, folder.path)
     policy.set_training_mode(False)
-    return TrainedAgent(policy, scenario, configuration.settings.engine)
+    return TrainedAgent(policy, scenario, settings.observation, settings.engine)
 
 
 def load_archive(
@@ -382,6 +424,7 @@ def load_archive(
     scenario: Scenario,
     *,
     trust_archive: bool = False,
+    observation: str = "grid",
     engine: str = "event",
 ) -> TrainedAgent:
     """Return the agent of an archive that stable-baselines3 or RL Zoo wrote.
@@ -394,7 +437,8 @@ def load_archive(
         algorithm: Of the archive.
         scenario: A scenario of the size that the policy is for.
         trust_archive: Whether the archive may run code: only for one whose maker you trust.
-        engine: An engine that the scenario's calibration knows; no blast is run with it.
+        observation: Name of the observation that the policy is for.
+        engine: For an observation that shows loads; see `TrainedAgent`.
 
     Raises:
         BlastEnvError: If the archive is not trusted, or cannot be read.
@@ -408,4 +452,4 @@ def load_archive(
     except (OSError, ImportError, ValueError, KeyError, RuntimeError, AttributeError) as error:
         raise BlastEnvError(f"{path}: cannot be read: {error}") from error
     policy.set_training_mode(False)
-    return TrainedAgent(policy, scenario, engine)
+    return TrainedAgent(policy, scenario, observation, engine)

@@ -153,6 +153,7 @@ class EnvironmentMaker:
             scenario=self.source,
             realisations=1,
             engine=settings.engine,
+            observation=settings.observation,
             cache=LoadsCache(_LOADS),
             **_threat_arguments(settings),
         )

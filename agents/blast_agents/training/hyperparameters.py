@@ -140,6 +140,7 @@ PolicyName = Literal[
     "blast_agents.policies.spatial.SpatialPolicy",
     "blast_agents.policies.spatial.SpatialMaskablePolicy",
     "CnnPolicy",
+    "MlpPolicy",
 ]
 """Policies by the names that RL Zoo imports them by."""
 
@@ -161,7 +162,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class PolicyArguments(BaseModel):
-    """Arguments of the spatial policies; `None` and a `CnnPolicy` leave stable-baselines3's.
+    """Arguments of the spatial policies; stable-baselines3's own policies take none.
 
     Attributes:
         rows: Rows of the build zone; the scenario decides.

@@ -154,7 +154,9 @@ class Recorder(BaseCallback):
         self._is_pending = False
 
     def _evaluate(self) -> None:
-        agent = TrainedAgent(self.algorithm.policy, self.scenario, self.settings.engine)
+        agent = TrainedAgent(
+            self.algorithm.policy, self.scenario, self.settings.observation, self.settings.engine
+        )
         reduction = self.selection.reduction(agent)
         counters = self.progress.counters
         row = EvaluationRow(

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from blast_agents.training.hyperparameters import ALGORITHMS, Hyperparameters, described
 from blast_env.envs.arguments import check_names
+from blast_env.envs.observations import OBSERVATIONS
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
@@ -49,6 +50,7 @@ class TrainingSettings(BaseModel):
         seed: Decides everything: weights, episodes, actions, minibatches.
         threat: `"visible"`: the agent sees the charge; `"hidden"`: it sees where it may be.
         engine: Engine that runs the blasts.
+        observation: Name of what the agent sees of the site; see `BlastBarrier-v0`.
         hidden_threats: Charges in an episode where they are hidden. The mean over episodes is the
             same for any number; with few, more layouts are tried for the same number of blasts.
         evaluation_interval: Rollouts from one evaluation to the next.
@@ -66,6 +68,7 @@ class TrainingSettings(BaseModel):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     threat: Literal["visible", "hidden"] = "visible"
     engine: str = "event"
+    observation: Literal["grid", "grid_with_load", "features"] = "grid"
     hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
     evaluation_interval: Annotated[int, Field(ge=1)] = 5
     evaluation_cases: Annotated[int, Field(ge=2, le=100)] = 16
@@ -99,11 +102,13 @@ def settings_from(values: Mapping[str, Any]) -> TrainingSettings:
     """Return settings from plain values.
 
     Raises:
-        UnknownNameError: If there is no such algorithm or threat; the message names the nearest.
+        UnknownNameError: If there is no such algorithm, threat or observation; the message names
+            the nearest.
         BlastEnvError: If a value is of no use; the message names its bound.
     """
     check_names("algorithm", [values.get("algorithm", ALGORITHMS[0])], ALGORITHMS)
     check_names("threat", [values.get("threat", THREATS[0])], THREATS)
+    check_names("observation", [values.get("observation", "grid")], OBSERVATIONS)
     try:
         return TrainingSettings.model_validate(values)
     except ValidationError as error:
