@@ -23,7 +23,7 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation, Observable
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement, Scenario
-from blast_env.sites import SightLines, generate_site
+from blast_env.sites import Visibility, generate_site
 from blast_env.sites.turning import turned
 
 LENGTH_M = 10.0  # what the features of length are divided by
@@ -162,7 +162,7 @@ def test_what_a_module_hides_it_takes_from_those_in_line_with_it_and_from_no_oth
 
 
 @pytest.mark.parametrize("seed", [10_000, 10_003, 10_005, 10_010])
-def test_what_modules_hide_is_what_sight_lines_say(seed: int) -> None:
+def test_what_modules_hide_is_what_lines_of_sight_say(seed: int) -> None:
     """A charge that may be anywhere on a road or in a parking area, against lines drawn one by one.
 
     The features know the structures by their extent alone, and 96 bearings of each of 9 places.
@@ -175,7 +175,7 @@ def test_what_modules_hide_is_what_sight_lines_say(seed: int) -> None:
     env = gym.make("BlastBarrier-v0", scenario=bare_site, engine="event", threat="hidden")
     planes, _ = env.reset(seed=0)
     view = zone_view(torch.as_tensor(planes)[None], zone.rows, zone.columns, places=9)
-    lines = SightLines.of(bare_site)
+    lines = Visibility.of(bare_site)
     expected = np.tensordot(lines.weight, lines.cut, axes=1) / lines.weight.sum()
     found = view.cells[0, :, :, CUT].numpy() / SHARE_GAIN
     assert np.corrcoef(found.ravel(), expected.ravel())[0, 1] > 0.95

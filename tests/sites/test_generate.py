@@ -19,7 +19,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.scenario import BuildZone, Placement, Scenario, SegmentSource
 from blast_env.scenario.zone import distance_m, source_bounds_m
-from blast_env.sites import Objection, SightLineCriterion, SiteRanges, draw_site, generate_site
+from blast_env.sites import Objection, SiteRanges, VisibilityCriterion, draw_site, generate_site
 
 RANGES = SiteRanges()
 SEEDS = st.integers(0, 2**63 - 1)
@@ -180,7 +180,7 @@ def test_everything_drawn_from_the_default_ranges_is_valid() -> None:
 
 
 def test_sites_meet_the_criterion_and_most_meet_it_at_once(sites: tuple[Scenario, ...]) -> None:
-    criterion = SightLineCriterion()
+    criterion = VisibilityCriterion()
     assert not any(criterion.objection(site) for site in sites)
     at_once = [
         criterion.objection(draw_site(np.random.default_rng(seed), RANGES, "x")) is None
