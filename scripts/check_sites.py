@@ -19,7 +19,7 @@ from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, progress_bar
 from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.rendering.figures import save_figure
-from blast_env.scenario import BuildZone, Scenario, SegmentSource, usable_cells
+from blast_env.scenario import Scenario, SegmentSource, usable_cells
 from blast_env.scenario.zone import distance_m, source_bounds_m
 from blast_env.sites import (
     SiteMeasures,
@@ -215,12 +215,6 @@ def print_row(*cells: str) -> None:
     print_line(f"| {' | '.join(cells)} |")
 
 
-def zone_of(site: Scenario) -> BuildZone:
-    """Return the build zone of a generated site, which has one."""
-    assert site.build_zone is not None
-    return site.build_zone
-
-
 def stand_off_m(site: Scenario) -> float:
     """Return the least distance from the charge to the protected building."""
     return distance_m(site.charge[0], site.structures[0].rectangle_m)
@@ -245,9 +239,9 @@ PROPERTIES: Final[Mapping[str, Callable[[Scenario], float]]] = {
     "facade (m)": lambda site: facade_and_depth_m(site)[0],
     "depth of the building (m)": lambda site: facade_and_depth_m(site)[1],
     "usable cells": lambda site: int(usable_cells(site).sum()),
-    "modules in stock": lambda site: zone_of(site).stock,
-    "keep-outs": lambda site: len(zone_of(site).keep_outs),
-    "clearance (m)": lambda site: zone_of(site).clearance_m,
+    "modules in stock": lambda site: site.zone.stock,
+    "keep-outs": lambda site: len(site.zone.keep_outs),
+    "clearance (m)": lambda site: site.zone.clearance_m,
 }
 
 
@@ -258,8 +252,8 @@ CONDITIONS: Final[Mapping[str, Callable[[Scenario], bool]]] = {
     "building looks at the threat with its longer side": lambda site: (
         facade_and_depth_m(site)[0] > facade_and_depth_m(site)[1]
     ),
-    "access way": lambda site: zone_of(site).access_way is not None,
-    "duct and budget": lambda site: zone_of(site).budget is not None,
+    "access way": lambda site: site.zone.access_way is not None,
+    "duct and budget": lambda site: site.zone.budget is not None,
 }
 
 
