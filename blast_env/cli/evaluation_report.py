@@ -208,7 +208,7 @@ def _print_totals(evaluation: LayoutEvaluation) -> None:
     )
     print_line(
         f"engine {evaluation.engine_name} ({evaluation.engine_version}), calibration "
-        f"{evaluation.calibration.name}, scenario hash {evaluation.scenario.content_hash[:12]}"
+        f"{evaluation.calibration}, scenario hash {evaluation.scenario.content_hash[:12]}"
     )
 
 
