@@ -46,6 +46,7 @@ class BlastSite:
         charge: The charge in metres and kilograms.
         structures: The structures and, when there is one, the barrier; see `obstacles`.
         gauges: Virtual gauges, in metres; the particle engines have none.
+        air_height_m: Height of the simulated air, metres; the particle engines know none.
     """
 
     site: Rectangle
@@ -53,6 +54,7 @@ class BlastSite:
     charge: Charge
     structures: tuple["StructureOutline", ...]
     gauges: tuple[Gauge, ...] = ()
+    air_height_m: float = 12.0
 
     def obstacles(self) -> tuple[ModularObstacle, ...]:
         """Return fresh obstacles without any hit, in the order of `structures`."""
