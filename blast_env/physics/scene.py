@@ -46,7 +46,7 @@ class BlastSite:
         charge: The charge in metres and kilograms.
         structures: The structures and, when there is one, the barrier; see `obstacles`.
         gauges: Virtual gauges, in metres; the particle engines have none.
-        air_height_m: Height of the air above the ground, in metres; likewise.
+        air_height_m: Height of the simulated air, metres; the particle engines know none.
     """
 
     site: Rectangle

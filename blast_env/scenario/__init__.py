@@ -12,10 +12,10 @@ from blast_env.scenario.files import (
 )
 from blast_env.scenario.layout_file import LayoutFile, load_layout, write_layout
 from blast_env.scenario.models import (
-    SCHEMA_VERSION,
     AnySource,
     AnyStructure,
     ConcreteSquareSection,
+    GaugeSection,
     ModularObstacleSection,
     PointSource,
     RectangleSource,
@@ -26,6 +26,7 @@ from blast_env.scenario.models import (
 )
 from blast_env.scenario.placement import Placement, check_layout, usable_cells
 from blast_env.scenario.problems import Problem, ScenarioError
+from blast_env.scenario.versions import SCHEMA_VERSION
 from blast_env.scenario.zone import AccessWay, BuildZone, CostArea, KeepOut
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "Charge",
     "ConcreteSquareSection",
     "CostArea",
+    "GaugeSection",
     "KeepOut",
     "LayoutFile",
     "ModularObstacleSection",

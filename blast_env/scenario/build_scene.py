@@ -1,4 +1,4 @@
-"""From a scenario to the scene of one blast."""
+"""From a scenario to the site of one blast, and for particles to its scene."""
 
 from collections.abc import Sequence
 
@@ -7,10 +7,19 @@ import numpy as np
 from blast_env.geometry import Cell, Rectangle
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.presets import for_charge
-from blast_env.physics.scene import Charge, Scene, StructureOutline
+from blast_env.physics.scene import BlastSite, Charge, Gauge, Scene, StructureOutline
 from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
-from blast_env.scenario import BuildZone, Scenario, check_layout, usable_cells
+from blast_env.scenario import (
+    BuildZone,
+    PointSource,
+    Problem,
+    Scenario,
+    ScenarioError,
+    check_layout,
+    usable_cells,
+)
 from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
+from blast_env.scenario.zone import TOLERANCE_M, distance_m
 from blast_env.units import UNITS_PER_M
 
 
@@ -36,13 +45,50 @@ def draw_charge(scenario: Scenario, seed: int) -> Charge:
     return scenario.sample_charge(random_streams(seed)[0])
 
 
+def build_site(
+    scenario: Scenario,
+    layout: Sequence[Cell] = (),
+    seed: int = 0,
+    charge: Charge | None = None,
+) -> BlastSite:
+    """Lay out a scenario for one blast, for an engine that needs no balls.
+
+    Args:
+        scenario: The scenario.
+        layout: (row, column) of the build-zone cells that hold a barrier module.
+        seed: Decides the charge, where the scenario leaves it open: the same one as for particles.
+        charge: The charge, instead of one drawn from the scenario.
+
+    Raises:
+        LayoutError: If the layout does not fit the build zone, or the charge.
+        ScenarioError: If the charge is not clear of a structure or the border.
+        ValueError: If the seed is negative.
+    """
+    cells = check_layout(scenario, layout)
+    if charge is not None:
+        _check_clear(scenario.with_charge(charge), cells)
+    charge_rng, *_ = random_streams(seed)
+    charge = scenario.sample_charge(charge_rng) if charge is None else charge
+    structures = tuple(_outline(section) for section in scenario.structures)
+    if cells:
+        structures += (barrier_outline(scenario.zone, cells),)
+    return BlastSite(
+        site=scenario.site.rectangle_m.scaled(UNITS_PER_M),
+        charge_centre=(charge.position_m[0] * UNITS_PER_M, charge.position_m[1] * UNITS_PER_M),
+        charge=charge,
+        structures=structures,
+        gauges=tuple(Gauge(each.name, each.position_m) for each in scenario.gauges),
+        air_height_m=scenario.air_height_m,
+    )
+
+
 def build_scene(
     scenario: Scenario,
     layout: Sequence[Cell] = (),
     seed: int = 0,
     charge: Charge | None = None,
 ) -> Scene:
-    """Lay out a scenario for one blast.
+    """Lay out a scenario for one blast of particles, which know no heights.
 
     Args:
         scenario: The scenario.
@@ -53,36 +99,32 @@ def build_scene(
 
     Raises:
         LayoutError: If the layout does not fit the build zone, or the charge.
-        ScenarioError: If the charge is not clear of a structure or the border.
+        ScenarioError: If the charge is not clear of a structure or the border, or over a roof:
+            without heights it would be inside the structure.
         BlastEnvError: If the parameters do not reach to the mass of the charge.
         ValueError: If the seed is negative.
     """
-    cells = check_layout(scenario, layout)
-    if charge is not None:
-        _check_clear(scenario.with_charge(charge), cells)
-    charge_rng, fan_rng, air_rng = random_streams(seed)
-    charge = scenario.sample_charge(charge_rng) if charge is None else charge
-    parameters = for_charge(scenario.parameters, charge.tnt_kg)
-    site = scenario.site.rectangle_m.scaled(UNITS_PER_M)
-    structures = tuple(_outline(section) for section in scenario.structures)
-    if cells:
-        structures += (barrier_outline(scenario.zone, cells),)
-    centre = (charge.position_m[0] * UNITS_PER_M, charge.position_m[1] * UNITS_PER_M)
+    base = build_site(scenario, layout, seed, charge)
+    _check_not_over_a_roof(scenario, base.charge)
+    parameters = for_charge(scenario.parameters, base.charge.tnt_kg)
+    _, fan_rng, air_rng = random_streams(seed)
     air = air_lattice(
         parameters.air,
-        site,
-        _solid_rectangles(structures),
-        centre,
+        base.site,
+        _solid_rectangles(base.structures),
+        base.charge_centre,
         parameters.explosive.offset_units + parameters.explosive.radius_units,
         air_rng,
     )
-    fan = explosion_fan(parameters.explosive, centre, fan_rng)
+    fan = explosion_fan(parameters.explosive, base.charge_centre, fan_rng)
     return Scene(
-        site=site,
-        charge_centre=centre,
-        charge=charge,
+        site=base.site,
+        charge_centre=base.charge_centre,
+        charge=base.charge,
         balls=Balls.concatenate((air, fan)),
-        structures=structures,
+        structures=base.structures,
+        gauges=base.gauges,
+        air_height_m=base.air_height_m,
         parameters=parameters,
     )
 
@@ -96,6 +138,26 @@ def _check_clear(scenario: Scenario, cells: tuple[Cell, ...]) -> None:
     usable = usable_cells(scenario)
     if not all(usable[cell] for cell in cells):
         check_layout(scenario, cells)
+
+
+def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
+    """Refuse a charge that would be inside a structure if that were endlessly high.
+
+    Raises:
+        ScenarioError: If it is.
+    """
+    if charge.height_m == 0.0:
+        return
+    (x_m, y_m), tnt_kg, _ = charge
+    place = PointSource(position_m=(x_m, y_m), tnt_kg=tnt_kg)
+    for structure in scenario.structures:
+        if distance_m(place, structure.rectangle_m) < scenario.charge_radius_m - TOLERANCE_M:
+            message = (
+                f"is at ({x_m:g}, {y_m:g}) m, {charge.height_m:g} m high, over {structure.name!r}"
+                f" of {structure.height_m:g} m: the particle engines know no heights and would put"
+                " it inside, must be clear of it in plan, or the engine one with heights"
+            )
+            raise ScenarioError(scenario.name, [Problem("charge", message)])
 
 
 def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]:
@@ -121,6 +183,8 @@ def _outline(section: AnyStructure) -> StructureOutline:
         weight=section.weight,
         cells=None,
         capacity=section.module_capacity,
+        height_m=section.height_m,
+        faces=section.faces,
     )
 
 
@@ -136,4 +200,5 @@ def barrier_outline(zone: BuildZone, cells: tuple[Cell, ...]) -> StructureOutlin
         weight=1.0,
         cells=cells,
         capacity=zone.module_capacity,
+        height_m=zone.height_m,
     )

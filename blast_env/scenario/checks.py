@@ -18,6 +18,7 @@ from blast_env.physics.presets import for_charge
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.scenario.problems import Problem, extent
 from blast_env.scenario.sections import AnySource, AnyStructure, SimulationSection, Site
+from blast_env.scenario.versions import MAX_ITEMS
 from blast_env.scenario.zone import (
     TOLERANCE_M,
     AccessWay,
@@ -92,10 +93,6 @@ Item = TypeVar("Item")
 
 MOST_AIR_BALLS: Final = 1_000_000
 """What fits into the memory of a common computer."""
-
-
-MAX_ITEMS: Final = 100
-"""Longer arrays are errors of their own; their other items are not compared with each other."""
 
 
 _SITE: Final = TypeAdapter(Site)

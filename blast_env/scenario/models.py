@@ -1,6 +1,7 @@
 """What a scenario is: its sections together.
 
-All lengths are in metres, x to the right and y upwards from the lower left corner of the site.
+All lengths are in metres, x to the right and y upwards from the lower left corner of the site;
+heights are above the ground.
 """
 
 import json
@@ -12,9 +13,11 @@ import numpy as np
 from pydantic import (
     AfterValidator,
     Field,
+    SerializerFunctionWrapHandler,
     StrictInt,
     TypeAdapter,
     ValidationError,
+    model_serializer,
     model_validator,
 )
 
@@ -29,12 +32,14 @@ from blast_env.scenario.checks import (
     check_sources,
     sound_parts,
 )
+from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
 from blast_env.scenario.problems import ScenarioError, problems_from
 from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
     ChargeSource,
     ConcreteSquareSection,
+    GaugeSection,
     ModularObstacleSection,
     Name,
     PointM,
@@ -47,11 +52,18 @@ from blast_env.scenario.sections import (
     SizeM,
     StructureSection,
 )
+from blast_env.scenario.versions import (
+    FIRST_VERSION,
+    SCHEMA_VERSION,
+    check_version,
+    lowest_version,
+    unused_new_keys,
+    version_problems,
+)
 from blast_env.scenario.zone import BuildZone, KeepOut
 from blast_env.units import MODULE_SIDE_M
 
 __all__ = [
-    "SCHEMA_VERSION",
     "AnySource",
     "AnyStructure",
     "BuildZone",
@@ -59,6 +71,7 @@ __all__ = [
     "Charge",
     "ChargeSource",
     "ConcreteSquareSection",
+    "GaugeSection",
     "KeepOut",
     "ModularObstacleSection",
     "PointM",
@@ -74,11 +87,9 @@ __all__ = [
 ]
 
 
-SCHEMA_VERSION: Final = 1
-"""The version of the file format that this release reads and writes."""
-
-
-_LATER_KEYS: Final = ("clearance_m", "module_cost", "cost_areas", "budget", "access_way")
+_LATER_KEYS: Final = (
+    *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m"),
+)
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
 
@@ -86,18 +97,11 @@ Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
 """Where the charge comes from."""
 
 
-def _check_version(version: int) -> int:
-    """Refuse a file of another version of the format."""
-    if version != SCHEMA_VERSION:
-        raise ValueError(f"must be {SCHEMA_VERSION}, the only version that this release reads")
-    return version
-
-
 class Scenario(Section):
     """A protective-layout problem: everything but the layout and the seed.
 
     Attributes:
-        schema_version: Version of the file format.
+        schema_version: The lowest version of the file format that holds the scenario.
         name: Short name, as in `load_scenario("courtyard")`.
         description: What the scenario models, for people.
         site: The simulated area.
@@ -106,9 +110,10 @@ class Scenario(Section):
         build_zone: Where barrier modules may be placed; without it, nowhere.
         simulation: Parameters of the blast model.
         calibration: Name of the calibration that turns impulses into pascal seconds.
+        gauges: Where overpressure is recorded, by engines that know it.
     """
 
-    schema_version: Annotated[StrictInt, AfterValidator(_check_version)]
+    schema_version: Annotated[StrictInt, AfterValidator(check_version)]
     name: Name
     description: Annotated[str, Field(max_length=2000)] = ""
     site: Site
@@ -117,6 +122,7 @@ class Scenario(Section):
     build_zone: BuildZone | None = None
     simulation: SimulationSection = SimulationSection()
     calibration: Name | None = None
+    gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100)] = ()
 
     @property
     def zone(self) -> BuildZone:
@@ -142,6 +148,19 @@ class Scenario(Section):
         return charge_radius_m(self.parameters)
 
     @property
+    def air_height_m(self) -> float:
+        """How high the simulated air is: as `site` says, or by a rule.
+
+        The rule: 12 m, or 6 m more than the highest structure or barrier if that is more.
+        """
+        return air_height_m(self.site, self.structures, self.build_zone)
+
+    @property
+    def height_notes(self) -> tuple[str, ...]:
+        """What the scenario says of heights that an engine without them does not heed."""
+        return height_notes(self.structures, self.charge, self.build_zone, self.gauges)
+
+    @property
     def content_hash(self) -> str:
         """SHA-256 of everything that affects a result: not of the words for people.
 
@@ -149,6 +168,9 @@ class Scenario(Section):
         keys or in how they arrive at the same simulation parameters have the same hash.
         """
         content = self.model_dump(mode="json", exclude={"name", "description", "simulation"})
+        content["schema_version"] = FIRST_VERSION  # newer keys are there or not, which says it all
+        if self.site.air_height_m == default_air_height_m(self.structures, self.build_zone):
+            del content["site"]["air_height_m"]
         if self.build_zone is not None:
             content["build_zone"] = _without_words(self.build_zone)
         content["parameters"] = self.parameters.model_dump(mode="json")
@@ -171,7 +193,7 @@ class Scenario(Section):
         except ValidationError as error:
             problems = problems_from(error, cls)
         # Pydantic skips the checks between sections if any section is unsound.
-        problems += check_parts(sound_parts(document))
+        problems += (*version_problems(document), *check_parts(sound_parts(document)))
         raise ScenarioError(source, dict.fromkeys(problems))
 
     def at_stand_off(self, distance_m: float) -> "Scenario":
@@ -235,12 +257,14 @@ class Scenario(Section):
         except ValidationError:  # all that is wrong is in the error of the whole
             own = [source.model_dump() for source in sources]
             return Scenario.from_document(
-                self.model_dump() | {"charge": [*own, *document]}, self.name
+                self.model_dump() | {"schema_version": SCHEMA_VERSION, "charge": [*own, *document]},
+                self.name,
             )
         problems = check_sources(self._parts(together))
         if problems:
             raise ScenarioError(self.name, dict.fromkeys(problems))
-        return self.model_copy(update={"charge": together})
+        copy = self.model_copy(update={"charge": together})
+        return copy.model_copy(update={"schema_version": lowest_version(copy)})
 
     def with_simulation(
         self, preset: str | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
@@ -268,15 +292,31 @@ class Scenario(Section):
         # Drawn also for a single source, so that adding one does not shift the stream.
         chosen = int(rng.choice(len(weights), p=weights / weights.sum()))
         source = self.charge[chosen]
-        return Charge(source.sample_position_m(rng), source.tnt_kg)
+        return Charge(source.sample_position_m(rng), source.tnt_kg, source.height_m)
 
     @model_validator(mode="after")
     def _check_sections_together(self) -> Self:
         """Refuse a scenario whose sections do not fit each other."""
-        problems = check_parts(self._parts(self.charge))
+        problems = (*version_problems(self), *check_parts(self._parts(self.charge)))
         if problems:
             raise ScenarioError(self.name, problems)
+        # Equal scenarios are equal in whichever version their files are written.
+        object.__setattr__(self, "schema_version", lowest_version(self))
         return self
+
+    @model_serializer(mode="wrap")
+    def _in_lowest_version(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out newer keys that say nothing, so that the lowest version will do."""
+        document: dict[str, Any] = handler(self)
+        for *above, key in unused_new_keys(self):
+            table: Any = document
+            if not above or above[0] in document:  # else it was left out of the dump
+                for part in above:
+                    table = table[part]
+                table.pop(key, None)
+        if "schema_version" in document:
+            document["schema_version"] = lowest_version(self)
+        return document
 
     def _parts(self, sources: Sequence[AnySource]) -> Parts:
         """Return the sections for the checks between them, with these sources."""

@@ -1,6 +1,7 @@
-"""The sections of a scenario: site, charge, structures; `build_zone` and `simulation` are others.
+"""The sections of a scenario: site, charge, structures, gauges, simulation; not the build zone.
 
-All lengths are in metres, x to the right and y upwards from the lower left corner of the site.
+All lengths are in metres, x to the right and y upwards from the lower left corner of the site;
+heights are above the ground, which is flat.
 """
 
 import re
@@ -24,6 +25,7 @@ from pydantic import (
 from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import PRESETS, preset
+from blast_env.physics.scene import WALLS, WallName
 from blast_env.scenario.problems import (
     Problem,
     ScenarioError,
@@ -46,6 +48,10 @@ PointM = tuple[Coordinate, Coordinate]
 SizeM = tuple[Length, Length]
 
 
+Height = Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0)]
+"""Of something that stands: a module at least."""
+
+
 Count = Annotated[StrictInt, Field(ge=1, le=1000)]
 
 
@@ -66,10 +72,17 @@ class Section(BaseModel):
 
 
 class Site(Section):
-    """The simulated area; what leaves it is gone."""
+    """The simulated area; what leaves it is gone.
+
+    Attributes:
+        width_m: Its extent along x.
+        height_m: Its extent along y.
+        air_height_m: How high the simulated air is; without it, `Scenario.air_height_m` decides.
+    """
 
     width_m: Annotated[StrictFloat, Field(ge=2.0, le=2000.0)]
     height_m: Annotated[StrictFloat, Field(ge=2.0, le=2000.0)]
+    air_height_m: Annotated[StrictFloat, Field(ge=2.0, le=2000.0)] | None = None
 
     @property
     def rectangle_m(self) -> Rectangle:
@@ -83,10 +96,12 @@ class ChargeSource(Section):
     Attributes:
         tnt_kg: TNT-equivalent mass of a charge from this source.
         weight: How likely this source is, relative to the others.
+        height_m: Height of the charge's centre above the ground; 0 lies on it.
     """
 
     tnt_kg: Annotated[StrictFloat, Field(ge=0.01, le=100_000.0)]
     weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] = 1.0
+    height_m: Coordinate = 0.0
 
 
 class PointSource(ChargeSource):
@@ -148,6 +163,14 @@ class RectangleSource(ChargeSource):
 AnySource = Annotated[PointSource | SegmentSource | RectangleSource, Field(discriminator="kind")]
 
 
+def _check_faces(faces: tuple[WallName, ...]) -> tuple[WallName, ...]:
+    """Refuse a wall that is named twice, and return the walls in the usual order."""
+    for wall in WALLS:
+        if faces.count(wall) > 1:
+            raise ValueError(f"names {wall!r} twice, must name each wall at most once")
+    return tuple(wall for wall in WALLS if wall in faces)
+
+
 class StructureSection(Section):
     """Base of the structures.
 
@@ -158,6 +181,8 @@ class StructureSection(Section):
         weight: How much its load counts among the protected structures.
         module_capacity: Impulse, simulation units, that a module bears before it is removed;
             without it modules never fail.
+        height_m: Height; without it, as high as the air.
+        faces: The walls whose load counts; a wall is named by the side that it looks to.
     """
 
     name: Name
@@ -165,6 +190,12 @@ class StructureSection(Section):
     protected: StrictBool = False
     weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] = 1.0
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
+    height_m: Height | None = None
+    faces: Annotated[
+        tuple[WallName, ...],
+        Field(min_length=1, max_length=len(WALLS)),
+        AfterValidator(_check_faces),
+    ] = WALLS
 
 
 class ModularObstacleSection(StructureSection):
@@ -207,6 +238,18 @@ class ConcreteSquareSection(StructureSection):
 AnyStructure = Annotated[
     ModularObstacleSection | ConcreteSquareSection, Field(discriminator="kind")
 ]
+
+
+class GaugeSection(Section):
+    """A place in the air where overpressure is recorded.
+
+    Attributes:
+        name: Name in tables and pictures.
+        position_m: X, y, and height above the ground.
+    """
+
+    name: Name
+    position_m: tuple[Coordinate, Coordinate, Coordinate]
 
 
 def _check_preset(name: str) -> str:

@@ -17,6 +17,7 @@ from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
     Count,
+    Height,
     PointM,
     PointSource,
     RectangleSource,
@@ -111,6 +112,7 @@ class BuildZone(Section):
         cost_areas: Areas in which a module has another cost; the highest one counts.
         budget: What the modules may cost together; without it, anything.
         access_way: A way across the zone that must stay open; without it, none need.
+        height_m: Height of the modules; without it, as high as the air.
     """
 
     corner_m: PointM
@@ -124,6 +126,7 @@ class BuildZone(Section):
     cost_areas: Annotated[tuple[CostArea, ...], Field(max_length=100)] = ()
     budget: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
     access_way: AccessWay | None = None
+    height_m: Height | None = None
 
     @property
     def rectangle_m(self) -> Rectangle:

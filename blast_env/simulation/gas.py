@@ -400,7 +400,7 @@ def _columns(loads: LoadTable) -> dict[str, FloatArray]:
 
 def _means(groups: Any, area_m2: float) -> pd.DataFrame:
     """Return impulses as means, peaks as the largest, arrivals as the first of each group."""
-    table = groups.agg(
+    table: pd.DataFrame = groups.agg(
         positive_impulse_pa_s=("positive_impulse_pa_s", "mean"),
         first_impulse_pa_s=("first_impulse_pa_s", "mean"),
         negative_impulse_pa_s=("negative_impulse_pa_s", "mean"),

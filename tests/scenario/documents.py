@@ -67,8 +67,26 @@ _FULL: Document = {
 
 
 def full_document() -> Document:
-    """Return a valid document in which every key of the format occurs."""
+    """Return a valid document in which every key of the format's first version occurs."""
     return deepcopy(_FULL)
+
+
+def tall_document() -> Document:
+    """Return the full document with every key that version 2 added."""
+    document = full_document()
+    document |= {
+        "schema_version": 2,
+        "name": "tall",
+        "gauges": [
+            {"name": "door", "position_m": [19.75, 10.0, 1.5]},
+            {"name": "roof", "position_m": [21.0, 10.0, 6.5]},
+        ],
+    }
+    document["site"]["air_height_m"] = 14.0
+    document["charge"][0]["height_m"] = 1.0
+    document["structures"][0] |= {"height_m": 6.0, "faces": ["west", "south"]}
+    document["build_zone"]["height_m"] = 3.0
+    return document
 
 
 def minimal_document() -> Document:
@@ -97,7 +115,7 @@ def all_documents() -> list[Document]:
         tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8"))
         for name in bundled_scenarios()
     ]
-    return [full_document(), minimal_document(), *bundled]
+    return [full_document(), tall_document(), minimal_document(), *bundled]
 
 
 def key_paths(value: object, path: KeyPath = ()) -> Iterator[KeyPath]:

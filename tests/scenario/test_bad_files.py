@@ -28,10 +28,15 @@ OPTIONAL = {
     *("module_capacity", "keep_outs", "preset", "overrides", "air", "explosive", "spacing_units"),
     *("jitter", "ball_count", "collide_within_charge"),
     *("clearance_m", "module_cost", "cost_areas", "budget", "access_way"),
+    *("air_height_m", "height_m", "faces", "gauges"),
 }
 CASES = [(document, path) for document in all_documents() for path in key_paths(document)]
 KEYS = [(document, path) for document, path in CASES if isinstance(path[-1], str)]
-REQUIRED = [(document, path) for document, path in KEYS if path[-1] not in OPTIONAL]
+REQUIRED = [
+    (document, path)
+    for document, path in KEYS
+    if path[-1] not in OPTIONAL or path == ("site", "height_m")
+]
 LEAVES = [case for case in CASES if not isinstance(value_at(*case), dict | list)]
 NUMBERS = [
     case

@@ -274,8 +274,9 @@ def test_a_charge_that_does_not_fit_has_the_problems_of_the_whole_document(charg
         (partial(scenario.with_charge, charge), [point]),
         (partial(scenario.with_possible_charges, [charge]), [*document["charge"], point]),
     ):
+        changes = {"schema_version": 2, "charge": sources}
         with pytest.raises(ScenarioError) as expected:
-            Scenario.from_document(document | {"charge": sources}, scenario.name)
+            Scenario.from_document(document | changes, scenario.name)
         with pytest.raises(ScenarioError) as found:
             change()
         assert str(found.value) == str(expected.value)

@@ -38,7 +38,7 @@ from tests.scenario.documents import (
         (("charge", 0, "position_m"), [1, 2, 3], "charge[0].position_m: has 3 values, must have"),
         (("charge", 0, "position_m"), [1.0], "charge[0].position_m[1]: missing"),
         (("charge", 0, "position_m"), [1, "a"], "charge[0].position_m[1]: is 'a' (a string), mus"),
-        (("schema_version",), 2, "schema_version: is 2, must be 1, the only version"),
+        (("schema_version",), 3, "schema_version: is 3, must be 1 or 2, the versions that"),
         (("schema_version",), True, "schema_version: is true (a truth value), must be a whole"),
         (("simulation", "preset"), "balistic", "simulation.preset: is 'balistic', there is no su"),
         (("simulation", "preset"), "balistic", "did you mean 'ballistic'?"),
@@ -86,8 +86,11 @@ def test_bad_value_is_named_with_its_bound(path: KeyPath, value: object, line: s
             ("simulation", "overrides", "exlosive"),
             "f.toml: simulation.overrides.exlosive: unknown key, did you mean 'explosive'?",
         ),
-        (("site", "zzz"), "f.toml: site.zzz: unknown key; known: width_m, height_m"),
-        (("site", "a b\n"), "f.toml: site.'a b\\n': unknown key; known: width_m, height_m"),
+        (("site", "zzz"), "f.toml: site.zzz: unknown key; known: width_m, height_m, air_height_m"),
+        (
+            ("site", "a b\n"),
+            "f.toml: site.'a b\\n': unknown key; known: width_m, height_m, air_height_m",
+        ),
     ],
 )
 def test_unknown_key_is_answered_with_the_nearest_one(path: KeyPath, line: str) -> None:

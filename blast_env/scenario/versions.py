@@ -1,0 +1,102 @@
+"""Versions of the file format: which keys are new, and which version holds a scenario."""
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any, Final
+
+from pydantic import BaseModel
+
+from blast_env.scenario.problems import KeyParts, Problem, key_path
+
+SCHEMA_VERSION: Final = 2
+"""The newest version of the file format; this release reads all of them."""
+
+
+FIRST_VERSION: Final = 1
+"""The version without heights, in which every wall is as high as the air."""
+
+
+NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
+    "": ("gauges",),
+    "site": ("air_height_m",),
+    "charge": ("height_m",),
+    "structures": ("height_m", "faces"),
+    "build_zone": ("height_m",),
+}
+"""What version 2 added, by section; all of it has a default, which is what version 1 means."""
+
+
+MAX_ITEMS: Final = 100
+"""Longer arrays are errors of their own; their other items are not looked at."""
+
+
+def check_version(version: int) -> int:
+    """Refuse a file of another version of the format."""
+    if not FIRST_VERSION <= version <= SCHEMA_VERSION:
+        raise ValueError(
+            f"must be {FIRST_VERSION} or {SCHEMA_VERSION}, the versions that this release reads"
+        )
+    return version
+
+
+def version_problems(content: Any) -> Iterator[Problem]:
+    """Yield the keys that the version of a file does not have.
+
+    Args:
+        content: The parsed file, sound or not, or the scenario made from it.
+    """
+    version = _item(content, "schema_version")
+    if isinstance(version, bool) or version != FIRST_VERSION:
+        return
+    for parts, table, keys in _tables(content):
+        given = _given(table)
+        for key in keys:
+            if key in given:
+                yield Problem(
+                    key_path((*parts, key)),
+                    f"schema_version {SCHEMA_VERSION} has this key, the file has schema_version"
+                    f" {FIRST_VERSION}",
+                )
+
+
+def unused_new_keys(scenario: BaseModel) -> Iterator[KeyParts]:
+    """Yield the newer keys of a scenario that say no more than if they were not there."""
+    for parts, table, keys in _tables(scenario):
+        if isinstance(table, BaseModel):
+            for key in keys:
+                if _is_unused(table, key):
+                    yield (*parts, key)
+
+
+def lowest_version(scenario: BaseModel) -> int:
+    """Return the lowest version of the format that holds a scenario."""
+    for _, table, keys in _tables(scenario):
+        if isinstance(table, BaseModel) and not all(_is_unused(table, key) for key in keys):
+            return SCHEMA_VERSION
+    return FIRST_VERSION
+
+
+def _is_unused(table: BaseModel, key: str) -> bool:
+    return bool(getattr(table, key) == type(table).model_fields[key].default)
+
+
+def _tables(content: Any) -> Iterator[tuple[KeyParts, Any, tuple[str, ...]]]:
+    """Yield where a table with newer keys is, the table, and the keys."""
+    for name, keys in NEW_KEYS.items():
+        section = _item(content, name) if name else content
+        if isinstance(section, list | tuple):
+            for index, item in enumerate(section[:MAX_ITEMS]):
+                yield (name, index), item, keys
+        else:
+            yield (name,) if name else (), section, keys
+
+
+def _item(table: Any, key: str) -> Any:
+    """Return what a table holds under a key."""
+    return table.get(key) if isinstance(table, Mapping) else getattr(table, key)
+
+
+def _given(table: Any) -> Collection[str]:
+    """Return the keys that were written."""
+    if isinstance(table, Mapping):
+        return table.keys()
+    return table.model_fields_set if isinstance(table, BaseModel) else ()
