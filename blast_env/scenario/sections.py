@@ -167,7 +167,7 @@ def _check_faces(faces: tuple[WallName, ...]) -> tuple[WallName, ...]:
     """Refuse a wall that is named twice, and return the walls in the usual order."""
     for wall in WALLS:
         if faces.count(wall) > 1:
-            raise ValueError(f"names {wall!r} twice, must name each wall at most once")
+            raise ValueError(f"must name each wall at most once, not {wall!r} twice")
     return tuple(wall for wall in WALLS if wall in faces)
 
 
