@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -25,7 +25,7 @@ from pydantic import (
 from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import PRESETS, preset
-from blast_env.physics.scene import WALLS, WallName
+from blast_env.physics.scene import WALLS, Charge, WallName
 from blast_env.scenario.problems import (
     Problem,
     ScenarioError,
@@ -109,6 +109,15 @@ class PointSource(ChargeSource):
 
     kind: Literal["point"] = "point"
     position_m: PointM
+
+    @classmethod
+    def at(cls, charge: Charge) -> Self:
+        """Return the source of one charge.
+
+        Raises:
+            ValidationError: If the charge is out of bounds.
+        """
+        return cls(position_m=charge.position_m, tnt_kg=charge.tnt_kg, height_m=charge.height_m)
 
     @property
     def segment_m(self) -> tuple[PointM, PointM]:
