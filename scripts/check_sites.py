@@ -1,6 +1,6 @@
 """What generated sites are like, and whether the criterion that they are chosen by means anything.
 
-The criterion is told from sight lines; here every site is measured with blasts. All sites that a
+The criterion is told from lines of sight; here every site is measured with blasts. All sites that a
 seed draws are, the rejected ones too: a criterion that rejects the wrong ones would show.
 """
 
@@ -19,16 +19,16 @@ from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, progress_bar
 from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.rendering.figures import save_figure
-from blast_env.scenario import BuildZone, Scenario, SegmentSource, usable_cells
+from blast_env.scenario import Scenario, SegmentSource, usable_cells
 from blast_env.scenario.zone import distance_m, source_bounds_m
 from blast_env.sites import (
-    SightLineCriterion,
-    SightLines,
     SiteMeasures,
     SiteRanges,
+    Visibility,
+    VisibilityCriterion,
     draw_site,
     generate_site,
-    sight_line_layout,
+    visibility_layout,
 )
 from blast_env.sites.contact_sheet import contact_sheet
 
@@ -39,11 +39,11 @@ MOST_REDUCTION: Final = 0.85
 
 
 LEAST_ADVANTAGE: Final = 0.1
-"""A site is worth solving if blasts say so: the sight-line layout takes so much off the impulse,
+"""A site is worth solving if blasts say so: the visibility layout takes so much off the impulse,
 no layout takes more than that, and random layouts take so much less on average."""
 
 
-CRITERION: Final = SightLineCriterion()
+CRITERION: Final = VisibilityCriterion()
 
 
 QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
@@ -55,9 +55,9 @@ class Measured:
 
     Attributes:
         accepted: Whether the criterion accepts it.
-        shares: What its sight lines say.
+        shares: What its lines of sight say.
         unprotected_pa_s: Impulse on the building without a barrier, Pa*s.
-        cut: Share of the sight lines that each layout cuts: the sight-line layout, then the
+        cut: Share of the lines of sight that each layout cuts: the visibility layout, then the
             random ones (1 + random,).
         reduction: Share of the impulse that each of them takes off (1 + random,).
     """
@@ -70,7 +70,7 @@ class Measured:
 
     @property
     def advantage(self) -> float:
-        """Reduction of the sight-line layout above that of random layouts, on average."""
+        """Reduction of the visibility layout above that of random layouts, on average."""
         return float(self.reduction[0] - self.reduction[1:].mean())
 
     @property
@@ -86,8 +86,8 @@ class Measured:
 def measured(site: Scenario, random_layouts: int, threats: int, engine: str) -> Measured:
     """Measure a site with blasts of charges drawn from where they may be."""
     rng = np.random.default_rng(0)
-    lines = SightLines.of(site)
-    layouts = [sight_line_layout(site, lines)]
+    lines = Visibility.of(site)
+    layouts = [visibility_layout(site, lines)]
     layouts += [random_layout(site, rng) for _ in range(random_layouts)]
     evaluator = BlastEvaluator(site, engine, cache_size=0)
     drawn = draw_threats(site, range(threats))
@@ -179,7 +179,7 @@ def print_measured(results: Sequence[Measured]) -> None:
         "unprotected impulse (Pa s)": np.array([each.unprotected_pa_s for each in results]),
         "reduction by random layouts, mean (%)": 100.0 * reduction[:, 1:].mean(axis=1),
         f"by the best of {reduction.shape[1] - 1} (%)": 100.0 * reduction[:, 1:].max(axis=1),
-        "by the sight-line layout (%)": 100.0 * reduction[:, 0],
+        "by the visibility layout (%)": 100.0 * reduction[:, 0],
         "its advantage over random layouts (%)": np.array([100.0 * x.advantage for x in results]),
     }
     print_row("measured with blasts", "least", "10 %", "median", "90 %", "largest")
@@ -189,21 +189,21 @@ def print_measured(results: Sequence[Measured]) -> None:
 
 
 def print_agreement(results: Sequence[Measured]) -> None:
-    """Print how far sight lines and blasts agree."""
+    """Print how far lines of sight and blasts agree."""
     cut = np.array([each.cut for each in results])
     reduction = np.array([each.reduction for each in results])
     within = [np.corrcoef(*pair)[0, 1] for pair in zip(cut[:, 1:], reduction[:, 1:], strict=True)]
     random_share = np.array([each.shares.random_share for each in results])
     measured_random = reduction[:, 1:].mean(axis=1)
     print_line(
-        "correlation of the share of sight lines cut with the reduction:"
+        "correlation of the share of lines of sight cut with the reduction:"
         f" {np.corrcoef(cut.ravel(), reduction.ravel())[0, 1]:.2f} over all layouts,"
         f" {np.median(within):.2f} among a site's random layouts (median);"
-        f" {np.corrcoef(cut[:, 0], reduction[:, 0])[0, 1]:.2f} over sight-line layouts,"
+        f" {np.corrcoef(cut[:, 0], reduction[:, 0])[0, 1]:.2f} over visibility layouts,"
         f" {np.corrcoef(random_share, measured_random)[0, 1]:.2f} over the means of random ones"
     )
     faults = ("", *dict.fromkeys(each.fault for each in results if each.fault))
-    print_row("by sight lines", *(fault or "worth solving by blasts" for fault in faults))
+    print_row("by lines of sight", *(fault or "worth solving by blasts" for fault in faults))
     print_line("|---" * (1 + len(faults)) + "|")
     for label, accepted in (("accepted", True), ("rejected", False)):
         found = [each.fault for each in results if each.accepted is accepted]
@@ -213,12 +213,6 @@ def print_agreement(results: Sequence[Measured]) -> None:
 def print_row(*cells: str) -> None:
     """Print a row of a Markdown table."""
     print_line(f"| {' | '.join(cells)} |")
-
-
-def zone_of(site: Scenario) -> BuildZone:
-    """Return the build zone of a generated site, which has one."""
-    assert site.build_zone is not None
-    return site.build_zone
 
 
 def stand_off_m(site: Scenario) -> float:
@@ -245,9 +239,9 @@ PROPERTIES: Final[Mapping[str, Callable[[Scenario], float]]] = {
     "facade (m)": lambda site: facade_and_depth_m(site)[0],
     "depth of the building (m)": lambda site: facade_and_depth_m(site)[1],
     "usable cells": lambda site: int(usable_cells(site).sum()),
-    "modules in stock": lambda site: zone_of(site).stock,
-    "keep-outs": lambda site: len(zone_of(site).keep_outs),
-    "clearance (m)": lambda site: zone_of(site).clearance_m,
+    "modules in stock": lambda site: site.zone.stock,
+    "keep-outs": lambda site: len(site.zone.keep_outs),
+    "clearance (m)": lambda site: site.zone.clearance_m,
 }
 
 
@@ -258,8 +252,8 @@ CONDITIONS: Final[Mapping[str, Callable[[Scenario], bool]]] = {
     "building looks at the threat with its longer side": lambda site: (
         facade_and_depth_m(site)[0] > facade_and_depth_m(site)[1]
     ),
-    "access way": lambda site: zone_of(site).access_way is not None,
-    "duct and budget": lambda site: zone_of(site).budget is not None,
+    "access way": lambda site: site.zone.access_way is not None,
+    "duct and budget": lambda site: site.zone.budget is not None,
 }
 
 

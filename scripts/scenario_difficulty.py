@@ -118,7 +118,7 @@ def origin(study: Study) -> str:
     """Return what the figures were made with; the hash tells when they are out of date."""
     scenario, evaluator = study.evaluator.scenario, study.evaluator
     return (
-        f"Preset `{scenario.simulation.preset}`, calibration `{evaluator.calibration.name}`, "
+        f"Preset `{scenario.simulation.preset}`, calibration `{evaluator.calibration_name}`, "
         f"engine `{evaluator.engine.name}`, scenario hash `{scenario.content_hash[:12]}`."
     )
 

@@ -23,7 +23,6 @@ from blast_env.cli.evaluation_report import (
     print_means,
     report_layout,
     seeds_text,
-    write_table,
 )
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
@@ -36,6 +35,7 @@ from blast_env.provenance import command, versions
 from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import save_scenario
+from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
 
 _HEADERS: Final = (
@@ -176,7 +176,7 @@ def _write(comparison: Comparison, record: dict[str, Any], out: Path) -> list[Pa
     with write_atomically(path) as temporary:
         text = json.dumps(record, indent=2, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
-    table = write_table(case_table(comparison), out / "cases.csv")
+    table = write_csv(case_table(comparison), out / "cases.csv")
     return [path, table, save_figure(comparison_figure(comparison), out / "evaluation.png")]
 
 

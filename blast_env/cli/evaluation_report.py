@@ -7,8 +7,6 @@ from math import isnan
 from pathlib import Path
 from typing import Final
 
-import pandas as pd
-
 from blast_env.cli.output import (
     make_table,
     print_line,
@@ -25,8 +23,9 @@ from blast_env.evaluation import (
     evaluate_against,
 )
 from blast_env.export import LayoutPlan, check_target, export_layouts
-from blast_env.files import make_folder, write_atomically
+from blast_env.files import make_folder
 from blast_env.statistics import Estimate
+from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
 
 _PERCENT = 100.0
@@ -67,13 +66,6 @@ class EvaluateOptions:
         if self.out is None:
             return
         make_folder(self.out)
-
-
-def write_table(table: pd.DataFrame, path: Path) -> Path:
-    """Write a table as CSV; return the path."""
-    with write_atomically(path) as temporary:
-        table.to_csv(temporary, index=False)
-    return path
 
 
 def cache_record(evaluator: BlastEvaluator | Evaluators) -> dict[str, float]:
@@ -161,7 +153,7 @@ def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
         "modules.csv": evaluation.module_table,
         "threats.csv": evaluation.threat_table,
     }
-    written += [write_table(table, out / name) for name, table in tables.items()]
+    written += [write_csv(table, out / name) for name, table in tables.items()]
     return written + save_pictures(lambda: _save_figure(evaluation, out))
 
 
@@ -216,7 +208,7 @@ def _print_totals(evaluation: LayoutEvaluation) -> None:
     )
     print_line(
         f"engine {evaluation.engine_name} ({evaluation.engine_version}), calibration "
-        f"{evaluation.calibration.name}, scenario hash {evaluation.scenario.content_hash[:12]}"
+        f"{evaluation.calibration}, scenario hash {evaluation.scenario.content_hash[:12]}"
     )
 
 

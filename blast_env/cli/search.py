@@ -6,7 +6,6 @@ from time import perf_counter
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import pandas as pd
 import typer
 from blast_agents.search import (
     LayoutProblem,
@@ -40,11 +39,12 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.cases import practice_hidden, practice_visible
 from blast_env.evaluation.comparison import CVAR_LEVEL
-from blast_env.files import make_folder, write_atomically
+from blast_env.files import make_folder
 from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
 from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
 from blast_env.statistics import reductions
+from blast_env.tables import write_csv
 
 ThreatName = Literal["visible", "hidden"]
 
@@ -127,10 +127,10 @@ def write_search(
     provenance = _provenance(run, options, checked)
     written = [write_layout(out / "layout.json", scenario, result.layout, provenance)]
     if result.history:
-        written.append(_write_table(result.history_table(), out / "history.csv"))
+        written.append(write_csv(result.history_table(), out / "history.csv"))
         written += save_pictures(lambda: _save_figure(run, out))
     if result.front:
-        written.append(_write_table(result.front_table(), out / "front.csv"))
+        written.append(write_csv(result.front_table(), out / "front.csv"))
     for path in written:
         print_line(f"wrote {path}")
 
@@ -168,12 +168,6 @@ def _provenance(
             "held_out_reduction_ci95": [low, high],
         },
     }
-
-
-def _write_table(table: pd.DataFrame, path: Path) -> Path:
-    with write_atomically(path) as temporary:
-        table.to_csv(temporary, index=False)
-    return path
 
 
 def _risk_text(options: SearchOptions) -> str:

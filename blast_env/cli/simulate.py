@@ -116,7 +116,8 @@ def _write_pictures(
 ) -> list[Path]:
     if not any((heat_map, history, scheme, velocities)):
         return []
-    from blast_env.rendering import figures  # Matplotlib takes long to import
+    # Here, because pictures need the extra `render`.
+    from blast_env.rendering import figures
 
     blast = result.blast
     pictures = (

@@ -34,7 +34,6 @@ from blast_env.envs.strategies import (
     ScenarioSource,
     ThreatModel,
     scenario_source,
-    zone_of,
 )
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.evaluation.evaluator import Evaluators
@@ -210,7 +209,7 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
         )
         representative = self.task.source.representative
         self.task.evaluators.of(representative)  # so that a wrong engine fails here, not later
-        zone = zone_of(representative)
+        zone = representative.zone
         self.action_space = spaces.Discrete(zone.rows * zone.columns + 1)
         self.observation_space = self.task.observation.space(representative)
         self._display = Display(render_mode, self.metadata["render_fps"])

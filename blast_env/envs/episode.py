@@ -137,7 +137,7 @@ class Episode:
             "reduction": protected.reduction_from(unprotected),
             "layout": self.placement.cells,
             "scenario_hash": self.observable.scenario.content_hash,
-            "calibration": self.objective.evaluator.calibration.name,
+            "calibration": self.objective.evaluator.calibration_name,
             "calibration_in_range": protected.in_range,
             "charges": case.charges,
             "blast_seeds": tuple(

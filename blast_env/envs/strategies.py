@@ -12,7 +12,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.comparison import Objective
 from blast_env.geometry import Cell
 from blast_env.physics.scene import Charge
-from blast_env.scenario import AnySource, BuildZone, PointSource, Scenario, load_scenario
+from blast_env.scenario import AnySource, PointSource, Scenario, load_scenario
 
 
 class ThreatModel(Protocol):
@@ -117,17 +117,8 @@ def scenario_source(scenario: str | Path | Scenario | ScenarioSource) -> Scenari
         raise BlastEnvError(
             f"scenario is {source!r}, must be a name, a path, a Scenario or a ScenarioSource"
         )
-    zone_of(source.representative)
+    source.representative.zone  # noqa: B018  # refuses a scenario without one
     return source
-
-
-def zone_of(scenario: Scenario) -> BuildZone:
-    """Return the build zone of a scenario.
-
-    Raises:
-        BlastEnvError: If it has none.
-    """
-    return scenario.zone
 
 
 def check_size(scenario: Scenario, representative: Scenario) -> None:

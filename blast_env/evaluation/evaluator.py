@@ -2,13 +2,14 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final
 
 from blast_env.calibration.model import Calibration, scenario_calibration
 from blast_env.evaluation.cases import Threat
-from blast_env.evaluation.loads import BlastLoads, blast_loads
+from blast_env.evaluation.loads import BlastLoads, blast_loads, gas_loads
 from blast_env.evaluation.store import (
     BlastCache,
     BlastKey,
@@ -19,7 +20,7 @@ from blast_env.evaluation.store import (
 )
 from blast_env.geometry import Cell
 from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine
+from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.scene import Charge
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
@@ -46,7 +47,8 @@ class BlastEvaluator:
     Attributes:
         scenario: As given.
         engine: The engine.
-        calibration: The scenario's calibration, checked against its parameters and the engine.
+        calibration: The scenario's calibration, checked against its parameters and the engine;
+            `None` for gas dynamics, which needs none.
         blasts: Number of blasts that were really simulated.
         cache_hits: Number of loads that were asked for and needed no blast.
 
@@ -66,7 +68,9 @@ class BlastEvaluator:
     ) -> None:
         self.scenario = scenario
         self.engine = find_engine(engine)
-        self.calibration = scenario_calibration(scenario, self.engine.name)
+        self.calibration: Calibration | None = None
+        if not is_gas(self.engine):
+            self.calibration = scenario_calibration(scenario, self.engine.name)
         self.blasts = 0
         self.cache_hits = 0
         self._remembered = LoadsCache(cache_size)
@@ -77,9 +81,14 @@ class BlastEvaluator:
             charge=Charge((0.0, 0.0), 0.0),
             seed=0,
             engine=engine_text(self.engine),
-            calibration=calibration_digest(self.calibration),
+            calibration="" if self.calibration is None else calibration_digest(self.calibration),
             code=code_version(),
         )
+
+    @property
+    def calibration_name(self) -> str:
+        """Name of the calibration; `"none"` for gas dynamics, which needs none."""
+        return "none" if self.calibration is None else self.calibration.name
 
     @property
     def cache_hit_rate(self) -> float:
@@ -127,7 +136,7 @@ class BlastEvaluator:
         found = {key: loads for key in asked if (loads := self._known(key)) is not None}
         missing = [key for key in asked if key not in found]
         run = partial(_run_one, calibration=self.calibration)
-        blasts = [self._blast(key) for key in missing]
+        blasts = [_Work(self.scenario, self.engine, key) for key in missing]
         for done, (index, loads) in enumerate(as_completed(run, blasts, processes), start=1):
             found[missing[index]] = loads
             self._remember(missing[index], loads)
@@ -141,7 +150,9 @@ class BlastEvaluator:
 
     def _key(self, layout: Sequence[Cell], threat: Threat) -> BlastKey:
         cells = tuple(sorted(check_layout(self.scenario, layout)))
-        return self._key_of_nothing._replace(layout=cells, charge=threat.charge, seed=threat.seed)
+        # Gas dynamics has no fan and no air to draw: a charge has one realisation.
+        seed = 0 if is_gas(self.engine) else threat.seed
+        return self._key_of_nothing._replace(layout=cells, charge=threat.charge, seed=seed)
 
     def _known(self, key: BlastKey) -> BlastLoads | None:
         """Return loads that are remembered here or there."""
@@ -156,13 +167,25 @@ class BlastEvaluator:
         loads.module_impulse_sim.flags.writeable = False  # it is given out more than once
         self._remembered.add(key, loads)
 
-    def _blast(self, key: BlastKey) -> Blast:
-        return Blast(self.scenario, key.layout, key.seed, self.engine, key.charge)
+
+@dataclass(frozen=True)
+class _Work:
+    """One blast to run, perhaps in a worker process."""
+
+    scenario: Scenario
+    engine: Engine
+    key: BlastKey
 
 
-def _run_one(blast: Blast, calibration: Calibration) -> BlastLoads:
-    """Run one blast, perhaps in a worker process."""
-    return blast_loads(blast.run(), calibration)
+def _run_one(work: _Work, calibration: Calibration | None) -> BlastLoads:
+    scenario, engine, key = work.scenario, work.engine, work.key
+    if is_gas(engine):
+        from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
+
+        return gas_loads(GasBlast(scenario, key.layout, key.seed, engine, key.charge).run())
+    if calibration is None:
+        raise AssertionError("an evaluator of particles has a calibration")
+    return blast_loads(Blast(scenario, key.layout, key.seed, engine, key.charge).run(), calibration)
 
 
 _MOST_EVALUATORS: Final = 4

@@ -1,6 +1,7 @@
 """The loads that one blast puts on the structures."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,9 @@ from blast_env.calibration.model import Calibration
 from blast_env.physics.structure import ModularObstacle
 from blast_env.simulation import BlastResult
 from blast_env.units import PA_PER_PSI
+
+if TYPE_CHECKING:
+    from blast_env.simulation.gas import GasResult
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,7 @@ class BlastLoads:
     Attributes:
         structures: One load a structure, in the order of the scene.
         module_impulse_sim: Sum of m |v| on each module of the structures, in the order of the
-            scene, simulation units (modules,).
+            scene, simulation units (modules,); for gas dynamics the momentum on its walls, N s.
     """
 
     structures: tuple[StructureLoad, ...]
@@ -93,6 +97,27 @@ def blast_loads(result: BlastResult, calibration: Calibration) -> BlastLoads:
         structures=tuple(_structure_load(result, each, calibration) for each in structures),
         module_impulse_sim=np.array(impulse, dtype=np.float64),
     )
+
+
+def gas_loads(result: "GasResult") -> BlastLoads:
+    """Return the loads of a blast of gas dynamics, which has no simulation units (NaN)."""
+    table = result.structures
+    structures = []
+    for row in table.to_dict("records"):
+        scaled = result.impulse(row["structure"])
+        structures.append(
+            StructureLoad(
+                name=row["structure"],
+                protected=row["protected"],
+                weight=row["weight"],
+                impulse_sim=np.nan,
+                transferred_impulse_sim=np.nan,
+                impulse_psi_s=scaled.psi_s,
+                in_range=scaled.in_range,
+                notes=scaled.notes,
+            )
+        )
+    return BlastLoads(tuple(structures), result.module_impulse_n_s)
 
 
 def _structure_load(

@@ -11,7 +11,6 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from blast_env.calibration.model import Calibration
 from blast_env.evaluation.cases import Case, Threat, draw_threats
 from blast_env.evaluation.comparison import (
     CVAR_LEVEL,
@@ -171,7 +170,7 @@ def evaluation_record(evaluation: "LayoutEvaluation") -> dict[str, Any]:
         "scenario_hash": scenario.content_hash,
         "layout": [list(cell) for cell in evaluation.layout],
         "engine": evaluation.engine_name,
-        "calibration": evaluation.calibration.name,
+        "calibration": evaluation.calibration,
         "versions": versions(evaluation.engine_version),
         "result": _result(evaluation),
         "notes": list(evaluation.notes),
@@ -314,7 +313,7 @@ class LayoutEvaluation:
         layout: The layout's cells, sorted.
         loads: Loads with the layout, one a threat.
         unprotected: Loads without any barrier, one a threat.
-        calibration: What converted simulated impulses.
+        calibration: Name of what converted simulated impulses; `"none"` for gas dynamics.
         engine_name: Name of the engine.
         engine_version: Version of the library that did the physics.
         cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
@@ -327,7 +326,7 @@ class LayoutEvaluation:
     layout: Layout
     loads: tuple[BlastLoads, ...]
     unprotected: tuple[BlastLoads, ...]
-    calibration: Calibration
+    calibration: str
     engine_name: str
     engine_version: str
     cvar_level: float
@@ -437,7 +436,7 @@ class LayoutEvaluation:
             if outside:
                 notes.append(
                     f"{outside[0].name}: {len(outside)} of {len(self.threats)} threats are outside "
-                    f"the range of calibration {self.calibration.name!r}, "
+                    f"the range that engine and calibration {self.calibration!r} were made for, "
                     f"e.g. {'; '.join(outside[0].notes)}"
                 )
         return tuple(notes)
@@ -543,7 +542,7 @@ def evaluate_against(
         layout=cells,
         loads=loads,
         unprotected=unprotected,
-        calibration=evaluator.calibration,
+        calibration=evaluator.calibration_name,
         engine_name=evaluator.engine.name,
         engine_version=evaluator.engine.version,
         cvar_level=cvar_level,

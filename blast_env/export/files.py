@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import pandas as pd
 
+from blast_env import tables
 from blast_env.errors import BlastEnvError, suggestion
 from blast_env.export.plan import Feature, LayoutPlan
 from blast_env.files import make_folder, write_atomically
@@ -48,8 +49,7 @@ def write_csv(plan: LayoutPlan, path: Path) -> None:
     Raises:
         BlastEnvError: If the file cannot be written.
     """
-    with write_atomically(path) as temporary:
-        module_table(plan).to_csv(temporary, index=False)
+    tables.write_csv(module_table(plan), path)
 
 
 COORDINATES: Final = (

@@ -18,6 +18,7 @@ class EndReason(StrEnum):
 
     OUT_OF_REACH = "no moving ball can reach a structure before the time limit"
     TIME_LIMIT = "the time limit was reached"
+    LOADS_COMPLETE = "the loads on the structures are complete"
     EVENT_LIMIT = "the limit of collisions was reached before the end"
 
 
@@ -100,7 +101,7 @@ class BlastRun(Protocol):
 
 
 class Engine(Protocol):
-    """Something that can run a scene.
+    """Something that can run a blast: of particles, or of a gas.
 
     Attributes:
         name: Name in records and calibrations.
@@ -114,6 +115,10 @@ class Engine(Protocol):
     @property
     def version(self) -> str:
         """Version of the library that does the physics."""
+
+
+class ParticleEngine(Engine, Protocol):
+    """An engine that can run a scene of balls."""
 
     def start(self, scene: Scene) -> BlastRun:
         """Return a run of the scene at time 0, independent of every other run."""

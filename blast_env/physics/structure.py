@@ -122,6 +122,11 @@ class LoadColours(NamedTuple):
     full: Colour = (122, 4, 46)
 
 
+def module_name(x_m: float, y_m: float) -> str:
+    """Return the identifier of the module with this centre."""
+    return f"x{x_m:.3f}_y{y_m:.3f}"
+
+
 @dataclass(slots=True)
 class ModularPart:
     """The basic building element: a static square of 2 units (section 2.7).
@@ -156,7 +161,7 @@ class ModularPart:
     @property
     def module_id(self) -> str:
         """Identifier made from the position of the centre in metres, unique on a site."""
-        return f"x{self.x / UNITS_PER_M:.3f}_y{self.y / UNITS_PER_M:.3f}"
+        return module_name(self.x / UNITS_PER_M, self.y / UNITS_PER_M)
 
     @property
     def rectangle(self) -> Rectangle:

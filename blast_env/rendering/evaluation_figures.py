@@ -226,7 +226,7 @@ def _subtitle(evaluation: LayoutEvaluation) -> str:
     return (
         f"{count_of('threat', len(evaluation.threats))}; worst: {charge.tnt_kg:g} kg TNT at "
         f"({x_m:.1f} m, {y_m:.1f} m), {evaluation.worst.impulse_pa_s:,.0f} Pa·s; "
-        f"calibration {evaluation.calibration.name}, engine {evaluation.engine_name}{range_note}"
+        f"calibration {evaluation.calibration}, engine {evaluation.engine_name}{range_note}"
     )
 
 

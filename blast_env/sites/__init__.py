@@ -2,28 +2,28 @@
 
 from blast_env.sites.criterion import (
     Objection,
-    SightLineCriterion,
     SiteCriterion,
     SiteMeasures,
-    sight_line_layout,
+    VisibilityCriterion,
+    visibility_layout,
 )
 from blast_env.sites.generate import draw_site, generate_site
 from blast_env.sites.ranges import SiteRanges
 from blast_env.sites.source import HELD_OUT_SITES, SiteSource
 from blast_env.sites.turning import turned
-from blast_env.sites.visibility import SightLines
+from blast_env.sites.visibility import Visibility
 
 __all__ = [
     "HELD_OUT_SITES",
     "Objection",
-    "SightLineCriterion",
-    "SightLines",
     "SiteCriterion",
     "SiteMeasures",
     "SiteRanges",
     "SiteSource",
+    "Visibility",
+    "VisibilityCriterion",
     "draw_site",
     "generate_site",
-    "sight_line_layout",
     "turned",
+    "visibility_layout",
 ]

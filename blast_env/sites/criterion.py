@@ -8,16 +8,16 @@ import numpy as np
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Cell
 from blast_env.scenario import Placement, Scenario, usable_cells
-from blast_env.sites.visibility import SightLines
+from blast_env.sites.visibility import Visibility
 
 
 @dataclass(frozen=True)
 class SiteMeasures:
-    """Shares of the sight lines; see `SightLines`.
+    """Shares of the lines of sight; see `Visibility`.
 
     Attributes:
         open_share: Share that no other structure stops; the other shares are of these lines.
-        layout_share: Share that `sight_line_layout` cuts.
+        layout_share: Share that `visibility_layout` cuts.
         wall_share: Share that the best straight wall cuts, one row or column of the zone with as
             many modules in a run as there are, budget and access way aside.
         random_share: Share that as many modules cut on cells drawn at random, on average,
@@ -36,23 +36,23 @@ class SiteMeasures:
         Raises:
             BlastEnvError: If it has no build zone.
         """
-        lines = SightLines.of(scenario)
+        lines = Visibility.of(scenario)
         return cls(
             open_share=lines.open_share,
-            layout_share=lines.cut_share(sight_line_layout(scenario, lines)),
+            layout_share=lines.cut_share(visibility_layout(scenario, lines)),
             wall_share=_wall_share(scenario, lines),
             random_share=_random_share(scenario, lines),
         )
 
 
-def sight_line_layout(scenario: Scenario, lines: SightLines) -> tuple[Cell, ...]:
+def visibility_layout(scenario: Scenario, lines: Visibility) -> tuple[Cell, ...]:
     """Return a layout of which each module cuts as many lines by its cost as one more can.
 
     It keeps every condition of the build zone, and ends where no module would cut another line.
 
     Args:
         scenario: The scenario.
-        lines: Its sight lines.
+        lines: Its lines of sight.
     """
     placement = Placement.empty(scenario)
     left = lines.weight.copy()
@@ -68,7 +68,7 @@ def sight_line_layout(scenario: Scenario, lines: SightLines) -> tuple[Cell, ...]
     return placement.cells
 
 
-def _wall_share(scenario: Scenario, lines: SightLines) -> float:
+def _wall_share(scenario: Scenario, lines: Visibility) -> float:
     """Return the share of the lines that the best straight run of modules cuts."""
     zone, usable = scenario.zone, usable_cells(scenario)
     cut = lines.cut & usable
@@ -88,7 +88,7 @@ def _any_in_runs(cut: BoolArray, run: int) -> BoolArray:
     return anything
 
 
-def _random_share(scenario: Scenario, lines: SightLines) -> float:
+def _random_share(scenario: Scenario, lines: Visibility) -> float:
     """Return the expected share of the lines that modules on random usable cells cut."""
     zone, usable = scenario.zone, usable_cells(scenario)
     cells = int(usable.sum())
@@ -125,15 +125,15 @@ class SiteCriterion(Protocol):
 
 
 @dataclass(frozen=True)
-class SightLineCriterion:
+class VisibilityCriterion:
     """Sites where a good layout does much, none does everything, and places make a difference.
 
-    Told from the sight lines (`SiteMeasures`) in a few milliseconds, without a blast.
+    Told from the lines of sight (`SiteMeasures`) in a few milliseconds, without a blast.
     `scripts/check_sites.py` compares it with blasts.
 
     Attributes:
-        least_open_share: Share of the sight lines that other structures must leave open.
-        least_layout_share: Share of these that the sight-line layout must cut at least.
+        least_open_share: Share of the lines of sight that other structures must leave open.
+        least_layout_share: Share of these that the visibility layout must cut at least.
         most_layout_share: Share that it may cut at most, and any straight wall.
         least_advantage: How much more it must cut than random layouts do on average.
     """
@@ -153,8 +153,8 @@ class SightLineCriterion:
         advantage = shares.layout_share - shares.random_share
         least, most = self.least_layout_share, self.most_layout_share
         for what, value, low, high in (
-            ("open share of the sight lines", shares.open_share, self.least_open_share, 1.0),
-            ("share cut by the sight-line layout", shares.layout_share, least, most),
+            ("open share of the lines of sight", shares.open_share, self.least_open_share, 1.0),
+            ("share cut by the visibility layout", shares.layout_share, least, most),
             ("share cut by the best straight wall", shares.wall_share, 0.0, most),
             ("advantage over random layouts", advantage, self.least_advantage, 1.0),
         ):

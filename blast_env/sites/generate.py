@@ -26,7 +26,7 @@ from blast_env.scenario import (
     Site,
 )
 from blast_env.scenario.zone import box_distances_m
-from blast_env.sites.criterion import Objection, SightLineCriterion, SiteCriterion
+from blast_env.sites.criterion import Objection, SiteCriterion, VisibilityCriterion
 from blast_env.sites.ranges import MARGIN_M, SiteRanges, Span, WholeSpan, modules_within
 from blast_env.sites.turning import turned
 from blast_env.units import MODULE_SIDE_M
@@ -301,7 +301,7 @@ RANGES: Final = SiteRanges()
 """The ranges that sites are drawn from unless others are given."""
 
 
-CRITERION: Final = SightLineCriterion()
+CRITERION: Final = VisibilityCriterion()
 """The criterion that sites meet unless another one is given."""
 
 

@@ -1,4 +1,4 @@
-"""The lines along which a charge sees the protected structures, and what modules cut of them."""
+"""Visibility: the lines along which a charge sees the protected structures, and who cuts them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ PLACES: Final = 9
 
 
 @dataclass(frozen=True, eq=False)
-class SightLines:
-    """Straight ways from where a charge may be to the protected structures.
+class Visibility:
+    """The lines of sight from where a charge may be to the protected structures.
 
     From places spread evenly over every source, lines leave in directions spread evenly, as the
     balls of a charge do. Those that would meet a protected structure count, each by the weights
@@ -41,8 +41,8 @@ class SightLines:
     open_share: float
 
     @classmethod
-    def of(cls, scenario: Scenario) -> "SightLines":
-        """Return the sight lines of a scenario.
+    def of(cls, scenario: Scenario) -> "Visibility":
+        """Return the lines of sight of a scenario.
 
         Raises:
             BlastEnvError: If it has no build zone.

@@ -12,7 +12,7 @@ from blast_agents.league import (
     ResultStore,
     Rule,
     Search,
-    SightLineLayout,
+    VisibilityLayout,
     hidden_track,
     known_track,
     standard_entries,
@@ -33,7 +33,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, evaluate_against
 from blast_env.physics.scene import Charge
 from blast_env.scenario import PointSource
-from blast_env.sites import SightLines
+from blast_env.sites import Visibility
 from tests.agents.league_cases import TRAINING, WallAgent, road_scenario
 
 SCENARIO = road_scenario()
@@ -117,15 +117,15 @@ def test_a_rule_stands_in_the_middle_of_a_hidden_threat() -> None:
     assert Rule(wall_near_charge, "rule").propose(case) == wall_near_charge(SCENARIO, middle)
 
 
-def test_sight_lines_are_cut_before_the_charge_or_before_all_its_places() -> None:
+def test_lines_of_sight_are_cut_before_the_charge_or_before_all_its_places() -> None:
     """A known charge has but one place: its lines are cut, and not those of the others."""
     scenario = load_scenario("courtyard")
     place = PointSource(position_m=(5.0, 10.0), tnt_kg=100.0)
     (hidden,) = hidden_track(scenario, 1).cases
     known = replace(hidden, charge=Charge(place.position_m, place.tnt_kg))
-    lines_of_one = SightLines.of(scenario.model_copy(update={"charge": (place,)}))
-    lines_of_all = SightLines.of(scenario)
-    of_one, of_all = (SightLineLayout().propose(case) for case in (known, hidden))
+    lines_of_one = Visibility.of(scenario.model_copy(update={"charge": (place,)}))
+    lines_of_all = Visibility.of(scenario)
+    of_one, of_all = (VisibilityLayout().propose(case) for case in (known, hidden))
     assert lines_of_one.cut_share(of_one) > lines_of_one.cut_share(of_all)
     assert lines_of_all.cut_share(of_all) > lines_of_all.cut_share(of_one)
 

@@ -20,9 +20,10 @@ from blast_agents.training.agent import logits_of
 import blast_env  # noqa: F401
 from blast_env import load_scenario
 from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.observations import GridObservation, Observable
 from blast_env.physics.scene import Charge
-from blast_env.scenario import Scenario
-from blast_env.sites import SightLines, generate_site
+from blast_env.scenario import Placement, Scenario
+from blast_env.sites import Visibility, generate_site
 from blast_env.sites.turning import turned
 
 LENGTH_M = 10.0  # what the features of length are divided by
@@ -161,7 +162,7 @@ def test_what_a_module_hides_it_takes_from_those_in_line_with_it_and_from_no_oth
 
 
 @pytest.mark.parametrize("seed", [10_000, 10_003, 10_005, 10_010])
-def test_what_modules_hide_is_what_sight_lines_say(seed: int) -> None:
+def test_what_modules_hide_is_what_lines_of_sight_say(seed: int) -> None:
     """A charge that may be anywhere on a road or in a parking area, against lines drawn one by one.
 
     The features know the structures by their extent alone, and 96 bearings of each of 9 places.
@@ -174,7 +175,7 @@ def test_what_modules_hide_is_what_sight_lines_say(seed: int) -> None:
     env = gym.make("BlastBarrier-v0", scenario=bare_site, engine="event", threat="hidden")
     planes, _ = env.reset(seed=0)
     view = zone_view(torch.as_tensor(planes)[None], zone.rows, zone.columns, places=9)
-    lines = SightLines.of(bare_site)
+    lines = Visibility.of(bare_site)
     expected = np.tensordot(lines.weight, lines.cut, axes=1) / lines.weight.sum()
     found = view.cells[0, :, :, CUT].numpy() / SHARE_GAIN
     assert np.corrcoef(found.ravel(), expected.ravel())[0, 1] > 0.95
@@ -191,3 +192,39 @@ def test_a_rule_s_wall_covers_the_bearings_to_the_facade() -> None:
     wall = zone_view(observed(env, charge.position_m, layout=layout[:8]), 40, 16)
     assert bare == 1.0
     assert wall.site[0, OPEN_FACADE] < 0.7
+
+
+def test_a_place_counts_by_the_angle_under_which_it_sees_the_facade() -> None:
+    """More of a blast meets the facade from nearby: a wall before that place hides the more."""
+    points = ((2.25, 10.25), (35.25, 10.25))  # 7.75 m before the house, and 3 times that behind it
+    scenario = Scenario.from_document(
+        {
+            "schema_version": 1,
+            "name": "two_sides",
+            "site": {"width_m": 40.0, "height_m": 20.0},
+            "charge": [
+                {"kind": "point", "position_m": point_m, "tnt_kg": 100.0} for point_m in points
+            ],
+            "structures": [
+                {
+                    "kind": "ModularObstacle",
+                    "name": "house",
+                    "corner_m": (10.0, 8.0),
+                    "rows": 9,
+                    "columns": 4,
+                    "protected": True,
+                }
+            ],
+            "build_zone": {"corner_m": (5.0, 8.0), "rows": 9, "columns": 1, "stock": 9},
+        },
+        "two_sides",
+    )
+    wall = Placement.of(scenario, list(scenario.zone.cells()))
+    episode = GridObservation().episode(Observable(scenario, scenario.charge))
+    bare, walled = (
+        zone_view(torch.as_tensor(episode.observe(placement))[None], 9, 1, places=2)
+        for placement in (Placement.empty(scenario), wall)
+    )
+    assert bare.cells[..., CUT].sum() == pytest.approx(0.75 * SHARE_GAIN, rel=0.02)
+    assert bare.site[0, OPEN_FACADE] == pytest.approx(1.0)
+    assert walled.site[0, OPEN_FACADE] == pytest.approx(0.25, abs=0.01)  # as seen from the right

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from blast_env.envs.strategies import zone_of
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators
 from blast_env.scenario import Scenario
@@ -49,7 +48,7 @@ def test_every_reset_draws_a_site_by_the_seed() -> None:
         first, second = play(env, seed), play(twin, seed)
         assert same(first, second)
         hashes.append(first[-1][4]["scenario_hash"])
-        assert len(first[-1][4]["layout"]) == zone_of(env.observable.scenario).stock
+        assert len(first[-1][4]["layout"]) == env.observable.scenario.zone.stock
     assert len(set(hashes)) > 3
 
 

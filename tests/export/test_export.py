@@ -18,7 +18,7 @@ from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.export import SUFFIXES, FeatureKind, LayoutPlan, export_layout, export_layouts
 from blast_env.export.files import COLUMNS
 from blast_env.physics.scene import Charge
-from blast_env.scenario import BuildZone, LayoutFile, Scenario, load_layout
+from blast_env.scenario import LayoutFile, Scenario, load_layout
 from blast_env.scenario.build_scene import build_scene
 
 COURTYARD = load_scenario("courtyard")
@@ -35,13 +35,8 @@ def plan(
     return LayoutPlan(scenario, layout, charge, {"method": "by hand"})
 
 
-def zone_of(scenario: Scenario) -> BuildZone:
-    assert scenario.build_zone is not None
-    return scenario.build_zone
-
-
 def squares_m(layout: tuple[tuple[int, int], ...]) -> list[tuple[float, ...]]:
-    return [tuple(zone_of(COURTYARD).cell_rectangle_m(cell)) for cell in layout]
+    return [tuple(COURTYARD.zone.cell_rectangle_m(cell)) for cell in layout]
 
 
 def outlines(space: Modelspace, layer: str) -> list[LWPolyline]:
@@ -104,7 +99,7 @@ def test_geojson_has_closed_counterclockwise_polygons_in_site_metres(tmp_path: P
     (charge,) = by_kind["charge"]
     assert charge["geometry"] == {"type": "Point", "coordinates": [5.0, 11.25]}
     assert [each["properties"]["name"] for each in by_kind["keep_out"]] == [
-        keep_out.reason for keep_out in zone_of(COURTYARD).keep_outs
+        keep_out.reason for keep_out in COURTYARD.zone.keep_outs
     ]
     assert len(by_kind["build_zone"]) == len(by_kind["site"]) == 1
     modules = [np.array(each["geometry"]["coordinates"][0]) for each in by_kind["barrier"]]
@@ -136,7 +131,7 @@ def test_dxf_is_in_metres_with_a_layer_a_kind(tmp_path: Path) -> None:
 def test_every_part_of_a_site_is_in_every_drawing(name: str, tmp_path: Path) -> None:
     """Nothing of a site is forgotten, with several sources, structures, costs or conditions."""
     scenario = load_scenario(name)
-    zone = zone_of(scenario)
+    zone = scenario.zone
     empty = plan(scenario, (), None)
     expected = Counter(
         {

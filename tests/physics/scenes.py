@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blast_env.geometry import Rectangle
-from blast_env.physics.engine import BallStates, BlastRun, Engine
+from blast_env.physics.engine import BallStates, BlastRun, ParticleEngine
 from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, CollisionType
@@ -103,14 +103,14 @@ def closed_box(
     ]
 
 
-def finished(of_scene: Scene, engine: Engine = EVENT) -> BlastRun:
+def finished(of_scene: Scene, engine: ParticleEngine = EVENT) -> BlastRun:
     """Return the run of a scene at its end."""
     run = engine.start(of_scene)
     run.advance(np.inf)
     return run
 
 
-def states_at(of_scene: Scene, time_s: float, engine: Engine = EVENT) -> BallStates:
+def states_at(of_scene: Scene, time_s: float, engine: ParticleEngine = EVENT) -> BallStates:
     """Return the balls of a scene at a time."""
     run = engine.start(of_scene)
     run.advance(time_s)

@@ -15,7 +15,7 @@ import pytest
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.physics.engine import BlastRun, Engine
+from blast_env.physics.engine import BlastRun, ParticleEngine
 from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.scene import Scene
@@ -90,7 +90,7 @@ def digest_of(run: BlastRun) -> str:
     return state.hexdigest()
 
 
-def digest(kind: str, engine: Engine = EVENT) -> str:
+def digest(kind: str, engine: ParticleEngine = EVENT) -> str:
     return digest_of(finished(SCENES[kind](), engine))
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
-from blast_env.physics.engine import Engine
+from blast_env.physics.engine import ParticleEngine
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.pymunk.engine import PymunkEngine
 from tests.physics.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, wall
@@ -13,7 +13,7 @@ FACADE = wall((100.0, 90.0), 10, 1)
 
 
 def shot(
-    engine: Engine,
+    engine: ParticleEngine,
     position: tuple[float, float],
     velocity: tuple[float, float],
     kind: CollisionType = EXPLOSIVE,
@@ -27,7 +27,7 @@ def shot(
 
 @pytest.mark.parametrize("kind", [EXPLOSIVE, AIR])
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
-def test_head_on_ball(engine: Engine, kind: CollisionType, restitution: float) -> None:
+def test_head_on_ball(engine: ParticleEngine, kind: CollisionType, restitution: float) -> None:
     """I = m |v| and transferred (1 + C_e) m |v|: the paper's formula and Newton's."""
     (hit,) = shot(
         engine, (80.0, 99.0), (500.0, 0.0), kind, 2.0, contact={"module_restitution": restitution}
@@ -42,7 +42,7 @@ def test_head_on_ball(engine: Engine, kind: CollisionType, restitution: float) -
     assert hit["time_s"] == pytest.approx(19.0 / 500.0, abs=2e-3)
 
 
-def test_impulse_of_an_oblique_ball_uses_the_whole_speed(engine: Engine) -> None:
+def test_impulse_of_an_oblique_ball_uses_the_whole_speed(engine: ParticleEngine) -> None:
     hits = shot(engine, (80.0, 80.0), (300.0, 300.0))
     assert hits[0]["impulse"] == pytest.approx(300.0 * np.sqrt(2.0), rel=1e-9)
     assert np.degrees(incidence_angle_rad(hits))[0] == pytest.approx(45.0)
@@ -50,7 +50,7 @@ def test_impulse_of_an_oblique_ball_uses_the_whole_speed(engine: Engine) -> None
 
 
 @pytest.mark.parametrize("y", [91.7, 92.0, 92.3, 95.0, 98.0, 99.99, 100.0, 107.95])
-def test_a_seam_gives_no_push_to_the_side(engine: Engine, y: float) -> None:
+def test_a_seam_gives_no_push_to_the_side(engine: ParticleEngine, y: float) -> None:
     """Near a seam the ball overlaps two squares, but the wall is flat."""
     of_scene = scene(balls([EXPLOSIVE], [(90.0, y)], [(400.0, 0.0)]), [FACADE], parameters())
     run = engine.start(of_scene)
@@ -60,7 +60,7 @@ def test_a_seam_gives_no_push_to_the_side(engine: Engine, y: float) -> None:
     assert hit["module"] == int((y - 90.0) // 2.0) or y in (92.0, 98.0, 100.0)
 
 
-def test_a_free_corner_does_push_to_the_side(engine: Engine) -> None:
+def test_a_free_corner_does_push_to_the_side(engine: ParticleEngine) -> None:
     of_scene = scene(balls([EXPLOSIVE], [(90.0, 110.6)], [(400.0, 0.0)]), [FACADE], parameters())
     run = engine.start(of_scene)
     run.advance(0.06)
@@ -82,7 +82,7 @@ def test_a_ball_in_an_inner_corner_counts_once_in_a_step() -> None:
     assert hits["transferred_impulse"].sum() == pytest.approx(2.0 * 2.0 * 300.0, rel=1e-6)
 
 
-def test_an_explosive_ball_shrinks_once_per_contact_with_a_module(engine: Engine) -> None:
+def test_an_explosive_ball_shrinks_once_per_contact_with_a_module(engine: ParticleEngine) -> None:
     for kind, factor in ((EXPLOSIVE, 0.7), (AIR, 1.0)):
         of_scene = scene(balls([kind], [(90.0, 99.0)], [(400.0, 0.0)]), [FACADE], parameters())
         run = engine.start(of_scene)
@@ -94,7 +94,7 @@ def test_an_explosive_ball_shrinks_once_per_contact_with_a_module(engine: Engine
 
 @pytest.mark.parametrize("elasticity", [0.0, 0.8])
 def test_an_explosive_ball_shrinks_once_per_contact_with_air(
-    engine: Engine, elasticity: float
+    engine: ParticleEngine, elasticity: float
 ) -> None:
     """Inelastic balls stay together for many steps: still one contact."""
     of_scene = scene(
@@ -108,7 +108,7 @@ def test_an_explosive_ball_shrinks_once_per_contact_with_air(
     assert run.balls().radius == pytest.approx([0.9, 1.0])
 
 
-def test_a_ball_below_the_minimum_radius_is_removed(engine: Engine) -> None:
+def test_a_ball_below_the_minimum_radius_is_removed(engine: ParticleEngine) -> None:
     of_scene = scene(
         balls([EXPLOSIVE], [(90.0, 99.0)], [(400.0, 0.0)]),
         [FACADE],
@@ -119,7 +119,7 @@ def test_a_ball_below_the_minimum_radius_is_removed(engine: Engine) -> None:
     assert len(run.balls()) == 0
 
 
-def test_a_module_passes_its_capacity_and_is_removed(engine: Engine) -> None:
+def test_a_module_passes_its_capacity_and_is_removed(engine: ParticleEngine) -> None:
     """Two rows of modules; the ball that breaks the front one lets the next reach the back."""
     two_deep = wall((100.0, 98.0), 1, 2, capacity=500.0)
     of_scene = scene(
@@ -139,12 +139,12 @@ def test_a_module_passes_its_capacity_and_is_removed(engine: Engine) -> None:
     assert back.hits >= 1
 
 
-def test_without_a_capacity_nothing_is_destroyed(engine: Engine) -> None:
+def test_without_a_capacity_nothing_is_destroyed(engine: ParticleEngine) -> None:
     of_scene = scene(balls([AIR], [(80.0, 99.0)], [(4000.0, 0.0)]), [FACADE], parameters())
     assert not any(part.destroyed for part in finished(of_scene, engine).obstacles[0].parts)
 
 
-def test_hits_are_summed_per_module(engine: Engine) -> None:
+def test_hits_are_summed_per_module(engine: ParticleEngine) -> None:
     of_scene = scene(
         balls([AIR] * 3, [(80.0, 91.0), (70.0, 91.0), (80.0, 95.0)], [(400.0, 0.0)] * 3),
         [FACADE],

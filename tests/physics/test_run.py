@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle
-from blast_env.physics.engine import BlastRun, EndReason, Engine
-from blast_env.physics.engines import ENGINE_NAMES, find_engine
+from blast_env.physics.engine import BlastRun, EndReason, ParticleEngine
+from blast_env.physics.engines import ENGINE_NAMES, find_particle_engine
 from blast_env.physics.particles import (
     Balls,
     CollisionType,
@@ -36,7 +36,7 @@ def fan_scene(distance: float, count: int = 720, facade: float = 20.0) -> Scene:
 
 
 @pytest.mark.parametrize("distance", [20.0, 40.0, 80.0])
-def test_hits_without_air_equal_the_view_factor(engine: Engine, distance: float) -> None:
+def test_hits_without_air_equal_the_view_factor(engine: ParticleEngine, distance: float) -> None:
     """The share of the fan that the facade covers, as seen from the charge."""
     count, facade, radius = 720, 20.0, 0.05
     angle = 2.0 * np.arctan((facade / 2 + radius) / distance)
@@ -44,7 +44,7 @@ def test_hits_without_air_equal_the_view_factor(engine: Engine, distance: float)
     assert abs(len(finished(fan_scene(distance), engine).log) - expected) <= 1.0
 
 
-def test_a_facade_twice_as_far_gets_half_the_balls(engine: Engine) -> None:
+def test_a_facade_twice_as_far_gets_half_the_balls(engine: ParticleEngine) -> None:
     near, far = (
         len(finished(fan_scene(d, count=1440, facade=16.0), engine).log) for d in (40.0, 80.0)
     )
@@ -126,7 +126,7 @@ def test_nothing_tunnels_through_a_module_or_the_border(
             stepping={"step_radii": step_radii, "time_limit_s": time_s},
         ),
     )
-    run = find_engine(engine_name).start(of_scene)
+    run = find_particle_engine(engine_name).start(of_scene)
     hit = False
     for share in np.linspace(0.02, 1.0, 50):
         run.advance(share * time_s)
@@ -188,7 +188,7 @@ def test_changing_the_time_step_gives_lasting_contacts_no_second_push() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_a_mirrored_scene_gives_exactly_mirrored_loads(engine: Engine, seed: int) -> None:
+def test_a_mirrored_scene_gives_exactly_mirrored_loads(engine: ParticleEngine, seed: int) -> None:
     """The site is centred on 0, so that mirroring it rounds nothing."""
     size, rng = (160.0, 100.0), np.random.default_rng(seed)
     of_parameters = parameters(stepping={"time_limit_s": 0.1})
@@ -215,7 +215,7 @@ def test_a_mirrored_scene_gives_exactly_mirrored_loads(engine: Engine, seed: int
     assert (loads[1][:, ::-1] == loads[0]).all()
 
 
-def test_a_run_ends_when_nothing_can_reach_a_structure(engine: Engine) -> None:
+def test_a_run_ends_when_nothing_can_reach_a_structure(engine: ParticleEngine) -> None:
     of_scene = scene(
         balls([AIR], [(20.0, 20.0)], [(10.0, 0.0)]),
         [wall((150.0, 150.0), 2, 2)],
@@ -226,7 +226,7 @@ def test_a_run_ends_when_nothing_can_reach_a_structure(engine: Engine) -> None:
     assert run.steps == 0
 
 
-def test_a_run_ends_when_all_balls_have_left(engine: Engine) -> None:
+def test_a_run_ends_when_all_balls_have_left(engine: ParticleEngine) -> None:
     of_scene = scene(
         balls([AIR], [(20.0, 20.0)], [(-200.0, 0.0)]), [wall((30.0, 150.0), 2, 2)], parameters()
     )
@@ -235,7 +235,7 @@ def test_a_run_ends_when_all_balls_have_left(engine: Engine) -> None:
     assert len(run.balls()) == 0
 
 
-def test_a_run_ends_at_the_time_limit(engine: Engine) -> None:
+def test_a_run_ends_at_the_time_limit(engine: ParticleEngine) -> None:
     limit_s = 0.0123
     of_scene = scene(
         balls([AIR], [(26.0, 20.0)], [(200.0, 0.0)]),
@@ -247,7 +247,7 @@ def test_a_run_ends_at_the_time_limit(engine: Engine) -> None:
     assert limit_s <= run.time_s < limit_s + step_s(run)
 
 
-def test_a_ball_that_reaches_the_border_is_removed(engine: Engine) -> None:
+def test_a_ball_that_reaches_the_border_is_removed(engine: ParticleEngine) -> None:
     of_scene = scene(
         balls([AIR, AIR], [(20.0, 20.0), (50.0, 50.0)], [(-500.0, 0.0), (1.0, 0.0)]),
         [wall((54.0, 45.0), 5, 2)],
@@ -260,7 +260,7 @@ def test_a_ball_that_reaches_the_border_is_removed(engine: Engine) -> None:
     assert run.balls().index.tolist() == [1]
 
 
-def test_cutting_a_run_into_calls_does_not_change_it(engine: Engine) -> None:
+def test_cutting_a_run_into_calls_does_not_change_it(engine: ParticleEngine) -> None:
     of_scene = fan_scene(40.0, count=200)
     whole, cut = finished(of_scene, engine), engine.start(of_scene)
     for end_s in np.arange(0.0, 10.0, 0.0007):

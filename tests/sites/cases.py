@@ -1,4 +1,4 @@
-"""Small scenarios of which the sight lines can be told by hand."""
+"""Small scenarios of which the lines of sight can be told by hand."""
 
 from typing import Any
 

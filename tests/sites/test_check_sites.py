@@ -49,7 +49,7 @@ def test_the_facade_is_the_side_that_the_charge_looks_at() -> None:
     assert facade_and_depth_m(yard()) == (4.0, 2.0)
 
 
-def test_measuring_puts_the_sight_line_layout_first() -> None:
+def test_measuring_puts_the_visibility_layout_first() -> None:
     found = measured(yard(stock=5), random_layouts=2, threats=1, engine="pymunk")
     assert found.cut.shape == found.reduction.shape == (3,)
     assert found.cut[0] == pytest.approx(found.shares.layout_share)

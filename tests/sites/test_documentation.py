@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from blast_env.sites import HELD_OUT_SITES, SightLineCriterion, SiteRanges
+from blast_env.sites import HELD_OUT_SITES, SiteRanges, VisibilityCriterion
 from blast_env.sites.generate import MOST_TRIES
 from blast_env.sites.visibility import DIRECTIONS
 
@@ -30,7 +30,7 @@ def test_the_table_has_no_other_rows() -> None:
 
 
 def test_bounds_are_those_of_the_criterion() -> None:
-    criterion = SightLineCriterion()
+    criterion = VisibilityCriterion()
     least, most = criterion.least_layout_share, criterion.most_layout_share
     for words in (
         f"at least {criterion.least_open_share:.0%} of",

@@ -17,9 +17,9 @@ from blast_env.calibration import load_calibration
 from blast_env.envs.observations import FeaturesObservation, GridObservation
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.scenario import BuildZone, Placement, Scenario, SegmentSource
+from blast_env.scenario import Placement, Scenario, SegmentSource
 from blast_env.scenario.zone import distance_m, source_bounds_m
-from blast_env.sites import Objection, SightLineCriterion, SiteRanges, draw_site, generate_site
+from blast_env.sites import Objection, SiteRanges, VisibilityCriterion, draw_site, generate_site
 
 RANGES = SiteRanges()
 SEEDS = st.integers(0, 2**63 - 1)
@@ -42,12 +42,7 @@ class Nothing:
 
 
 def kept_out(site: Scenario, reason: str) -> int:
-    return sum(reason in area.reason for area in zone_of(site).keep_outs)
-
-
-def zone_of(site: Scenario) -> BuildZone:
-    assert site.build_zone is not None
-    return site.build_zone
+    return sum(reason in area.reason for area in site.zone.keep_outs)
 
 
 def threat_of(site: Scenario) -> Rectangle:
@@ -56,7 +51,7 @@ def threat_of(site: Scenario) -> Rectangle:
 
 def test_all_sites_have_the_same_spaces(sites: tuple[Scenario, ...]) -> None:
     assert {(site.site.width_m, site.site.height_m) for site in sites} == {(36.0, 36.0)}
-    assert {(zone_of(site).rows, zone_of(site).columns) for site in sites} == {(28, 28)}
+    assert {(site.zone.rows, site.zone.columns) for site in sites} == {(28, 28)}
     for observation in (GridObservation(), FeaturesObservation()):
         first = observation.space(sites[0])
         assert all(observation.space(site) == first for site in sites)
@@ -109,15 +104,15 @@ PROPERTIES: dict[str, tuple[Callable[[Scenario], object], int]] = {
     "place of the building": (lambda site: site.structures[0].corner_m, 100),
     "neighbours": (lambda site: len(site.structures), 2),
     "places of neighbours": (lambda site: [s.corner_m for s in site.structures[1:]], 30),
-    "place of the zone": (lambda site: zone_of(site).corner_m, 60),
+    "place of the zone": (lambda site: site.zone.corner_m, 60),
     "path": (lambda site: kept_out(site, "path"), 2),
     "hydrant": (lambda site: kept_out(site, "hydrant"), 2),
     "trees": (lambda site: kept_out(site, "tree"), 4),
-    "stock": (lambda site: zone_of(site).stock, 8),
-    "clearance": (lambda site: zone_of(site).clearance_m, 5),
-    "access way": (lambda site: zone_of(site).access_way, 5),
-    "cost of a module over a duct": (lambda s: [a.module_cost for a in zone_of(s).cost_areas], 10),
-    "budget": (lambda site: zone_of(site).budget, 20),
+    "stock": (lambda site: site.zone.stock, 8),
+    "clearance": (lambda site: site.zone.clearance_m, 5),
+    "access way": (lambda site: site.zone.access_way, 5),
+    "cost of a module over a duct": (lambda s: [a.module_cost for a in s.zone.cost_areas], 10),
+    "budget": (lambda site: site.zone.budget, 20),
 }
 
 
@@ -138,7 +133,7 @@ def test_what_is_drawn_lies_within_the_ranges(sites: tuple[Scenario, ...]) -> No
         distance = distance_m(site.charge[0], building)
         assert RANGES.stand_off_m[0] <= distance
         assert RANGES.tnt_kg[0] <= site.charge[0].tnt_kg <= RANGES.tnt_kg[1]
-        assert RANGES.stock[0] <= zone_of(site).stock <= RANGES.stock[1]
+        assert RANGES.stock[0] <= site.zone.stock <= RANGES.stock[1]
         threat = threat_of(site)
         lengths = sorted((threat.right - threat.left, threat.top - threat.bottom))
         is_road = isinstance(site.charge[0], SegmentSource)
@@ -149,7 +144,7 @@ def test_what_is_drawn_lies_within_the_ranges(sites: tuple[Scenario, ...]) -> No
 
 def test_the_zone_lies_between_threat_and_building(sites: tuple[Scenario, ...]) -> None:
     for site in sites:
-        threat, zone = threat_of(site), zone_of(site).rectangle_m
+        threat, zone = threat_of(site), site.zone.rectangle_m
         assert not zone.overlaps(threat.grown(RANGES.zone_from_threat_m[0]))
         for neighbour in site.structures[1:]:
             assert not neighbour.rectangle_m.overlaps(zone)
@@ -180,7 +175,7 @@ def test_everything_drawn_from_the_default_ranges_is_valid() -> None:
 
 
 def test_sites_meet_the_criterion_and_most_meet_it_at_once(sites: tuple[Scenario, ...]) -> None:
-    criterion = SightLineCriterion()
+    criterion = VisibilityCriterion()
     assert not any(criterion.objection(site) for site in sites)
     at_once = [
         criterion.objection(draw_site(np.random.default_rng(seed), RANGES, "x")) is None
@@ -227,7 +222,7 @@ def test_narrow_ranges_leave_only_what_they_say() -> None:
     )
     for seed in range(5):
         site = generate_site(seed, ranges)
-        zone = zone_of(site)
+        zone = site.zone
         assert site.charge[0].tnt_kg == 100.0
         assert len(site.structures) == 1
         assert not zone.keep_outs

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blast_env.scenario import Placement, Scenario, usable_cells
-from blast_env.sites import SightLines, SiteMeasures, sight_line_layout
+from blast_env.sites import SiteMeasures, Visibility, visibility_layout
 from tests.sites.cases import yard
 
 SMALL = {"corner_m": (9.0, 9.0), "rows": 3, "columns": 2}
@@ -19,7 +19,7 @@ def shares(scenario: Scenario) -> SiteMeasures:
 @pytest.mark.parametrize("stock", [1, 2, 4])
 def test_the_share_of_random_layouts_is_the_mean_over_all_of_them(stock: int) -> None:
     scenario = yard(**SMALL, stock=stock)
-    lines = SightLines.of(scenario)
+    lines = Visibility.of(scenario)
     cells = [(row, column) for row in range(3) for column in range(2)]
     every = [lines.cut_share(layout) for layout in combinations(cells, stock)]
     assert shares(scenario).random_share == pytest.approx(np.mean(every), abs=1e-9)
@@ -37,7 +37,7 @@ def test_random_layouts_are_as_large_as_the_budget_allows() -> None:
 def test_the_best_wall_is_the_best_of_all_straight_runs(stock: int) -> None:
     keep_out = {"corner_m": (9.0, 9.5), "size_m": (1.0, 0.5), "reason": "path"}
     scenario = yard(**SMALL, stock=stock, keep_outs=[keep_out])
-    lines, usable = SightLines.of(scenario), usable_cells(scenario)
+    lines, usable = Visibility.of(scenario), usable_cells(scenario)
     grid = [[(row, column) for column in range(2)] for row in range(3)]
     runs = [
         line[first : first + stock]
@@ -48,25 +48,25 @@ def test_the_best_wall_is_the_best_of_all_straight_runs(stock: int) -> None:
     assert shares(scenario).wall_share == pytest.approx(max(every))
 
 
-def test_the_sight_line_layout_is_best_where_one_module_is_all() -> None:
+def test_the_visibility_layout_is_best_where_one_module_is_all() -> None:
     scenario = yard(stock=1)
-    lines = SightLines.of(scenario)
+    lines = Visibility.of(scenario)
     best = max(lines.cut_share([cell]) for cell in np.ndindex(8, 6))
-    assert lines.cut_share(sight_line_layout(scenario, lines)) == best
+    assert lines.cut_share(visibility_layout(scenario, lines)) == best
 
 
 def test_it_ends_when_nothing_is_left_to_cut() -> None:
     scenario = yard(stock=40)
-    lines = SightLines.of(scenario)
-    layout = sight_line_layout(scenario, lines)
+    lines = Visibility.of(scenario)
+    layout = visibility_layout(scenario, lines)
     assert lines.cut_share(layout) == 1.0
     assert len(layout) < 10  # the lines are 2.3 m apart at the zone, five modules wide
 
 
 def test_it_keeps_every_condition_and_each_module_adds_less(sites: tuple[Scenario, ...]) -> None:
     for site in sites[:40]:
-        lines = SightLines.of(site)
-        layout = sight_line_layout(site, lines)
+        lines = Visibility.of(site)
+        layout = visibility_layout(site, lines)
         Placement.of(site, layout)  # raises where a condition is broken
         zone = site.build_zone
         if zone is not None and zone.budget is None:
@@ -80,5 +80,5 @@ def test_it_keeps_every_condition_and_each_module_adds_less(sites: tuple[Scenari
 def test_dear_cells_are_used_last() -> None:
     dear = {"corner_m": (9.0, 8.0), "size_m": (3.0, 2.0), "reason": "duct", "module_cost": 9.0}
     scenario = yard(stock=2, cost_areas=[dear], budget=100.0)
-    layout = sight_line_layout(scenario, SightLines.of(scenario))
+    layout = visibility_layout(scenario, Visibility.of(scenario))
     assert all(row >= 4 for row, _ in layout)

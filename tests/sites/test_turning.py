@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blast_env.scenario import Scenario, bundled_scenarios, load_scenario, usable_cells
-from blast_env.sites import SightLines, generate_site, turned
+from blast_env.sites import Visibility, generate_site, turned
 from tests.scenario.documents import full_document, tall_document
 
 WITH_ZONE = ("courtyard", "perimeter_gate", "street_junction")
@@ -71,12 +71,12 @@ def test_faces_and_gauges_turn_and_heights_stay() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_layout_turned_with_its_site_cuts_as_many_sight_lines(seed: int) -> None:
+def test_a_layout_turned_with_its_site_cuts_as_many_lines_of_sight(seed: int) -> None:
     site = generate_site(seed)
     rows = site.build_zone.rows if site.build_zone is not None else 0
     rng = np.random.default_rng(seed)
     layout = [(int(r), int(c)) for r, c in rng.permutation(np.argwhere(usable_cells(site)))[:12]]
     turned_layout = [(column, rows - 1 - row) for row, column in layout]
-    before, after = SightLines.of(site), SightLines.of(turned(site, 1))
+    before, after = Visibility.of(site), Visibility.of(turned(site, 1))
     assert after.open_share == pytest.approx(before.open_share, abs=0.01)
     assert after.cut_share(turned_layout) == pytest.approx(before.cut_share(layout), abs=0.01)

@@ -8,8 +8,8 @@ from blast_agents.league.entries import (
     RandomLayout,
     Rule,
     Search,
-    SightLineLayout,
     Training,
+    VisibilityLayout,
     standard_entries,
 )
 from blast_agents.league.standings import Result, Standings, Verdict, verdicts
@@ -35,11 +35,11 @@ __all__ = [
     "ResultStore",
     "Rule",
     "Search",
-    "SightLineLayout",
     "Standings",
     "Track",
     "Training",
     "Verdict",
+    "VisibilityLayout",
     "find_tracks",
     "hidden_track",
     "known_track",

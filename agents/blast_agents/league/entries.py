@@ -13,7 +13,7 @@ from blast_env.evaluation import Case
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import PointSource, Scenario
-from blast_env.sites import SightLines, sight_line_layout
+from blast_env.sites import Visibility, visibility_layout
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ class Rule:
 
 
 @dataclass(frozen=True)
-class SightLineLayout:
-    """Cuts as many lines of sight as it can; see `blast_env.sites.sight_line_layout`.
+class VisibilityLayout:
+    """Cuts as many lines of sight as it can; see `blast_env.sites.visibility_layout`.
 
     Attributes:
         name: In tables.
@@ -87,7 +87,7 @@ class SightLineLayout:
         scenario = case.scenario
         if case.charge is not None:
             scenario = scenario.model_copy(update={"charge": (PointSource.at(case.charge),)})
-        return sight_line_layout(scenario, SightLines.of(scenario))
+        return visibility_layout(scenario, Visibility.of(scenario))
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Search:
         return search_name(self.method.name, self.budget)
 
 
-Instant = NoBarrier | RandomLayout | Rule | SightLineLayout | Agent
+Instant = NoBarrier | RandomLayout | Rule | VisibilityLayout | Agent
 """Entries that spend no blast on a case."""
 
 Entry = Instant | Search
@@ -149,7 +149,7 @@ def search_name(method: str, budget: int) -> str:
 
 
 def standard_entries(methods: Sequence[str], budgets: Sequence[int]) -> tuple[Entry, ...]:
-    """Return all entries but agents: no barrier, a random layout, rules, sight lines, searches.
+    """Return all entries but agents: no barrier, a random layout, rules, lines of sight, searches.
 
     Args:
         methods: Names of search methods.
@@ -162,4 +162,4 @@ def standard_entries(methods: Sequence[str], budgets: Sequence[int]) -> tuple[En
     rules = (Rule(rule, name) for name, rule in RULES.items())
     found = [find_search_method(name) for name in methods]
     searches = (Search(method, budget) for method in found for budget in budgets)
-    return (NoBarrier(), RandomLayout(), *rules, SightLineLayout(), *searches)
+    return (NoBarrier(), RandomLayout(), *rules, VisibilityLayout(), *searches)

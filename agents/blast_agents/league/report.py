@@ -20,6 +20,7 @@ from blast_env.geometry import Layout
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.style import count_of
 from blast_env.statistics import reductions
+from blast_env.tables import write_csv
 
 
 def summary_table(standings: Standings) -> pd.DataFrame:
@@ -161,8 +162,8 @@ def write_league(all_standings: Sequence[Standings], folder: Path, command: str)
     for standings in all_standings:
         name = standings.track.name
         written += [
-            _write_table(summary_table(standings), folder / f"{name}_summary.csv"),
-            _write_table(case_table(standings), folder / f"{name}_cases.csv"),
+            write_csv(summary_table(standings), folder / f"{name}_summary.csv"),
+            write_csv(case_table(standings), folder / f"{name}_cases.csv"),
             save_figure(league_figure(standings), folder / f"{name}.png"),
         ]
     page = folder / PAGE
@@ -210,9 +211,3 @@ def _percent(share: float) -> str:
 
 def _line(cells: Sequence[str]) -> str:
     return f"| {' | '.join(cells)} |"
-
-
-def _write_table(table: pd.DataFrame, path: Path) -> Path:
-    with write_atomically(path) as temporary:
-        table.to_csv(temporary, index=False)
-    return path

@@ -6,7 +6,6 @@ from typing import Final, Literal
 
 from blast_env.envs.arguments import check_names, whole_number
 from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
-from blast_env.envs.strategies import zone_of
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, SeedRange, draw_threats
 from blast_env.evaluation.cases import practice_hidden, practice_visible, visible_case
@@ -65,7 +64,7 @@ def known_track(scenario: Scenario, cases: int, seeds: int, seed: int = 0) -> Tr
     Raises:
         BlastEnvError: If a number is out of bounds, or there is no build zone.
     """
-    zone_of(scenario)
+    scenario.zone  # noqa: B018  # refuses a scenario without one
     drawn = []
     for index, first in enumerate(_first_seeds(cases, seeds, seed)):
         charge, search_seed = draw_charge(scenario, first), seed * MOST_CASES + index
@@ -101,7 +100,7 @@ def hidden_track(scenario: Scenario, seeds: int, seed: int = 0) -> Track:
     Raises:
         BlastEnvError: As for `known_track`.
     """
-    zone_of(scenario)
+    scenario.zone  # noqa: B018  # refuses a scenario without one
     (first,) = _first_seeds(1, seeds, seed)
     return Track(
         name=f"hidden_{scenario.name}",

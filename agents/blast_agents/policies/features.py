@@ -172,7 +172,7 @@ BEARINGS: Final = 96
 """Bearings that are told apart from each place of the charge."""
 
 
-MOST_SHADE: Final = 4.0
+MOST_OFFSET: Final = 4.0
 """They reach so many half widths of the facade to either side of its middle."""
 
 
@@ -190,9 +190,9 @@ class Bearings(NamedTuple):
         last: The one after its last, likewise.
         before: Which cells lie before the structures, 0 or 1, likewise.
         of_facade: Share of the facade on each bearing (batch, places, BEARINGS).
-        shade: How far from the facade's middle a cell is seen from the charge, in half widths of
+        offset: How far from the facade's middle a cell is seen from the charge, in half widths of
             the facade; mean over the places (batch, cells).
-        shade_size: The same without its sign, place by place (batch, cells).
+        offset_size: The same without its sign, place by place (batch, cells).
         cut: Share of the facade that a module on a cell hides (batch, cells).
     """
 
@@ -200,8 +200,8 @@ class Bearings(NamedTuple):
     last: Tensor
     before: Tensor
     of_facade: Tensor
-    shade: Tensor
-    shade_size: Tensor
+    offset: Tensor
+    offset_size: Tensor
     cut: Tensor
 
     @classmethod
@@ -209,7 +209,7 @@ class Bearings(NamedTuple):
         """Find them.
 
         A module hides the bearings between its two outermost corners, in whole steps of `2 *
-        MOST_SHADE / BEARINGS` half widths of the facade. What does not stand before the structures
+        MOST_OFFSET / BEARINGS` half widths of the facade. What does not stand before the structures
         hides nothing.
 
         Args:
@@ -222,26 +222,26 @@ class Bearings(NamedTuple):
         middle = (lines.left + lines.right)[..., None] / 2.0
         half_module = 0.5 * (lines.along_x.abs() + lines.along_y.abs())[..., None]
         nearest = along.clamp(min=1.0)
-        shade = (aside / nearest - middle) / half_facade
+        offset = (aside / nearest - middle) / half_facade
         half = half_module / nearest / half_facade
-        first, last = _edge(shade - half), _edge(shade + half)
+        first, last = _edge(offset - half), _edge(offset + half)
         last = torch.maximum(last, (first + 1).clamp(max=BEARINGS))
         weight = half_facade / half_facade.sum(dim=1, keepdim=True)
         centres = (torch.arange(BEARINGS, device=along.device) + 0.5) / BEARINGS * 2.0 - 1.0
-        of_facade = centres.abs().mul(MOST_SHADE).le(1.0).float()
+        of_facade = centres.abs().mul(MOST_OFFSET).le(1.0).float()
         of_facade = (of_facade / of_facade.sum()) * weight
         return cls(
             first=first,
             last=last,
             before=before,
             of_facade=of_facade,
-            shade=shade.clamp(-MOST_SHADE, MOST_SHADE).mean(dim=1),
-            shade_size=shade.abs().clamp(max=MOST_SHADE).mean(dim=1),
+            offset=offset.clamp(-MOST_OFFSET, MOST_OFFSET).mean(dim=1),
+            offset_size=offset.abs().clamp(max=MOST_OFFSET).mean(dim=1),
             cut=(_sums(of_facade, first, last) * before).sum(dim=1),
         )
 
 
-class Shadow(NamedTuple):
+class Occlusion(NamedTuple):
     """What modules do to the bearings; means over the places of the charge.
 
     Attributes:
@@ -261,7 +261,7 @@ class Shadow(NamedTuple):
     open_facade: Tensor
 
     @classmethod
-    def of(cls, bearings: Bearings, barrier: Tensor) -> "Shadow":
+    def of(cls, bearings: Bearings, barrier: Tensor) -> "Occlusion":
         """Return what the modules of a barrier hide, and what one more on each cell would.
 
         Args:
@@ -283,9 +283,9 @@ class Shadow(NamedTuple):
         )
 
 
-def _edge(shade: Tensor) -> Tensor:
+def _edge(offset: Tensor) -> Tensor:
     """Return the boundary between two bearings that is nearest, from 0 to BEARINGS."""
-    share = (shade / MOST_SHADE + 1.0) / 2.0
+    share = (offset / MOST_OFFSET + 1.0) / 2.0
     return (share * BEARINGS).round().clamp(0, BEARINGS).long()
 
 
@@ -319,8 +319,8 @@ class StaticCellFeatures(NamedTuple):
         along_share: `along` as a share of the whole way.
         aside: How far the cell is aside of the line, to the left, over 10 m.
         aside_size: The same without its sign.
-        shade: See `Bearings`.
-        shade_size: Likewise.
+        offset: See `Bearings`.
+        offset_size: Likewise.
         cut: Share of the facade that a module hides, times 10.
     """
 
@@ -329,8 +329,8 @@ class StaticCellFeatures(NamedTuple):
     along_share: Tensor
     aside: Tensor
     aside_size: Tensor
-    shade: Tensor
-    shade_size: Tensor
+    offset: Tensor
+    offset_size: Tensor
     cut: Tensor
 
 
@@ -339,7 +339,7 @@ class ChangingCellFeatures(NamedTuple):
 
     Attributes:
         open_cut: Share of the facade that a module hides and nothing else does, times 10.
-        covered: See `Shadow`.
+        covered: See `Occlusion`.
         depth: Likewise.
         cost: Cost of a module, from 0 to 1.
         free: Whether it may take a module, 0 or 1.
@@ -491,8 +491,8 @@ class ZoneGeometry(NamedTuple):
             along_share=(along / distance).mean(dim=1),
             aside=aside.mean(dim=1) / _LENGTH,
             aside_size=aside.abs().mean(dim=1) / _LENGTH,
-            shade=bearings.shade,
-            shade_size=bearings.shade_size,
+            offset=bearings.offset,
+            offset_size=bearings.offset_size,
             cut=bearings.cut * _SHARE_GAIN,
         )
         return cls(
@@ -519,7 +519,7 @@ class ZoneGeometry(NamedTuple):
             _crop(planes[name], self.row, self.column, self.rows, self.columns).float() / _LEVELS
             for name in ("barrier", "free")
         )
-        seen = Shadow.of(self.bearings, barrier.flatten(1))
+        seen = Occlusion.of(self.bearings, barrier.flatten(1))
         changing = ChangingCellFeatures(
             open_cut=seen.open_cut * _SHARE_GAIN,
             covered=seen.covered,

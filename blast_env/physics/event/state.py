@@ -337,8 +337,8 @@ class World(NamedTuple):
 
     Attributes:
         balls: Of `BALL` (n,).
-        cells: Of `CELL`.
-        heap: Of `HEAP_ENTRY` (n + 1,).
+        cells: The broad phase's grid, of `CELL`.
+        heap: The event queue, of `HEAP_ENTRY` (n + 1,).
         surfaces: Of `SURFACE`, cell by cell.
         modules: Modules of the surfaces.
         loads: Of `LOAD` (m,).

@@ -202,7 +202,7 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
             the ground, at least `LEAST_RADIUS_CELLS` cells away.
 
     Raises:
-        BlastEnvError: If the charge is outside the grid or too close to a solid cell for it.
+        BlastEnvError: If the charge is outside the grid or in a solid cell.
     """
     grid = solver.grid
     if radius_m is None:
@@ -223,26 +223,41 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
 def largest_radius_m(grid: GasGrid, charge: GasCharge) -> float:
     """Return how far the front of a charge can run before it meets a solid cell or the ground.
 
-    Below `LEAST_RADIUS_CELLS` cells the ground does not count: what has passed through it is laid
-    onto the grid as its mirror image.
+    At least `least_clearance_m`. Below that the ground does not count: what has passed through it
+    is laid onto the grid as its mirror image.
 
     Raises:
-        BlastEnvError: If the charge is outside the grid or in a solid cell, or if a solid cell is
-            closer than that.
+        BlastEnvError: If the charge is outside the grid or in a solid cell.
     """
-    grid.cell_at(charge.position_m)  # says what is wrong outside the grid
+    clear, least = clearance_m(grid, charge), least_clearance_m(grid, charge)
     x, y, z = _centre(charge)
-    least = max(charge.least_radius_m, LEAST_RADIUS_CELLS * grid.cell_m)
-    clear = _distance_to_solid(grid, (x, y, z))
-    if clear < least:
-        where = f"{clear:.3g} m from a solid cell" if clear > 0.0 else "inside a solid cell"
-        raise BlastEnvError(
-            f"the charge of {charge.mass_kg:g} kg at {charge.position_m} is {where}, but must be "
-            f"{least:.3g} m away ({LEAST_RADIUS_CELLS} cells, and its own radius)"
-        )
     if not charge.on_ground:
         clear = min(clear, max(z, least))
-    return min(clear, _farthest_corner(grid, (x, y, z)))
+    return min(max(clear, least), _farthest_corner(grid, (x, y, z)))
+
+
+def clearance_m(grid: GasGrid, charge: GasCharge) -> float:
+    """Return the distance from a charge to the nearest solid cell, infinite if there is none.
+
+    Raises:
+        BlastEnvError: If the charge is outside the grid or in a solid cell.
+    """
+    grid.cell_at(charge.position_m)  # says what is wrong outside the grid
+    clear = _distance_to_solid(grid, _centre(charge))
+    if clear <= 0.0:
+        raise BlastEnvError(
+            f"the charge of {charge.mass_kg:g} kg at {charge.position_m} is inside a solid cell"
+        )
+    return clear
+
+
+def least_clearance_m(grid: GasGrid, charge: GasCharge) -> float:
+    """Return the distance to solid cells that a charge should have: 2 cells, and its own radius.
+
+    A charge that is closer is laid onto the grid all the same, when its front has run so far; what
+    would then be in solid cells is lost, so that such a result is to be distrusted.
+    """
+    return max(charge.least_radius_m, LEAST_RADIUS_CELLS * grid.cell_m)
 
 
 def lay(

@@ -174,7 +174,7 @@ def step_length_units(balls: Balls, parameters: SimulationParameters) -> float:
 
 
 def _hash_cell(balls: Balls, parameters: SimulationParameters) -> float:
-    """Return the cell of the spatial hash: some ball diameters, or the spacing of the air."""
+    """Return the cell of the broad phase: some ball diameters, or the spacing of the air."""
     return max(4.0 * float(balls.radius.max()), parameters.air.spacing_units, MODULE_SIDE_UNITS)
 
 

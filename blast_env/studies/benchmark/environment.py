@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from blast_env.calibration.model import calibrated_engines
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.physics.collisions import CollisionLog
-from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine
-from blast_env.physics.engines import find_engine
+from blast_env.physics.engine import BallStates, BlastRun, EndReason, ParticleEngine
+from blast_env.physics.engines import find_particle_engine
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Placement, Scenario
@@ -35,7 +35,7 @@ class TimedEngine:
         seconds: Processor time in it so far.
     """
 
-    engine: Engine
+    engine: ParticleEngine
     seconds: float = 0.0
 
     @property
@@ -121,7 +121,7 @@ def measure_environment(scenario: Scenario, repeats: int) -> EnvironmentFigures:
     Raises:
         BlastEnvError: If the scenario has no build zone or no calibration.
     """
-    engine = TimedEngine(find_engine(benchmark_engine(scenario)))
+    engine = TimedEngine(find_particle_engine(benchmark_engine(scenario)))
     env = BlastBarrierEnv(scenario=scenario, engine=engine)
     rng = np.random.default_rng(0)
     _play_episode(env, rng, 0)  # compiles, where nothing is on disk yet

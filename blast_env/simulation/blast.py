@@ -1,10 +1,11 @@
-"""Running a blast: a pure function of scenario, layout, seed and engine."""
+"""Blasts of the particle engines, and `simulate` for all engines."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 import pandas as pd
@@ -18,8 +19,8 @@ from blast_env.calibration.model import (
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Cell
 from blast_env.physics.collisions import CollisionArray
-from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine
-from blast_env.physics.engines import find_engine
+from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, ParticleEngine
+from blast_env.physics.engines import find_engine, find_particle_engine, is_gas
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.provenance import versions
@@ -32,8 +33,12 @@ from blast_env.recording.tables import (
     structure_table,
 )
 from blast_env.runner import check_workers, in_order
-from blast_env.scenario import Scenario
+from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import build_scene, draw_charge
+
+if TYPE_CHECKING:
+    from blast_env.physics.gas.engine import GasEngine
+    from blast_env.simulation.gas import GasResult
 
 _PROGRESS_CALLS = 200
 
@@ -76,9 +81,19 @@ class Blast:
         drawn = draw_charge(self.scenario, self.seed) if self.charge is None else self.charge
         return replace(self, charge=drawn._replace(position_m=(x_m, y_m)))
 
+    @cached_property
+    def particle_engine(self) -> ParticleEngine:
+        """The engine itself.
+
+        Raises:
+            UnknownNameError: If there is no such engine.
+            BlastEnvError: If it is no engine of particles.
+        """
+        return find_particle_engine(self.engine)
+
     def start(self) -> BlastRun:
         """Return a run at time 0."""
-        return find_engine(self.engine).start(self.scene)
+        return self.particle_engine.start(self.scene)
 
     def run(self, progress: Callable[[float], None] | None = None) -> "BlastResult":
         """Run the blast to its end.
@@ -102,7 +117,7 @@ class Blast:
         """
         if run.end_reason is None:
             raise ValueError(f"the run is at {run.time_s} s and has not ended: advance it first")
-        engine = find_engine(self.engine)
+        engine = self.particle_engine
         return BlastResult(
             blast=self,
             engine_name=engine.name,
@@ -287,33 +302,76 @@ class BlastResult:
         return write_parquet(self, Path(path))
 
 
+@overload
+def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
+    scenario: Scenario | str | Path,
+    layout: Sequence[Cell] = ...,
+    seed: int = ...,
+    *,
+    engine: "Literal['gas'] | GasEngine",
+    charge: Charge | None = ...,
+    progress: Callable[[float], None] | None = ...,
+    cell_m: float | None = ...,
+) -> "GasResult": ...
+
+
+@overload
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
+    layout: Sequence[Cell] = ...,
+    seed: int = ...,
+    engine: str | Engine = ...,
+    charge: Charge | None = ...,
+    progress: Callable[[float], None] | None = ...,
+) -> BlastResult: ...
+
+
+def simulate(
+    scenario: Scenario | str | Path,
     layout: Sequence[Cell] = (),
     seed: int = 0,
     engine: str | Engine = "pymunk",
     charge: Charge | None = None,
     progress: Callable[[float], None] | None = None,
-) -> BlastResult:
+    cell_m: float | None = None,
+) -> "BlastResult | GasResult":
     """Run a blast to its end.
 
     The result is a pure function of the arguments, to the last bit and in any process.
 
     Args:
-        scenario: The scenario; see `load_scenario`.
+        scenario: The scenario, or its bundled name or path; see `load_scenario`.
         layout: (row, column) of the build-zone cells that hold a barrier module.
         seed: Decides the charge, where the scenario leaves it open, the fan and the air.
-        engine: Name of an engine, or an engine.
+        engine: Name of an engine, or an engine: the particle engines `"pymunk"` and `"event"`, or
+            gas dynamics, `"gas"`, for which the seed does no more than draw the charge.
         charge: The charge, instead of one drawn from the scenario.
         progress: Called from time to time with the share of the time limit that has passed.
+        cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
+
+    Returns:
+        A `BlastResult` of the particle engines, a `GasResult` of gas dynamics.
 
     Raises:
         LayoutError: If the layout does not fit the build zone.
         UnknownNameError: If there is no such engine.
         ScenarioError: If the charge is not clear of a structure or the border.
+        BlastEnvError: If `cell_m` does not divide the side of a module, or is given for an engine
+            that has no cells.
         ValueError: If the seed is negative.
     """
-    return Blast(scenario, tuple(layout), seed, engine, charge).run(progress)
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    found = find_engine(engine)
+    if is_gas(found):
+        from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
+
+        if cell_m is not None:
+            found = replace(found, cell_m=cell_m)
+        return GasBlast(scenario, tuple(layout), seed, found, charge).run(progress)
+    if cell_m is not None:
+        raise BlastEnvError(f"cell_m is {cell_m:g}: engine {found.name!r} has no cells")
+    return Blast(scenario, tuple(layout), seed, found, charge).run(progress)
 
 
 def simulate_many(

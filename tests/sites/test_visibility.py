@@ -1,4 +1,4 @@
-"""Sight lines of yards that can be told by hand."""
+"""Lines of sight of yards that can be told by hand."""
 
 from math import atan2, degrees
 
@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario, load_scenario
-from blast_env.sites import SightLines
+from blast_env.sites import Visibility
 from tests.sites.cases import COLUMNS, ROWS, block, yard, yard_document
 
 CELLS = st.tuples(st.integers(0, ROWS - 1), st.integers(0, COLUMNS - 1))
-YARD_LINES = SightLines.of(yard())
+YARD_LINES = Visibility.of(yard())
 
 
 def test_there_are_as_many_lines_as_the_house_has_degrees() -> None:
@@ -35,22 +35,22 @@ def test_half_a_wall_cuts_half() -> None:
 
 
 def test_a_module_behind_the_house_or_before_the_charge_cuts_nothing() -> None:
-    behind = SightLines.of(yard(corner_m=(18.0, 8.0), rows=8, columns=4, stock=1))
-    before = SightLines.of(yard(corner_m=(0.0, 8.0), rows=8, columns=3, stock=1))
+    behind = Visibility.of(yard(corner_m=(18.0, 8.0), rows=8, columns=4, stock=1))
+    before = Visibility.of(yard(corner_m=(0.0, 8.0), rows=8, columns=3, stock=1))
     assert not behind.cut.any()
     assert not before.cut.any()
 
 
 def test_another_structure_stops_lines_and_one_behind_does_not() -> None:
     # Its lower half stands before the lower half of the house, seen from the charge.
-    half = SightLines.of(yard(block("shed", 15.0, 7.5, 5, 1)))
+    half = Visibility.of(yard(block("shed", 15.0, 7.5, 5, 1)))
     assert half.open_share == pytest.approx(0.5, abs=0.1)
     assert len(half.weight) == round(half.open_share * len(YARD_LINES.weight))
-    assert SightLines.of(yard(block("shed", 18.0, 8.0, 8, 2))).open_share == 1.0
+    assert Visibility.of(yard(block("shed", 18.0, 8.0, 8, 2))).open_share == 1.0
 
 
 def test_a_house_that_is_hidden_has_no_lines() -> None:
-    hidden = SightLines.of(yard(block("shed", 15.0, 5.0, 20, 1)))
+    hidden = Visibility.of(yard(block("shed", 15.0, 5.0, 20, 1)))
     assert hidden.open_share == 0.0
     assert hidden.cut_share([(0, 0)]) == 0.0
 
@@ -62,7 +62,7 @@ def test_lines_count_by_the_weights_of_source_and_structure() -> None:
         {"kind": "point", "position_m": (17.0, 18.0), "tnt_kg": 100.0, "weight": 3.0}
     ]
     document["structures"][0]["weight"] = 2.0
-    lines = SightLines.of(Scenario.model_validate(document))
+    lines = Visibility.of(Scenario.model_validate(document))
     assert set(lines.weight) == {2.0, 6.0}
     of_first = lines.weight[lines.weight == 2.0].sum()
     wall = [(row, 0) for row in range(ROWS)]
@@ -79,7 +79,7 @@ def test_lines_count_by_the_weights_of_source_and_structure() -> None:
 def test_lines_leave_from_all_over_a_source(source: dict, places: int) -> None:
     document = yard_document()
     document["charge"] = [source | {"tnt_kg": 100.0}]
-    lines = SightLines.of(Scenario.model_validate(document))
+    lines = Visibility.of(Scenario.model_validate(document))
     # From further aside the house looks as wide or a little narrower.
     assert 0.6 * places < len(lines.weight) / len(YARD_LINES.weight) < 1.4 * places
 
@@ -95,12 +95,12 @@ def test_more_modules_never_cut_less_nor_more_than_they_do_apart(
 
 def test_a_scenario_without_a_zone_is_an_error() -> None:
     with pytest.raises(BlastEnvError, match="'free_field' has no build zone"):
-        SightLines.of(load_scenario("free_field"))
+        Visibility.of(load_scenario("free_field"))
 
 
-def test_bundled_scenarios_have_sight_lines() -> None:
+def test_bundled_scenarios_have_lines_of_sight() -> None:
     # Several sources, structures that hide each other, and a zone that overlaps a structure.
     for name in ("courtyard", "perimeter_gate", "street_junction"):
-        lines = SightLines.of(load_scenario(name))
+        lines = Visibility.of(load_scenario(name))
         assert 0.1 < lines.open_share <= 1.0
         assert np.isfinite(lines.weight).all()

@@ -1,0 +1,356 @@
+"""The gas engine: what a layout really does, in three dimensions and without any randomness.
+
+The site becomes a grid of cubes: structures, barrier and ground are solid, the borders are open and
+lie outside the site by a margin. The charge expands with spherical symmetry until its front reaches
+the first solid, then the solver takes over, until the loads on the structures are complete.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from math import cbrt, ceil, hypot, isclose
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.faces import Faces, exposed_faces
+from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.probes import FaceLoads, Gauges
+from blast_env.physics.gas.solver import GasSolver, Recorder, state_bytes
+from blast_env.physics.gas.source import (
+    GasCharge,
+    clearance_m,
+    least_clearance_m,
+    set_charge,
+)
+from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
+from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+
+ROOF: Final = "roof"
+FACE_NAMES: Final = (*WALLS, ROOF)
+"""The faces of a structure; those of `FaceTable.face` count through them."""
+
+CHECKED_SCALED_DISTANCE: Final = (1.7, 8.6)
+"""Where the source was checked, m/kg^(1/3) (docs/gas.md)."""
+CHECKED_CELLS: Final = 9.2
+"""Least cells per cube root of the charge's mass in kg with which it was checked, times 1 m."""
+
+_SOUND_M_S: Final = 340.0
+_MOST_BYTES: Final = 8 * 2**30
+_CHECK_STEPS: Final = 8
+_GROWTH: Final = 0.002  # of an impulse in a window, below which it is complete
+_SMALL_LOAD: Final = 0.05  # of the largest impulse: what counts at least
+_WINDOW_S: Final = 0.008  # of 100 kg; grows with the cube root of the mass
+_WINDOW_SHARE: Final = 0.3  # of the time since the wave could have come
+_NEARLY_ALL: Final = 0.98
+_LATE: Final = 1.2  # for ways round corners
+_TIME_LIMIT_S: Final = 0.1  # after that, of 100 kg
+
+Recorders = Callable[[GasGrid], Sequence[Recorder]]
+
+
+def _none(_: GasGrid) -> Sequence[Recorder]:
+    return ()
+
+
+@dataclass(frozen=True)
+class GasEngine:
+    """Runs blasts as compressible gas, in compiled code.
+
+    Attributes:
+        cell_m: Side of a cell; a module's side must be a whole number of them.
+        margin_m: How far the open borders are outside the site.
+        threads: Threads that share a blast; they change nothing but the time.
+        time_limit_s: When a run ends at the latest; by default long after the last arrival.
+
+    Raises:
+        BlastEnvError: If one of them is out of bounds.
+    """
+
+    cell_m: float = 0.5
+    margin_m: float = 4.0
+    threads: int = 1
+    time_limit_s: float | None = None
+    name: str = "gas"
+    version: str = f"gas 1 (numba {version('numba')})"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        cells = MODULE_SIDE_M / self.cell_m if self.cell_m > 0.0 else 0.0
+        if not (cells >= 1.0 and isclose(cells, round(cells), rel_tol=1e-9)):
+            raise BlastEnvError(
+                f"cell_m is {self.cell_m:g}, must be {MODULE_SIDE_M:g} m, the side of a module, "
+                "divided by a whole number"
+            )
+        if not self.margin_m >= 0.0:
+            raise BlastEnvError(f"margin_m is {self.margin_m:g}, must be at least 0")
+        if self.time_limit_s is not None and not self.time_limit_s > 0.0:
+            raise BlastEnvError(f"time_limit_s is {self.time_limit_s:g}, must be above 0")
+
+    def start_on(self, site: BlastSite, recorders: Recorders = _none) -> "GasRun":
+        """Return a run at time 0, independent of every other run.
+
+        Args:
+            site: What stands where.
+            recorders: Makes further recorders for the grid: maps, pictures.
+
+        Raises:
+            BlastEnvError: If the grid would not fit into memory, or the charge or a gauge is in a
+                solid.
+        """
+        return GasRun(self, site, recorders)
+
+
+@dataclass(frozen=True, eq=False)
+class FaceTable:
+    """The faces of structures and barrier, a cell's each.
+
+    Attributes:
+        faces: For the solver (n,).
+        structure: Index into the site's structures (n,).
+        row: Row of the module in its structure (n,).
+        column: Column of the module (n,).
+        face: Index into `FACE_NAMES` (n,).
+        centre_m: Centres (n, 3).
+    """
+
+    faces: Faces
+    structure: NDArray[np.int64]
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    face: NDArray[np.int64]
+    centre_m: FloatArray
+
+
+class GasRun:
+    """One blast on its way.
+
+    Attributes:
+        site: What stands where.
+        engine: The engine.
+        grid: The grid.
+        solver: The solver.
+        charge: The charge.
+        table: The faces on which loads are recorded.
+        loads: The loads on them.
+        gauges: The gauges, `None` without any.
+        end_reason: Why the run has ended; None while it has not.
+        notes: Why the result is to be distrusted, a sentence each.
+    """
+
+    def __init__(self, engine: GasEngine, site: BlastSite, recorders: Recorders = _none) -> None:
+        self.engine, self.site = engine, site
+        self.grid, owner = _grid(engine, site)
+        self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
+        self.notes = self._notes()
+        self.table = _face_table(self.grid, owner)
+        self.loads = FaceLoads(len(self.table.faces))
+        self.gauges = _gauges(self.grid, site)
+        own = [self.loads] if self.gauges is None else [self.loads, self.gauges]
+        self.solver = GasSolver(
+            self.grid,
+            faces=self.table.faces,
+            recorders=(*own, *recorders(self.grid)),
+            with_fuel=True,
+            burning=self.charge.burning,
+            threads=engine.threads,
+        )
+        set_charge(self.solver, self.charge)
+        self.end_reason: EndReason | None = None
+        self._groups = _groups(self.table, site)
+        # When the wave has come all over a structure; sound would not take longer than this.
+        self._reached_s = _LATE * _distances_m(self.charge, site) / _SOUND_M_S
+        scale = cbrt(self.charge.mass_kg / 100.0)
+        self._window_s = _WINDOW_S * scale
+        self.limit_s = engine.time_limit_s or float(
+            self._reached_s.max(initial=0.0) + _TIME_LIMIT_S * scale
+        )
+        self._history: list[tuple[float, FloatArray]] = []
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time so far."""
+        return self.solver.time_s
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+        return self.solver.steps
+
+    def advance(self, until_s: float) -> None:
+        """Go on until the simulated time is at least `until_s`, or the run has ended.
+
+        How a run is cut into calls does not change it.
+        """
+        while self.end_reason is None and self.solver.time_s < until_s:
+            self.solver.step()
+            if self.solver.time_s >= self.limit_s:
+                self.end_reason = EndReason.TIME_LIMIT
+            elif self.solver.steps % _CHECK_STEPS == 0 and self._is_complete():
+                self.end_reason = EndReason.LOADS_COMPLETE
+
+    def _is_complete(self) -> bool:
+        """Whether the impulse of every structure has stopped growing, and the wave has come."""
+        now_s = self.solver.time_s
+        impulse = self.loads.positive_impulse_pa_s
+        means = np.array([impulse[members].mean() for members in self._groups])
+        self._history.append((now_s, means))
+        for group, members in enumerate(self._groups):
+            if now_s < self._reached_s[group] and self._has_come(members):
+                self._reached_s[group] = now_s
+        if len(means) == 0 or not (now_s > self._reached_s).all():
+            return False
+        times = np.array([time_s for time_s, _ in self._history])
+        windows = np.maximum(self._window_s, _WINDOW_SHARE * (now_s - self._reached_s))
+        if (now_s - self._reached_s < windows).any():
+            return False
+        first = np.searchsorted(times, now_s - windows, side="right") - 1
+        before = np.array([self._history[k][1][group] for group, k in enumerate(first)])
+        least = _SMALL_LOAD * means.max()
+        return bool((means - before <= _GROWTH * np.maximum(means, least)).all())
+
+    def _has_come(self, members: NDArray[np.int64]) -> bool:
+        """Return whether a wave has come to nearly all of some faces."""
+        arrived = np.isfinite(self.loads.arrival_s[members])
+        return bool(arrived.mean() > _NEARLY_ALL)
+
+    def _notes(self) -> tuple[str, ...]:
+        """Return why the source was not checked for such a blast."""
+        clear, least = (
+            clearance_m(self.grid, self.charge),
+            least_clearance_m(self.grid, self.charge),
+        )
+        notes = []
+        if clear < least:
+            notes.append(
+                f"the charge is {clear:.2g} m from a solid, below the {least:.2g} m "
+                "that its source needs"
+            )
+        cells = cbrt(self.charge.mass_kg) / self.engine.cell_m
+        if cells < CHECKED_CELLS:
+            notes.append(
+                f"{cells:.2g} cells per m/kg^(1/3) of the charge, checked from {CHECKED_CELLS:g}: "
+                "take smaller cells"
+            )
+        return tuple(notes)
+
+
+def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
+    """Return the scaled distance of a structure's nearest point in plan, m/kg^(1/3)."""
+    distance = _distance_units(site.charge_centre, structure) / UNITS_PER_M
+    return hypot(distance, site.charge.height_m) / cbrt(site.charge.tnt_kg)
+
+
+def _grid(engine: GasEngine, site: BlastSite) -> tuple[GasGrid, NDArray[np.int64]]:
+    """Return the grid, and what each column of cells belongs to.
+
+    Returns:
+        The grid; index of the structure (-1: none), row and column of the module (3, nx, ny).
+    """
+    cell_m = engine.cell_m
+    margin = ceil(engine.margin_m / cell_m)
+    low = np.array([site.site.left, site.site.bottom]) / UNITS_PER_M
+    high = np.array([site.site.right, site.site.top]) / UNITS_PER_M
+    plan = np.ceil(np.round((high - low) / cell_m, 9)).astype(int) + 2 * margin
+    shape = (int(plan[0]), int(plan[1]), ceil(round(site.air_height_m / cell_m, 9)))
+    needed = state_bytes(shape, "single", with_fuel=True)
+    if needed > _MOST_BYTES:
+        raise BlastEnvError(
+            f"a grid of {shape[0]} x {shape[1]} x {shape[2]} cells of {cell_m:g} m would need "
+            f"{needed / 2**30:.1f} GiB, must be at most {_MOST_BYTES / 2**30:g}: take larger cells"
+        )
+    origin = low - margin * cell_m
+    x, y = (origin[axis] + cell_m * (np.arange(shape[axis]) + 0.5) for axis in (0, 1))
+    z = cell_m * (np.arange(shape[2]) + 0.5)
+    owner = np.full((3, shape[0], shape[1]), -1)
+    solid = np.zeros(shape, dtype=bool)
+    for index, outline in enumerate(site.structures):
+        row, column = _modules_at(outline, x, y)
+        here = row >= 0
+        owner[:, here] = np.stack([np.full(here.sum(), index), row[here], column[here]])
+        height_m = site.air_height_m if outline.height_m is None else outline.height_m
+        solid |= here[:, :, np.newaxis] & (z < height_m)
+    return GasGrid(cell_m, solid, (float(origin[0]), float(origin[1]), 0.0)), owner
+
+
+def _modules_at(
+    outline: StructureOutline, x_m: FloatArray, y_m: FloatArray
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return row and column of the module at each point (nx, ny); -1 where there is none."""
+    left, bottom = (coordinate / UNITS_PER_M for coordinate in outline.corner)
+    column = np.floor((x_m - left) / MODULE_SIDE_M).astype(np.int64)[:, np.newaxis]
+    row = np.floor((y_m - bottom) / MODULE_SIDE_M).astype(np.int64)[np.newaxis, :]
+    here = (column >= 0) & (column < outline.columns) & (row >= 0) & (row < outline.rows)
+    if outline.cells is not None:
+        present = np.zeros((outline.rows, outline.columns), dtype=bool)
+        present[tuple(np.array(outline.cells).T)] = True
+        here &= present[np.clip(row, 0, outline.rows - 1), np.clip(column, 0, outline.columns - 1)]
+    return np.where(here, row, -1), np.where(here, column, -1)
+
+
+def _face_table(grid: GasGrid, owner: NDArray[np.int64]) -> FaceTable:
+    faces = exposed_faces(grid, grid.solid)
+    behind = faces.solid
+    structure, row, column = owner[:, behind[:, 0], behind[:, 1]]
+    # West, east, south, north by axis and side; what looks up is the roof.
+    face = np.where(faces.axis == 2, len(WALLS), 2 * faces.axis + (faces.side > 0))
+    return FaceTable(faces, structure, row, column, face, faces.centres_m(grid))
+
+
+def _groups(table: FaceTable, site: BlastSite) -> list[NDArray[np.int64]]:
+    """Return the faces of each structure that is no barrier, walls and roof."""
+    return [
+        np.flatnonzero(table.structure == index)
+        for index, outline in enumerate(site.structures)
+        if outline.cells is None and (table.structure == index).any()
+    ]
+
+
+def _distances_m(charge: GasCharge, site: BlastSite) -> FloatArray:
+    """Return the way from the charge to the far end of each structure, m."""
+    x_m, y_m, _ = charge.position_m
+    ways = []
+    for outline in site.structures:
+        if outline.cells is None:
+            left, bottom, right, top = (side / UNITS_PER_M for side in outline.rectangle)
+            across, along = (
+                max(abs(x_m - left), abs(x_m - right)),
+                max(abs(y_m - bottom), abs(y_m - top)),
+            )
+            ways.append(hypot(across, along))
+    return np.array(ways)
+
+
+def _distance_units(point: tuple[float, float], outline: StructureOutline) -> float:
+    left, bottom, right, top = outline.rectangle
+    across = max(left - point[0], point[0] - right, 0.0)
+    along = max(bottom - point[1], point[1] - top, 0.0)
+    return hypot(across, along)
+
+
+def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:
+    """Return the gauges, each in the nearest cell of air."""
+    if not site.gauges:
+        return None
+    return Gauges(grid, [_air_cell(grid, each.name, each.position_m) for each in site.gauges])
+
+
+def _air_cell(
+    grid: GasGrid, name: str, position_m: tuple[float, float, float]
+) -> tuple[int, int, int]:
+    cell = grid.cell_at(position_m)
+    if not grid.solid[cell]:
+        return cell
+    near = [slice(max(at - 1, 0), at + 2) for at in cell]
+    air = np.argwhere(~grid.solid[tuple(near)]) + [part.start for part in near]
+    if len(air) == 0:
+        raise BlastEnvError(
+            f"gauge {name!r} at {position_m} is inside a solid, more than a cell from the air"
+        )
+    centres = np.array(grid.origin_m) + grid.cell_m * (air + 0.5)
+    nearest = air[np.argmin(((centres - position_m) ** 2).sum(axis=1))]
+    return int(nearest[0]), int(nearest[1]), int(nearest[2])

@@ -1,0 +1,410 @@
+"""A blast of the gas engine: loads in Pa s and Pa directly, no calibration between.
+
+Impulse is the sum of all positive phases; the first positive phase and the negative ones stand
+beside it. One charge and one layout have one result: there is no noise, and a seed only draws the
+charge.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from hashlib import sha256
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from blast_env.arrays import FloatArray
+from blast_env.calibration.model import ScaledImpulse
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.geometry import Cell
+from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.engine import (
+    CHECKED_SCALED_DISTANCE,
+    FACE_NAMES,
+    ROOF,
+    GasEngine,
+    GasRun,
+    scaled_distance,
+)
+from blast_env.physics.gas.probes import LoadTable
+from blast_env.physics.scene import BlastSite, Charge
+from blast_env.physics.structure import module_name
+from blast_env.provenance import versions
+from blast_env.recording.tables import RunRecord
+from blast_env.scenario import Scenario
+from blast_env.scenario.build_scene import build_site
+from blast_env.tables import Column, table_of
+from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
+
+_PROGRESS_CALLS: Final = 100
+
+_LOADS: Final = (
+    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases, mean over the area"),
+    Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase, likewise"),
+    Column("negative_impulse_pa_s", "Pa s", "impulse of all negative phases, 0 or below, likewise"),
+    Column("peak_pa", "Pa", "largest overpressure anywhere on it"),
+    Column("arrival_s", "s", "time at which 1 kPa is reached first, from the detonation"),
+)
+
+FACE_COLUMNS: Final = (
+    Column("structure", "", "name of the structure, or `barrier`"),
+    Column("face", "", "west, east, south, north or roof"),
+    Column("module_id", "", "name of the module, made from its centre in metres"),
+    Column("x_m", "m", "centre, from the left border"),
+    Column("y_m", "m", "centre, from the lower border"),
+    Column("z_m", "m", "centre, above the ground"),
+    *_LOADS,
+)
+"""A row a face of a cell."""
+
+MODULE_COLUMNS: Final = (
+    Column("module_id", "", "name of the module, made from its centre in metres"),
+    Column("structure", "", "structure that the module is part of"),
+    Column("row", "", "row in the structure's grid, upwards from 0"),
+    Column("column", "", "column in the structure's grid, to the right from 0"),
+    Column("x_m", "m", "centre, from the left border"),
+    Column("y_m", "m", "centre, from the lower border"),
+    Column("face", "", "west, east, south, north or roof"),
+    Column("area_m2", "m2", "area of that face over the whole height"),
+    *_LOADS,
+)
+"""A row a face of a module that touches air."""
+
+STRUCTURE_COLUMNS: Final = (
+    Column("structure", "", "name of the structure"),
+    Column("protected", "", "whether its load counts"),
+    Column("weight", "", "its weight among the protected structures"),
+    Column("height_m", "m", "its height"),
+    Column("faces", "", "the walls whose load counts"),
+    Column("area_m2", "m2", "their area"),
+    *_LOADS,
+    Column("most_loaded_face", "", "the wall with the largest impulse"),
+    Column("most_loaded_pa_s", "Pa s", "impulse on that wall"),
+    Column("roof_impulse_pa_s", "Pa s", "impulse on the roof; NaN where it is as high as the air"),
+)
+"""A row a structure; the loads are those on the walls that count."""
+
+GAUGE_COLUMNS: Final = (
+    Column("name", "", "name of the gauge"),
+    Column("x_m", "m", "centre of its cell, from the left border"),
+    Column("y_m", "m", "centre of its cell, from the lower border"),
+    Column("z_m", "m", "centre of its cell, above the ground"),
+    Column("arrival_s", "s", "time at which 1 kPa is reached first, from the detonation"),
+    Column("peak_pa", "Pa", "largest overpressure"),
+    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases"),
+    Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase"),
+    Column("negative_impulse_pa_s", "Pa s", "impulse of all negative phases, 0 or below"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class GasBlast:
+    """One blast of the gas engine that can be run.
+
+    Attributes:
+        scenario: The scenario.
+        layout: Cells of the build zone that hold a barrier module.
+        seed: Decides the charge, where the scenario leaves it open; nothing else.
+        engine: The engine.
+        charge: The charge, instead of one drawn from the scenario.
+    """
+
+    scenario: Scenario
+    layout: Sequence[Cell] = ()
+    seed: int = 0
+    engine: GasEngine = field(default_factory=GasEngine)
+    charge: Charge | None = None
+
+    @cached_property
+    def site(self) -> BlastSite:
+        """What stands where."""
+        return build_site(self.scenario, self.layout, self.seed, self.charge)
+
+    def run(self, progress: Callable[[float], None] | None = None) -> "GasResult":
+        """Run the blast to its end.
+
+        Args:
+            progress: Called from time to time with the share of the time limit that has passed.
+        """
+        run = self.engine.start_on(self.site)
+        while run.end_reason is None:
+            run.advance(run.time_s + run.limit_s / _PROGRESS_CALLS)
+            if progress is not None:
+                progress(min(run.time_s / run.limit_s, 1.0))
+        return GasResult(self, run)
+
+
+@dataclass(frozen=True, eq=False)
+class GasResult:
+    """What happened in a blast of the gas engine.
+
+    Attributes:
+        blast: What was run.
+        run: The run, at its end.
+    """
+
+    blast: GasBlast
+    run: GasRun
+
+    @property
+    def engine_name(self) -> str:
+        """Name of the engine."""
+        return self.blast.engine.name
+
+    @property
+    def engine_version(self) -> str:
+        """Version of the code that did the physics."""
+        return self.blast.engine.version
+
+    @property
+    def end_reason(self) -> EndReason:
+        """Why the run ended."""
+        return self.run.end_reason or EndReason.TIME_LIMIT
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time at the end."""
+        return self.run.time_s
+
+    @property
+    def steps(self) -> int:
+        """Steps of the engine."""
+        return self.run.steps
+
+    @property
+    def collisions(self) -> pd.DataFrame:
+        """There are none: a gas has no particles that collide.
+
+        Raises:
+            BlastEnvError: Always; the message says what there is instead.
+        """
+        raise BlastEnvError(
+            "engine 'gas' has no collisions: loads are in structures, modules, faces and gauges"
+        )
+
+    @cached_property
+    def faces(self) -> pd.DataFrame:
+        """One row a face of a cell, structures and barrier; see `FACE_COLUMNS`."""
+        table = self.run.table
+        outlines = self.run.site.structures
+        names = np.array([outline.name for outline in outlines], dtype=object)
+        frame = pd.DataFrame(
+            {
+                "structure": names[table.structure],
+                "face": np.array(FACE_NAMES, dtype=object)[table.face],
+                "module_id": self._module_ids,
+                "x_m": table.centre_m[:, 0],
+                "y_m": table.centre_m[:, 1],
+                "z_m": table.centre_m[:, 2],
+                **_columns(self.run.loads),
+                "row": table.row,
+                "column": table.column,
+            }
+        )
+        return frame.astype({"structure": "str", "face": "str", "module_id": "str"})
+
+    @cached_property
+    def modules(self) -> pd.DataFrame:
+        """One row a face of a module that touches air; see `MODULE_COLUMNS`."""
+        keys = ["structure", "module_id", "row", "column", "face"]
+        groups = self.faces.groupby(keys, sort=False, observed=True)
+        table = _means(groups, self._cell_area_m2).reset_index()
+        corners = {
+            outline.name: tuple(side / UNITS_PER_M for side in outline.corner)
+            for outline in self.run.site.structures
+        }
+        left, bottom = (table["structure"].map(lambda name, k=k: corners[name][k]) for k in (0, 1))
+        table["x_m"] = left + (table["column"] + 0.5) * MODULE_SIDE_M
+        table["y_m"] = bottom + (table["row"] + 0.5) * MODULE_SIDE_M
+        return table[[column.name for column in MODULE_COLUMNS]]
+
+    @cached_property
+    def structures(self) -> pd.DataFrame:
+        """One row a structure; see `STRUCTURE_COLUMNS`."""
+        rows = []
+        for outline in self.run.site.structures:
+            if outline.cells is not None:
+                continue
+            own = self.faces[self.faces["structure"] == outline.name]
+            walls = own[own["face"].isin(outline.faces)]
+            of_walls = walls.groupby("face")["positive_impulse_pa_s"].mean()
+            roof = own[own["face"] == ROOF]["positive_impulse_pa_s"]
+            height_m = outline.height_m or self.run.site.air_height_m
+            rows.append(
+                {
+                    "structure": outline.name,
+                    "protected": outline.protected,
+                    "weight": outline.weight,
+                    "height_m": height_m,
+                    "faces": " ".join(outline.faces),
+                    "area_m2": len(walls) * self._cell_area_m2,
+                    "positive_impulse_pa_s": walls["positive_impulse_pa_s"].mean(),
+                    "first_impulse_pa_s": walls["first_impulse_pa_s"].mean(),
+                    "negative_impulse_pa_s": walls["negative_impulse_pa_s"].mean(),
+                    "peak_pa": walls["peak_pa"].max(),
+                    "arrival_s": walls["arrival_s"].min(),
+                    "most_loaded_face": of_walls.idxmax() if len(of_walls) else "",
+                    "most_loaded_pa_s": of_walls.max() if len(of_walls) else np.nan,
+                    "roof_impulse_pa_s": roof.mean() if len(roof) else np.nan,
+                }
+            )
+        return table_of(rows, STRUCTURE_COLUMNS)
+
+    @cached_property
+    def gauges(self) -> pd.DataFrame:
+        """One row a gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
+        gauges, names = self.run.gauges, [each.name for each in self.run.site.gauges]
+        if gauges is None:
+            return table_of([], GAUGE_COLUMNS)
+        cells = np.array(self._gauge_cells)
+        centres = np.array(self.run.grid.origin_m) + self.run.grid.cell_m * (cells + 0.5)
+        frame = pd.DataFrame({"name": names, **_columns(gauges)})
+        frame[["x_m", "y_m", "z_m"]] = centres
+        return frame[[column.name for column in GAUGE_COLUMNS]]
+
+    def history(self, gauge: str) -> pd.DataFrame:
+        """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`.
+
+        Raises:
+            UnknownNameError: If there is no gauge of that name.
+        """
+        names = [each.name for each in self.run.site.gauges]
+        if gauge not in names or self.run.gauges is None:
+            raise UnknownNameError("gauge", gauge, names)
+        pressure = np.asarray(self.run.gauges.history_pa)[:, names.index(gauge)]
+        return pd.DataFrame({"time_s": self.run.gauges.time_s, "overpressure_pa": pressure})
+
+    def impulse(self, structure: str) -> ScaledImpulse:
+        """Return the impulse of all positive phases, mean over the walls that count.
+
+        Args:
+            structure: Name of the structure.
+
+        Returns:
+            `.pa_s`, `.psi_s`, and `.in_range` with `.notes`: whether the engine was checked for
+            such a distance, charge and cell, and the run was not cut off.
+
+        Raises:
+            UnknownNameError: If there is no structure of that name.
+        """
+        table = self.structures.set_index("structure")
+        if structure not in table.index:
+            raise UnknownNameError("structure", structure, table.index)
+        notes = self._notes(structure)
+        pa_s = float(table["positive_impulse_pa_s"].loc[structure])
+        return ScaledImpulse(pa_s / PA_PER_PSI, not notes, notes)
+
+    @cached_property
+    def module_impulse_n_s(self) -> FloatArray:
+        """Momentum on each module of the structures over its walls, N s (modules,).
+
+        In the order of the structures, row by row.
+        """
+        sums = []
+        for outline in self.run.site.structures:
+            if outline.cells is None:
+                own = self.faces[
+                    (self.faces["structure"] == outline.name) & (self.faces["face"] != ROOF)
+                ]
+                loads = np.zeros((outline.rows, outline.columns))
+                values = own["positive_impulse_pa_s"].to_numpy() * self._cell_area_m2
+                np.add.at(loads, (own["row"].to_numpy(), own["column"].to_numpy()), values)
+                sums.append(loads.ravel())
+        return np.concatenate(sums) if sums else np.zeros(0)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all loads, the gauges and the end, as hexadecimal digits."""
+        state = sha256()
+        for table in (self.run.loads, self.run.gauges):
+            if table is not None:
+                for values in _columns(table).values():
+                    state.update(np.ascontiguousarray(values).tobytes())
+        state.update(np.array([self.time_s, self.steps]).tobytes())
+        return state.hexdigest()
+
+    @cached_property
+    def run_record(self) -> RunRecord:
+        """Everything needed to repeat the run: what was run, with which versions."""
+        blast, charge, known = self.blast, self.run.site.charge, versions(self.engine_version)
+        return {
+            "scenario": blast.scenario.name,
+            "scenario hash": blast.scenario.content_hash,
+            "layout (row, column)": " ".join(f"{row},{column}" for row, column in blast.layout),
+            "charge x (m)": charge.position_m[0],
+            "charge y (m)": charge.position_m[1],
+            "charge height (m)": charge.height_m,
+            "charge TNT equivalent (kg)": charge.tnt_kg,
+            "engine": self.engine_name,
+            "cell (m)": blast.engine.cell_m,
+            "margin (m)": blast.engine.margin_m,
+            "engine version": known["engine"],
+            "blast-env version": known["blast_env"],
+            "python version": known["python"],
+            "numpy version": known["numpy"],
+            "cells": int(np.prod(self.run.grid.shape)),
+            "cell updates": self.run.solver.cell_updates,
+            "cells raised to the floor": self.run.solver.lifted,
+            "steps": self.steps,
+            "simulated time (s)": self.time_s,
+            "ended because": str(self.end_reason),
+            "digest": self.digest,
+        }
+
+    @property
+    def _cell_area_m2(self) -> float:
+        return self.run.grid.cell_m**2
+
+    @property
+    def _module_ids(self) -> list[str]:
+        table, outlines = self.run.table, self.run.site.structures
+        return [
+            module_name(
+                outlines[structure].corner[0] / UNITS_PER_M + (column + 0.5) * MODULE_SIDE_M,
+                outlines[structure].corner[1] / UNITS_PER_M + (row + 0.5) * MODULE_SIDE_M,
+            )
+            for structure, row, column in zip(table.structure, table.row, table.column, strict=True)
+        ]
+
+    @property
+    def _gauge_cells(self) -> list[tuple[int, int, int]]:
+        gauges = self.run.gauges
+        return [] if gauges is None else [tuple(cell) for cell in gauges.cells]
+
+    def _notes(self, structure: str) -> tuple[str, ...]:
+        notes = list(self.run.notes)
+        (outline,) = (each for each in self.run.site.structures if each.name == structure)
+        low, high = CHECKED_SCALED_DISTANCE
+        scaled = scaled_distance(self.run.site, outline)
+        if not low <= scaled <= high:
+            notes.append(
+                f"scaled distance {scaled:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
+            )
+        if self.end_reason is EndReason.TIME_LIMIT:
+            notes.append(f"the blast was cut off: {self.end_reason}")
+        if self.run.solver.lifted:
+            notes.append(f"{self.run.solver.lifted} cells were raised to the floor of pressure")
+        return tuple(notes)
+
+
+def _columns(loads: LoadTable) -> dict[str, FloatArray]:
+    return {
+        "positive_impulse_pa_s": loads.positive_impulse_pa_s,
+        "first_impulse_pa_s": loads.first_impulse_pa_s,
+        "negative_impulse_pa_s": loads.negative_impulse_pa_s,
+        "peak_pa": loads.peak_pa,
+        "arrival_s": loads.arrival_s,
+    }
+
+
+def _means(groups: Any, area_m2: float) -> pd.DataFrame:
+    """Return impulses as means, peaks as the largest, arrivals as the first of each group."""
+    table: pd.DataFrame = groups.agg(
+        positive_impulse_pa_s=("positive_impulse_pa_s", "mean"),
+        first_impulse_pa_s=("first_impulse_pa_s", "mean"),
+        negative_impulse_pa_s=("negative_impulse_pa_s", "mean"),
+        peak_pa=("peak_pa", "max"),
+        arrival_s=("arrival_s", "min"),
+    )
+    return table.assign(area_m2=groups.size() * area_m2)
