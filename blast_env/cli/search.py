@@ -297,7 +297,7 @@ def _visible_charge(scenario: Scenario, options: SearchOptions) -> Charge:
     charge = scenario.sample_charge(np.random.default_rng(options.seed))
     if options.charge_position_m is None:
         return charge
-    moved = Charge(options.charge_position_m, charge.tnt_kg)
+    moved = charge._replace(position_m=options.charge_position_m)
     scenario.with_charge(moved)  # refuses a place that is not clear
     return moved
 

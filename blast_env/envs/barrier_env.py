@@ -92,8 +92,9 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     `reset` alone, so that with one seed all layouts meet the same blasts.
 
     Options of `reset`: `"charge_position_m"`, (x, y) of every charge; `"tnt_kg"`, the mass of
-    every charge; `"layout"`, cells that hold a module from the start; `"blast_seed"`, the seed of
-    the first blast, the others have the following ones.
+    every charge; `"charge_height_m"`, the height of its centre above the ground (the particle
+    engines know no height); `"layout"`, cells that hold a module from the start; `"blast_seed"`,
+    the seed of the first blast, the others have the following ones.
 
     ## Episode end
     Terminated when the agent finishes, when no cell can take another module, or after
@@ -103,9 +104,9 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     Always `action_mask` and `illegal_actions`; after a step `reward_terms`; at the end
     `impulse_psi_s`, `impulse_pa_s` and `impulse_sim` (simulation units), as the reward counts
     them; `unprotected_impulse_pa_s`, the same blasts without a barrier, and `reduction`, the share
-    that the layout takes off it (NaN if nothing arrives without a barrier);
-    `layout`, `scenario_hash`, `charges` (position, kg TNT) and
-    `blast_seeds` (a tuple a charge) to repeat the blasts; `calibration` and
+    that the layout takes off it (NaN if nothing arrives without a barrier); `layout`,
+    `scenario_hash`, `charges` (position, kg TNT, height) and `blast_seeds` (a tuple a charge) to
+    repeat the blasts; `calibration` and
     `calibration_in_range`; `blasts`, `cache_hits` (loads that needed no blast) and
     `cache_hit_rate`, their share, counted since the environment was made.
 

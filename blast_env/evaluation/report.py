@@ -27,7 +27,7 @@ from blast_env.physics.engines import GAS, find_engine
 from blast_env.provenance import versions
 from blast_env.recording.tables import module_table
 from blast_env.scenario import Scenario, check_layout, load_scenario
-from blast_env.scenario.build_scene import build_scene
+from blast_env.scenario.build_scene import build_site
 from blast_env.statistics import (
     Estimate,
     check_cvar_level,
@@ -102,7 +102,7 @@ def structure_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
 def module_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
     """Return one row a module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
     threat = evaluation.threats[0]
-    scene = build_scene(evaluation.scenario, (), threat.seed, threat.charge)
+    scene = build_site(evaluation.scenario, (), threat.seed, threat.charge)
     impulse, bare = (
         np.mean([load.module_impulse_sim for load in loads], axis=0)
         for loads in (evaluation.loads, evaluation.unprotected)
