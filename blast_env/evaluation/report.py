@@ -431,14 +431,19 @@ class LayoutEvaluation:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What the calibration was not made for, a sentence a structure."""
-        notes = [] if self.engine_name == GAS else list(self.scenario.height_notes)
+        is_gas = self.engine_name == GAS
+        notes = [] if is_gas else list(self.scenario.height_notes)
+        checked = (
+            "what gas dynamics was checked for"
+            if is_gas
+            else (f"the range of calibration {self.calibration!r}")
+        )
         for of_structure in zip(*(load.structures for load in self.loads), strict=True):
             outside = [load for load in of_structure if not load.in_range]
             if outside:
                 notes.append(
                     f"{outside[0].name}: {len(outside)} of {len(self.threats)} threats are outside "
-                    f"the range that engine and calibration {self.calibration!r} were made for, "
-                    f"e.g. {'; '.join(outside[0].notes)}"
+                    f"{checked}, e.g. {'; '.join(outside[0].notes)}"
                 )
         return tuple(notes)
 

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.geometry import Rectangle
-from blast_env.physics.scene import Charge
+from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import Colour, load_colour
 from blast_env.rendering.canvas import (
     Lettering,
