@@ -46,6 +46,11 @@ class Opening:
         step = max(int(np.searchsorted(self.time_s, time_s, side="right")) - 1, 0)
         return self._over_distance(self.overpressure_pa[step], distance_m)
 
+    def overpressures_pa(self, distance_m: ArrayLike) -> Floats:
+        """Return the overpressures over time at some distances (steps, n)."""
+        distances_m = np.atleast_1d(np.asarray(distance_m, dtype=np.float64))
+        return np.stack([self._over_distance(row, distances_m) for row in self.overpressure_pa])
+
     def peak_pa(self, distance_m: ArrayLike) -> Floats:
         """Return the largest overpressures so far, 0 where the front has not been."""
         return self._over_distance(self.overpressure_pa.max(axis=0, initial=0.0), distance_m)
