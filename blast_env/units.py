@@ -21,3 +21,6 @@ MS_PER_S: Final = 1000.0
 
 PA_PER_PSI: Final = 6894.757293168
 """Pascals in a pound-force per square inch; also Pa s in a psi s."""
+
+PA_PER_KPA: Final = 1000.0
+"""Pascals in a kilopascal."""

@@ -103,12 +103,13 @@ def expected_charge(sources: Sequence[AnySource]) -> Charge:
         sources: At least one; of a scenario, or what is known of a hidden charge.
 
     Returns:
-        The means, by weight, of the places and of the masses.
+        The means, by weight, of the places, of the masses and of the heights.
     """
     weights = np.array([source.weight for source in sources])
     x_m, y_m = weights @ [source_bounds_m(source).centre for source in sources] / weights.sum()
     tnt_kg = weights @ [source.tnt_kg for source in sources] / weights.sum()
-    return Charge((float(x_m), float(y_m)), float(tnt_kg))
+    height_m = weights @ [source.height_m for source in sources] / weights.sum()
+    return Charge((float(x_m), float(y_m)), float(tnt_kg), float(height_m))
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from blast_env.evaluation.report import case_table, comparison_record
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
 from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
 from blast_env.provenance import command, versions
 from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.rendering.figures import save_figure
@@ -84,7 +85,11 @@ def _report_hidden(
     options: EvaluateOptions,
 ) -> None:
     """One layout for all the places where the charge may be."""
-    evaluator = BlastEvaluator(source.scenario, options.engine or agent.engine, cache=options.cache)
+    evaluator = BlastEvaluator(
+        source.scenario,
+        find_engine(options.engine or agent.engine, options.cell_m),
+        cache=options.cache,
+    )
     proposal = propose(agent, source.scenario, None)
     plan = LayoutPlan(source.scenario, proposal.layout, provenance=provenance)
     report_layout(plan, evaluator, seeds, options)
@@ -101,7 +106,9 @@ def _report_cases(
     """A layout for each charge, or each site."""
     options.prepare_files(len(seeds))
     cases = unseen_cases(settings, source, seeds)
-    evaluators = Evaluators(options.engine or agent.engine, options.cache)
+    evaluators = Evaluators(
+        find_engine(options.engine or agent.engine, options.cell_m), options.cache
+    )
     proposals = [propose(agent, each.scenario, each.charge) for each in cases]
     with progress_bar(f"{2 * len(cases)} blasts in {_place(settings, cases)}") as progress:
         comparison = compare(

@@ -13,6 +13,7 @@ from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.export import LayoutPlan
+from blast_env.physics.engines import find_engine
 from blast_env.scenario import LayoutFile, load_layout, load_scenario
 from blast_env.statistics import check_cvar_level
 
@@ -60,6 +61,11 @@ EngineName = Annotated[
 ]
 
 
+CellSide = Annotated[
+    float | None, typer.Option(help="Side of the cells of gas dynamics, m; 0.5 unless given.")
+]
+
+
 CvarLevel = Annotated[float, typer.Option(help="0.8: also show the mean of the worst 20 %.")]
 
 
@@ -93,6 +99,7 @@ def evaluate(
     first_seed: FirstSeed = None,
     processes: Processes = 1,
     engine: EngineName = None,
+    cell: CellSide = None,
     cvar_level: CvarLevel = CVAR_LEVEL,
     cache: CacheFolder = None,
     export: ExportPath = None,
@@ -105,7 +112,7 @@ def evaluate(
     trained on visible charges proposes a layout for each of them, any other one layout for all.
     """
     options = EvaluateOptions(
-        seeds, first_seed, processes, engine, cvar_level, cache, export, out, as_json
+        seeds, first_seed, processes, engine, cell, cvar_level, cache, export, out, as_json
     )
     with user_errors():
         check_cvar_level(cvar_level)
@@ -133,7 +140,9 @@ def _evaluate_file(path: Path, scenario: str, options: EvaluateOptions) -> None:
     chosen = load_scenario(scenario)
     cells = load_layout(path, chosen)
     plan = LayoutPlan(chosen, cells, provenance=LayoutFile.load(path).provenance)
-    evaluator = BlastEvaluator(chosen, options.engine or _ENGINE, cache=options.cache)
+    evaluator = BlastEvaluator(
+        chosen, find_engine(options.engine or _ENGINE, options.cell_m), cache=options.cache
+    )
     report_layout(plan, evaluator, options.seed_range, options)
 
 

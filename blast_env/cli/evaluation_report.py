@@ -39,6 +39,7 @@ class EvaluateOptions:
     first_seed: int | None
     processes: int
     engine: str | None
+    cell_m: float | None
     cvar_level: float
     cache: Path | None
     export: Path | None

@@ -40,6 +40,8 @@ from blast_env.evaluation import (
 from blast_env.evaluation.cases import practice_hidden, practice_visible
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.files import make_folder
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
 from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
@@ -213,7 +215,12 @@ def search(
     cvar_level: Annotated[
         float, typer.Option(help="For the risk cvar; 0.8: the mean of the worst 20 %.")
     ] = CVAR_LEVEL,
-    engine: Annotated[str, typer.Option(help="Engine that runs the blasts.")] = "event",
+    engine: Annotated[
+        str, typer.Option(help="event or pymunk (particles), or gas (gas dynamics).")
+    ] = "event",
+    cell: Annotated[
+        float | None, typer.Option(help="Side of the cells of gas dynamics, m; 0.5 unless given.")
+    ] = None,
     processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
     start_from: Annotated[
         list[Path] | None, typer.Option(help="Layout file to begin with; more than one will do.")
@@ -248,7 +255,7 @@ def search(
             engine=engine,
             start_from=tuple(str(path) for path in start_from or ()),
         )
-        evaluator = BlastEvaluator(load_scenario(scenario), engine, cache=cache)
+        evaluator = BlastEvaluator(load_scenario(scenario), find_engine(engine, cell), cache=cache)
         if out is not None:
             make_folder(out)
         run = _run(options, evaluator, processes)
@@ -265,17 +272,17 @@ def _run(options: SearchOptions, evaluator: BlastEvaluator, processes: int) -> S
     scenario = evaluator.scenario
     initial = tuple(load_layout(path, scenario) for path in options.start_from)
     method = find_search_method(options.method, initial)
-    problem = LayoutProblem(evaluator, _practice(scenario, options), processes)
+    problem = LayoutProblem(evaluator, _practice(scenario, options, evaluator.engine), processes)
     problem.unprotected_pa_s  # noqa: B018  # refuses a case in which nothing arrives
     hits, begun_s = evaluator.cache_hits, perf_counter()
     result = _with_progress(method, problem, options)
     return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)
 
 
-def _practice(scenario: Scenario, options: SearchOptions) -> Case:
+def _practice(scenario: Scenario, options: SearchOptions, engine: Engine) -> Case:
     """Return what the search may spend its blasts on."""
     model = find_threat_model(options.threat, options.threats)
-    realisations = find_realisations(options.realisations, options.threat)
+    realisations = find_realisations(options.realisations, options.threat, engine)
     risk = find_risk(options.risk, options.cvar_level)
     if not isinstance(model, HiddenThreat):
         charge = _visible_charge(scenario, options)
@@ -290,7 +297,7 @@ def _visible_charge(scenario: Scenario, options: SearchOptions) -> Charge:
     charge = scenario.sample_charge(np.random.default_rng(options.seed))
     if options.charge_position_m is None:
         return charge
-    moved = Charge(options.charge_position_m, charge.tnt_kg)
+    moved = charge._replace(position_m=options.charge_position_m)
     scenario.with_charge(moved)  # refuses a place that is not clear
     return moved
 

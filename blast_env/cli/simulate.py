@@ -12,6 +12,7 @@ import typer
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell
+from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Scenario, load_layout, load_scenario
 from blast_env.simulation import Blast, BlastResult
@@ -38,7 +39,12 @@ def simulate(
     preset: Annotated[
         str | None, typer.Option(help="Parameters of this name instead of the scenario's.")
     ] = None,
-    engine: Annotated[str, typer.Option(help="Engine that runs the blast.")] = "pymunk",
+    engine: Annotated[
+        str, typer.Option(help="pymunk or event (particles), or gas (gas dynamics).")
+    ] = "pymunk",
+    cell: Annotated[
+        float | None, typer.Option(help="Side of the cells of gas dynamics, m; 0.5 unless given.")
+    ] = None,
     charge: Annotated[
         tuple[float, float] | None,
         typer.Option(metavar="X Y", help="Where the charge is, m, instead of drawing it."),
@@ -69,7 +75,24 @@ def simulate(
         chosen = _changed(named, preset, stand_off)
         # A layout is for the site of the file; preset and stand-off are this command's.
         cells: Sequence[Cell] = () if layout is None else load_layout(layout, named)
-        blast = Blast(chosen, cells, seed, engine)
+        found = find_engine(engine, cell)
+        if is_gas(found):
+            # Here, because Numba takes half a second to import.
+            from blast_env.cli.gas_blast import GasOutput, report_gas_blast
+
+            for option, path in {
+                "--film": film,
+                "--heat-map": heat_map,
+                "--history": history,
+                "--scheme": scheme,
+                "--velocities": velocities,
+            }.items():
+                if path is not None:
+                    raise BlastEnvError(f"{option} draws particles: engine 'gas' has none")
+            output = GasOutput(excel, parquet, as_json)
+            report_gas_blast(chosen, cells, seed, found, charge, output)
+            return
+        blast = Blast(chosen, cells, seed, found)
         if charge is not None:
             blast = blast.with_charge_at(charge)
         with progress_bar(f"blast in {chosen.name}") as progress:

@@ -119,12 +119,14 @@ class ResetOptions:
     Attributes:
         charge_position_m: (x, y) of every charge.
         tnt_kg: TNT-equivalent mass of every charge.
+        charge_height_m: Height of every charge above the ground.
         layout: Cells that hold a module from the start.
         blast_seed: Seed of the first blast; the others have the following ones.
     """
 
     charge_position_m: tuple[float, float] | None = None
     tnt_kg: float | None = None
+    charge_height_m: float | None = None
     layout: Sequence[Cell] = ()
     blast_seed: int | None = None
 
@@ -140,10 +142,12 @@ class ResetOptions:
         check_names("option of reset", options, (field.name for field in fields(cls)))
         seed = options.get("blast_seed")
         tnt_kg = options.get("tnt_kg")
+        height_m = options.get("charge_height_m")
         position_m = options.get("charge_position_m")
         return cls(
             charge_position_m=None if position_m is None else _position_m(position_m),
             tnt_kg=None if tnt_kg is None else _number("tnt_kg", tnt_kg),
+            charge_height_m=None if height_m is None else _number("charge_height_m", height_m),
             layout=options.get("layout", ()),
             blast_seed=None if seed is None else whole_number("blast_seed", seed, 0, 2**63),
         )
@@ -151,13 +155,15 @@ class ResetOptions:
     @property
     def fix_charge(self) -> bool:
         """Whether anything of the charge is fixed."""
-        return self.charge_position_m is not None or self.tnt_kg is not None
+        fixed = (self.charge_position_m, self.tnt_kg, self.charge_height_m)
+        return any(each is not None for each in fixed)
 
     def charge(self, drawn: Charge) -> Charge:
         """Return a charge that was drawn, with what is fixed in its place."""
         return Charge(
             drawn.position_m if self.charge_position_m is None else self.charge_position_m,
             drawn.tnt_kg if self.tnt_kg is None else self.tnt_kg,
+            drawn.height_m if self.charge_height_m is None else self.charge_height_m,
         )
 
 

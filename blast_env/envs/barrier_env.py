@@ -40,6 +40,7 @@ from blast_env.evaluation.evaluator import Evaluators
 from blast_env.evaluation.store import BlastCache
 from blast_env.geometry import Cell
 from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
 from blast_env.scenario import Placement, Scenario
 from blast_env.statistics import Risk
 
@@ -91,8 +92,9 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     `reset` alone, so that with one seed all layouts meet the same blasts.
 
     Options of `reset`: `"charge_position_m"`, (x, y) of every charge; `"tnt_kg"`, the mass of
-    every charge; `"layout"`, cells that hold a module from the start; `"blast_seed"`, the seed of
-    the first blast, the others have the following ones.
+    every charge; `"charge_height_m"`, the height of its centre above the ground (the particle
+    engines know no height); `"layout"`, cells that hold a module from the start; `"blast_seed"`,
+    the seed of the first blast, the others have the following ones.
 
     ## Episode end
     Terminated when the agent finishes, when no cell can take another module, or after
@@ -102,8 +104,9 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     Always `action_mask` and `illegal_actions`; after a step `reward_terms`; at the end
     `impulse_psi_s`, `impulse_pa_s` and `impulse_sim` (simulation units), as the reward counts
     them; `unprotected_impulse_pa_s`, the same blasts without a barrier, and `reduction`, the share
-    that the layout takes off it; `layout`, `scenario_hash`, `charges` (position, kg TNT) and
-    `blast_seeds` (a tuple a charge) to repeat the blasts; `calibration` and
+    that the layout takes off it (NaN if nothing arrives without a barrier); `layout`,
+    `scenario_hash`, `charges` (position, kg TNT, height) and `blast_seeds` (a tuple a charge) to
+    repeat the blasts; `calibration` and
     `calibration_in_range`; `blasts`, `cache_hits` (loads that needed no blast) and
     `cache_hit_rate`, their share, counted since the environment was made.
 
@@ -120,7 +123,12 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     - `cvar_level`: the worst share 1 - `cvar_level` of the charges makes the CVaR.
     - `illegal_action_cost`: psi s; 0.001, or 6.9 Pa s, unless given.
     - `illegal_action_limit`: illegal actions that end the episode; 100 unless given.
-    - `engine`: name of an engine, or an engine.
+    - `engine`: name of an engine, or an engine. `"event"` and `"pymunk"` run the particle model:
+      for studying it, for learning methods cheaply, for a first look. `"gas"` (id
+      `BlastBarrierGas-v0`) is what a decision can rest on: three dimensions, loads without a
+      calibration, one realisation a charge since there is no noise, a second or more a blast;
+      `impulse_sim` is NaN there.
+    - `cell_m`: side of the cells of gas dynamics; 0.5 m unless given.
     - `cache`: where blasts are remembered beside the memory of the environment: a folder, which
       other processes and later runs may use too, or a cache (`blast_env.evaluation.store`).
     - `render_mode`: `None`, `"human"`, `"rgb_array"` or `"ansi"`.
@@ -187,9 +195,11 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
         illegal_action_cost: float = 0.001,
         illegal_action_limit: int = 100,
         engine: str | Engine = "event",
+        cell_m: float | None = None,
         cache: str | Path | BlastCache | None = None,
         render_mode: str | None = None,
     ) -> None:
+        found = find_engine(engine, cell_m)
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.render_mode = render_mode
@@ -201,10 +211,10 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
         self.task = Task(
             source=scenario_source(scenario),
             threat_model=find_threat_model(threat, threats),
-            realisations=find_realisations(realisations, threat),
+            realisations=find_realisations(realisations, threat, found),
             risk=find_risk(risk, cvar_level),
             observation=strategy("observation", observation, OBSERVATIONS),
-            evaluators=Evaluators(engine, cache),
+            evaluators=Evaluators(found, cache),
         )
         representative = self.task.source.representative
         self.task.evaluators.of(representative)  # so that a wrong engine fails here, not later

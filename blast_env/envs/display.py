@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from blast_env.envs.episode import Episode
 from blast_env.geometry import Rectangle
+from blast_env.physics.engines import is_gas
 from blast_env.scenario import AnySource, Placement, PointSource, Scenario
 from blast_env.scenario.zone import distances_m
 from blast_env.simulation import Blast
@@ -117,8 +118,9 @@ class Display:
             for _ in range(_FRAMES_PER_PLACEMENT):
                 self._show(self._placing_frame(episode))
             return
-        for frame in self.blast_frames(episode):
-            self._show(frame)
+        if not is_gas(episode.objective.evaluator.engine):
+            for frame in self.blast_frames(episode):
+                self._show(frame)
         self._show(self._final_frame(episode))
 
     def render(self, episode: Episode) -> Frame | str | None:
@@ -154,6 +156,8 @@ class Display:
 
     def _final_frame(self, episode: Episode) -> Frame:
         painter = self._placing_painter(episode)
+        if is_gas(episode.objective.evaluator.engine):  # no balls that could be drawn
+            return painter.paint(episode.placement, [*_state_lines(episode), _outcome(episode)])
         if self._last_frame is None:
             self._last_frame = painter.padded(_screening(episode).last_frame())
         return self._last_frame.copy()

@@ -35,6 +35,8 @@ from blast_env.evaluation.cases import Case, SeedRange, Threat
 from blast_env.evaluation.comparison import Assessment, Objective
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Cell
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import is_gas
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement, Scenario
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk
@@ -249,12 +251,17 @@ def find_threat_model(threat: str | ThreatModel, threats: int | None) -> ThreatM
     return chosen
 
 
-def find_realisations(realisations: int | None, threat: str | ThreatModel) -> int:
+def find_realisations(realisations: int | None, threat: str | ThreatModel, engine: Engine) -> int:
     """Return the number of blasts for each charge for the arguments `realisations` and `threat`.
 
     Raises:
-        BlastEnvError: If the number is out of bounds.
+        BlastEnvError: If the number is out of bounds: gas dynamics has no fan and no air to draw,
+            so that a charge has one realisation.
     """
+    if is_gas(engine):
+        if realisations not in (None, 1):
+            raise BlastEnvError(f"realisations is {realisations}, must be 1: gas has no noise")
+        return 1
     if realisations is None:
         return VISIBLE_REALISATIONS if threat == "visible" else 1
     return whole_number("realisations", realisations, 1, 1000)

@@ -34,6 +34,11 @@ def register_environments() -> None:
         kwargs={"scenario": "courtyard", "reward": "incremental"},
     )
     gym.register(
+        id="BlastBarrierGas-v0",
+        entry_point=BARRIER_ENTRY_POINT,
+        kwargs={"scenario": "courtyard", "engine": "gas"},
+    )
+    gym.register(
         id="BlastBarrierSites-v0",
         entry_point=BARRIER_ENTRY_POINT,
         kwargs={"scenario": SiteSource.training()},

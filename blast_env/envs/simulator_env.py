@@ -242,7 +242,8 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
         # With the heaviest charge every bound is the highest.
         source = max(self.scenario.charge, key=lambda source: source.tnt_kg)
         position_m = source.sample_position_m(np.random.default_rng(0))
-        scene = Blast(self.scenario, charge=Charge(position_m, source.tnt_kg)).scene
+        charge = Charge(position_m, source.tnt_kg, source.height_m)
+        scene = Blast(self.scenario, charge=charge).scene
         modules = sum(section.rows * section.columns for section in self.scenario.structures)
         stepping = scene.parameters.stepping
         # A step of the engine can begin just before the time limit.

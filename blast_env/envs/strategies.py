@@ -39,9 +39,7 @@ class VisibleThreat:
         charges: tuple[Charge, ...],
     ) -> tuple[AnySource, ...]:
         """Return the charge itself."""
-        return tuple(
-            PointSource(position_m=each.position_m, tnt_kg=each.tnt_kg) for each in charges
-        )
+        return tuple(PointSource.at(each) for each in charges)
 
 
 @dataclass(frozen=True)

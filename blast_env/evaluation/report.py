@@ -23,10 +23,11 @@ from blast_env.evaluation.store import BlastCache
 from blast_env.files import write_atomically
 from blast_env.geometry import Cell, Layout
 from blast_env.physics.engine import Engine
+from blast_env.physics.engines import GAS, find_engine
 from blast_env.provenance import versions
 from blast_env.recording.tables import module_table
-from blast_env.scenario import Scenario, check_layout
-from blast_env.scenario.build_scene import build_scene
+from blast_env.scenario import Scenario, check_layout, load_scenario
+from blast_env.scenario.build_scene import build_site
 from blast_env.statistics import (
     Estimate,
     check_cvar_level,
@@ -101,7 +102,7 @@ def structure_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
 def module_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
     """Return one row a module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
     threat = evaluation.threats[0]
-    scene = build_scene(evaluation.scenario, (), threat.seed, threat.charge)
+    scene = build_site(evaluation.scenario, (), threat.seed, threat.charge)
     impulse, bare = (
         np.mean([load.module_impulse_sim for load in loads], axis=0)
         for loads in (evaluation.loads, evaluation.unprotected)
@@ -430,14 +431,19 @@ class LayoutEvaluation:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What the calibration was not made for, a sentence a structure."""
-        notes = []
+        is_gas = self.engine_name == GAS
+        notes = [] if is_gas else list(self.scenario.height_notes)
+        checked = (
+            "what gas dynamics was checked for"
+            if is_gas
+            else (f"the range of calibration {self.calibration!r}")
+        )
         for of_structure in zip(*(load.structures for load in self.loads), strict=True):
             outside = [load for load in of_structure if not load.in_range]
             if outside:
                 notes.append(
                     f"{outside[0].name}: {len(outside)} of {len(self.threats)} threats are outside "
-                    f"the range that engine and calibration {self.calibration!r} were made for, "
-                    f"e.g. {'; '.join(outside[0].notes)}"
+                    f"{checked}, e.g. {'; '.join(outside[0].notes)}"
                 )
         return tuple(notes)
 
@@ -464,7 +470,7 @@ class LayoutEvaluation:
 
 
 def evaluate_layout(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     layout: Sequence[Cell],
     seeds: Iterable[int] = range(16),
     processes: int = 1,
@@ -474,6 +480,7 @@ def evaluate_layout(
     cvar_level: float = CVAR_LEVEL,
     cache: str | Path | BlastCache | None = None,
     progress: Callable[[float], None] | None = None,
+    cell_m: float | None = None,
 ) -> LayoutEvaluation:
     """Return how much a layout takes off the protected structures, and how sure that is.
 
@@ -481,7 +488,8 @@ def evaluate_layout(
     threats. Use seeds that the layout was not chosen on: on the others it looks better than it is.
 
     Args:
-        scenario: The scenario; it must name a calibration.
+        scenario: The scenario, or its bundled name or path; for the particle engines it must name
+            a calibration.
         layout: (row, column) of the build-zone cells that hold a barrier module, in any order.
         seeds: At least one, none twice; 16 or more for an interval worth having.
         processes: Worker processes; they change nothing but the time.
@@ -490,6 +498,8 @@ def evaluate_layout(
         cvar_level: The worst share 1 - `cvar_level` of the threats makes the CVaR.
         cache: Folder or cache of blasts that were run before; see `BlastEvaluator`.
         progress: Called with the share of the blasts that is done.
+        cell_m: Side of the cells of gas dynamics, 0.5 m unless given. A seed then only draws the
+            charge: a charge has one realisation, and no calibration is needed.
 
     Raises:
         LayoutError: If the layout does not fit the build zone.
@@ -501,7 +511,9 @@ def evaluate_layout(
             `processes` or `cvar_level` is out of bounds, or if nothing arrives at the protected
             structures even without a barrier.
     """
-    evaluator = BlastEvaluator(scenario, engine, cache=cache)
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    evaluator = BlastEvaluator(scenario, find_engine(engine, cell_m), cache=cache)
     drawn = draw_threats(scenario, seeds) if threats is None else tuple(threats)
     return evaluate_against(
         evaluator, layout, drawn, processes, cvar_level=cvar_level, progress=progress

@@ -1,6 +1,7 @@
 """The engines that come with the package, by name: a new one is a file and a line here."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, cast
@@ -29,19 +30,32 @@ GAS: Final = "gas"
 """Gas dynamics: no particles, no seed, no calibration."""
 
 
-def find_engine(engine: str | Engine) -> Engine:
+def find_engine(engine: str | Engine, cell_m: float | None = None) -> Engine:
     """Return an engine by its name, or the engine itself.
+
+    Args:
+        engine: The name, or the engine.
+        cell_m: Side of the cells of gas dynamics; that of the engine unless given.
 
     Raises:
         UnknownNameError: If there is no engine of that name.
+        BlastEnvError: If `cell_m` does not divide the side of a module, or is given for an engine
+            that has no cells.
     """
-    if not isinstance(engine, str):
-        return engine
-    if engine not in _CLASSES:
-        raise UnknownNameError("engine", engine, ENGINE_NAMES)
-    module, _, name = _CLASSES[engine].partition(":")
-    found: Engine = getattr(import_module(module), name)()
-    return found
+    found = engine if not isinstance(engine, str) else _made(engine)
+    if cell_m is None:
+        return found
+    if not is_gas(found):
+        raise BlastEnvError(f"cell_m is {cell_m:g}, but engine {found.name!r} has no cells")
+    return replace(found, cell_m=cell_m)
+
+
+def _made(name: str) -> Engine:
+    if name not in _CLASSES:
+        raise UnknownNameError("engine", name, ENGINE_NAMES)
+    module, _, kind = _CLASSES[name].partition(":")
+    made: Engine = getattr(import_module(module), kind)()
+    return made
 
 
 def find_particle_engine(engine: str | Engine) -> ParticleEngine:

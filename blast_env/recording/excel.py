@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,6 +22,7 @@ from blast_env.recording.tables import (
     MODULE_COLUMNS,
     STRUCTURE_COLUMNS,
     RecordedBlast,
+    RunRecord,
 )
 from blast_env.tables import Column
 
@@ -43,6 +45,9 @@ _NUMBER_FORMATS: Final[Mapping[str, str]] = MappingProxyType(
         "sim": "#,##0.00",
         "sim mass": "0.0000",
         "sim units/s": "#,##0.0",
+        "Pa s": "#,##0.0",
+        "Pa": "#,##0",
+        "m2": "#,##0.00",
     }
 )
 
@@ -378,13 +383,45 @@ def write_workbook(
         BlastEnvError: If the suffix is another one or the file cannot be written there.
         ValueError: If `max_rows_per_sheet` is less than 2 or more than Excel allows.
     """
-    path = Path(path)
-    if path.suffix.lower() != SUFFIX:
-        raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
     if not 2 <= max_rows_per_sheet <= EXCEL_ROWS:
         raise ValueError(
             f"max_rows_per_sheet is {max_rows_per_sheet}, must be between 2 and {EXCEL_ROWS}"
         )
+    with _workbook(path) as workbook:
+        _WorkbookWriter(workbook, max_rows_per_sheet).write(blast)
+    return Path(path)
+
+
+class SheetTable(NamedTuple):
+    """A table for a sheet of its own, with what its columns mean."""
+
+    name: str
+    table: pd.DataFrame
+    columns: Sequence[Column]
+
+
+def write_tables(record: RunRecord, tables: Sequence[SheetTable], path: str | Path) -> Path:
+    """Write a workbook with a run record and tables, and a sheet that explains their columns.
+
+    As `write_workbook`: whole or not at all, and the same to the last byte for the same content.
+
+    Returns:
+        The path.
+
+    Raises:
+        BlastEnvError: If the suffix is another one or the file cannot be written there.
+    """
+    with _workbook(path) as workbook:
+        _WorkbookWriter(workbook, EXCEL_ROWS).write_tables(record, tables)
+    return Path(path)
+
+
+@contextmanager
+def _workbook(path: str | Path) -> Iterator[Any]:
+    """Give an empty workbook that becomes the file when the block ends well."""
+    path = Path(path)
+    if path.suffix.lower() != SUFFIX:
+        raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
     with write_atomically(path) as temporary:
         try:
             with (
@@ -395,10 +432,9 @@ def write_workbook(
                 ) as workbook,
             ):
                 workbook.use_zip64()
-                _WorkbookWriter(workbook, max_rows_per_sheet).write(blast)
+                yield workbook
         except (OSError, XlsxFileError) as error:
             raise BlastEnvError(f"{path}: cannot be written: {error}") from error
-    return path
 
 
 class _WorkbookWriter:
@@ -420,23 +456,38 @@ class _WorkbookWriter:
         self._number_heading = workbook.add_format(heading | {"align": "right", "indent": 0})
 
     def write(self, blast: RecordedBlast) -> None:
-        """Write all sheets and the properties."""
+        """Write all sheets of a blast of particles, with charts, and the properties."""
         record = blast.run_record
+        self._set_properties(record, f"Blast {record['scenario']}, seed {record['seed']}")
+        run = self._write_run(record)
+        tables = (
+            SheetTable("Structures", blast.structures, STRUCTURE_COLUMNS),
+            SheetTable("Modules", blast.modules, MODULE_COLUMNS),
+            SheetTable("Collisions", blast.collisions, COLLISION_COLUMNS),
+        )
+        for each in tables:
+            self._write_table(*each)
+        data = chart_data(blast)
+        self._write_sheet(_CHART_SHEET, data.table, data.columns)
+        add_charts(self._workbook, run, _CHART_COLUMN, _CHART_SHEET, data)
+        self._write_columns(tables, _UNITS)
+
+    def write_tables(self, record: RunRecord, tables: Sequence[SheetTable]) -> None:
+        """Write a run record and tables, and the properties."""
+        self._set_properties(record, f"Blast {record['scenario']}, engine {record['engine']}")
+        self._write_run(record)
+        for each in tables:
+            self._write_table(*each)
+        self._write_columns(tables, ())
+
+    def _set_properties(self, record: RunRecord, title: str) -> None:
         self._workbook.set_properties(
             {
-                "title": f"Blast {record['scenario']}, seed {record['seed']}",
+                "title": title,
                 "comments": f"blast-env {record['blast-env version']}, digest {record['digest']}",
                 "created": _CREATED,
             }
         )
-        run = self._write_run(record)
-        self._write_table("Structures", blast.structures, STRUCTURE_COLUMNS)
-        self._write_table("Modules", blast.modules, MODULE_COLUMNS)
-        self._write_table("Collisions", blast.collisions, COLLISION_COLUMNS)
-        data = chart_data(blast)
-        self._write_sheet(_CHART_SHEET, data.table, data.columns)
-        add_charts(self._workbook, run, _CHART_COLUMN, _CHART_SHEET, data)
-        self._write_columns()
 
     def _add_sheet(self, name: str, headings: Sequence[Heading]) -> Any:
         """Add a sheet with a frozen row of headings, and return it."""
@@ -501,19 +552,16 @@ class _WorkbookWriter:
                 if cell is not None:
                     write(row, index, cell, cell_format)
 
-    def _write_columns(self) -> None:
+    def _write_columns(
+        self, tables: Sequence[SheetTable], units: Sequence[tuple[str, str]]
+    ) -> None:
         """Write what every column and every unit means."""
-        tables = {
-            "Structures": STRUCTURE_COLUMNS,
-            "Modules": MODULE_COLUMNS,
-            "Collisions": COLLISION_COLUMNS,
-        }
         rows = [
-            (sheet, header(column), column.unit, column.meaning)
-            for sheet, columns in tables.items()
-            for column in columns
+            (each.name, header(column), column.unit, column.meaning)
+            for each in tables
+            for column in each.columns
         ]
-        rows += [("", "", unit, meaning) for unit, meaning in _UNITS]
+        rows += [("", "", unit, meaning) for unit, meaning in units]
         names = [column.name for column in _EXPLANATION_COLUMNS]
         self._write_sheet("Columns", pd.DataFrame(rows, columns=names), _EXPLANATION_COLUMNS)
 

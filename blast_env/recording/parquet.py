@@ -1,6 +1,7 @@
 """The collision table as Parquet, with the run record, the units and the meanings in the file."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,7 +11,8 @@ import pyarrow.parquet as pq
 
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.recording.tables import COLLISION_COLUMNS, RecordedBlast
+from blast_env.recording.tables import COLLISION_COLUMNS, RecordedBlast, RunRecord
+from blast_env.tables import Column
 
 METADATA_KEY: Final = b"blast_env"
 """Key of the run record, as JSON, in the metadata of the file."""
@@ -34,10 +36,30 @@ def write_parquet(blast: RecordedBlast, path: str | Path) -> Path:
     Raises:
         BlastEnvError: If the suffix is another one or the file cannot be written there.
     """
+    return write_table(blast.collisions, COLLISION_COLUMNS, blast.run_record, path)
+
+
+def write_table(
+    frame: pd.DataFrame, columns: Sequence[Column], record: RunRecord, path: str | Path
+) -> Path:
+    """Write a table as `write_parquet` writes the collisions.
+
+    Args:
+        frame: The table.
+        columns: Its columns.
+        record: The run record.
+        path: The file, with the suffix `.parquet`; an existing one is replaced.
+
+    Returns:
+        The path.
+
+    Raises:
+        BlastEnvError: If the suffix is another one or the file cannot be written there.
+    """
     path = Path(path)
     if path.suffix.lower() != SUFFIX:
         raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
-    table = _arrow_table(blast)
+    table = _arrow_table(frame, columns, record)
     with write_atomically(path) as temporary:
         try:
             pq.write_table(table, temporary)
@@ -71,18 +93,18 @@ def read_parquet(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
     return table.to_pandas(), _run_record(path, table.schema.metadata or {})
 
 
-def _arrow_table(blast: RecordedBlast) -> pa.Table:
-    """Return the collision table with all its metadata."""
-    table = pa.Table.from_pandas(blast.collisions, preserve_index=False)
-    columns = {column.name: column for column in COLLISION_COLUMNS}
+def _arrow_table(frame: pd.DataFrame, columns: Sequence[Column], record: RunRecord) -> pa.Table:
+    """Return a table with all its metadata."""
+    table = pa.Table.from_pandas(frame, preserve_index=False)
+    by_name = {column.name: column for column in columns}
     fields = [
         field.with_metadata(
-            {"unit": columns[field.name].unit, "meaning": columns[field.name].meaning}
+            {"unit": by_name[field.name].unit, "meaning": by_name[field.name].meaning}
         )
         for field in table.schema
     ]
-    record = json.dumps(blast.run_record, ensure_ascii=False).encode()
-    metadata = {**table.schema.metadata, METADATA_KEY: record}
+    content = json.dumps(record, ensure_ascii=False).encode()
+    metadata = {**table.schema.metadata, METADATA_KEY: content}
     return table.cast(pa.schema(fields, metadata=metadata))
 
 

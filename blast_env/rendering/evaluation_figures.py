@@ -11,7 +11,7 @@ from blast_env.evaluation.cases import Case
 from blast_env.evaluation.comparison import Comparison
 from blast_env.evaluation.report import LayoutEvaluation
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Scene, StructureOutline
+from blast_env.physics.scene import BlastSite, StructureOutline
 from blast_env.physics.structure import ModularObstacle
 from blast_env.rendering.site_plan import (
     draw_charge,
@@ -39,7 +39,7 @@ from blast_env.rendering.style import (
     unit_interval,
 )
 from blast_env.scenario import BuildZone
-from blast_env.scenario.build_scene import build_scene
+from blast_env.scenario.build_scene import build_site
 from blast_env.statistics import Estimate
 
 with render_extra():
@@ -56,7 +56,7 @@ with render_extra():
 _PERCENT = 100.0
 
 
-def draw_plan(axes: Axes, evaluation: LayoutEvaluation, scene: Scene) -> None:
+def draw_plan(axes: Axes, evaluation: LayoutEvaluation, scene: BlastSite) -> None:
     """Draw the site, the layout, and the charges in the colours of their reductions."""
     draw_layout(axes, evaluation.scenario.build_zone, scene)
     _draw_charges(axes, evaluation)
@@ -64,7 +64,7 @@ def draw_plan(axes: Axes, evaluation: LayoutEvaluation, scene: Scene) -> None:
     axes.set_title("Site, layout and charges", fontsize=11)
 
 
-def draw_layout(axes: Axes, zone: BuildZone | None, scene: Scene) -> None:
+def draw_layout(axes: Axes, zone: BuildZone | None, scene: BlastSite) -> None:
     """Draw the site and what stands on it, the modules of the barrier as filled squares."""
     draw_site(axes, in_metres(scene.site))
     if zone is not None:
@@ -103,7 +103,7 @@ def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
     bar.set_label("charges: reduction of the impulse on the protected structures (%)")
 
 
-def plan_legend(evaluation: LayoutEvaluation, scene: Scene) -> list[Artist]:
+def plan_legend(evaluation: LayoutEvaluation, scene: BlastSite) -> list[Artist]:
     """Return the legend entries for what the plan shows."""
     handles: list[Artist] = [_charge_handle("o", "charge")]
     if not evaluation.in_range:
@@ -152,7 +152,7 @@ def _worst_ring(*position_m: float) -> Line2D:
     )
 
 
-def what_stands(scene: Scene) -> list[StructureOutline]:
+def what_stands(scene: BlastSite) -> list[StructureOutline]:
     """Return what names should not cover: structures, and the barrier's modules one by one."""
     obstacles = [outline for outline in scene.structures if outline.cells is None]
     for outline in scene.structures:
@@ -201,7 +201,7 @@ def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
     lower = right[1].subgridspec(1, 2)
     modules = [figure.add_subplot(lower[column]) for column in range(2)]
     threat = evaluation.threats[0]
-    scene = build_scene(evaluation.scenario, evaluation.layout, threat.seed, threat.charge)
+    scene = build_site(evaluation.scenario, evaluation.layout, threat.seed, threat.charge)
     draw_plan(plan, evaluation, scene)
     _draw_threats(threats, evaluation)
     _draw_modules(modules, evaluation, scene)
@@ -291,7 +291,7 @@ def _name_threats(axes: Axes, seeds: Sequence[int]) -> None:
     axes.set_xlabel(f"seed of the threat{bands}")
 
 
-def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: Scene) -> None:
+def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: BlastSite) -> None:
     """Draw the mean load on the modules of one structure, without and with the barrier."""
     table = evaluation.table.set_index("structure")
     protected = table[table.protected]
@@ -382,10 +382,10 @@ class _Panel:
     reduction: float
     in_range: bool
 
-    def scene(self) -> Scene:
+    def scene(self) -> BlastSite:
         """Return the site with the layout and the first charge."""
         threat = self.case.threats[0]
-        return build_scene(self.case.scenario, self.layout, threat.seed, threat.charge)
+        return build_site(self.case.scenario, self.layout, threat.seed, threat.charge)
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
@@ -449,7 +449,7 @@ def _empty_panels(shown: Sequence[_Panel], columns: int) -> tuple[Figure, list[A
     return figure, panels[: len(shown)]
 
 
-def _draw_case(axes: Axes, panel: _Panel, scene: Scene, name: str) -> None:
+def _draw_case(axes: Axes, panel: _Panel, scene: BlastSite, name: str) -> None:
     draw_layout(axes, panel.case.scenario.build_zone, scene)
     draw_charge(axes, panel.case.threats[0].charge.position_m)
     axes.tick_params(labelsize=7.5)

@@ -148,8 +148,8 @@ def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
     """
     if charge.height_m == 0.0:
         return
-    (x_m, y_m), tnt_kg, _ = charge
-    place = PointSource(position_m=(x_m, y_m), tnt_kg=tnt_kg)
+    x_m, y_m = charge.position_m
+    place = PointSource.at(charge)
     for structure in scenario.structures:
         if distance_m(place, structure.rectangle_m) < scenario.charge_radius_m - TOLERANCE_M:
             message = (

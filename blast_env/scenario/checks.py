@@ -1,4 +1,4 @@
-"""Checks of a build zone against what stands around it: whether anything can be built at all."""
+"""Checks between the sections of a scenario: whether they fit each other."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,8 +16,15 @@ from blast_env.physics.parameters import AirParameters, SimulationParameters
 from blast_env.physics.particles import lattice_capacity
 from blast_env.physics.presets import for_charge
 from blast_env.physics.structure import BARRIER_NAME
+from blast_env.scenario.heights import air_height_m, depth_inside_m, is_over
 from blast_env.scenario.problems import Problem, extent
-from blast_env.scenario.sections import AnySource, AnyStructure, SimulationSection, Site
+from blast_env.scenario.sections import (
+    AnySource,
+    AnyStructure,
+    GaugeSection,
+    SimulationSection,
+    Site,
+)
 from blast_env.scenario.versions import MAX_ITEMS
 from blast_env.scenario.zone import (
     TOLERANCE_M,
@@ -107,6 +114,9 @@ _STRUCTURE: Final[TypeAdapter[AnyStructure]] = TypeAdapter(AnyStructure)
 _BUILD_ZONE: Final = TypeAdapter(BuildZone)
 
 
+_GAUGE: Final = TypeAdapter(GaugeSection)
+
+
 _SIMULATION: Final = TypeAdapter(SimulationSection)
 
 
@@ -121,6 +131,7 @@ class Parts:
         all_structures: Whether there are no structures but the sound ones.
         build_zone: The build zone, if there is one and it is sound.
         parameters: The parameters of the blast model, if they are sound.
+        gauges: The sound gauges, by their index.
     """
 
     site: Site | None
@@ -129,6 +140,14 @@ class Parts:
     all_structures: bool
     build_zone: BuildZone | None
     parameters: SimulationParameters | None
+    gauges: Mapping[int, GaugeSection]
+
+    @property
+    def air_height_m(self) -> float:
+        """Height of the air; infinite where an unsound section may decide it."""
+        if self.site is None or (self.site.air_height_m is None and not self.all_structures):
+            return math.inf
+        return air_height_m(self.site, self.structures.values(), self.build_zone)
 
     @property
     def charge_radius_m(self) -> float:
@@ -154,6 +173,7 @@ def sound_parts(document: Mapping[str, Any]) -> Parts:
         all_structures=isinstance(listed, list | tuple) and len(structures) == len(listed) > 0,
         build_zone=_sound(_BUILD_ZONE, document.get("build_zone")),
         parameters=None if simulation is None else simulation.parameters,
+        gauges=_sound_items(_GAUGE, document.get("gauges")),
     )
 
 
@@ -165,6 +185,8 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
         *_charge_problems(parts),
         *_build_zone_problems(parts),
         *_simulation_problems(parts),
+        *_height_problems(parts),
+        *_gauge_problems(parts),
     )
 
 
@@ -197,17 +219,26 @@ def _sound_items(adapter: TypeAdapter[Item], values: object) -> dict[int, Item]:
 
 def _name_problems(parts: Parts) -> Iterator[Problem]:
     """Check the names of the structures, and that one of them is protected."""
-    first_use: dict[str, int] = {}
     for index, structure in parts.structures.items():
-        key = f"structures[{index}].name"
         if structure.name == BARRIER_NAME:
-            yield Problem(key, f"is {BARRIER_NAME!r}, the name of the modules of a layout")
-        used = first_use.setdefault(structure.name, index)
-        if used != index:
-            yield Problem(key, f"is {structure.name!r}, already the name of structures[{used}]")
+            message = f"is {BARRIER_NAME!r}, the name of the modules of a layout"
+            yield Problem(f"structures[{index}].name", message)
+    yield from _repeated_names("structures", parts.structures)
     protected = any(structure.protected for structure in parts.structures.values())
     if parts.all_structures and not protected:
         yield Problem("structures", "none is protected, at least one must have protected = true")
+
+
+def _repeated_names(
+    key: str, items: Mapping[int, AnyStructure] | Mapping[int, GaugeSection]
+) -> Iterator[Problem]:
+    """Yield the names that another item of the array has already."""
+    first_use: dict[str, int] = {}
+    for index, item in items.items():
+        used = first_use.setdefault(item.name, index)
+        if used != index:
+            message = f"is {item.name!r}, already the name of {key}[{used}]"
+            yield Problem(f"{key}[{index}].name", message)
 
 
 def _structure_problems(parts: Parts) -> Iterator[Problem]:
@@ -234,12 +265,15 @@ def _charge_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(f"charge[{index}]", message)
         for j, structure in parts.structures.items():
             distance = distance_m(source, structure.rectangle_m)
-            if distance < radius - TOLERANCE_M:
+            if distance < radius - TOLERANCE_M and not is_over(source.height_m, structure):
                 message = (
                     f"its centre comes as near as {distance:g} m to structures[{j}],"
                     f" {_described(structure)}, must keep clear of it{words}"
                 )
+                if structure.height_m is not None:
+                    message += f", or be higher than its {structure.height_m:g} m"
                 yield Problem(f"charge[{index}]", message)
+        yield from _above_the_air(parts, f"charge[{index}].height_m", source.height_m)
 
 
 def _build_zone_problems(parts: Parts) -> Iterator[Problem]:
@@ -252,6 +286,43 @@ def _build_zone_problems(parts: Parts) -> Iterator[Problem]:
     )
     structures, sources = tuple(parts.structures.values()), tuple(parts.sources.values())
     yield from build_zone_problems(Surroundings(zone, structures, sources, parts.charge_radius_m))
+
+
+def _height_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that nothing sticks out of the air."""
+    for index, structure in parts.structures.items():
+        yield from _above_the_air(parts, f"structures[{index}].height_m", structure.height_m)
+    if parts.build_zone is not None:
+        yield from _above_the_air(parts, "build_zone.height_m", parts.build_zone.height_m)
+
+
+def _gauge_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that each gauge has a name of its own, and air around it or near it."""
+    yield from _repeated_names("gauges", parts.gauges)
+    for index, gauge in parts.gauges.items():
+        key, (x_m, y_m, z_m) = f"gauges[{index}].position_m", gauge.position_m
+        place = f"({x_m:g}, {y_m:g})"
+        yield from _outside_site(parts, key, place, Rectangle(x_m, y_m, x_m, y_m))
+        yield from _above_the_air(parts, f"{key}[2]", z_m)
+        for j, structure in parts.structures.items():
+            depth_m = depth_inside_m(gauge.position_m, structure)
+            if depth_m > MODULE_SIDE_M + TOLERANCE_M:
+                top = "" if structure.height_m is None else f", {structure.height_m:g} m high"
+                message = (
+                    f"{place}, {z_m:g} m high, is {depth_m:g} m deep inside structures[{j}],"
+                    f" {_described(structure)}{top}, must be at most {MODULE_SIDE_M:g} m deep"
+                )
+                yield Problem(key, message)
+
+
+def _above_the_air(parts: Parts, key: str, height_m: float | None) -> Iterator[Problem]:
+    """Yield a problem if a height is above the air."""
+    if height_m is not None and height_m > parts.air_height_m + TOLERANCE_M:
+        message = (
+            f"is {height_m:g}, must be at most {parts.air_height_m:g}, the height of the air"
+            " (which site.air_height_m can raise)"
+        )
+        yield Problem(key, message)
 
 
 def _simulation_problems(parts: Parts) -> Iterator[Problem]:

@@ -38,6 +38,17 @@ def is_over(height_m: float, structure: AnyStructure) -> bool:
     return structure.height_m is not None and height_m > structure.height_m
 
 
+def depth_inside_m(position_m: tuple[float, float, float], structure: AnyStructure) -> float:
+    """Return how far it is from a place to the nearest air beside or above a structure.
+
+    Negative or 0 outside.
+    """
+    x_m, y_m, z_m = position_m
+    left, bottom, right, top = structure.rectangle_m
+    depth_m = min(x_m - left, right - x_m, y_m - bottom, top - y_m)
+    return depth_m if structure.height_m is None else min(depth_m, structure.height_m - z_m)
+
+
 def height_notes(
     structures: Iterable[AnyStructure],
     sources: Iterable[AnySource],

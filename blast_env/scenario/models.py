@@ -327,6 +327,7 @@ class Scenario(Section):
             all_structures=True,
             build_zone=self.build_zone,
             parameters=self.parameters,
+            gauges=dict(enumerate(self.gauges)),
         )
 
 

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -25,7 +25,7 @@ from pydantic import (
 from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import PRESETS, preset
-from blast_env.physics.scene import WALLS, WallName
+from blast_env.physics.scene import WALLS, Charge, WallName
 from blast_env.scenario.problems import (
     Problem,
     ScenarioError,
@@ -110,6 +110,15 @@ class PointSource(ChargeSource):
     kind: Literal["point"] = "point"
     position_m: PointM
 
+    @classmethod
+    def at(cls, charge: Charge) -> Self:
+        """Return the source of one charge.
+
+        Raises:
+            ValidationError: If the charge is out of bounds.
+        """
+        return cls(position_m=charge.position_m, tnt_kg=charge.tnt_kg, height_m=charge.height_m)
+
     @property
     def segment_m(self) -> tuple[PointM, PointM]:
         """Start and end of the diagonal that the source spans."""
@@ -167,7 +176,7 @@ def _check_faces(faces: tuple[WallName, ...]) -> tuple[WallName, ...]:
     """Refuse a wall that is named twice, and return the walls in the usual order."""
     for wall in WALLS:
         if faces.count(wall) > 1:
-            raise ValueError(f"names {wall!r} twice, must name each wall at most once")
+            raise ValueError(f"must name each wall at most once, not {wall!r} twice")
     return tuple(wall for wall in WALLS if wall in faces)
 
 

@@ -362,15 +362,11 @@ def simulate(
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
-    found = find_engine(engine)
+    found = find_engine(engine, cell_m)
     if is_gas(found):
         from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
 
-        if cell_m is not None:
-            found = replace(found, cell_m=cell_m)
         return GasBlast(scenario, tuple(layout), seed, found, charge).run(progress)
-    if cell_m is not None:
-        raise BlastEnvError(f"cell_m is {cell_m:g}: engine {found.name!r} has no cells")
     return Blast(scenario, tuple(layout), seed, found, charge).run(progress)
 
 

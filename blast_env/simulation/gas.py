@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -31,6 +32,8 @@ from blast_env.physics.gas.probes import LoadTable
 from blast_env.physics.scene import BlastSite, Charge
 from blast_env.physics.structure import module_name
 from blast_env.provenance import versions
+from blast_env.recording.excel import SheetTable, write_tables
+from blast_env.recording.parquet import write_table
 from blast_env.recording.tables import RunRecord
 from blast_env.scenario import Scenario
 from blast_env.scenario.build_scene import build_site
@@ -351,6 +354,34 @@ class GasResult:
             "ended because": str(self.end_reason),
             "digest": self.digest,
         }
+
+    def to_excel(self, path: str | Path) -> Path:
+        """Write a workbook with structures, modules, gauges and the run record.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        tables = (
+            SheetTable("Structures", self.structures, STRUCTURE_COLUMNS),
+            SheetTable("Modules", self.modules, MODULE_COLUMNS),
+            SheetTable("Gauges", self.gauges, GAUGE_COLUMNS),
+        )
+        return write_tables(self.run_record, tables, path)
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write the loads on all faces of cells as Parquet, the run record in its metadata.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        faces = self.faces[[column.name for column in FACE_COLUMNS]]
+        return write_table(faces, FACE_COLUMNS, self.run_record, path)
 
     @property
     def _cell_area_m2(self) -> float:

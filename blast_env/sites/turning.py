@@ -1,20 +1,30 @@
 """The same site turned by right angles."""
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Final
 
 from blast_env.geometry import Rectangle
+from blast_env.physics.scene import WallName
 from blast_env.scenario import (
     AccessWay,
     AnySource,
     AnyStructure,
     BuildZone,
     ConcreteSquareSection,
+    GaugeSection,
     PointSource,
     Scenario,
     SegmentSource,
 )
 from blast_env.scenario.sections import PointM
 from blast_env.scenario.zone import Area
+
+_TURNED_WALL: Final[Mapping[WallName, WallName]] = {
+    "west": "south",
+    "south": "east",
+    "east": "north",
+    "north": "west",
+}
 
 
 def turned(scenario: Scenario, quarter_turns: int) -> Scenario:
@@ -38,6 +48,7 @@ def _turned_once(scenario: Scenario) -> Scenario:
         "site": site.model_copy(update={"width_m": site.height_m, "height_m": site.width_m}),
         "charge": tuple(_source(each, site.height_m) for each in scenario.charge),
         "structures": tuple(_structure(each, site.height_m) for each in scenario.structures),
+        "gauges": tuple(_gauge(each, site.height_m) for each in scenario.gauges),
         "build_zone": None if zone is None else _zone(zone, site.height_m),
     }
     return scenario.model_copy(update=changes)
@@ -63,10 +74,18 @@ def _source(source: AnySource, height_m: float) -> AnySource:
 
 
 def _structure(structure: AnyStructure, height_m: float) -> AnyStructure:
-    changes: dict[str, Any] = {"corner_m": _corner(structure.rectangle_m, height_m)}
+    changes: dict[str, Any] = {
+        "corner_m": _corner(structure.rectangle_m, height_m),
+        "faces": tuple(_TURNED_WALL[wall] for wall in structure.faces),
+    }
     if not isinstance(structure, ConcreteSquareSection):
         changes |= {"rows": structure.columns, "columns": structure.rows}
     return structure.model_copy(update=changes)
+
+
+def _gauge(gauge: GaugeSection, height_m: float) -> GaugeSection:
+    x_m, y_m, z_m = gauge.position_m
+    return gauge.model_copy(update={"position_m": (*_point((x_m, y_m), height_m), z_m)})
 
 
 def _zone(zone: BuildZone, height_m: float) -> BuildZone:

@@ -230,13 +230,14 @@ def test_options_fix_charge_layout_and_seeds() -> None:
     options = {
         "charge_position_m": np.array([2.0, 8.0]),
         "tnt_kg": 50,
+        "charge_height_m": 1.5,
         "layout": [(0, 0), np.array([1, 1])],
         "blast_seed": 77,
     }
     _, info = env.reset(seed=1, options=options)
     assert not info["action_mask"][[0, COLUMNS + 1]].any()
     _, _, _, _, info = env.step(FINISH)
-    assert info["charges"] == (((2.0, 8.0), 50.0),)
+    assert info["charges"] == (((2.0, 8.0), 50.0, 1.5),)
     assert info["blast_seeds"] == ((77,),)
     assert info["layout"] == ((0, 0), (1, 1))
 

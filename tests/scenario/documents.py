@@ -79,7 +79,7 @@ def tall_document() -> Document:
         "name": "tall",
         "gauges": [
             {"name": "door", "position_m": [19.75, 10.0, 1.5]},
-            {"name": "roof", "position_m": [21.0, 10.0, 6.5]},
+            {"name": "roof", "position_m": [20.25, 10.0, 6.5]},
         ],
     }
     document["site"]["air_height_m"] = 14.0

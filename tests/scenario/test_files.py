@@ -2,7 +2,7 @@ import os
 import re
 import subprocess
 import sys
-from copy import deepcopy
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -28,6 +28,7 @@ from tests.scenario.documents import (
     all_documents,
     full_document,
     minimal_document,
+    tall_document,
 )
 
 BUNDLED = ("courtyard", "free_field", "perimeter_gate", "street_junction")
@@ -270,9 +271,19 @@ def test_example_of_the_format_description_loads() -> None:
     assert scenario.simulation.overrides
 
 
+def test_example_of_heights_fits_into_the_whole_example() -> None:
+    text = (REPOSITORY / "docs" / "scenario_format.md").read_text(encoding="utf-8")
+    whole, heights = (tomllib.loads(each) for each in re.findall(r"```toml\n(.*?)```", text, re.S))
+    scenario = Scenario.from_document({**whole, **heights, "schema_version": 2}, "example")
+    assert (scenario.schema_version, scenario.air_height_m) == (2, 12.0)
+    for key in ("charge", "structures"):  # what the second one repeats is as in the first
+        for item in heights[key]:
+            assert {k: v for k, v in item.items() if k not in ("height_m", "faces")} in whole[key]
+
+
 def test_format_description_names_every_key() -> None:
     text = (REPOSITORY / "docs" / "scenario_format.md").read_text(encoding="utf-8")
-    document = deepcopy(full_document())
+    document = tall_document()
     keys = {
         *document,
         *document["site"],
@@ -282,6 +293,6 @@ def test_format_description_names_every_key() -> None:
         *document["build_zone"]["access_way"],
         *document["simulation"],
     }
-    for item in (*document["charge"], *document["structures"]):
+    for item in (*document["charge"], *document["structures"], *document["gauges"]):
         keys |= set(item)
     assert {key for key in keys if f"`{key}`" not in text} == set()

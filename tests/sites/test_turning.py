@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.scenario import Scenario, bundled_scenarios, load_scenario, usable_cells
 from blast_env.sites import Visibility, generate_site, turned
-from tests.scenario.documents import full_document
+from tests.scenario.documents import full_document, tall_document
 
 WITH_ZONE = ("courtyard", "perimeter_gate", "street_junction")
 
@@ -57,6 +57,16 @@ def test_every_part_of_a_scenario_turns() -> None:
     ):
         left, bottom, right, top = before.rectangle_m
         assert after.rectangle_m == (20.0 - top, left, 20.0 - bottom, right)
+    assert turned(once, 3) == scenario
+
+
+def test_faces_and_gauges_turn_and_heights_stay() -> None:
+    scenario = Scenario.model_validate(tall_document())
+    once = turned(scenario, 1)
+    assert once.structures[0].faces == ("east", "south")  # they were south and west
+    assert once.structures[0].height_m == 6.0
+    assert [gauge.position_m for gauge in once.gauges] == [(10.0, 19.75, 1.5), (10.0, 20.25, 6.5)]
+    assert (once.charge[0].height_m, once.zone.height_m, once.air_height_m) == (1.0, 3.0, 14.0)
     assert turned(once, 3) == scenario
 
 

@@ -86,8 +86,7 @@ class VisibilityLayout:
         """Return the layout for the charge, or for all the places where a hidden one may be."""
         scenario = case.scenario
         if case.charge is not None:
-            at_it = PointSource(position_m=case.charge.position_m, tnt_kg=case.charge.tnt_kg)
-            scenario = scenario.model_copy(update={"charge": (at_it,)})
+            scenario = scenario.model_copy(update={"charge": (PointSource.at(case.charge),)})
         return visibility_layout(scenario, Visibility.of(scenario))
 
 

@@ -365,7 +365,7 @@ class TrainedAgent:
     def _episode(self, scenario: Scenario, charge: Charge | None) -> EpisodeObservation:
         sources = scenario.charge
         if charge is not None:
-            sources = (PointSource(position_m=charge.position_m, tnt_kg=charge.tnt_kg),)
+            sources = (PointSource.at(charge),)
         observable = Observable(scenario, sources, self._module_loads)
         return OBSERVATIONS[self.observation].episode(observable)
 

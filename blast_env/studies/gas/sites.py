@@ -1,0 +1,66 @@
+"""The sites of the gas engine's studies: real heights, and a small yard for small cells."""
+
+from typing import Any, Final
+
+from blast_env.scenario import Scenario
+
+BUILDING_M: Final = 6.0
+BARRIER_M: Final = 3.0
+
+
+def with_heights(
+    scenario: Scenario,
+    structures_m: float = BUILDING_M,
+    barrier_m: float = BARRIER_M,
+    air_m: float | None = None,
+) -> Scenario:
+    """Return a scenario whose structures and barrier have heights.
+
+    Args:
+        scenario: The scenario.
+        structures_m: Height of all structures.
+        barrier_m: Height of the modules of the build zone.
+        air_m: How high the air is, instead of what the scenario says.
+    """
+    document: dict[str, Any] = scenario.model_dump()
+    document["schema_version"] = 2
+    for structure in document["structures"]:
+        structure["height_m"] = structures_m
+    if document.get("build_zone") is not None:
+        document["build_zone"]["height_m"] = barrier_m
+    if air_m is not None:
+        document["site"]["air_height_m"] = air_m
+    return Scenario.from_document(document, scenario.name)
+
+
+def yard() -> Scenario:
+    """Return a site on which cells of an eighth of a metre can be afforded.
+
+    20 kg in the open, 8.5 m before a building of 2 x 4 x 3 m; walls of 1.5 m between them.
+    """
+    document = {
+        "schema_version": 2,
+        "name": "yard",
+        "site": {"width_m": 16.0, "height_m": 12.0, "air_height_m": 8.0},
+        "charge": [{"kind": "point", "position_m": (2.5, 6.0), "tnt_kg": 20.0}],
+        "structures": [
+            {
+                "kind": "ModularObstacle",
+                "name": "building",
+                "corner_m": (11.0, 4.0),
+                "rows": 8,
+                "columns": 4,
+                "protected": True,
+                "height_m": 3.0,
+            }
+        ],
+        "build_zone": {
+            "corner_m": (4.5, 2.0),
+            "rows": 16,
+            "columns": 10,
+            "stock": 8,
+            "height_m": 1.5,
+        },
+        "simulation": {"preset": "ballistic"},
+    }
+    return Scenario.from_document(document, "yard")

@@ -1,0 +1,337 @@
+"""The tables and figures of docs/gas.md: what was checked about the gas engine."""
+
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+from math import cbrt, isnan
+from pathlib import Path
+from typing import Annotated, Final
+
+import numpy as np
+import typer
+from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
+
+from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.files import make_folder
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
+from blast_env.rendering.figures import save_figure
+from blast_env.runner import run_all
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario.build_scene import draw_charge
+from blast_env.simulation.gas import GasBlast
+from blast_env.studies.agreement.layouts import Layout
+from blast_env.studies.gas.borders import border_loads
+from blast_env.studies.gas.cells import cell_loads, difference
+from blast_env.studies.gas.corners import corner_waves
+from blast_env.studies.gas.ending import Ending, ending
+from blast_env.studies.gas.reference import free_field, wide_wall
+from blast_env.studies.gas.sites import BARRIER_M, BUILDING_M, with_heights, yard
+from blast_env.studies.gas.sources import source_ratios, trade_off_figure
+from blast_env.studies.shielding.ratios import EXPERIMENT, REGIONS
+from blast_env.tables import markdown_table
+from blast_env.units import MS_PER_S
+
+CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
+"""With which cells a charge is held against Kingery and Bulmash, by its mass in kg."""
+PEAK_CHARGE_KG: Final = 100.0
+PEAK_DISTANCE_M: Final = 12.5
+YARD: Final = "yard"
+
+Cell = Annotated[float, typer.Option(help="Side of a cell, m.")]
+Processes = Annotated[int, typer.Option(min=1)]
+app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
+
+
+def _numbers(text: str) -> list[float]:
+    """Return the numbers of a list separated by commas; none for an empty one."""
+    try:
+        return [float(part) for part in text.split(",") if part]
+    except ValueError as error:
+        raise typer.BadParameter(f"{text!r}: {error}") from error
+
+
+@app.command()
+def source(cell: Cell = 0.5, out: Path = Path("out/gas_source.png")) -> None:
+    """Print and draw what the charge could be: sources against Kingery and Bulmash.
+
+    100 kg on the ground. No source meets the incident and the reflected impulse at once.
+    """
+    with user_errors():
+        make_folder(out.parent)
+        with progress_bar("sources") as progress:
+            found = source_ratios(cell_m=cell, progress=progress)
+        rows = [
+            (
+                each.name,
+                ", ".join(f"{wall.z_m_kg:.2f}" for wall in each.reflected),
+                ", ".join(f"{wall.impulse:.3f}" for wall in each.reflected),
+                ", ".join(f"{wave.impulse:.3f}" for wave in each.incident),
+                ", ".join(f"{wall.arrival:.3f}" for wall in each.reflected),
+            )
+            for each in found
+        ]
+        headers = ("source", "Z (m/kg^(1/3))", "reflected", "incident", "arrival at the wall")
+        print_line(markdown_table(headers, rows))
+        print_line(f"wrote {save_figure(trade_off_figure(found, cell), out)}")
+
+
+@app.command()
+def kingery_bulmash(
+    charges: Annotated[str, typer.Option(help="kg, separated by commas.")] = "20,100,1000",
+    distances: Annotated[
+        str, typer.Option(help="m/kg^(1/3), separated by commas.")
+    ] = "1.7,2.15,2.7,3.45,4.3,5.4,8.6",
+    peak_cells: Annotated[
+        str, typer.Option(help="m, for 100 kg at 12.5 m; empty: leave that table out.")
+    ] = "1,0.5,0.25",
+) -> None:
+    """Hold the waves of charges on the ground against Kingery and Bulmash.
+
+    Impulses of the first positive phase, arrival and peak over the curves; then the reflected peak
+    by the size of the cells.
+    """
+    headers = ("charge (kg)", "cell (m)", "", "Z (m/kg^(1/3))", "impulse", "arrival", "peak")
+    wanted, rows = _numbers(distances), []
+    with user_errors():
+        for charge_kg in _numbers(charges):
+            cell_m = CELLS_M.get(charge_kg, 0.5)
+            walls = [wide_wall(charge_kg, z * cbrt(charge_kg), cell_m) for z in wanted]
+            waves = free_field(charge_kg, wanted, cell_m)
+            for name, ratios in (("reflected", walls), ("incident", waves)):
+                for ratio in ratios:
+                    values = (ratio.impulse, ratio.arrival, ratio.peak)
+                    start = (f"{charge_kg:g}", f"{cell_m:g}", name, f"{ratio.z_m_kg:.2f}")
+                    rows.append((*start, *(f"{value:.3f}" for value in values)))
+        print_line(markdown_table(headers, rows))
+        peaks = []
+        for cell_m in _numbers(peak_cells):
+            ratio = wide_wall(PEAK_CHARGE_KG, PEAK_DISTANCE_M, cell_m)
+            cells = f"{cbrt(PEAK_CHARGE_KG) / cell_m:.1f}"
+            peaks.append((f"{cell_m:g}", cells, f"{ratio.impulse:.3f}", f"{ratio.peak:.3f}"))
+        if peaks:
+            columns = ("cell (m)", "cells per kg^(1/3)", "reflected impulse", "reflected peak")
+            print_line("\n" + markdown_table(columns, peaks))
+
+
+@app.command()
+def margins(
+    scenario: str = "courtyard",
+    margins_m: Annotated[
+        str, typer.Option("--margins", help="m, separated by commas.")
+    ] = "2,4,8,16",
+    airs_m: Annotated[
+        str, typer.Option("--airs", help="Heights of the air with real heights, m.")
+    ] = "12,18,24",
+    cell: Cell = 0.5,
+) -> None:
+    """Print how loads depend on how far the open borders are from the site.
+
+    With everything as high as the air, and with real heights; the last of the margins and of the
+    heights of the air is what the others are compared with.
+    """
+    with user_errors():
+        loaded, engine = load_scenario(scenario), GasEngine(cell_m=cell)
+        cases = {"endless": loaded, _HEIGHTS: with_heights(loaded)}
+        rows = []
+        for heights, site in cases.items():
+            for name, layout in _rule_layouts(site).items():
+                found = border_loads(site, layout, _numbers(margins_m), engine)
+                loads = [each.impulse_pa_s for each in found]
+                rows.append((heights, name, *_against_last(loads)))
+        numbers = [f"{margin:g} m" for margin in _numbers(margins_m)]
+        print_line(markdown_table(("heights", "layout", *numbers), rows))
+        rows = []
+        for name, layout in _rule_layouts(loaded).items():
+            loads = [
+                border_loads(with_heights(loaded, air_m=air), layout, [engine.margin_m], engine)[
+                    0
+                ].impulse_pa_s
+                for air in _numbers(airs_m)
+            ]
+            rows.append((_HEIGHTS, name, *_against_last(loads)))
+        if rows and _numbers(airs_m):
+            numbers = [f"air {air:g} m high" for air in _numbers(airs_m)]
+            print_line("\n" + markdown_table(("heights", "layout", *numbers), rows))
+
+
+_HEIGHTS: Final = f"building {BUILDING_M:g} m, wall {BARRIER_M:g} m"
+
+
+def _against_last(loads: list[float]) -> list[str]:
+    """Return loads in Pa s, with how far they are from the last one."""
+    return [f"{load:.1f} ({100.0 * (load / loads[-1] - 1.0):+.2f} %)" for load in loads]
+
+
+def _rule_layouts(scenario: Scenario) -> dict[str, Layout]:
+    """Return no barrier and the two walls by rule, for the charge of seed 0."""
+    charge = draw_charge(scenario, 0)
+    return {
+        "no barrier": (),
+        "wall near the charge": wall_near_charge(scenario, charge),
+        "wall near the building": wall_near_building(scenario, charge),
+    }
+
+
+def _random_layouts(scenario: Scenario, count: int) -> dict[str, Layout]:
+    rng = np.random.default_rng(0)
+    return {f"random {number}": random_layout(scenario, rng) for number in range(1, count + 1)}
+
+
+@app.command("ending")
+def endings(
+    scenario: str = "courtyard",
+    until: Annotated[float, typer.Option(help="When loads are looked at again, s.")] = 0.2,
+    random_layouts: Annotated[int, typer.Option(min=0)] = 2,
+    cell: Cell = 0.5,
+    processes: Processes = 1,
+) -> None:
+    """Print what the end of a run cuts off: the impulse then and later, with several layouts."""
+    with user_errors():
+        loaded, engine = load_scenario(scenario), GasEngine(cell_m=cell)
+        layouts = _rule_layouts(loaded) | _random_layouts(loaded, random_layouts)
+        jobs = {
+            (heights, name): GasBlast(site, layout, engine=engine)
+            for heights, site in (("endless", loaded), (_HEIGHTS, with_heights(loaded)))
+            for name, layout in layouts.items()
+        }
+        with progress_bar("blasts") as progress:
+            run = partial(ending, later_s=until)
+            found = run_all(run, list(jobs.values()), processes, progress)
+    headers = ("heights", "layout", "end (ms)", "impulse (Pa s)", f"at {until:g} s", "cut off")
+    rows = [(*job, *_ending_row(each)) for job, each in zip(jobs, found, strict=True)]
+    print_line(markdown_table(headers, rows))
+    print_line("ended because: " + ", ".join(sorted({str(each.reason) for each in found})))
+
+
+def _ending_row(found: Ending) -> tuple[str, ...]:
+    return (
+        f"{MS_PER_S * found.time_s:.0f}",
+        f"{found.impulse_pa_s:.1f}",
+        f"{found.later_pa_s:.1f}",
+        f"{100.0 * found.cut_off:.2f} %",
+    )
+
+
+@app.command()
+def cells(
+    scenario: Annotated[
+        str, typer.Option(help=f"{YARD!r} is a small site for small cells.")
+    ] = YARD,
+    endless: Annotated[bool, typer.Option(help="Everything as high as the air.")] = False,
+    charges: Annotated[int, typer.Option(min=1, help="Charges, those of seeds from 0.")] = 1,
+    random_layouts: Annotated[int, typer.Option(min=0)] = 2,
+    sizes: Annotated[str, typer.Option(help="Sides of cells, m, all layouts.")] = "0.5,0.25",
+    finest: Annotated[
+        float | None, typer.Option(help="m, for none and the first layout only.")
+    ] = None,
+    processes: Processes = 2,
+) -> None:
+    """Print whether smaller cells change loads, reductions and the order of layouts."""
+    with user_errors():
+        site = _cells_site(scenario, endless)
+        for seed in range(charges):
+            charge = draw_charge(site, seed)
+            _print_cells(site, charge, random_layouts, (_numbers(sizes), finest), processes)
+
+
+def _cells_site(scenario: str, endless: bool) -> Scenario:
+    if scenario == YARD:
+        return yard()
+    loaded = load_scenario(scenario)
+    return loaded if endless else with_heights(loaded)
+
+
+def _print_cells(
+    site: Scenario,
+    charge: Charge,
+    random_layouts: int,
+    sizes: tuple[list[float], float | None],
+    processes: int,
+) -> None:
+    rules: dict[str, Callable[[Scenario, Charge], Layout]] = {
+        "wall near the charge": wall_near_charge,
+        "wall near the building": wall_near_building,
+    }
+    layouts = {name: rule(site, charge) for name, rule in rules.items()}
+    layouts |= _random_layouts(site, random_layouts)
+    all_sizes, finest = sizes
+    jobs = [(size, list(layouts.values())) for size in all_sizes]
+    if finest is not None:
+        jobs.append((finest, list(layouts.values())[:1]))
+    found = []
+    for size, tried in jobs:
+        with progress_bar(f"{site.name}, {size:g} m") as progress:
+            found.append(cell_loads(site, tried, charge, size, processes, progress))
+    x_m, y_m = charge.position_m
+    print_line(f"{site.name}, {charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m")
+    rows = [
+        ("no barrier (Pa s)", *(f"{each.unprotected_pa_s:.1f}" for each in found)),
+        *(
+            (name, *(_reduction(each.reduction.tolist(), number) for each in found))
+            for number, name in enumerate(layouts)
+        ),
+        ("CPU time of a blast (s)", *(f"{each.cpu_s:.1f}" for each in found)),
+    ]
+    print_line(markdown_table(("", *(f"{each.cell_m:g} m" for each in found)), rows) + "\n")
+    rows = []
+    for coarse, fine in pairwise(found):
+        apart = difference(coarse, fine)
+        rows.append(
+            (
+                f"{coarse.cell_m:g} m less {fine.cell_m:g} m",
+                f"{100.0 * apart.impulse:+.2f} %",
+                f"{100.0 * apart.reduction:+.2f}",
+                f"{100.0 * apart.largest:+.2f}",
+                "-" if isnan(apart.rank) else f"{apart.rank:.2f}",
+            )
+        )
+    headers = ("", "impulse", "reduction (points)", "at most", "rank correlation")
+    print_line(markdown_table(headers, rows) + "\n")
+
+
+def _reduction(reductions: list[float], number: int) -> str:
+    return f"{100.0 * reductions[number]:.1f} %" if number < len(reductions) else "-"
+
+
+@app.command()
+def corners(
+    sizes: Annotated[str, typer.Option(help="Sides of cells, m.")] = "0.5,0.25",
+    heights: Annotated[
+        str, typer.Option(help="Heights of the block, m; empty: as high as wide.")
+    ] = "",
+) -> None:
+    """Print what gets round one and two corners of a block: first waves over the free field's."""
+    rows = []
+    with user_errors():
+        wanted: list[float | None] = [*_numbers(heights)] or [None]
+        for height_m in wanted:
+            for cell_m in _numbers(sizes):
+                waves = corner_waves(cell_m, height_m)
+                for region in REGIONS:
+                    gauges, band = waves.gauges_of(region), EXPERIMENT.get(region)
+                    rows.append(
+                        (
+                            f"{waves.height_m:g}",
+                            f"{cell_m:g}",
+                            region.replace("_", " "),
+                            "-" if band is None else f"{band.value:.2f} ± {band.tolerance:.2f}",
+                            f"{waves.mean(region):.2f}",
+                            f"{gauges.min():.2f} to {gauges.max():.2f}",
+                            f"{waves.mean(region, all_phases=True):.2f}",
+                            f"{100.0 * waves.unfinished:.0f} %",
+                        )
+                    )
+    headers = (
+        "block (m high)",
+        "cell (m)",
+        "gauges",
+        "experiments",
+        "first wave",
+        "gauge by gauge",
+    )
+    print_line(markdown_table((*headers, "all phases", "unfinished"), rows))
+
+
+if __name__ == "__main__":
+    app()

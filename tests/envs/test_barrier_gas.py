@@ -1,0 +1,56 @@
+"""The environment on gas dynamics: the same rules, one realisation, no calibration."""
+
+import pickle
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import evaluate_layout
+from tests.gas_sites import WALL, hut
+
+HUT = hut()
+
+
+def make(**options: Any) -> gym.Env:
+    return gym.make("BlastBarrierGas-v0", scenario=HUT, disable_env_checker=True, **options)
+
+
+def test_an_episode_pays_the_loads_of_gas_dynamics() -> None:
+    env = make(render_mode="rgb_array")
+    env.reset(seed=0, options={"layout": WALL[:-1]})
+    zone = HUT.zone
+    _, reward, ended, _, info = env.step(WALL[-1][0] * zone.columns + WALL[-1][1])
+    assert ended
+    expected = evaluate_layout(HUT, WALL, [0], engine="gas")
+    assert info["impulse_pa_s"] == pytest.approx(expected.impulse_pa_s.value)
+    assert info["reduction"] == pytest.approx(expected.mean_reduction)
+    assert reward == pytest.approx(-info["impulse_psi_s"])
+    assert info["calibration"] == "none"
+    assert np.isnan(info["impulse_sim"])
+    assert info["blasts"] == 2
+    picture = env.render()
+    assert isinstance(picture, np.ndarray)
+    assert picture.ndim == 3
+
+
+def test_it_keeps_gymnasium_s_rules() -> None:
+    check_env(make().unwrapped, skip_render_check=True)
+
+
+def test_it_pickles_after_a_blast() -> None:
+    env = make().unwrapped
+    finish = HUT.zone.rows * HUT.zone.columns
+    env.reset(seed=1)
+    env.step(finish)
+    copy = pickle.loads(pickle.dumps(env))
+    copy.reset(seed=1)
+    assert copy.step(finish)[4]["cache_hits"] > 0
+
+
+def test_more_realisations_are_refused() -> None:
+    with pytest.raises(BlastEnvError, match="realisations is 2, must be 1: gas has no noise"):
+        make(realisations=2)

@@ -1,0 +1,45 @@
+"""A small site with heights, on which a blast of gas dynamics takes a fraction of a second."""
+
+from typing import Any
+
+from blast_env.scenario import Scenario
+
+WALL = tuple((row, 0) for row in range(6))
+"""In front of the building, between it and the charge."""
+
+
+def site_document(**changes: Any) -> dict[str, Any]:
+    """Return a charge of 5 kg in the west, a zone of 2 x 6 cells, a hut in the east."""
+    return {
+        "schema_version": 2,
+        "name": "hut",
+        "site": {"width_m": 10.0, "height_m": 8.0, "air_height_m": 5.0},
+        "charge": [{"kind": "point", "position_m": [2.0, 4.0], "tnt_kg": 5.0}],
+        "build_zone": {
+            "corner_m": [4.0, 2.5],
+            "rows": 6,
+            "columns": 2,
+            "stock": 6,
+            "height_m": 1.5,
+        },
+        "structures": [
+            {
+                "kind": "ModularObstacle",
+                "name": "hut",
+                "corner_m": [6.0, 3.0],
+                "rows": 4,
+                "columns": 4,
+                "height_m": 2.0,
+                "protected": True,
+            }
+        ],
+        "gauges": [
+            {"name": "front", "position_m": [5.75, 4.25, 0.25]},
+            {"name": "behind", "position_m": [9.0, 4.25, 0.25]},
+        ],
+    } | changes
+
+
+def hut(**changes: Any) -> Scenario:
+    """Return the site, with other sections where some are given."""
+    return Scenario.from_document(site_document(**changes), "hut")

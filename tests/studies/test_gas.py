@@ -1,0 +1,139 @@
+"""The studies of the gas engine, on scenes that take seconds."""
+
+from math import cbrt
+
+import numpy as np
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.gas.source import TNT
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario.build_scene import draw_charge
+from blast_env.simulation.gas import GasBlast
+from blast_env.studies.gas.borders import border_loads
+from blast_env.studies.gas.cells import CellLoads, cell_loads, difference
+from blast_env.studies.gas.corners import corner_waves
+from blast_env.studies.gas.ending import Ending, ending
+from blast_env.studies.gas.loads import protected_impulse_pa_s
+from blast_env.studies.gas.reference import free_field, wide_wall
+from blast_env.studies.gas.sites import with_heights, yard
+from blast_env.studies.gas.sources import CHOSEN, source_ratios, trade_off_figure
+from blast_env.studies.shielding.scenes import BlockGeometry
+
+WALL = tuple((row, 4) for row in range(4, 12))
+
+
+@pytest.fixture(scope="module")
+def site() -> Scenario:
+    return yard()
+
+
+def test_waves_are_held_against_the_curves() -> None:
+    """With cells of half a metre impulses and arrival are as wanted, and peaks are clipped."""
+    wall = wide_wall(100.0, 12.3, 0.5)
+    (wave,) = free_field(100.0, [2.7], 0.5)
+    assert wall.z_m_kg == pytest.approx(12.5 / cbrt(100.0))  # rounded up to cells
+    assert wall.impulse == pytest.approx(1.0, abs=0.06)
+    assert wave.impulse == pytest.approx(1.0, abs=0.10)
+    assert (wall.arrival, wave.arrival) == pytest.approx((1.0, 1.0), abs=0.05)
+    assert max(wall.peak, wave.peak) < 0.7
+
+
+def test_sources_are_drawn() -> None:
+    shares: list[float] = []
+    found = source_ratios({CHOSEN: TNT}, [2.7], 1.0, shares.append)
+    assert shares == [1.0]
+    assert [each.name for each in found] == [CHOSEN]
+    assert found[0].reflected == [wide_wall(100.0, 2.7 * cbrt(100.0), 1.0)]
+    (axes,) = trade_off_figure(found, 1.0).axes
+    (line,) = axes.get_lines()
+    assert np.asarray(line.get_xdata()).tolist() == [found[0].reflected[0].impulse]
+
+
+def test_heights_are_given_to_everything() -> None:
+    courtyard = load_scenario("courtyard")
+    tall = with_heights(courtyard, 5.0, 2.0, 14.0)
+    assert [each.height_m for each in tall.structures] == [5.0]
+    assert tall.zone.height_m == 2.0
+    assert tall.air_height_m == 14.0
+    assert draw_charge(tall, 3) == draw_charge(courtyard, 3)
+    assert courtyard.structures[0].height_m is None
+
+
+def test_the_load_is_the_mean_by_weight_of_the_protected(site: Scenario) -> None:
+    document = site.model_dump()
+    (first,) = document["structures"]
+    other = {**first, "name": "other", "corner_m": (8.0, 9.0), "rows": 2, "weight": 3.0}
+    aside = {**first, "name": "aside", "corner_m": (8.0, 1.0), "rows": 2, "protected": False}
+    document["structures"] = [first, other, aside]
+    result = GasBlast(Scenario.from_document(document, "three")).run()
+    loads = {name: result.impulse(name).pa_s for name in ("building", "other")}
+    expected = (loads["building"] + 3.0 * loads["other"]) / 4.0
+    assert protected_impulse_pa_s(result) == pytest.approx(expected)
+
+
+def test_a_run_s_end_is_compared_with_later(site: Scenario) -> None:
+    blast = GasBlast(site)
+    found = ending(blast, 0.1)
+    result = blast.run()
+    assert found.reason is EndReason.LOADS_COMPLETE
+    assert (found.time_s, found.impulse_pa_s) == (result.time_s, protected_impulse_pa_s(result))
+    assert found.later_s >= 0.1
+    assert 0.0 <= found.cut_off < 0.03
+
+
+def test_what_is_cut_off_is_a_share_of_the_later_load() -> None:
+    found = Ending(0.1, EndReason.LOADS_COMPLETE, 90.0, 0.2, 100.0)
+    assert found.cut_off == pytest.approx(0.1)
+
+
+def test_loads_settle_as_the_borders_move_away(site: Scenario) -> None:
+    found = border_loads(site, WALL, (0.0, 4.0, 8.0), GasEngine())
+    assert [each.margin_m for each in found] == [0.0, 4.0, 8.0]
+    assert {each.air_m for each in found} == {8.0}
+    none, default, wide = (each.impulse_pa_s for each in found)
+    assert default == pytest.approx(wide, rel=0.02)
+    assert abs(none - wide) >= abs(default - wide)
+
+
+def test_loads_of_layouts_by_processes_are_the_same(site: Scenario) -> None:
+    charge = draw_charge(site, 0)
+    one = cell_loads(site, [WALL], charge, 0.5)
+    two = cell_loads(site, [WALL], charge, 0.5, processes=2)
+    assert one.unprotected_pa_s == two.unprotected_pa_s
+    assert one.impulse_pa_s.tolist() == two.impulse_pa_s.tolist()
+    assert 0.0 < one.reduction[0] < 0.4
+    assert one.cpu_s > 0.0
+
+
+def test_differences_of_cells_by_hand() -> None:
+    coarse = CellLoads(0.5, 100.0, np.array([90.0, 80.0, 60.0]), 1.0)
+    fine = CellLoads(0.25, 100.0, np.array([90.0, 60.0, 80.0]), 16.0)
+    found = difference(coarse, fine)
+    assert found.impulse == pytest.approx((0.0 + 0.0 + 1.0 / 3.0 - 0.25) / 4.0)
+    assert found.reduction == pytest.approx(0.0)
+    assert abs(found.largest) == pytest.approx(0.2)
+    assert found.rank == pytest.approx(0.5)
+    few = difference(coarse, CellLoads(0.125, 50.0, np.array([45.0]), 256.0))
+    assert few.impulse == pytest.approx(1.0)
+    assert few.reduction == pytest.approx(0.0)
+    assert np.isnan(few.rank)
+
+
+def test_the_first_wave_is_weaker_behind_corners() -> None:
+    geometry = BlockGeometry(side_modules=8, stand_off_m=6.0)
+    found = corner_waves(0.5, 3.0, geometry)
+    assert found.height_m == 3.0
+    assert found.coefficient.shape == (8 + 4,)
+    assert 0.2 < found.mean("one_corner") < 0.8
+    assert found.gauges_of("two_corners").tolist() == found.coefficient[8:].tolist()
+    assert found.mean("two_corners", all_phases=True) >= found.mean("two_corners")
+    # The mean is that of modules: a gauge stands for as many on both sides of the middle.
+    assert found.mean("two_corners") == pytest.approx(found.coefficient[8:].mean())
+
+
+def test_a_block_below_a_module_is_named() -> None:
+    with pytest.raises(BlastEnvError, match=r"height_m is 0\.2, must be at least 0\.5"):
+        corner_waves(0.5, 0.2)

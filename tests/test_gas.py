@@ -1,0 +1,179 @@
+"""Blasts of gas dynamics from a scenario to loads: sums that must agree, symmetry, bad input."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+
+import blast_env
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import BlastEvaluator, evaluate_layout
+from blast_env.evaluation.cases import Threat
+from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
+from blast_env.recording.parquet import read_parquet
+from blast_env.simulation.gas import FACE_COLUMNS, GasBlast, GasResult
+from tests.gas_sites import WALL, hut
+
+HUT = hut()
+
+
+@pytest.fixture(scope="module")
+def bare() -> GasResult:
+    return blast_env.simulate(HUT, engine="gas")
+
+
+@pytest.fixture(scope="module")
+def walled() -> GasResult:
+    return blast_env.simulate(HUT, WALL, engine="gas")
+
+
+def test_faces_modules_and_structures_add_up(bare: GasResult) -> None:
+    """The same momentum, however it is cut up; all four walls, not the roof."""
+    faces = bare.faces[bare.faces["face"] != "roof"]
+    area_m2 = 0.5**2
+    total = float((faces["positive_impulse_pa_s"] * area_m2).sum())
+    walls = bare.modules[bare.modules["face"] != "roof"]
+    of_modules = float((walls["positive_impulse_pa_s"] * walls["area_m2"]).sum())
+    (row,) = bare.structures.to_dict("records")
+    assert of_modules == pytest.approx(total)
+    assert row["positive_impulse_pa_s"] * row["area_m2"] == pytest.approx(total)
+    assert bare.module_impulse_n_s.sum() == pytest.approx(total)
+    assert row["area_m2"] == 4 * 2.0 * 2.0
+    assert bare.impulse("hut").pa_s == pytest.approx(row["positive_impulse_pa_s"])
+
+
+def test_the_wall_that_sees_the_charge_takes_most(bare: GasResult) -> None:
+    (row,) = bare.structures.to_dict("records")
+    assert row["most_loaded_face"] == "west"
+    of_walls = bare.faces.groupby("face")["positive_impulse_pa_s"].mean()
+    assert of_walls["west"] > 2.0 * of_walls["north"] > 2.0 * of_walls["east"] > 0.0
+    assert row["roof_impulse_pa_s"] == pytest.approx(of_walls["roof"])
+    assert 0.0 < row["first_impulse_pa_s"] <= row["positive_impulse_pa_s"]
+    assert row["negative_impulse_pa_s"] < 0.0
+
+
+def test_a_site_with_a_mirror_has_loads_with_a_mirror(bare: GasResult) -> None:
+    """The charge is in the middle: north and south are the same up to rounding."""
+    loads = bare.faces.set_index(["face", "x_m", "z_m"])["positive_impulse_pa_s"]
+    south, north = loads["south"].sort_index(), loads["north"].sort_index()
+    np.testing.assert_allclose(south.to_numpy(), north.to_numpy(), rtol=1e-4)
+
+
+def test_a_named_wall_is_the_one_that_counts(bare: GasResult) -> None:
+    document = HUT.model_dump(mode="json", exclude_none=True)
+    document["structures"][0]["faces"] = ["west"]
+    west = blast_env.simulate(blast_env.Scenario.from_document(document, "west"), engine="gas")
+    mean = bare.faces[bare.faces["face"] == "west"]["positive_impulse_pa_s"].mean()
+    assert west.impulse("hut").pa_s == pytest.approx(float(mean))
+
+
+def test_a_wall_protects_and_is_itself_loaded(bare: GasResult, walled: GasResult) -> None:
+    assert walled.impulse("hut").pa_s < 0.95 * bare.impulse("hut").pa_s
+    barrier = walled.modules[walled.modules["structure"] == "barrier"]
+    assert barrier["positive_impulse_pa_s"].max() > bare.modules["positive_impulse_pa_s"].max()
+    assert set(walled.structures["structure"]) == {"hut"}
+
+
+def test_gauges_integrate_their_histories(bare: GasResult) -> None:
+    for row in bare.gauges.to_dict("records"):
+        history = bare.history(row["name"])
+        steps = np.diff(history["time_s"], prepend=history["time_s"][0])
+        positive = np.clip(history["overpressure_pa"], 0.0, None)
+        assert row["peak_pa"] == pytest.approx(history["overpressure_pa"].max())
+        assert row["positive_impulse_pa_s"] == pytest.approx(
+            float((positive * steps).sum()), rel=0.1
+        )
+    front, behind = bare.gauges.to_dict("records")
+    assert front["peak_pa"] > 3.0 * behind["peak_pa"]
+    assert front["arrival_s"] < behind["arrival_s"]
+
+
+def test_a_run_is_a_function_of_its_arguments(bare: GasResult) -> None:
+    """Not of the seed, where the charge is fixed; and of the cells."""
+    again = blast_env.simulate(HUT, seed=5, engine="gas")
+    assert again.digest == bare.digest
+    assert replace(GasEngine(), threads=2).start_on(bare.run.site).grid.shape == bare.run.grid.shape
+    finer = blast_env.simulate(HUT, engine="gas", cell_m=0.25)
+    assert finer.digest != bare.digest
+    assert finer.impulse("hut").pa_s == pytest.approx(bare.impulse("hut").pa_s, rel=0.1)
+
+
+def test_threads_change_no_bit(bare: GasResult) -> None:
+    two = GasBlast(HUT, engine=GasEngine(threads=2)).run()
+    assert two.digest == bare.digest
+
+
+def test_a_run_ends_when_little_more_can_come(bare: GasResult) -> None:
+    assert bare.end_reason is EndReason.LOADS_COMPLETE
+    longer = GasBlast(HUT, engine=GasEngine(time_limit_s=2.0 * bare.time_s))
+    run = longer.engine.start_on(longer.site)
+    run._is_complete = lambda: False  # type: ignore[method-assign]
+    run.advance(np.inf)
+    assert run.end_reason is EndReason.TIME_LIMIT
+    late = GasResult(longer, run)
+    assert late.impulse("hut").pa_s == pytest.approx(bare.impulse("hut").pa_s, rel=0.02)
+    assert any("cut off" in note for note in late.impulse("hut").notes)
+
+
+def test_a_charge_that_hangs_or_lies_close_is_flagged_or_runs() -> None:
+    hanging = blast_env.simulate(HUT, engine="gas", charge=Charge((2.0, 4.0), 5.0, 1.5))
+    assert hanging.impulse("hut").pa_s > 0.0
+    close = blast_env.simulate(HUT, engine="gas", charge=Charge((5.25, 4.0), 5.0))
+    assert any("from a solid" in note for note in close.impulse("hut").notes)
+    assert not close.impulse("hut").in_range
+
+
+def test_an_evaluation_takes_one_realisation_a_charge() -> None:
+    evaluator = BlastEvaluator(HUT, "gas")
+    threats = [Threat(HUT.sample_charge(np.random.default_rng(0)), seed) for seed in range(4)]
+    loads = evaluator.loads_of_many([(WALL, threat) for threat in threats])
+    assert evaluator.blasts == 1
+    assert evaluator.calibration_name == "none"
+    assert len({load.protected_impulse_pa_s for load in loads}) == 1
+    evaluation = evaluate_layout(HUT, WALL, range(2), engine="gas")
+    assert 0.05 < evaluation.mean_reduction < 0.6
+    assert evaluation.to_dict()["calibration"] == "none"
+
+
+def test_particles_say_that_they_know_no_heights() -> None:
+    document = HUT.model_dump(mode="json", exclude_none=True) | {
+        "simulation": {"preset": "ballistic"},
+        "calibration": "ballistic_kb_100kg",
+    }
+    document["charge"][0]["tnt_kg"] = 100.0
+    scenario = blast_env.Scenario.from_document(document, "hut")
+    evaluation = evaluate_layout(scenario, WALL, range(2), engine="event")
+    assert any("no heights" in note for note in evaluation.notes)
+
+
+def test_files_have_the_tables(bare: GasResult, tmp_path: Path) -> None:
+    workbook = openpyxl.load_workbook(bare.to_excel(tmp_path / "gas.xlsx"))
+    assert workbook.sheetnames == ["Run", "Structures", "Modules", "Gauges", "Columns"]
+    assert workbook["Structures"].max_row == 2
+    assert workbook["Modules"].max_row == len(bare.modules) + 1
+    table, record = read_parquet(bare.to_parquet(tmp_path / "gas.parquet"))
+    assert list(table.columns) == [column.name for column in FACE_COLUMNS]
+    assert record["digest"] == bare.digest
+
+
+def test_bad_input_is_named(bare: GasResult) -> None:
+    with pytest.raises(BlastEnvError, match="'gas' has no collisions: loads are in"):
+        _ = bare.collisions
+    with pytest.raises(UnknownNameError, match="'front'"):
+        bare.history("frnt")
+    with pytest.raises(UnknownNameError, match="'hut'"):
+        bare.impulse("hat")
+    with pytest.raises(BlastEnvError, match=r"cell_m is 0.3, must be 0.5 m, .* whole number"):
+        blast_env.simulate(HUT, engine="gas", cell_m=0.3)
+    with pytest.raises(BlastEnvError, match=r"cell_m is 0\.5, but engine 'event' has no cells"):
+        evaluate_layout(HUT, WALL, engine="event", cell_m=0.5)
+    with pytest.raises(BlastEnvError, match="inside a solid cell"):
+        GasEngine().start_on(
+            replace(bare.run.site, charge=Charge((7.0, 4.0), 5.0), charge_centre=(28.0, 16.0))
+        )
+    with pytest.raises(BlastEnvError, match=r"would need .* GiB, must be at most 8"):
+        GasEngine(cell_m=0.5 / 64).start_on(bare.run.site)
