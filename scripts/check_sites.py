@@ -6,11 +6,11 @@ seed draws are, the rejected ones too: a criterion that rejects the wrong ones w
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import process_time
 from typing import Annotated, Final
 
-import joblib
 import numpy as np
 import typer
 from blast_agents.rules import random_layout
@@ -19,6 +19,7 @@ from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, progress_bar
 from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.rendering.figures import save_figure
+from blast_env.runner import run_all
 from blast_env.scenario import Scenario, SegmentSource, usable_cells
 from blast_env.scenario.zone import distance_m, source_bounds_m
 from blast_env.sites import (
@@ -135,12 +136,9 @@ def main(
     if picture is not None:
         print_line(f"wrote {save_figure(contact_sheet(generated[:12]), picture)}")
     drawn = [site for of_seed in of_seeds[:blasted] for site in of_seed]
-    jobs = (joblib.delayed(measured)(site, random_layouts, threats, engine) for site in drawn)
-    results: list[Measured] = []
+    measure = partial(measured, random_layouts=random_layouts, threats=threats, engine=engine)
     with progress_bar("blasts") as progress:
-        for result in joblib.Parallel(n_jobs=processes, return_as="generator")(jobs):
-            results.append(result)
-            progress(len(results) / len(drawn))
+        results = run_all(measure, drawn, processes, progress=progress)
     print_measured([each for each in results if each.accepted])
     print_agreement(results)
 

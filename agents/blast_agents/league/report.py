@@ -1,7 +1,6 @@
 """The tables of a track: one row an entry, and one row an entry and case."""
 
 from collections.abc import Sequence
-from importlib.metadata import version
 from math import isnan
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +16,7 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation import Case
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
+from blast_env.provenance import package_version
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.style import count_of
 from blast_env.statistics import reductions
@@ -186,7 +186,7 @@ def markdown(all_standings: Sequence[Standings], command: str) -> str:
         "Blasts in total and wall time include the training of an agent; blasts on held-out "
         "threats count nowhere. Wall time adds up what each search took in one process.",
         "",
-        f"Engine {engines}, blast-env {version('blast-env')}: `{command}`",
+        f"Engine {engines}, blast-env {package_version()}: `{command}`",
     ]
     return "\n".join(lines) + "\n"
 

@@ -6,7 +6,6 @@ import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
 
@@ -18,6 +17,7 @@ from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import OBSERVATIONS
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
+from blast_env.provenance import versions
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
 
 CONFIGURATION_FORMAT: Final = 1
@@ -351,13 +351,7 @@ def check_scenario(scenario: Scenario, configuration: RunConfiguration, place: s
 
 def _versions() -> dict[str, str]:
     """Return the versions that a result depends on."""
-    versions = {"python": platform.python_version(), "platform": platform.platform()}
-    for name in _PACKAGES:
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "not installed"
-    return versions
+    return {"platform": platform.platform()} | versions(packages=_PACKAGES)
 
 
 def _write(path: Path, text: str) -> None:
