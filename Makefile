@@ -7,12 +7,15 @@ STAMP := $(VENV)/.installed
 export SDL_VIDEODRIVER ?= dummy
 export PYGAME_HIDE_SUPPORT_PROMPT := 1
 
-.PHONY: demo test lint types check setup clean
+.PHONY: demo test lint types compiled check setup clean
 
 demo: $(STAMP)
 	$(BIN)/python scripts/demo.py
 
-test: lint types check
+# Types are checked beside compiling: each keeps one core busy for about a minute.
+test: $(STAMP)
+	$(MAKE) --jobs 2 lint types compiled
+	$(MAKE) check
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -21,6 +24,9 @@ lint: $(STAMP)
 
 types: $(STAMP)
 	$(BIN)/mypy
+
+compiled: $(STAMP)
+	$(BIN)/python -m tests.compile_engines
 
 check: $(STAMP)
 	$(BIN)/pytest --numprocesses auto --dist worksteal

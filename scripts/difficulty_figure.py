@@ -7,7 +7,6 @@ import numpy as np
 
 from blast_env.evaluation import LayoutEvaluation
 from blast_env.physics.scene import Scene
-from blast_env.rendering.evaluation_figures import what_stands
 from blast_env.rendering.site_plan import (
     draw_loads,
     draw_outline,
@@ -16,6 +15,7 @@ from blast_env.rendering.site_plan import (
     in_metres,
     load_colours,
     rectangle_patch,
+    what_stands,
     write_heading,
     write_names,
 )
@@ -86,7 +86,8 @@ def difficulty_figure(evaluation: LayoutEvaluation, name: str) -> Figure:
     )
     for axes, scene in zip(plans, scenes, strict=True):
         # The others have names that say little and would cover much.
-        write_names(axes, [each for each in what_stands(scene) if each.protected or each.cells])
+        standing = what_stands(scene.structures)
+        write_names(axes, [each for each in standing if each.protected or each.cells])
     return figure
 
 

@@ -25,6 +25,7 @@ from blast_env.studies.agreement.layouts import Layout
 from blast_env.studies.gas.cells import cell_loads, difference
 from blast_env.studies.gas.corners import corner_waves
 from blast_env.studies.gas.ending import Ending, ending
+from blast_env.studies.gas.judgement import judge as judgement
 from blast_env.studies.gas.loads import protected_impulse_pa_s
 from blast_env.studies.gas.reference import free_field, wide_wall
 from blast_env.studies.gas.sites import BARRIER_M, BUILDING_M, with_heights, yard
@@ -347,6 +348,43 @@ def _within(gauges: FloatArray, band: ExperimentalBand) -> str:
     """Return how many gauges are within a band."""
     low, high = band.bounds
     return f"{((gauges >= low) & (gauges <= high)).sum()} of {len(gauges)}"
+
+
+@app.command()
+def judge(
+    scenario: str = "courtyard",
+    random_layouts: int = 8,
+    charges: int = 3,
+    seeds: int = 4,
+    processes: Processes = 2,
+) -> None:
+    """Judge the particle model by gas dynamics: order, overstatement, regret.
+
+    Random layouts and the two walls by rule, each under charges that the scenario draws.
+    """
+    with user_errors():
+        chosen = load_scenario(scenario)
+        rng = np.random.default_rng(0)
+        drawn = [draw_charge(chosen, seed) for seed in range(charges)]
+        layouts = [random_layout(chosen, rng) for _ in range(random_layouts)]
+        layouts += [rule(chosen, drawn[0]) for rule in (wall_near_charge, wall_near_building)]
+        with progress_bar(f"gas blasts in {chosen.name}") as progress:
+            found = judgement(chosen, layouts, drawn, seeds, processes, progress)
+    particle, gas = found.means
+    names = [*(f"random {n + 1}" for n in range(random_layouts)), "wall near charge"]
+    names.append("wall near building")
+    rows = [
+        (name, *(f"{100.0 * p:.0f} / {100.0 * g:.1f}" for p, g in zip(ps, gs, strict=True)))
+        for name, ps, gs in zip(names, found.particle, found.gas, strict=True)
+    ]
+    headers = ("reduction, particle / gas (%)", *(f"charge {n + 1}" for n in range(charges)))
+    print_line(markdown_table(headers, rows))
+    print_line(
+        f"mean {100.0 * particle:.1f} % by particles, {100.0 * gas:.1f} % by gas: overstated "
+        f"{found.overstatement:.1f} times; rank correlation {found.all_pairs:.2f} over all pairs, "
+        f"{', '.join(f'{each:.2f}' for each in found.rank_correlations)} by charge; regret "
+        f"{100.0 * found.regret.value:.1f} points"
+    )
 
 
 if __name__ == "__main__":

@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from blast_env import save_scenario
+from tests.scenarios import BALLISTIC_COURTYARD
+
 REPOSITORY = Path(__file__).parents[1]
 CALIBRATIONS = (
     "ballistic_kb_100kg",
@@ -77,7 +80,10 @@ def test_a_search_runs_beside_a_package_named_agents_and_without_extras(
     clean: Path, tmp_path: Path
 ) -> None:
     python = clean / "bin" / "python"
-    command = (python, "-m", "blast_env", "search", "--budget", "4", "--held-out", "2")
+    # An engine that need not be compiled in every environment anew, and thin air.
+    save_scenario(BALLISTIC_COURTYARD, tmp_path / "thin.toml")
+    command = (python, "-m", "blast_env", "search", "--scenario", "thin.toml", "--engine", "pymunk")
+    command += ("--budget", "4", "--held-out", "2")
     done = started(*command, "--method", "random", "--out", "found", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert json.loads((tmp_path / "found" / "layout.json").read_text())["cells"]
@@ -88,7 +94,8 @@ def test_a_search_runs_beside_a_package_named_agents_and_without_extras(
     training = started(python, "-m", "blast_env", "train", "--run", "run", cwd=tmp_path)
     assert training.returncode == 2
     assert "'torch': pip install blast-env[agents,render]" in training.stderr
-    assert call(python, "-c", "import agents; print(agents.Agent)", cwd=tmp_path)
+    engines = "import blast_env.physics.event.engine, blast_env.physics.gas.engine"
+    assert call(python, "-c", f"{engines}, agents; print(agents.Agent)", cwd=tmp_path)
 
 
 def test_the_description_on_a_package_page_links_to_no_file(clean: Path) -> None:

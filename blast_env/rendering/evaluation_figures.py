@@ -1,7 +1,7 @@
 """Figures of evaluations."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, isnan
 from typing import Final
 
@@ -11,23 +11,23 @@ from blast_env.evaluation.cases import Case
 from blast_env.evaluation.comparison import Comparison
 from blast_env.evaluation.report import LayoutEvaluation
 from blast_env.geometry import Layout
-from blast_env.physics.scene import BlastSite, StructureOutline
+from blast_env.physics.scene import BlastSite
 from blast_env.physics.structure import ModularObstacle
 from blast_env.rendering.site_plan import (
     draw_charge,
     draw_loads,
     draw_outline,
     draw_site,
+    draw_what_stands,
     draw_zone,
     in_metres,
-    legend_handles,
+    layout_legend,
     load_colours,
-    rectangle_patch,
+    what_stands,
     write_heading,
     write_names,
 )
 from blast_env.rendering.style import (
-    BARRIER,
     EXPLOSIVE,
     INK,
     PROTECTED,
@@ -46,7 +46,6 @@ with render_extra():
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
-    from matplotlib.collections import PatchCollection
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -69,11 +68,7 @@ def draw_layout(axes: Axes, zone: BuildZone | None, scene: BlastSite) -> None:
     draw_site(axes, in_metres(scene.site))
     if zone is not None:
         draw_zone(axes, zone)
-    for outline in scene.structures:
-        draw_outline(axes, outline)
-        if outline.cells is not None:
-            parts = [rectangle_patch(in_metres(part.rectangle)) for part in outline.build().parts]
-            axes.add_collection(PatchCollection(parts, color=unit_interval(BARRIER), zorder=4))
+    draw_what_stands(axes, scene.structures)
 
 
 def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
@@ -114,15 +109,6 @@ def plan_legend(evaluation: LayoutEvaluation, scene: BlastSite) -> list[Artist]:
     return [*handles, *(handle for handle in site if handle.get_label() != "charge")]
 
 
-def layout_legend(structures: Sequence[StructureOutline], zone: BuildZone | None) -> list[Artist]:
-    """Return the legend entries for a charge and for what `draw_layout` shows."""
-    handles = legend_handles(structures, zone)
-    for handle in handles:
-        if handle.get_label() == "barrier module":
-            handle.set(fill=True, facecolor=unit_interval(BARRIER))
-    return handles
-
-
 def _charge_handle(marker: str, label: str) -> Line2D:
     return Line2D(
         [],
@@ -150,17 +136,6 @@ def _worst_ring(*position_m: float) -> Line2D:
         label="charge with the largest impulse",
         zorder=6,
     )
-
-
-def what_stands(scene: BlastSite) -> list[StructureOutline]:
-    """Return what names should not cover: structures, and the barrier's modules one by one."""
-    obstacles = [outline for outline in scene.structures if outline.cells is None]
-    for outline in scene.structures:
-        if outline.cells is not None:
-            corners = [part.rectangle[:2] for part in outline.build().parts]
-            single = replace(outline, rows=1, columns=1, cells=((0, 0),))
-            obstacles += [replace(single, corner=corner) for corner in corners]
-    return obstacles
 
 
 # Okabe and Ito's colours, which people with any colour vision can tell apart.
@@ -208,7 +183,7 @@ def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
     handles = plan_legend(evaluation, scene)
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=9, frameon=False)
     write_heading(figure, _title(evaluation), _subtitle(evaluation))
-    write_names(plan, what_stands(scene))
+    write_names(plan, what_stands(scene.structures))
     return figure
 
 

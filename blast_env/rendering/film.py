@@ -219,10 +219,16 @@ def plan_film(
     Raises:
         BlastEnvError: If an argument is not positive or the film would have too many frames.
     """
+    return plan_until(shown_until_s(result), frames_per_s, slow_motion)
+
+
+def plan_until(
+    end_s: float, frames_per_s: float = 25.0, slow_motion: float | None = None
+) -> FilmPlan:
+    """Return the plan of a film that ends at a simulated time; see `plan_film`."""
     for name, value in (("frames_per_s", frames_per_s), ("slow_motion", slow_motion)):
         if value is not None and not 0.0 < value < inf:
             raise BlastEnvError(f"{name} is {value}, must be positive")
-    end_s = shown_until_s(result)
     if slow_motion is None:
         slow_motion = _usual_slow_motion(end_s) if end_s > 0.0 else 1.0
     plan = FilmPlan(end_s, slow_motion, frames_per_s)
@@ -265,23 +271,28 @@ def write_film(
         BlastEnvError: If the suffix is another one, an argument is out of bounds or the file
             cannot be written; nothing is left behind then, nor after Ctrl-C.
     """
-    suffix = _known_suffix(path)
+    suffix = known_suffix(path)
     tell = progress or _tell_nobody
     with write_atomically(path) as temporary:
         result = blast.run(lambda share: tell(_SHARE_OF_FIRST_RUN * share))
         plan = plan_film(result, frames_per_s, slow_motion)
         if suffix == ".gif":
-            plan, width_px = _for_gif(plan, width_px)
+            plan, width_px = for_gif(plan, width_px)
         full_impulse = largest_load(result) if full_impulse is None else full_impulse
         even_px = width_px - width_px % 2
         painter = FramePainter.for_blast(blast, width_px=even_px, full_impulse=full_impulse)
-        with _open_film(suffix, temporary, plan, blast) as film:
+        with open_film(suffix, temporary, plan, blast.scenario.name, _comment(plan, blast)) as film:
             _draw(blast.start(), painter, plan, film, tell)
     tell(1.0)
     return result
 
 
-def _known_suffix(path: str | Path) -> str:
+def known_suffix(path: str | Path) -> str:
+    """Return the suffix of a film in small letters.
+
+    Raises:
+        BlastEnvError: If no film with that suffix can be written.
+    """
     suffix = Path(path).suffix
     if suffix.lower() not in SUFFIXES:
         raise BlastEnvError(
@@ -321,18 +332,30 @@ def paint_at(run: BlastRun, painter: FramePainter, time_s: float, note: str) -> 
     return painter.paint(balls, run.obstacles, time_s, note)
 
 
-def _open_film(suffix: str, path: Path, plan: FilmPlan, blast: Blast) -> FilmFile:
+def open_film(suffix: str, path: Path, plan: FilmPlan, title: str, comment: str) -> FilmFile:
+    """Return a film of the kind that a suffix names, open for its frames.
+
+    Args:
+        suffix: One of `SUFFIXES`.
+        path: The file; its own suffix does not matter.
+        plan: The plan, for a GIF one from `for_gif`.
+        title: Title in the metadata; a GIF has none.
+        comment: Comment in the metadata.
+    """
+    if suffix == ".gif":
+        return GifFile(path, plan.frames_per_s, comment)
+    return Mp4File(path, plan.frames_per_s, title, comment)
+
+
+def _comment(plan: FilmPlan, blast: Blast) -> str:
     scenario = blast.scenario
-    comment = (
+    return (
         f"{scenario.name}, seed {blast.seed}, {plan.real_time_factor}, "
         f"{plan.end_s * MS_PER_S:.4g} ms of simulated time, scenario {scenario.content_hash}"
     )
-    if suffix == ".gif":
-        return GifFile(path, plan.frames_per_s, comment)
-    return Mp4File(path, plan.frames_per_s, scenario.name, comment)
 
 
-def _for_gif(plan: FilmPlan, width_px: int) -> tuple[FilmPlan, int]:
+def for_gif(plan: FilmPlan, width_px: int) -> tuple[FilmPlan, int]:
     """Return a plan and a width with which a GIF stays small."""
     frames_per_s = min(plan.frames_per_s, _GIF_FRAMES_PER_S)
     # A GIF tells how long a frame lasts in whole hundredths of a second.

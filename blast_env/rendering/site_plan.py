@@ -1,6 +1,7 @@
 """The plan of a site in matplotlib, with captions."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -105,6 +106,15 @@ def draw_outline(axes: Axes, obstacle: Obstacle, linewidth: float = 1.6) -> None
         )
 
 
+def draw_what_stands(axes: Axes, structures: Sequence[StructureOutline]) -> None:
+    """Draw the outlines of the structures, and the modules of the barrier as filled squares."""
+    for outline in structures:
+        draw_outline(axes, outline)
+        if outline.cells is not None:
+            parts = [rectangle_patch(in_metres(part.rectangle)) for part in outline.build().parts]
+            axes.add_collection(PatchCollection(parts, color=unit_interval(BARRIER), zorder=4))
+
+
 def draw_loads(
     axes: Axes, obstacle: ModularObstacle, scale: Normalize, linewidth: float = 0.4
 ) -> PatchCollection:
@@ -163,6 +173,15 @@ def legend_handles(obstacles: Sequence[Obstacle], zone: BuildZone | None) -> lis
         if zone.keep_outs:
             handles.append(_box("keep-out", unit_interval(QUIET_INK), 0.0, hatch="////"))
     handles.append(_box("site border", unit_interval(BORDER), 1.8))
+    return handles
+
+
+def layout_legend(structures: Sequence[Obstacle], zone: BuildZone | None) -> list[Artist]:
+    """Return the legend entries for a charge and for what `draw_what_stands` shows."""
+    handles = legend_handles(structures, zone)
+    for handle in handles:
+        if handle.get_label() == "barrier module":
+            handle.set(fill=True, facecolor=unit_interval(BARRIER))
     return handles
 
 
@@ -230,6 +249,17 @@ def write_names(axes: Axes, obstacles: Sequence[Obstacle], below: bool = False) 
     site = axes.patches[0].get_window_extent()
     for text, obstacle in zip(texts, named, strict=True):
         taken.append(_settle(text, _pixels(axes, obstacle), taken, site, below))
+
+
+def what_stands(structures: Sequence[StructureOutline]) -> list[StructureOutline]:
+    """Return what names should not cover: structures, and the barrier's modules one by one."""
+    obstacles = [outline for outline in structures if outline.cells is None]
+    for outline in structures:
+        if outline.cells is not None:
+            corners = [part.rectangle[:2] for part in outline.build().parts]
+            single = replace(outline, rows=1, columns=1, cells=((0, 0),))
+            obstacles += [replace(single, corner=corner) for corner in corners]
+    return obstacles
 
 
 def _name(axes: Axes, obstacle: Obstacle) -> Annotation:

@@ -26,6 +26,7 @@ from blast_env.physics.gas.engine import (
     ROOF,
     GasEngine,
     GasRun,
+    Recorders,
     scaled_distance,
 )
 from blast_env.physics.gas.probes import LoadTable
@@ -124,13 +125,19 @@ class GasBlast:
         """What stands where."""
         return build_site(self.scenario, self.layout, self.seed, self.charge)
 
-    def run(self, progress: Callable[[float], None] | None = None) -> "GasResult":
+    def run(
+        self,
+        progress: Callable[[float], None] | None = None,
+        recorders: Recorders = lambda _: (),
+    ) -> "GasResult":
         """Run the blast to its end.
 
         Args:
             progress: Called from time to time with the share of the time limit that has passed.
+            recorders: Makes further recorders for the grid: maps, pictures. They stay in the
+                result, in `run.solver.recorders`.
         """
-        run = self.engine.start_on(self.site)
+        run = self.engine.start_on(self.site, recorders)
         while run.end_reason is None:
             run.advance(run.time_s + run.limit_s / _PROGRESS_CALLS)
             if progress is not None:

@@ -24,7 +24,7 @@ from tests.agents.search_cases import WatchedEvaluator, ballistic, small_problem
 
 ALL_BLASTS = 598
 DRAWN = ("random", "greedy", "annealing", "genetic", "nsga2")
-SEEDS = range(5)
+SEEDS = range(3)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import matplotlib
@@ -16,6 +17,7 @@ from blast_env import load_scenario, save_scenario, simulate
 from blast_env.calibration.model import load_calibration
 from blast_env.cli import app
 from blast_env.physics.pymunk.engine import PymunkRun
+from blast_env.rendering import film
 from tests.scenarios import BALLISTIC_COURTYARD
 
 COMMANDS = (
@@ -66,8 +68,9 @@ def test_the_module_is_the_command_and_completes_its_words() -> None:
 
 
 def test_simulate_prints_loads_with_units_and_writes_all_files(
-    sparse: Path, tmp_path: Path
+    sparse: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(film, "write_film", partial(film.write_film, frames_per_s=3.0))
     names = ("film.mp4", "table.xlsx", "table.parquet", "map.png")
     options = ("--film", "--excel", "--parquet", "--heat-map")
     written = [tmp_path / name for name in names]

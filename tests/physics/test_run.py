@@ -45,9 +45,7 @@ def test_hits_without_air_equal_the_view_factor(engine: ParticleEngine, distance
 
 
 def test_a_facade_twice_as_far_gets_half_the_balls(engine: ParticleEngine) -> None:
-    near, far = (
-        len(finished(fan_scene(d, count=1440, facade=16.0), engine).log) for d in (40.0, 80.0)
-    )
+    near, far = (len(finished(fan_scene(d, facade=16.0), engine).log) for d in (40.0, 80.0))
     assert near / far == pytest.approx(2.0, rel=0.08)
 
 
@@ -104,7 +102,7 @@ def test_no_scene_has_more_air_than_its_capacity(seed: int, spacing: float, widt
     restitution=st.floats(0.0, 1.0),
     step_radii=st.floats(0.1, 0.5),
 )
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 def test_nothing_tunnels_through_a_module_or_the_border(
     engine_name: str,
     kind: CollisionType,

@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,18 +38,34 @@ def write(shown: tuple[FilmPanel, ...], path: Path, **changes: Any) -> tuple[Any
     return write_side_by_side(shown, path, **options)
 
 
+@dataclass(frozen=True)
+class Written:
+    """A film of both blasts, what came back from writing it, and the progress that was told."""
+
+    path: Path
+    results: tuple[Any, ...]
+    frames: np.ndarray
+    shares: list[float]
+
+
+@pytest.fixture(scope="module")
+def both(blast: Blast, barrier_blast: Blast, tmp_path_factory: pytest.TempPathFactory) -> Written:
+    path = tmp_path_factory.mktemp("film") / "both.mp4"
+    shares: list[float] = []
+    results = write(panels(blast, barrier_blast), path, progress=shares.append)
+    return Written(path, results, frames_of(path), shares)
+
+
 def test_both_blasts_are_shown_to_the_end_of_the_longer_one(
-    blast: Blast, barrier_blast: Blast, tmp_path: Path
+    blast: Blast, barrier_blast: Blast, both: Written
 ) -> None:
-    path = tmp_path / "both.mp4"
-    results = write(panels(blast, barrier_blast), path)
-    assert [each.digest for each in results] == [blast.run().digest, barrier_blast.run().digest]
-    frames = frames_of(path)
-    plans = [plan_film(each, 5.0, 40.0) for each in results]
-    assert len(frames) == max(plan.frame_count for plan in plans) > 3
-    assert frames.shape[2] == WIDTH_PX
-    assert frames.shape[1] % 2 == 0
-    assert list(tmp_path.iterdir()) == [path]
+    digests = [each.digest for each in both.results]
+    assert digests == [blast.run().digest, barrier_blast.run().digest]
+    plans = [plan_film(each, 5.0, 40.0) for each in both.results]
+    assert len(both.frames) == max(plan.frame_count for plan in plans) > 3
+    assert both.frames.shape[2] == WIDTH_PX
+    assert both.frames.shape[1] % 2 == 0
+    assert list(both.path.parent.iterdir()) == [both.path]
 
 
 def test_the_same_blast_twice_gives_two_equal_halves(blast: Blast, tmp_path: Path) -> None:
@@ -61,12 +78,8 @@ def test_the_same_blast_twice_gives_two_equal_halves(blast: Blast, tmp_path: Pat
     assert np.abs(frames[0] - frames[-1]).max() > 100
 
 
-def test_the_barrier_is_in_its_own_half_alone(
-    blast: Blast, barrier_blast: Blast, tmp_path: Path
-) -> None:
-    path = tmp_path / "both.mp4"
-    write(panels(blast, barrier_blast), path)
-    first = frames_of(path)[0].astype(int)
+def test_the_barrier_is_in_its_own_half_alone(barrier_blast: Blast, both: Written) -> None:
+    first = both.frames[0].astype(int)
     painter = FramePainter.for_blast(barrier_blast, width_px=WIDTH_PX // 2)
     part = barrier_blast.scene.obstacles()[-1].parts[0]
     across, down = painter.view.pixel(part.x, part.y)
@@ -84,11 +97,9 @@ def test_ctrl_c_leaves_nothing_behind(blast: Blast, barrier_blast: Blast, tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_progress_rises_to_one(blast: Blast, barrier_blast: Blast, tmp_path: Path) -> None:
-    shares: list[float] = []
-    write(panels(blast, barrier_blast), tmp_path / "both.mp4", progress=shares.append)
-    assert shares == sorted(shares)
-    assert shares[-1] == 1.0
+def test_progress_rises_to_one(both: Written) -> None:
+    assert both.shares == sorted(both.shares)
+    assert both.shares[-1] == 1.0
 
 
 def test_what_is_no_film_of_two_is_refused(blast: Blast, tmp_path: Path) -> None:

@@ -131,7 +131,7 @@ def test_deleted_key_is_named(case: int) -> None:
 
 
 @given(st.data())
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=250, deadline=None, derandomize=True)
 def test_value_of_the_wrong_type_is_named(data: st.DataObject) -> None:
     document, path = data.draw(st.sampled_from(CASES))
     wrong = data.draw(wrong_values(value_at(document, path)))
@@ -230,7 +230,7 @@ TOP_KEYS = sorted(set(Scenario.model_fields))
 
 
 @given(st.dictionaries(st.sampled_from(TOP_KEYS) | st.text(max_size=10), TOML_VALUES, max_size=8))
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=120, deadline=None, derandomize=True)
 def test_any_other_toml_is_an_error(document: Document) -> None:
     error_of_document(document)
 

@@ -56,7 +56,7 @@ def assert_free_explain_and_place_agree(placement: Placement, cells: list[Cell])
 
 
 @given(zone_documents(), st.integers(0, 10**6))
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=250, deadline=None, derandomize=True)
 def test_free_cells_are_those_that_the_rules_allow(document: Document, seed: int) -> None:
     scenario = buildable(document)
     zone = scenario.zone

@@ -1,5 +1,9 @@
 """The demonstration with a training of a second, and its verdict on known loads."""
 
+import shutil
+from contextlib import redirect_stdout
+from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -31,10 +35,17 @@ def tiny(folder: Path) -> DemoSettings:
     )
 
 
-def test_it_trains_compares_and_films(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    settings = tiny(tmp_path)
-    comparison = demonstrate(settings)
-    printed = capsys.readouterr().out
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSettings, Comparison, str]:
+    """The settings of a demonstration, what it found and what it printed."""
+    settings = tiny(tmp_path_factory.mktemp("demo"))
+    with redirect_stdout(StringIO()) as printed:
+        comparison = demonstrate(settings)
+    return settings, comparison, printed.getvalue()
+
+
+def test_it_trains_compares_and_films(first: tuple[DemoSettings, Comparison, str]) -> None:
+    settings, comparison, printed = first
     assert comparison.verdict in printed
     assert [line.split()[1] for line in printed.splitlines() if line.startswith("  after")] == [
         "4",
@@ -62,10 +73,12 @@ def test_it_trains_compares_and_films(tmp_path: Path, capsys: pytest.CaptureFixt
         assert set(Placement.of(small_scenario(), proposal.layout).cells) == set(proposal.layout)
 
 
-def test_it_can_be_run_again_but_removes_nothing_of_others(tmp_path: Path) -> None:
-    settings = tiny(tmp_path)
-    first, second = demonstrate(settings), demonstrate(settings)
-    assert first.verdict == second.verdict
+def test_it_can_be_run_again_but_removes_nothing_of_others(
+    tmp_path: Path, first: tuple[DemoSettings, Comparison, str]
+) -> None:
+    settings = replace(first[0], out=tmp_path / "out")
+    shutil.copytree(first[0].out, settings.out)
+    assert demonstrate(settings).verdict == first[1].verdict
     (RunFolder(settings.run).path / "config.yaml").unlink()
     with pytest.raises(BlastEnvError, match="must be empty"):
         demonstrate(settings)

@@ -95,6 +95,7 @@ def test_layouts_of_all_sizes_are_ranked_by_both_engines(
         return 100.0 - modules + noise
 
     monkeypatch.setattr(study, "measured_loads", loads)
+    monkeypatch.setattr(study, "_RESAMPLES", 100)  # the intervals are not looked at
     out = tmp_path / "loads.csv"
     result = run(layouts.app, "engines", "--layouts=60", "--charges=2", f"--out={out}")
     assert result.exit_code == 0, result.output

@@ -25,6 +25,7 @@ from scripts.scenario_difficulty import (
     studied_scenarios,
     with_section,
 )
+from tests.agents.search_cases import ballistic
 
 REPOSITORY = Path(__file__).parents[2]
 SMALL = Effort(
@@ -65,7 +66,7 @@ HARD = {"walls": (0.4, 0.6, 0.7), "searched": 0.5, "random": (0.7, 0.75, 0.8, 0.
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return Study(load_scenario("courtyard"), SMALL, "event", processes=1)
+    return Study(ballistic("courtyard"), SMALL, "event", processes=1)
 
 
 @pytest.fixture(scope="module")
@@ -203,7 +204,8 @@ def run_command(*arguments: str) -> tuple[int, str]:
     return answer.exit_code, answer.output
 
 
-def test_the_command_prints_and_writes(tmp_path: Path) -> None:
+def test_the_command_prints_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scenario_difficulty, "load_scenario", ballistic)
     page, pictures = tmp_path / "page.md", tmp_path / "pictures"
     page.write_text("# Title\n<!-- begin courtyard -->\n<!-- end courtyard -->\n")
     small = ("--layouts=2", "--seeds=2", "--charges=2", "--realisations=1", "--processes=1")

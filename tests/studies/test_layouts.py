@@ -7,6 +7,7 @@ from scipy.stats import spearmanr
 from blast_env import simulate
 from blast_env.physics.presets import preset
 from blast_env.physics.scene import Charge
+from blast_env.studies.agreement import layouts as study
 from blast_env.studies.agreement.layouts import (
     AVERAGED,
     ENGINES,
@@ -65,7 +66,8 @@ def test_averaging_seeds_brings_all_correlations_up() -> None:
 
 
 @pytest.mark.parametrize("name", STATISTICS)
-def test_bootstrap_interval_surrounds_the_value(name: str) -> None:
+def test_bootstrap_interval_surrounds_the_value(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "_RESAMPLES", 400)
     found = correlation(noisy_loads(0.5), STATISTICS[name], np.random.default_rng(1))
     assert found.low < found.value < found.high
     assert found.high - found.low < 0.2

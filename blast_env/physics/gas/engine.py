@@ -19,11 +19,13 @@ from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
 from blast_env.physics.gas.faces import Faces, exposed_faces
 from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import FaceLoads, Gauges
 from blast_env.physics.gas.solver import GasSolver, Recorder, state_bytes
 from blast_env.physics.gas.source import (
     GasCharge,
     clearance_m,
+    largest_radius_m,
     least_clearance_m,
     set_charge,
 )
@@ -160,6 +162,8 @@ class GasRun:
             threads=engine.threads,
         )
         set_charge(self.solver, self.charge)
+        if self.gauges is not None:
+            _add_opening(self.gauges, self.grid, self.charge)
         self.end_reason: EndReason | None = None
         self._groups = _groups(self.table, site)
         # When the wave has come all over a structure; sound would not take longer than this.
@@ -337,6 +341,17 @@ def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:
     if not site.gauges:
         return None
     return Gauges(grid, [_air_cell(grid, each.name, each.position_m) for each in site.gauges])
+
+
+def _add_opening(gauges: Gauges, grid: GasGrid, charge: GasCharge) -> None:
+    """Add what gauges nearer than the first obstacle had before the grid took over."""
+    centres_m = np.array(grid.origin_m) + grid.cell_m * (gauges.cells + 0.5)
+    x_m, y_m, z_m = charge.position_m
+    centre_m = np.array([x_m, y_m, 0.0 if charge.on_ground else z_m])
+    distance_m = np.sqrt(((centres_m - centre_m) ** 2).sum(axis=1))
+    if distance_m.min() < largest_radius_m(grid, charge):
+        opening = opening_of(grid, charge)
+        gauges.add_before(opening.time_s, opening.overpressures_pa(distance_m))
 
 
 def _air_cell(

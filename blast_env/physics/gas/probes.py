@@ -186,6 +186,15 @@ class Gauges(LoadTable):
         self._times: list[float] = []
         self._history: list[NDArray[np.float64]] = []
 
+    def add_before(self, time_s: NDArray[np.float64], overpressure_pa: NDArray[np.float64]) -> None:
+        """Add what came before the first step, at its times (steps,): (steps, n)."""
+        steps_s = np.diff(time_s, prepend=0.0)
+        for time, step_s, overpressure in zip(time_s, steps_s, overpressure_pa, strict=True):
+            if step_s > 0.0:
+                self._times.append(float(time))
+                self._history.append(overpressure)
+                self.add(overpressure, float(time), float(step_s))
+
     def record(self, solver: GasSolver, step_s: float) -> None:
         """Add a step."""
         overpressure = solver.overpressure_at(self.cells)

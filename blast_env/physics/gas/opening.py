@@ -1,0 +1,86 @@
+"""What happened before the grid took a blast over: its first, spherical stage, seen again.
+
+The solver's recorders begin when the charge is laid onto the grid, with its front already at the
+first obstacle. Whoever was nearer to the charge has missed the front by then.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.source import GasCharge, largest_radius_m
+
+_RADII: Final = 240
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """Overpressure over time and distance from the charge until the grid takes over.
+
+    Attributes:
+        centre_m: Centre of the blast: x, y, and height above the ground.
+        end_s: When the grid takes over.
+        front_m: Where the front is then.
+        time_s: Times (steps,).
+        radius_m: Distances, from the surface of the charge to the front (n,).
+        overpressure_pa: Overpressures (steps, n).
+    """
+
+    centre_m: tuple[float, float, float]
+    end_s: float
+    front_m: float
+    time_s: Floats
+    radius_m: Floats
+    overpressure_pa: Floats
+
+    def at(self, time_s: float, distance_m: ArrayLike) -> Floats:
+        """Return the overpressures at some distances at a time, 0 beyond the front.
+
+        Within the charge it is the pressure at its surface.
+        """
+        step = max(int(np.searchsorted(self.time_s, time_s, side="right")) - 1, 0)
+        return self._over_distance(self.overpressure_pa[step], distance_m)
+
+    def overpressures_pa(self, distance_m: ArrayLike) -> Floats:
+        """Return the overpressures over time at some distances (steps, n)."""
+        distances_m = np.atleast_1d(np.asarray(distance_m, dtype=np.float64))
+        return np.stack([self._over_distance(row, distances_m) for row in self.overpressure_pa])
+
+    def peak_pa(self, distance_m: ArrayLike) -> Floats:
+        """Return the largest overpressures so far, 0 where the front has not been."""
+        return self._over_distance(self.overpressure_pa.max(axis=0, initial=0.0), distance_m)
+
+    def positive_impulse_pa_s(self, distance_m: ArrayLike) -> Floats:
+        """Return the impulses of all positive phases so far."""
+        step_s = np.diff(self.time_s, append=self.end_s)
+        positive = np.maximum(self.overpressure_pa, 0.0)
+        return self._over_distance(step_s @ positive, distance_m)
+
+    def _over_distance(self, values: Floats, distance_m: ArrayLike) -> Floats:
+        return np.interp(np.asarray(distance_m), self.radius_m, values, right=0.0)
+
+
+def opening_of(grid: GasGrid, charge: GasCharge) -> Opening:
+    """Return the first stage of a blast; it takes a good part of a second.
+
+    Args:
+        grid: The grid that takes the blast over.
+        charge: The charge.
+    """
+    profile = charge.profile(largest_radius_m(grid, charge))
+    surface_m = charge.least_radius_m * (1.0 + 1e-9)
+    radii = np.linspace(surface_m, max(profile.front_m, surface_m), _RADII)
+    blast = charge.explosive.in_free_air(charge.free_air_kg, radii)
+    if profile.time_s > 0.0:
+        blast.advance(until_s=profile.time_s)
+    history = blast.history
+    if not len(history):
+        history = np.zeros((1, 1 + _RADII))
+    x_m, y_m, z_m = charge.position_m
+    centre_m = (x_m, y_m, 0.0 if charge.on_ground else z_m)
+    return Opening(centre_m, profile.time_s, profile.front_m, history[:, 0], radii, history[:, 1:])

@@ -1,0 +1,432 @@
+"""Figures of a blast of the gas engine: the ground, facades unfolded, histories of gauges.
+
+Two results can be drawn beside each other, say without and with a barrier; both then have the same
+scale.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import dist
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.calibration.references import Burst, Friedlander, kingery_bulmash
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.physics.scene import WALLS, StructureOutline, WallName
+from blast_env.rendering.site_plan import (
+    in_metres,
+    load_colours,
+    write_heading,
+)
+from blast_env.rendering.style import (
+    FAINT,
+    QUIET_INK,
+    count_of,
+    nice_ceiling,
+    number_on_axis,
+    render_extra,
+    unit_interval,
+)
+from blast_env.simulation.gas import GasBlast, GasResult
+from blast_env.units import MS_PER_S, UNITS_PER_M
+
+with render_extra():
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Colormap, Normalize
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import FuncFormatter
+
+Quantity = Literal["impulse", "peak"]
+"""What is drawn: the impulse of all positive phases, or the largest overpressure."""
+
+PA_PER_KPA: Final = 1000.0
+
+MINUS: Final = "\N{MINUS SIGN}"
+
+_PERCENT: Final = 100.0
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How a quantity is drawn.
+
+    Attributes:
+        name: Its name.
+        unit: Its unit.
+        column: Its column in the tables of a result.
+        factor: From the column to the unit.
+        summary: What stands for a whole wall.
+        of_all: From the values of a wall to that.
+    """
+
+    name: str
+    unit: str
+    column: str
+    factor: float
+    summary: str
+    of_all: Callable[[FloatArray], float]
+
+    @property
+    def label(self) -> str:
+        """Its name with its unit."""
+        return f"{self.name} ({self.unit})"
+
+
+KINDS: Final = {
+    "impulse": Kind(
+        "impulse of all positive phases",
+        "Pa·s",
+        "positive_impulse_pa_s",
+        1.0,
+        "mean",
+        lambda values: float(np.nanmean(values)),
+    ),
+    "peak": Kind(
+        "peak overpressure",
+        "kPa",
+        "peak_pa",
+        1.0 / PA_PER_KPA,
+        "largest",
+        lambda values: float(np.nanmax(values)),
+    ),
+}
+
+
+def kind_of(quantity: str) -> Kind:
+    """Return how a quantity is drawn.
+
+    Raises:
+        UnknownNameError: If there is no such quantity.
+    """
+    if quantity not in KINDS:
+        raise UnknownNameError("quantity", quantity, KINDS)
+    return KINDS[quantity]
+
+
+def layout_words(blast: GasBlast) -> str:
+    """Return what barrier a blast has, in words."""
+    return f"barrier of {count_of('module', len(blast.layout))}" if blast.layout else "no barrier"
+
+
+def gas_subtitle(blast: GasBlast) -> str:
+    """Return charge and cells of a blast in words; the seed has nothing to say beside them."""
+    charge = blast.site.charge
+    x_m, y_m = charge.position_m
+    place = f"({x_m:.1f} m, {y_m:.1f} m)"
+    if charge.height_m > 0.0:
+        place += f", {charge.height_m:g} m high"
+    return f"charge {charge.tnt_kg:g} kg TNT at {place}, gas in cells of {blast.engine.cell_m:g} m"
+
+
+def check_comparable(blasts: Sequence[GasBlast]) -> None:
+    """Check that blasts can be drawn beside each other: one site, one charge.
+
+    Raises:
+        BlastEnvError: If they differ in one of them.
+    """
+    first = blasts[0].site
+    for blast in blasts[1:]:
+        if blast.site.site != first.site:
+            raise BlastEnvError("the blasts to be compared have different sites")
+        if blast.site.charge != first.charge:
+            raise BlastEnvError(
+                f"the blasts to be compared have different charges, {first.charge} and "
+                f"{blast.site.charge}"
+            )
+
+
+def both_results(result: GasResult, beside: GasResult | None) -> list[GasResult]:
+    """Return one or two results from left to right, checked with `check_comparable`."""
+    results = [result] if beside is None else [beside, result]
+    check_comparable([each.blast for each in results])
+    return results
+
+
+def gas_heading(results: Sequence[GasResult], what: str) -> tuple[str, str]:
+    """Return the heading of a figure of some results, and the line under it."""
+    blast = results[-1].blast
+    subtitle = gas_subtitle(blast)
+    if len(results) == 1:
+        subtitle += f", {layout_words(blast)}"
+    return f"{blast.scenario.name}: {what}", subtitle
+
+
+def loads_and_solids() -> Colormap:
+    """Return the colours of loads, grey for what is solid."""
+    return load_colours().with_extremes(bad=unit_interval(FAINT))
+
+
+# Facades.
+
+_FACADES_IN: Final = 11.0
+_LEAST_WALL_SHARE: Final = 0.13  # of all walls, for its title
+_WALL_HEIGHTS_IN: Final = (1.0, 4.0)
+
+_LEFT_TO_RIGHT: Final[dict[WallName, tuple[str, bool]]] = {
+    "west": ("y", True),
+    "south": ("x", False),
+    "east": ("y", False),
+    "north": ("x", True),
+}
+"""The walls as one walks round a structure, with the axis along each and whether it falls."""
+
+
+def facades(
+    result: GasResult,
+    structure: str | None = None,
+    quantity: Quantity = "impulse",
+    beside: GasResult | None = None,
+) -> Figure:
+    """Return the walls of a structure unfolded, with the load on every cell's face.
+
+    The walls are seen from outside, in the order in which one walks round: west, south, east,
+    north, so that neighbours share a corner.
+
+    Args:
+        result: The blast.
+        structure: Name of the structure; the protected one with the largest impulse without it.
+        quantity: `"impulse"`, of all positive phases in Pa s, or `"peak"`, overpressure in kPa.
+        beside: Another result with the same site and charge, drawn above on the same scale:
+            without the barrier, or with another layout.
+
+    Raises:
+        BlastEnvError: If site or charge of the results differ, or there is no structure.
+        UnknownNameError: If there is no such structure or quantity.
+    """
+    kind, results = kind_of(quantity), both_results(result, beside)
+    outline = _outline(results[0], structure)
+    walls = [
+        {wall: _wall(each, outline, wall, kind) for wall in _LEFT_TO_RIGHT} for each in results
+    ]
+    largest = max(float(np.nanmax(v, initial=0.0)) for row in walls for v in row.values())
+    scale = Normalize(0.0, nice_ceiling(largest) if largest > 0.0 else 1.0)
+    lengths = np.array([_length_m(outline, wall) for wall in _LEFT_TO_RIGHT])
+    widths = np.maximum(lengths, _LEAST_WALL_SHARE * lengths.sum())
+    height_m = outline.height_m or result.run.site.air_height_m
+    low, high = _WALL_HEIGHTS_IN
+    row_in = min(max(_FACADES_IN * height_m / float(widths.sum()), low), high) + 0.85
+    figure = Figure(figsize=(_FACADES_IN + 2.2, row_in * len(results) + 0.9), layout="compressed")
+    panels = figure.subplots(
+        len(results), len(WALLS), squeeze=False, sharey=True, width_ratios=widths.tolist()
+    )
+    for row, each in enumerate(results):
+        for axes, wall in zip(panels[row], _LEFT_TO_RIGHT, strict=True):
+            _draw_wall(axes, outline, wall, walls[row][wall], scale, height_m)
+            before = walls[0][wall] if row else None
+            axes.set_title(_wall_title(outline, wall, walls[row][wall], before, kind), fontsize=9.5)
+        words = f"{layout_words(each.blast)}\n" if beside is not None else ""
+        panels[row][0].set_ylabel(f"{words}z (m)")
+    bar = figure.colorbar(
+        ScalarMappable(scale, load_colours()),
+        ax=panels.ravel().tolist(),
+        shrink=0.85,
+        pad=0.02,
+        format=FuncFormatter(number_on_axis),
+    )
+    bar.set_label(kind.label)
+    title, subtitle = gas_heading(results, f"{kind.name} on the walls of {outline.name}")
+    write_heading(figure, title, f"{subtitle}; walls seen from outside")
+    return figure
+
+
+def _outline(result: GasResult, structure: str | None) -> StructureOutline:
+    known = {each.name: each for each in result.run.site.structures if each.cells is None}
+    if structure is not None:
+        if structure not in known:
+            raise UnknownNameError("structure", structure, known)
+        return known[structure]
+    table = result.structures
+    if not len(table):
+        raise BlastEnvError(f"{result.blast.scenario.name} has no structure with walls")
+    chosen = table[table["protected"]] if table["protected"].any() else table
+    worst = int(chosen["positive_impulse_pa_s"].to_numpy().argmax())
+    return known[str(chosen["structure"].iloc[worst])]
+
+
+def _length_m(outline: StructureOutline, wall: WallName) -> float:
+    left, bottom, right, top = in_metres(outline.rectangle)
+    return right - left if _LEFT_TO_RIGHT[wall][0] == "x" else top - bottom
+
+
+def _wall(result: GasResult, outline: StructureOutline, wall: WallName, kind: Kind) -> FloatArray:
+    """Return the load on each cell's face of a wall, by height and along x or y.
+
+    nan where something stands before the wall.
+    """
+    cell_m = result.run.grid.cell_m
+    axis = _LEFT_TO_RIGHT[wall][0]
+    low = outline.corner["xy".index(axis)] / UNITS_PER_M
+    height_m = outline.height_m or result.run.site.air_height_m
+    shape = (round(height_m / cell_m), round(_length_m(outline, wall) / cell_m))
+    values = np.full(shape, np.nan)
+    own = result.faces
+    own = own[(own["structure"] == outline.name) & (own["face"] == wall)]
+    along = np.floor((own[f"{axis}_m"].to_numpy() - low) / cell_m).astype(int)
+    up = np.floor(own["z_m"].to_numpy() / cell_m).astype(int)
+    values[up, along] = kind.factor * own[kind.column].to_numpy()
+    return values
+
+
+def _draw_wall(
+    axes: Axes,
+    outline: StructureOutline,
+    wall: WallName,
+    values: FloatArray,
+    scale: Normalize,
+    height_m: float,
+) -> None:
+    axis, falls = _LEFT_TO_RIGHT[wall]
+    low = outline.corner["xy".index(axis)] / UNITS_PER_M
+    high = low + _length_m(outline, wall)
+    axes.imshow(
+        values,
+        norm=scale,
+        cmap=loads_and_solids(),
+        origin="lower",
+        interpolation="nearest",
+        extent=(low, high, 0.0, height_m),
+    )
+    axes.set_xlim((high, low) if falls else (low, high))
+    axes.set_xlabel(f"{axis} (m)")
+    for spine in axes.spines.values():
+        spine.set_color(unit_interval(QUIET_INK))
+
+
+def _wall_title(
+    outline: StructureOutline,
+    wall: WallName,
+    values: FloatArray,
+    before: FloatArray | None,
+    kind: Kind,
+) -> str:
+    name = wall if wall in outline.faces else f"{wall} (does not count)"
+    if not np.isfinite(values).any():
+        return f"{name}\nno air before it"
+    now = kind.of_all(values)
+    words = f"{kind.summary} {now:.3g} {kind.unit}"
+    if before is not None and np.isfinite(before).any() and kind.of_all(before) > 0.0:
+        change = f"{_PERCENT * (now / kind.of_all(before) - 1.0):+.0f} %"
+        words += f" ({change.replace('-', MINUS)})"
+    return f"{name}\n{words}"
+
+
+# Gauges.
+
+# Okabe and Ito's colours, which people with any colour vision can tell apart.
+_MAIN, _BESIDE, _REFERENCE = "#0072B2", "#D55E00", "#000000"
+
+
+def gauge_history(
+    result: GasResult, gauge: str, *, free_field: bool = False, beside: GasResult | None = None
+) -> Figure:
+    """Return overpressure and impulse at a gauge over time.
+
+    Args:
+        result: The blast.
+        gauge: Name of the gauge.
+        free_field: Whether to draw Kingery and Bulmash's incident wave at its distance, as
+            Friedlander's waveform: what would come there if nothing stood anywhere.
+        beside: Another result with the same site and charge, drawn into the same axes.
+
+    Raises:
+        UnknownNameError: If there is no gauge of that name.
+        BlastEnvError: If Kingery and Bulmash have no wave for this distance, or site or charge
+            differ.
+    """
+    results = both_results(result, beside)
+    figure = Figure(figsize=(8.6, 6.8), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    end_s = max(each.time_s for each in results)
+    for each in results:
+        of_result = each is result
+        colour = _MAIN if of_result else _BESIDE
+        history = each.history(gauge)
+        row = each.gauges.set_index("name").loc[gauge]
+        time_s, overpressure = history["time_s"].to_numpy(), history["overpressure_pa"].to_numpy()
+        # Still air before.
+        time_s = np.concatenate(([0.0, 2.0 * time_s[0] - time_s[1]], time_s))
+        overpressure = np.concatenate(([0.0, 0.0], overpressure))
+        words = layout_words(each.blast)
+        _draw_wave(
+            (upper, lower),
+            (time_s, overpressure, _positive_impulse(time_s, overpressure)),
+            (
+                f"{words}: peak {row['peak_pa'] / PA_PER_KPA:.3g} kPa",
+                f"{words}: {row['positive_impulse_pa_s']:.3g} Pa·s",
+            ),
+            color=colour,
+            linestyle="-" if of_result else "--",
+            linewidth=1.8,
+        )
+    own = result.gauges[result.gauges["name"] == gauge]
+    x_m, y_m, z_m = own[["x_m", "y_m", "z_m"]].to_numpy()[0]
+    place = (float(x_m), float(y_m), float(z_m))
+    if free_field:
+        wave, words = _free_field(result, place)
+        time_s = np.unique([*np.linspace(0.0, end_s, 2000), wave.arrival_s, wave.arrival_s - 1e-9])
+        _draw_wave(
+            (upper, lower),
+            (time_s, wave.pressure(time_s), wave.impulse_until(time_s)),
+            (
+                f"{words}: peak {wave.peak / PA_PER_KPA:.3g} kPa",
+                f"{words}: {wave.impulse():.3g} Pa·s",
+            ),
+            color=_REFERENCE,
+            linestyle=(0, (1.2, 1.2)),
+            linewidth=1.6,
+        )
+    upper.axhline(0.0, color=unit_interval(QUIET_INK), linewidth=0.8, zorder=1)
+    upper.set_ylabel("overpressure (kPa)")
+    lower.set_ylabel("impulse of the positive phases (Pa·s)")
+    lower.set_xlabel("time since the detonation (ms)")
+    lower.set_xlim(0.0, end_s * MS_PER_S)
+    lower.set_ylim(bottom=0.0)
+    for axes in (upper, lower):
+        axes.grid(alpha=0.25)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(fontsize=9, frameon=False, loc="best")
+    title, subtitle = gas_heading(results, f"gauge {gauge}")
+    at = ", ".join(f"{value:.2f}" for value in place)
+    write_heading(figure, title, f"{subtitle}; gauge at ({at}) m")
+    return figure
+
+
+def _positive_impulse(time_s: FloatArray, overpressure_pa: FloatArray) -> FloatArray:
+    """Return the impulse of all positive phases up to each time, as gauges add it up."""
+    parts = 0.5 * (overpressure_pa[1:] + overpressure_pa[:-1]) * np.diff(time_s)
+    return np.concatenate(([0.0], np.cumsum(np.maximum(parts, 0.0))))
+
+
+def _draw_wave(
+    panels: tuple[Axes, Axes],
+    wave: tuple[FloatArray, FloatArray, FloatArray],
+    labels: tuple[str, str],
+    **style: Any,
+) -> None:
+    """Draw the overpressures and impulses of a wave, Pa and Pa s, over its times in s."""
+    time_s, overpressure_pa, impulse_pa_s = wave
+    panels[0].plot(MS_PER_S * time_s, overpressure_pa / PA_PER_KPA, label=labels[0], **style)
+    panels[1].plot(MS_PER_S * time_s, impulse_pa_s, label=labels[1], **style)
+
+
+def _free_field(result: GasResult, place: tuple[float, float, float]) -> tuple[Friedlander, str]:
+    """Return Kingery and Bulmash's incident wave at a place, and its name."""
+    charge = result.run.charge
+    burst: Burst = "hemispherical" if charge.on_ground else "spherical"
+    x_m, y_m, z_m = charge.position_m
+    distance_m = dist((x_m, y_m, 0.0 if charge.on_ground else z_m), place)
+    peak_pa, duration_s, impulse_pa_s, arrival_s = (
+        kingery_bulmash(quantity, distance_m, charge.mass_kg, burst)
+        for quantity in (
+            "incident_overpressure",
+            "positive_duration",
+            "incident_impulse",
+            "arrival_time",
+        )
+    )
+    wave = Friedlander.from_impulse(peak_pa, duration_s, impulse_pa_s, arrival_s)
+    kind = "free field" if charge.on_ground else "free air, no ground"
+    return wave, f"Kingery-Bulmash, {kind}, incident at {distance_m:.1f} m"

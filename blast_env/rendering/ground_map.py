@@ -1,0 +1,260 @@
+"""Maps of the ground: peak overpressure and impulse of a blast of the gas engine."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.opening import Opening, opening_of
+from blast_env.physics.gas.probes import GroundMap
+from blast_env.physics.gas.source import largest_radius_m
+from blast_env.physics.scene import BlastSite
+from blast_env.rendering.gas import (
+    Quantity,
+    both_results,
+    gas_heading,
+    kind_of,
+    layout_words,
+    loads_and_solids,
+)
+from blast_env.rendering.site_plan import (
+    add_outline,
+    draw_charge,
+    draw_site,
+    draw_what_stands,
+    draw_zone,
+    in_metres,
+    layout_legend,
+    what_stands,
+    write_heading,
+    write_names,
+)
+from blast_env.rendering.style import (
+    BORDER,
+    INK,
+    number_on_axis,
+    render_extra,
+    short_number,
+    unit_interval,
+)
+from blast_env.simulation.gas import GasResult
+
+with render_extra():
+    from matplotlib import patheffects
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.contour import QuadContourSet
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Circle
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+_LEVELS: Final = {"few": (1.0, 2.0, 5.0), "many": (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)}
+_FEW_LEVELS: Final = 7
+_NUMBER_CLEAR: Final = 0.025  # of the site's width
+_MOST_OF_THE_GROUND: Final = 0.93
+_MAP_WIDTHS_IN: Final = (6.0, 7.4)
+_FINER: Final = "spherical stage, finer than the grid"
+_MAP_HEIGHTS_IN: Final = (3.4, 7.0)
+
+
+def ground_recorders(grid: GasGrid) -> tuple[GroundMap, ...]:
+    """Return what a blast must be run with for `ground_map`, as `GasBlast.run(recorders=...)`."""
+    return (GroundMap(grid),)
+
+
+def ground_values(result: GasResult, quantity: Quantity) -> FloatArray:
+    """Return a quantity in the lowest cells over the whole grid, nan in solids (nx, ny).
+
+    Around a charge on the ground it has what the spherical stage did before the grid took over.
+
+    Args:
+        result: A blast that was run with `ground_recorders`.
+        quantity: `"impulse"`, in Pa s, or `"peak"`, in Pa.
+
+    Raises:
+        BlastEnvError: If it was run without them.
+        UnknownNameError: If there is no such quantity.
+    """
+    kind_of(quantity)
+    maps = [each for each in result.run.solver.recorders if isinstance(each, GroundMap)]
+    if not maps:
+        raise BlastEnvError("the blast has no map: run it with recorders=ground_recorders")
+    opening = opening_of(result.run.grid, result.run.charge)
+    distance_m = _distances_m(result.run.grid, opening)
+    if quantity == "peak":
+        return np.maximum(maps[0].peak_pa, opening.peak_pa(distance_m))
+    return maps[0].positive_impulse_pa_s + opening.positive_impulse_pa_s(distance_m)
+
+
+def _distances_m(grid: GasGrid, opening: Opening) -> FloatArray:
+    """Return the distances of the lowest cells from the centre of a blast (nx, ny)."""
+    x_m, y_m, z_m = opening.centre_m
+    across = grid.centres_m(0)[:, np.newaxis] - x_m
+    along = grid.centres_m(1)[np.newaxis, :] - y_m
+    return np.asarray(np.sqrt(across**2 + along**2 + (grid.centres_m(2)[0] - z_m) ** 2))
+
+
+def ground_map(
+    result: GasResult, quantity: Quantity = "peak", beside: GasResult | None = None
+) -> Figure:
+    """Return a map of the load over the ground, with contours and what stands on it.
+
+    Args:
+        result: A blast that was run with `ground_recorders`.
+        quantity: `"peak"`, overpressure in kPa, or `"impulse"`, of all positive phases in Pa s.
+        beside: Another result with the same site and charge, drawn to the left on the same scale:
+            without the barrier, or with another layout.
+
+    Raises:
+        BlastEnvError: If a blast was run without the recorders, or site or charge differ.
+        UnknownNameError: If there is no such quantity.
+    """
+    kind, results = kind_of(quantity), both_results(result, beside)
+    values = [kind.factor * ground_values(each, quantity) for each in results]
+    levels = _contour_levels(
+        [_on_site(each, value)[2] for each, value in zip(results, values, strict=True)]
+    )
+    scale = LogNorm(levels[0], levels[-1])
+    figure = Figure(figsize=_map_size_in(result.run.site, len(results)), layout="constrained")
+    plans = figure.subplots(1, len(results), squeeze=False, sharex=True, sharey=True)[0]
+    for axes, each, value in zip(plans, results, values, strict=True):
+        _draw_ground(axes, each, value, levels, scale)
+        if beside is not None:
+            axes.set_title(layout_words(each.blast), fontsize=11)
+    for axes in plans[1:]:
+        axes.set_ylabel("")
+        axes.tick_params(left=False, labelleft=False)
+    bar = figure.colorbar(
+        ScalarMappable(scale, loads_and_solids()),
+        ax=list(plans),
+        extend="both",
+        shrink=0.85,
+        pad=0.02,
+        format=FuncFormatter(number_on_axis),
+    )
+    bar.ax.yaxis.set_major_locator(FixedLocator(levels))
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    bar.set_label(kind.label)
+    structures = [outline for each in results for outline in each.run.site.structures]
+    handles = layout_legend(structures, result.blast.scenario.build_zone)
+    if result.run.charge.on_ground:
+        handles.append(
+            Line2D([], [], color=unit_interval(INK), linestyle=(0, (1.0, 2.0)), label=_FINER)
+        )
+    columns = -(-len(handles) // -(-len(handles) // int(figure.get_figwidth() / 1.45)))
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
+    )
+    height_m = result.run.grid.centres_m(2)[0]
+    title, subtitle = gas_heading(results, f"{kind.name} over the ground")
+    write_heading(figure, title, f"{subtitle}; {height_m:g} m above the ground")
+    for axes, each in zip(plans, results, strict=True):
+        write_names(axes, what_stands(each.run.site.structures))
+    return figure
+
+
+def _map_size_in(site: BlastSite, count: int) -> tuple[float, float]:
+    width, height = site.site.right - site.site.left, site.site.top - site.site.bottom
+    plan_in = _MAP_WIDTHS_IN[0 if count > 1 else 1]
+    low, high = _MAP_HEIGHTS_IN
+    return count * plan_in + 1.6, min(max(plan_in * height / width, low), high) + 1.7
+
+
+def _on_site(result: GasResult, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return x and y of the cells on the site, and the values there (nx,), (ny,), (nx, ny)."""
+    grid, site = result.run.grid, in_metres(result.run.site.site)
+    x_m, y_m = grid.centres_m(0), grid.centres_m(1)
+    across = (x_m > site.left) & (x_m < site.right)
+    along = (y_m > site.bottom) & (y_m < site.top)
+    return x_m[across], y_m[along], values[np.ix_(across, along)]
+
+
+def _contour_levels(parts: Sequence[FloatArray]) -> list[float]:
+    """Return levels of few digits over most of the ground; near the charge there is no end."""
+    values = np.concatenate([part[np.isfinite(part)] for part in parts])
+    high = float(np.quantile(values, _MOST_OF_THE_GROUND))
+    low = max(float(values.min()), 1e-3 * high)
+    powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    for steps in ("few", "many"):
+        levels = [step * 10.0**power for power in powers for step in _LEVELS[steps]]
+        first = max((k for k, level in enumerate(levels) if level <= low), default=0)
+        last = min((k for k, level in enumerate(levels) if level >= high), default=len(levels))
+        shown = [float(f"{level:.3g}") for level in levels[first : last + 1]]
+        if len(shown) >= _FEW_LEVELS:
+            break
+    return shown
+
+
+def _draw_ground(
+    axes: Axes, result: GasResult, values: FloatArray, levels: Sequence[float], scale: Normalize
+) -> None:
+    site, site_m = result.run.site, in_metres(result.run.site.site)
+    grid = result.run.grid
+    draw_site(axes, site_m)
+    x_m, y_m, inside = _on_site(result, values)
+    half = grid.cell_m / 2.0
+    image = axes.imshow(
+        inside.T,
+        norm=scale,
+        cmap=loads_and_solids(),
+        origin="lower",
+        interpolation="nearest",
+        extent=(x_m[0] - half, x_m[-1] + half, y_m[0] - half, y_m[-1] + half),
+        zorder=1,
+    )
+    image.set_clip_path(axes.patches[0])
+    reach = 0.03 * max(site_m.right, site_m.top)
+    axes.set_xlim(site_m.left - reach, site_m.right + reach)
+    axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
+    lines = axes.contour(
+        x_m, y_m, inside.T, levels=levels, colors=[unit_interval(INK)], linewidths=0.7
+    )
+    _write_levels(axes, lines, result)
+    if result.blast.scenario.build_zone is not None:
+        draw_zone(axes, result.blast.scenario.build_zone)
+    add_outline(axes, site_m, edgecolor=unit_interval(BORDER), linewidth=1.8)
+    draw_what_stands(axes, site.structures)
+    draw_charge(axes, site.charge.position_m)
+    if result.run.charge.on_ground:
+        circle = _taken_over(result)
+        axes.add_patch(circle)
+        circle.set_clip_path(axes.patches[0])
+
+
+def _taken_over(result: GasResult) -> Circle:
+    """Return how far the front was when the grid took over: inside, peaks are sharper."""
+    radius_m = largest_radius_m(result.run.grid, result.run.charge)
+    return Circle(
+        result.run.site.charge.position_m,
+        radius_m,
+        fill=False,
+        edgecolor=unit_interval(INK),
+        linewidth=1.4,
+        linestyle=(0, (1.0, 2.0)),
+        label=_FINER,
+        zorder=2,
+    )
+
+
+def _write_levels(axes: Axes, lines: QuadContourSet, result: GasResult) -> None:
+    """Write the numbers of contours, but not on the border, nor over what stands."""
+    grid, site = result.run.grid, in_metres(result.run.site.site)
+    clear_m = _NUMBER_CLEAR * (site.right - site.left)
+    solid = np.argwhere(grid.solid[:, :, 0])
+    solid_m = np.array(grid.origin_m)[:2] + grid.cell_m * (solid + 0.5)
+    charge_m = np.array([result.run.site.charge.position_m])
+    standing_m = np.concatenate((solid_m, charge_m))
+    numbers = axes.clabel(lines, fmt=lambda value: short_number(value, 3), fontsize=8, inline=False)
+    for text in list(numbers):
+        x_m, y_m = text.get_position()
+        to_border_m = min(x_m - site.left, site.right - x_m, y_m - site.bottom, site.top - y_m)
+        to_solid_m = float(np.hypot(*(standing_m - (x_m, y_m)).T).min())
+        if min(to_border_m, to_solid_m) < clear_m:
+            text.remove()
+            continue
+        text.set_path_effects([patheffects.withStroke(linewidth=3.0, foreground="white")])

@@ -1,0 +1,512 @@
+"""Frames of overpressure in the air: in plan at a height, and in a vertical section.
+
+They begin at the detonation: until the grid takes a blast over, its spherical stage is drawn.
+"""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import UnknownNameError
+from blast_env.geometry import Rectangle
+from blast_env.physics.gas.opening import Opening
+from blast_env.physics.gas.probes import Snapshots
+from blast_env.physics.scene import BlastSite, StructureOutline
+from blast_env.physics.structure import Colour
+from blast_env.rendering.frames import Frame
+from blast_env.rendering.gas import (
+    MINUS,
+    PA_PER_KPA,
+    gas_subtitle,
+    layout_words,
+)
+from blast_env.rendering.site_plan import draw_charge, in_metres, layout_legend, rectangle_patch
+from blast_env.rendering.style import (
+    BARRIER,
+    BORDER,
+    FAINT,
+    INK,
+    PROTECTED,
+    QUIET_INK,
+    STRUCTURE,
+    render_extra,
+    unit_interval,
+)
+from blast_env.simulation.gas import GasResult
+from blast_env.units import MS_PER_S
+
+with render_extra():
+    from matplotlib import colormaps
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import AsinhNorm
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+_FINER: Final = 4  # pixels drawn along a cell
+_COLOURS: Final = "RdBu_r"  # lightness falls to both sides, and red and blue are safe
+_LINEAR_SHARE: Final = 0.1  # of the scale
+_TICKS: Final = (1.0, 0.5, 0.2, 0.05)
+_CUT: Final = (0, (6, 3, 1, 3))  # dashes and dots, points
+
+
+@dataclass(frozen=True)
+class Section:
+    """A vertical section: the plane x = `at_m` or y = `at_m`.
+
+    Attributes:
+        axis: The axis that it is normal to.
+        at_m: Where; the layer of cells that holds it is drawn.
+    """
+
+    axis: Literal["x", "y"]
+    at_m: float
+
+    def __post_init__(self) -> None:
+        """Check the axis.
+
+        Raises:
+            UnknownNameError: If it is neither x nor y.
+        """
+        if self.axis not in ("x", "y"):
+            raise UnknownNameError("axis", self.axis, ("x", "y"))
+
+    @property
+    def normal(self) -> int:
+        """Index of the axis that it is normal to."""
+        return "xy".index(self.axis)
+
+
+def default_section(site: BlastSite) -> Section:
+    """Return the section through the charge that points to what is protected."""
+    x_m, y_m = site.charge.position_m
+    solids = [each for each in site.structures if each.cells is None]
+    chosen = [each for each in solids if each.protected] or solids
+    centres = [in_metres(each.rectangle).centre for each in chosen]
+    if not centres:
+        return Section("y", y_m)
+    across = sum(abs(centre[0] - x_m) for centre in centres)
+    along = sum(abs(centre[1] - y_m) for centre in centres)
+    return Section("y", y_m) if across >= along else Section("x", x_m)
+
+
+@dataclass(frozen=True, eq=False)
+class PressureShot:
+    """A blast with pictures of the overpressure in two planes.
+
+    Attributes:
+        result: The blast.
+        section: The section.
+        opening: Its stage before the grid.
+        planes: Pictures in plan and in the section.
+    """
+
+    result: GasResult
+    section: Section
+    opening: Opening
+    planes: tuple[Snapshots, Snapshots]
+
+    def at(self, time_s: float, plane: int) -> FloatArray | None:
+        """Return the overpressure in a plane at a time, Pa, along its two axes; nan in solids.
+
+        It is that of the nearest picture; None before the grid has taken over.
+        """
+        frames = self.planes[plane].frames
+        if time_s < self.opening.end_s or not frames:
+            return None
+        times_s = [frame.time_s for frame in frames]
+        after = min(bisect_left(times_s, time_s), len(frames) - 1)
+        before = max(after - 1, 0)
+        nearest = min((before, after), key=lambda k: abs(times_s[k] - time_s))
+        return frames[nearest].overpressure_pa.astype(np.float64)
+
+    def layer_m(self, plane: int) -> float:
+        """Return where a plane is along the axis that it is normal to."""
+        snapshots = self.planes[plane]
+        return float(self.result.run.grid.centres_m(snapshots.axis)[snapshots.layer])
+
+    def distances_m(self, plane: int, finer: int) -> FloatArray:
+        """Return the distances of the parts of the cells in a plane from the charge.
+
+        Args:
+            plane: The plane.
+            finer: Into how many parts each side of a cell is cut.
+        """
+        grid, normal = self.result.run.grid, self.planes[plane].axis
+        first, second = (
+            grid.origin_m[axis]
+            + grid.cell_m / finer * (np.arange(finer * grid.shape[axis]) + 0.5)
+            - self.opening.centre_m[axis]
+            for axis in range(3)
+            if axis != normal
+        )
+        away_m = self.layer_m(plane) - self.opening.centre_m[normal]
+        return np.asarray(np.sqrt(first[:, np.newaxis] ** 2 + second**2 + away_m**2))
+
+
+class _Smooth:
+    """Draws cells as pixels between whose centres values go over evenly, but never through walls.
+
+    Args:
+        air: Which cells are air (nx, ny).
+    """
+
+    def __init__(self, air: NDArray[np.bool_]) -> None:
+        self._air = air
+        self._weights = [self._along(count) for count in air.shape]
+        self._inside = np.repeat(np.repeat(air, _FINER, axis=0), _FINER, axis=1)
+        self._shares = np.maximum(self._spread(air.astype(np.float64)), 1e-12)
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Return the pixels of some values (nx, ny), 0 in solids: (n nx, n ny)."""
+        known = np.where(self._air, values, 0.0)
+        return np.where(self._inside, self._spread(known) / self._shares, 0.0)
+
+    def _spread(self, values: FloatArray) -> FloatArray:
+        across, along = self._weights
+        return np.asarray((along @ (across @ values).T).T)
+
+    @staticmethod
+    def _along(count: int) -> csr_matrix:
+        """Return the weights of the cells in the pixels along an axis (n count, count)."""
+        place = np.clip((np.arange(_FINER * count) + 0.5) / _FINER - 0.5, 0.0, count - 1.0)
+        return csr_matrix(np.maximum(1.0 - np.abs(place[:, np.newaxis] - np.arange(count)), 0.0))
+
+
+class _Picture(NamedTuple):
+    """The picture of a plane of a blast, with the distances of its pixels from the charge."""
+
+    shot: int
+    plane: int
+    image: AxesImage
+    smooth: _Smooth
+    distances_m: FloatArray
+
+
+# Lengths in pixels.
+_DPI: Final = 100
+_LEFT_PX, _GAP_PX, _RIGHT_PX = 66, 40, 22
+_HEADER_PX, _TITLE_PX, _TITLES_PX, _AXIS_PX, _BETWEEN_PX = 62, 22, 46, 48, 26
+_BAR_PX, _BAR_LABELS_PX, _LEGEND_PX = 14, 52, 30
+_LEGEND_ENTRY_PX: Final = 155
+_MOST_HIGH: Final = 0.8  # of a panel's width
+
+
+class PressurePainter:
+    """Paints the moments of blasts beside each other, all on one colour scale.
+
+    Args:
+        shots: The blasts, from left to right.
+        full_kpa: Overpressure at the end of the scale.
+        width_px: Width of the frames, even.
+
+    Attributes:
+        figure: The figure; its moving parts show the last moment painted.
+        scale: The colour scale, kPa.
+    """
+
+    def __init__(self, shots: Sequence[PressureShot], full_kpa: float, width_px: int) -> None:
+        self.shots = tuple(shots)
+        self.scale = AsinhNorm(_LINEAR_SHARE * full_kpa, -full_kpa, full_kpa)
+        self._per_unit = 0.5 / float(np.arcsinh(1.0 / _LINEAR_SHARE))
+        self._colours: Frame = colormaps[_COLOURS](np.arange(256), bytes=True)
+        site_m = in_metres(shots[0].result.run.site.site)
+        self._site_m = site_m
+        self._high_m = shots[0].result.run.site.air_height_m
+        along = 1 - shots[0].section.normal
+        low, high = site_m[along], site_m[along + 2]
+        self._section_m = Rectangle(low, 0.0, high, self._high_m)
+        self._moving: list[tuple[Axes, Artist]] = []
+        self._images: list[_Picture] = []
+        handles = self._handles()
+        figure = self._arrange(width_px, len(handles))
+        self.figure = figure
+        canvas: Any = FigureCanvasAgg  # partly without types
+        self._canvas = canvas(figure)
+        for number in range(len(shots)):
+            self._draw_plan(number)
+            self._draw_section(number)
+        self._draw_bar()
+        figure.legend(
+            handles=handles,
+            loc="lower center",
+            ncols=self._legend_columns,
+            fontsize=8,
+            frameon=False,
+            bbox_to_anchor=(0.5, 0.0),
+            borderaxespad=0.3,
+        )
+        self._write_header()
+        self._canvas.draw()
+        self._ground = self._canvas.copy_from_bbox(figure.bbox)
+
+    def paint(self, time_s: float, note: str = "") -> Frame:
+        """Return a frame, uint8 (height, width, 3).
+
+        Args:
+            time_s: Simulated time.
+            note: A remark under the time.
+        """
+        for each in self._images:
+            shot = self.shots[each.shot]
+            values = shot.at(time_s, each.plane)
+            if values is None:
+                pixels = shot.opening.at(time_s, each.distances_m)
+            else:
+                pixels = each.smooth(values)
+            each.image.set_data(self.colours(pixels.T / PA_PER_KPA))
+        self._clock.set_text(f"{time_s * MS_PER_S:.1f} ms")
+        self._note.set_text(note)
+        self._canvas.restore_region(self._ground)
+        for axes, artist in self._moving:
+            axes.draw_artist(artist)
+        for text in (self._clock, self._note):
+            self.figure.draw_artist(text)
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+
+    def colours(self, overpressure_kpa: FloatArray) -> Frame:
+        """Return the colours of overpressures, uint8 (..., 4)."""
+        # As the scale does it; it takes much longer.
+        share = np.arcsinh(overpressure_kpa * (1.0 / self.scale.linear_width)) * self._per_unit
+        last = len(self._colours) - 1
+        index = np.clip((share + 0.5) * (last + 1), 0.0, last).astype(np.intp)
+        return self._colours[index]
+
+    def _arrange(self, width_px: int, legend_entries: int) -> Figure:
+        """Lay out the page in pixels: a plan above a section a blast, scale and legend below."""
+        count = len(self.shots)
+        plan, section = self._site_m, self._section_m
+        panel_px = (width_px - _LEFT_PX - _RIGHT_PX - (count - 1) * _GAP_PX) / count
+        widest_m = max(plan.right - plan.left, section.right - section.left)
+        per_m = min(panel_px / widest_m, _MOST_HIGH * width_px / (plan.top - plan.bottom))
+        self._legend_columns = max(width_px // _LEGEND_ENTRY_PX, 2)
+        lines = -(-legend_entries // self._legend_columns)
+        heights_px = [per_m * (each.top - each.bottom) for each in (plan, section)]
+        below_px = round(_BAR_PX + _BAR_LABELS_PX + 12 + lines * _LEGEND_PX * 0.66)
+        first_px = _HEADER_PX + (_TITLES_PX if count > 1 else _TITLE_PX)
+        height_px = round(first_px + sum(heights_px) + 2 * _AXIS_PX + _BETWEEN_PX + below_px)
+        height_px += height_px % 2
+        figure = Figure(figsize=((width_px + 0.5) / _DPI, (height_px + 0.5) / _DPI), dpi=_DPI)
+        self._size_px = (width_px, height_px)
+        self._below_px = below_px
+        self._axes = []
+        for number in range(count):
+            middle_px = _LEFT_PX + number * (panel_px + _GAP_PX) + panel_px / 2.0
+            top_px = float(first_px)
+            pair = []
+            for each, high_px in zip((plan, section), heights_px, strict=True):
+                wide_px = per_m * (each.right - each.left)
+                box = (middle_px - wide_px / 2.0, top_px + high_px, wide_px, high_px)
+                axes = figure.add_axes(self._share(*box))
+                axes.set_xlim(each.left, each.right)
+                axes.set_ylim(each.bottom, each.top)
+                axes.tick_params(labelsize=8)
+                pair.append(axes)
+                top_px += high_px + _AXIS_PX + _BETWEEN_PX
+            self._axes.append(pair)
+        return figure
+
+    def _share(
+        self, left_px: float, bottom_px: float, wide_px: float, high_px: float
+    ) -> tuple[float, float, float, float]:
+        """Return a box as shares of the page; its bottom is counted from the page's top."""
+        width, height = self._size_px
+        return left_px / width, 1.0 - bottom_px / height, wide_px / width, high_px / height
+
+    def _draw_plan(self, number: int) -> None:
+        axes, shot = self._axes[number][0], self.shots[number]
+        site, height_m = shot.result.run.site, shot.layer_m(0)
+        self._add_image(number, 0)
+        for outline in site.structures:
+            top_m = site.air_height_m if outline.height_m is None else outline.height_m
+            for rectangle in _parts(outline):
+                self._add_solid(axes, rectangle, outline, is_cut=top_m > height_m)
+        before = len(axes.lines)
+        draw_charge(axes, site.charge.position_m)
+        line = axes.axhline if shot.section.axis == "y" else axes.axvline
+        line(shot.layer_m(1), color=unit_interval(INK), linewidth=0.8, linestyle=_CUT)
+        self._let_move(axes, axes.lines[before:])
+        self._frame(axes, ("x (m)", "y (m)" if number == 0 else ""), BORDER)
+        axes.set_title(f"plan at z = {height_m:g} m", fontsize=9, loc="left")
+        if len(self.shots) > 1:
+            axes.annotate(
+                layout_words(shot.result.blast),
+                (0.5, 1.0),
+                (0.0, 20.0),
+                xycoords="axes fraction",
+                textcoords="offset points",
+                ha="center",
+                fontsize=10.5,
+                fontweight="bold",
+            )
+
+    def _draw_section(self, number: int) -> None:
+        axes, shot = self._axes[number][1], self.shots[number]
+        site, at_m = shot.result.run.site, shot.layer_m(1)
+        along = 1 - shot.section.normal
+        self._add_image(number, 1)
+        for outline in site.structures:
+            top_m = site.air_height_m if outline.height_m is None else outline.height_m
+            for part in _parts(outline):
+                if part[shot.section.normal] < at_m < part[shot.section.normal + 2]:
+                    rectangle = Rectangle(part[along], 0.0, part[along + 2], top_m)
+                    self._add_solid(axes, rectangle, outline, is_cut=True)
+        before = len(axes.lines)
+        charge = site.charge
+        if abs(charge.position_m[shot.section.normal] - at_m) <= shot.result.run.grid.cell_m:
+            draw_charge(axes, (charge.position_m[along], charge.height_m))
+            axes.lines[-1].set_clip_on(False)
+        axes.axhline(shot.layer_m(0), color=unit_interval(INK), linewidth=0.8, linestyle=_CUT)
+        self._let_move(axes, axes.lines[before:])
+        self._frame(axes, (f"{'xy'[along]} (m)", "z (m)" if number == 0 else ""), QUIET_INK)
+        axes.set_title(f"section at {shot.section.axis} = {at_m:g} m", fontsize=9, loc="left")
+
+    def _add_image(self, number: int, plane: int) -> None:
+        axes, shot = self._axes[number][plane], self.shots[number]
+        grid = shot.result.run.grid
+        normal = shot.planes[plane].axis
+        first, second = (axis for axis in range(3) if axis != normal)
+        air = ~np.take(grid.solid, shot.planes[plane].layer, axis=normal)
+        low, high = (
+            [grid.origin_m[axis] + grid.cell_m * end * grid.shape[axis] for axis in (first, second)]
+            for end in (0, 1)
+        )
+        image = AxesImage(
+            axes,
+            interpolation="nearest",
+            origin="lower",
+            extent=(low[0], high[0], low[1], high[1]),
+        )
+        image.set_clip_path(axes.patch)
+        image.set_data(self.colours(np.zeros((2, 2))))
+        axes.add_artist(image)
+        self._let_move(axes, [image])
+        distances_m = shot.distances_m(plane, _FINER)
+        self._images.append(_Picture(number, plane, image, _Smooth(air), distances_m))
+
+    def _add_solid(
+        self, axes: Axes, rectangle: Rectangle, outline: StructureOutline, *, is_cut: bool
+    ) -> None:
+        """Draw what stands: filled where the plane cuts it, its outline where it is below."""
+        patch = rectangle_patch(rectangle)
+        if outline.cells is not None:
+            patch.set(edgecolor=unit_interval(BARRIER), linewidth=0.8)
+            colour = unit_interval(BARRIER)
+        else:
+            edge = PROTECTED if outline.protected else STRUCTURE
+            patch.set(edgecolor=unit_interval(edge), linewidth=2.0)
+            colour = unit_interval(FAINT)
+        patch.set(facecolor=colour if is_cut else "none")
+        axes.add_patch(patch)
+        self._let_move(axes, [patch])
+
+    def _frame(self, axes: Axes, labels: tuple[str, str], colour: Colour) -> None:
+        axes.set_xlabel(labels[0], fontsize=9, labelpad=2.0)
+        axes.set_ylabel(labels[1], fontsize=9)
+        if not labels[1]:
+            axes.tick_params(labelleft=False)
+        for spine in axes.spines.values():
+            spine.set_color(unit_interval(colour))
+            spine.set_linewidth(1.2)
+        self._let_move(axes, list(axes.spines.values()))
+
+    def _let_move(self, axes: Axes, artists: Sequence[Artist]) -> None:
+        """Leave artists out of the ground, and draw them in every frame, in this order."""
+        for artist in artists:
+            artist.set_animated(True)
+            self._moving.append((axes, artist))
+
+    def _draw_bar(self) -> None:
+        width, height = self._size_px
+        wide_px = min(0.7 * width, 720.0)
+        bottom_px = height - self._below_px + _BAR_PX
+        place = self.figure.add_axes(
+            self._share((width - wide_px) / 2.0, bottom_px, wide_px, _BAR_PX)
+        )
+        bar = self.figure.colorbar(
+            ScalarMappable(self.scale, _COLOURS),
+            cax=place,
+            orientation="horizontal",
+            extend="both",
+            format=FuncFormatter(_signed),
+        )
+        full = float(self.scale.vmax or 0.0)
+        marks = [sign * share * full for share in _TICKS for sign in (-1.0, 1.0)]
+        place.xaxis.set_major_locator(FixedLocator(sorted({*marks, 0.0})))
+        place.xaxis.set_minor_locator(NullLocator())
+        place.tick_params(labelsize=8)
+        bar.set_label("overpressure (kPa), the same scale everywhere", fontsize=9)
+
+    def _handles(self) -> list[Artist]:
+        structures = [each for shot in self.shots for each in shot.result.run.site.structures]
+        handles = [h for h in layout_legend(structures, None) if h.get_label() != "site border"]
+        for handle in handles:
+            if isinstance(handle, Line2D):
+                handle.set_markersize(10.0)
+        ink = unit_interval(INK)
+        handles.append(
+            Line2D(
+                [], [], color=ink, linewidth=0.8, linestyle=(0, (6, 3, 1, 3)), label="other plane"
+            )
+        )
+        return handles
+
+    def _write_header(self) -> None:
+        width, height = self._size_px
+        blast = self.shots[-1].result.blast
+        title = f"{blast.scenario.name}: overpressure"
+        if len(self.shots) == 1:
+            title += f", {layout_words(blast)}"
+        quiet = unit_interval(QUIET_INK)
+        for text, top_px, size, colour, bold in (
+            (title, 10, 12, unit_interval(INK), True),
+            (gas_subtitle(blast), 36, 8.5, quiet, False),
+        ):
+            self.figure.text(
+                12 / width,
+                1.0 - top_px / height,
+                text,
+                va="top",
+                fontsize=size,
+                color=colour,
+                fontweight="bold" if bold else "normal",
+            )
+        self._clock, self._note = (
+            self.figure.text(
+                1.0 - 12 / width,
+                1.0 - top_px / height,
+                "",
+                ha="right",
+                va="top",
+                fontsize=size,
+                color=colour,
+                fontweight="bold" if bold else "normal",
+                animated=True,
+            )
+            for top_px, size, colour, bold in (
+                (10, 12, unit_interval(INK), True),
+                (36, 8.5, quiet, False),
+            )
+        )
+
+
+def _signed(value: float, position: int | None) -> str:  # noqa: ARG001
+    """Return the number at a tick that may be below 0."""
+    return f"{value:g}".replace("-", MINUS)
+
+
+def _parts(outline: StructureOutline) -> list[Rectangle]:
+    """Return a structure's rectangle, or those of a barrier's modules, in metres."""
+    if outline.cells is None:
+        return [in_metres(outline.rectangle)]
+    return [in_metres(part.rectangle) for part in outline.build().parts]

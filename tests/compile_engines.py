@@ -1,0 +1,48 @@
+"""Compile what Numba keeps on disk for the tests, once: `python -m tests.compile_engines`.
+
+Tests in several processes that all find nothing on disk would each compile the same. They still
+may: nothing depends on this but the time.
+"""
+
+from typing import Literal
+
+import numpy as np
+
+from blast_env import load_scenario, simulate
+from blast_env.physics.gas.faces import ground_faces
+from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.probes import FaceLoads, Gauges, GroundMap
+from blast_env.physics.gas.solver import GasSolver
+from blast_env.physics.gas.source import GasCharge, set_charge
+
+
+def event_engine() -> None:
+    simulate(load_scenario("courtyard"), engine="event")
+
+
+def gas_engine(precision: Literal["single", "double"]) -> None:
+    """Every kernel: a charge on the ground burns, seen by every recorder that is compiled."""
+    grid = GasGrid(0.5, np.zeros((24, 24, 12), dtype=bool))
+    faces = ground_faces(grid)
+    charge = GasCharge(1.0, (6.0, 6.0, 0.0))
+    solver = GasSolver(
+        grid,
+        faces=faces,
+        recorders=(FaceLoads(len(faces)), Gauges(grid, [(3, 3, 3)]), GroundMap(grid)),
+        precision=precision,
+        with_fuel=True,
+        burning=charge.burning,
+    )
+    set_charge(solver, charge)
+    solver.step()
+    solver.largest_overpressure_pa()
+
+
+def main() -> None:
+    event_engine()
+    gas_engine("single")
+    gas_engine("double")
+
+
+if __name__ == "__main__":
+    main()
