@@ -22,7 +22,7 @@ from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.simulation.gas import GasBlast
 from blast_env.studies.agreement.layouts import Layout
-from blast_env.studies.gas.cells import cell_loads, difference
+from blast_env.studies.gas.cells import CellLoads, cell_loads, difference
 from blast_env.studies.gas.corners import corner_waves
 from blast_env.studies.gas.ending import Ending, ending
 from blast_env.studies.gas.judgement import judge as judgement
@@ -242,6 +242,9 @@ def cells(
     finest: Annotated[
         float | None, typer.Option(help="m, for none and the first layout only.")
     ] = None,
+    until: Annotated[
+        float | None, typer.Option(help="When loads are looked at, s; at the end of the runs.")
+    ] = None,
     processes: Processes = 2,
 ) -> None:
     """Print whether smaller cells change loads, reductions and the order of layouts."""
@@ -249,7 +252,8 @@ def cells(
         site = _cells_site(scenario, endless)
         for seed in range(charges):
             charge = draw_charge(site, seed)
-            _print_cells(site, charge, random_layouts, (_numbers(sizes), finest), processes)
+            run = partial(cell_loads, site, charge=charge, until_s=until, processes=processes)
+            _print_cells(site, charge, random_layouts, (_numbers(sizes), finest), run)
 
 
 def _cells_site(scenario: str, endless: bool) -> Scenario:
@@ -264,7 +268,7 @@ def _print_cells(
     charge: Charge,
     random_layouts: int,
     sizes: tuple[list[float], float | None],
-    processes: int,
+    run: Callable[..., CellLoads],
 ) -> None:
     rules: dict[str, Callable[[Scenario, Charge], Layout]] = {
         "wall near the charge": wall_near_charge,
@@ -279,7 +283,7 @@ def _print_cells(
     found = []
     for size, tried in jobs:
         with progress_bar(f"{site.name}, {size:g} m") as progress:
-            found.append(cell_loads(site, tried, charge, size, processes, progress))
+            found.append(run(tried, cell_m=size, progress=progress))
     x_m, y_m = charge.position_m
     print_line(f"{site.name}, {charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m")
     rows = [

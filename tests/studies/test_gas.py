@@ -104,6 +104,8 @@ def test_loads_of_layouts_by_processes_are_the_same(site: Scenario) -> None:
     assert one.impulse_pa_s.tolist() == two.impulse_pa_s.tolist()
     assert 0.0 < one.reduction[0] < 0.4
     assert one.cpu_s > 0.0
+    later = cell_loads(site, [WALL], charge, 0.5, until_s=0.06)
+    assert later.impulse_pa_s[0] == ending(GasBlast(site, WALL), 0.06).later_pa_s
 
 
 def test_differences_of_cells_by_hand() -> None:
