@@ -11,6 +11,7 @@ import numpy as np
 import typer
 from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
 
+from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.files import make_folder
 from blast_env.physics.gas.engine import GasEngine
@@ -21,15 +22,15 @@ from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.simulation.gas import GasBlast
 from blast_env.studies.agreement.layouts import Layout
-from blast_env.studies.gas.borders import border_loads
-from blast_env.studies.gas.cells import cell_loads, difference
+from blast_env.studies.gas.cells import CellLoads, cell_loads, difference
 from blast_env.studies.gas.corners import corner_waves
 from blast_env.studies.gas.ending import Ending, ending
 from blast_env.studies.gas.judgement import judge as judgement
+from blast_env.studies.gas.loads import protected_impulse_pa_s
 from blast_env.studies.gas.reference import free_field, wide_wall
 from blast_env.studies.gas.sites import BARRIER_M, BUILDING_M, with_heights, yard
 from blast_env.studies.gas.sources import source_ratios, trade_off_figure
-from blast_env.studies.shielding.ratios import EXPERIMENT, REGIONS
+from blast_env.studies.shielding.ratios import EXPERIMENT, REGIONS, ExperimentalBand
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 
@@ -121,39 +122,54 @@ def margins(
     margins_m: Annotated[
         str, typer.Option("--margins", help="m, separated by commas.")
     ] = "2,4,8,16",
-    airs_m: Annotated[
-        str, typer.Option("--airs", help="Heights of the air with real heights, m.")
-    ] = "12,18,24",
     cell: Cell = 0.5,
 ) -> None:
-    """Print how loads depend on how far the open borders are from the site.
+    """Print how loads depend on how far the open borders at the sides are from the site.
 
-    With everything as high as the air, and with real heights; the last of the margins and of the
-    heights of the air is what the others are compared with.
+    With everything as high as the air, and with real heights; the others are compared with the
+    last of the margins.
     """
+    rows, wanted = [], _numbers(margins_m)
+    with user_errors():
+        loaded = load_scenario(scenario)
+        for heights, site in (("endless", loaded), (_HEIGHTS, with_heights(loaded))):
+            for name, layout in _rule_layouts(site).items():
+                blasts = [
+                    GasBlast(site, layout, engine=GasEngine(cell_m=cell, margin_m=margin_m))
+                    for margin_m in wanted
+                ]
+                loads = [protected_impulse_pa_s(blast.run()) for blast in blasts]
+                rows.append((heights, name, *_against_last(loads)))
+    print_line(markdown_table(("heights", "layout", *(f"{m:g} m" for m in wanted)), rows))
+
+
+@app.command()
+def air_height(
+    scenario: str = "courtyard",
+    heights_m: Annotated[
+        str, typer.Option("--heights", help="m, separated by commas.")
+    ] = "12,18,24,36",
+    until: Annotated[float, typer.Option(help="When loads are looked at again, s.")] = 0.2,
+    cell: Cell = 0.5,
+) -> None:
+    """Print how loads depend on how high the air is, which ends at an open border.
+
+    With real heights; at the end of the run, and later. The others are compared with the last of
+    the heights.
+    """
+    rows, wanted = [], _numbers(heights_m)
     with user_errors():
         loaded, engine = load_scenario(scenario), GasEngine(cell_m=cell)
-        cases = {"endless": loaded, _HEIGHTS: with_heights(loaded)}
-        rows = []
-        for heights, site in cases.items():
-            for name, layout in _rule_layouts(site).items():
-                found = border_loads(site, layout, _numbers(margins_m), engine)
-                loads = [each.impulse_pa_s for each in found]
-                rows.append((heights, name, *_against_last(loads)))
-        numbers = [f"{margin:g} m" for margin in _numbers(margins_m)]
-        print_line(markdown_table(("heights", "layout", *numbers), rows))
-        rows = []
         for name, layout in _rule_layouts(loaded).items():
-            loads = [
-                border_loads(with_heights(loaded, air_m=air), layout, [engine.margin_m], engine)[
-                    0
-                ].impulse_pa_s
-                for air in _numbers(airs_m)
+            found = [
+                ending(GasBlast(with_heights(loaded, air_m=air_m), layout, engine=engine), until)
+                for air_m in wanted
             ]
-            rows.append((_HEIGHTS, name, *_against_last(loads)))
-        if rows and _numbers(airs_m):
-            numbers = [f"air {air:g} m high" for air in _numbers(airs_m)]
-            print_line("\n" + markdown_table(("heights", "layout", *numbers), rows))
+            at_end = [each.impulse_pa_s for each in found]
+            later = [each.later_pa_s for each in found]
+            rows.append((name, "the end", *_against_last(at_end)))
+            rows.append((name, f"{until:g} s", *_against_last(later)))
+    print_line(markdown_table(("layout", "at", *(f"{m:g} m" for m in wanted)), rows))
 
 
 _HEIGHTS: Final = f"building {BUILDING_M:g} m, wall {BARRIER_M:g} m"
@@ -226,6 +242,9 @@ def cells(
     finest: Annotated[
         float | None, typer.Option(help="m, for none and the first layout only.")
     ] = None,
+    until: Annotated[
+        float | None, typer.Option(help="When loads are looked at, s; at the end of the runs.")
+    ] = None,
     processes: Processes = 2,
 ) -> None:
     """Print whether smaller cells change loads, reductions and the order of layouts."""
@@ -233,7 +252,8 @@ def cells(
         site = _cells_site(scenario, endless)
         for seed in range(charges):
             charge = draw_charge(site, seed)
-            _print_cells(site, charge, random_layouts, (_numbers(sizes), finest), processes)
+            run = partial(cell_loads, site, charge=charge, until_s=until, processes=processes)
+            _print_cells(site, charge, random_layouts, (_numbers(sizes), finest), run)
 
 
 def _cells_site(scenario: str, endless: bool) -> Scenario:
@@ -248,7 +268,7 @@ def _print_cells(
     charge: Charge,
     random_layouts: int,
     sizes: tuple[list[float], float | None],
-    processes: int,
+    run: Callable[..., CellLoads],
 ) -> None:
     rules: dict[str, Callable[[Scenario, Charge], Layout]] = {
         "wall near the charge": wall_near_charge,
@@ -263,7 +283,7 @@ def _print_cells(
     found = []
     for size, tried in jobs:
         with progress_bar(f"{site.name}, {size:g} m") as progress:
-            found.append(cell_loads(site, tried, charge, size, processes, progress))
+            found.append(run(tried, cell_m=size, progress=progress))
     x_m, y_m = charge.position_m
     print_line(f"{site.name}, {charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m")
     rows = [
@@ -317,21 +337,21 @@ def corners(
                             f"{cell_m:g}",
                             region.replace("_", " "),
                             "-" if band is None else f"{band.value:.2f} ± {band.tolerance:.2f}",
+                            "-" if band is None else _within(gauges, band),
                             f"{waves.mean(region):.2f}",
                             f"{gauges.min():.2f} to {gauges.max():.2f}",
                             f"{waves.mean(region, all_phases=True):.2f}",
                             f"{100.0 * waves.unfinished:.0f} %",
                         )
                     )
-    headers = (
-        "block (m high)",
-        "cell (m)",
-        "gauges",
-        "experiments",
-        "first wave",
-        "gauge by gauge",
-    )
-    print_line(markdown_table((*headers, "all phases", "unfinished"), rows))
+    headers = ("block (m high)", "cell (m)", "gauges", "experiments", "within", "first wave")
+    print_line(markdown_table((*headers, "gauge by gauge", "all phases", "unfinished"), rows))
+
+
+def _within(gauges: FloatArray, band: ExperimentalBand) -> str:
+    """Return how many gauges are within a band."""
+    low, high = band.bounds
+    return f"{((gauges >= low) & (gauges <= high)).sum()} of {len(gauges)}"
 
 
 @app.command()

@@ -44,7 +44,7 @@ def test_commands_of_the_documentation_exist(named: tuple[str, ...]) -> None:
 
 
 def test_the_documentation_names_every_command() -> None:
-    for name in ("engines", "layouts", "validity", "presets"):
+    for name in ("engines", "gas", "layouts", "validity", "presets"):
         commands = importlib.import_module(f"scripts.{name}").app.registered_commands
         found = {each.name or each.callback.__name__.replace("_", "-") for each in commands}
         documented = {named[1] for named in NAMED if named[0] == f"scripts.{name}"}

@@ -16,6 +16,7 @@ from blast_env.scenario import Scenario
 from blast_env.simulation.gas import GasBlast
 from blast_env.statistics import reductions
 from blast_env.studies.agreement.layouts import Layout
+from blast_env.studies.gas.ending import ending
 from blast_env.studies.gas.loads import protected_impulse_pa_s
 
 
@@ -64,20 +65,34 @@ def cell_loads(
     layouts: Sequence[Layout],
     charge: Charge,
     cell_m: float,
+    until_s: float | None = None,
     processes: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> CellLoads:
-    """Run one blast without a barrier and one with each layout."""
-    run = partial(_load, scenario, charge, GasEngine(cell_m=cell_m))
+    """Run one blast without a barrier and one with each layout.
+
+    Args:
+        scenario: The scenario.
+        layouts: The layouts.
+        charge: The charge.
+        cell_m: Side of a cell.
+        until_s: When loads are looked at; at the end of the run unless given.
+        processes: Worker processes.
+        progress: Called with the share of the blasts that is done.
+    """
+    run = partial(_load, scenario, charge, GasEngine(cell_m=cell_m), until_s)
     loads, times_s = np.array(run_all(run, [(), *layouts], processes, progress)).T
     return CellLoads(cell_m, float(loads[0]), loads[1:], float(times_s.mean()))
 
 
 def _load(
-    scenario: Scenario, charge: Charge, engine: GasEngine, layout: Layout
+    scenario: Scenario, charge: Charge, engine: GasEngine, until_s: float | None, layout: Layout
 ) -> tuple[float, float]:
-    start = process_time()
-    impulse = protected_impulse_pa_s(GasBlast(scenario, layout, 0, engine, charge).run())
+    start, blast = process_time(), GasBlast(scenario, layout, 0, engine, charge)
+    if until_s is None:
+        impulse = protected_impulse_pa_s(blast.run())
+    else:
+        impulse = ending(blast, until_s).later_pa_s
     return impulse, process_time() - start
 
 
