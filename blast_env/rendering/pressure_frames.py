@@ -365,7 +365,6 @@ class PressurePainter:
         charge = site.charge
         if abs(charge.position_m[shot.section.normal] - at_m) <= shot.result.run.grid.cell_m:
             draw_charge(axes, (charge.position_m[along], charge.height_m))
-            axes.lines[-1].set_clip_on(False)
         axes.axhline(shot.layer_m(0), color=unit_interval(INK), linewidth=0.8, linestyle=_CUT)
         self._let_move(axes, axes.lines[before:])
         self._frame(axes, (f"{'xy'[along]} (m)", "z (m)" if number == 0 else ""), QUIET_INK)
