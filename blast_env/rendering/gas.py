@@ -219,6 +219,8 @@ def facades(
             axes.set_title(_wall_title(outline, wall, walls[row][wall], before, kind), fontsize=9.5)
         words = f"{layout_words(each.blast)}\n" if beside is not None else ""
         panels[row][0].set_ylabel(f"{words}z (m)")
+    for axes, wall in zip(panels[-1], _LEFT_TO_RIGHT, strict=True):
+        axes.set_xlabel(f"{_LEFT_TO_RIGHT[wall][0]} (m)")
     bar = figure.colorbar(
         ScalarMappable(scale, load_colours()),
         ax=panels.ravel().tolist(),
@@ -290,7 +292,6 @@ def _draw_wall(
         extent=(low, high, 0.0, height_m),
     )
     axes.set_xlim((high, low) if falls else (low, high))
-    axes.set_xlabel(f"{axis} (m)")
     for spine in axes.spines.values():
         spine.set_color(unit_interval(QUIET_INK))
 

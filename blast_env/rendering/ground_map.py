@@ -146,7 +146,7 @@ def ground_map(
         handles.append(
             Line2D([], [], color=unit_interval(INK), linestyle=(0, (1.0, 2.0)), label=_FINER)
         )
-    columns = -(-len(handles) // -(-len(handles) // int(figure.get_figwidth() / 1.45)))
+    columns = -(-len(handles) // -(-len(handles) // int(figure.get_figwidth() / 1.75)))
     figure.legend(
         handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
     )

@@ -84,7 +84,9 @@ def write_pressure_film(
         shots = []
         for number, each in enumerate(blasts):
             part = _SHARE_OF_RUNS / len(blasts)
-            shots.append(_record(each, height_m, section, _part(progress, number * part, part)))
+            shots.append(
+                record_planes(each, height_m, section, _part(progress, number * part, part))
+            )
         end_s = max(shot.result.time_s for shot in shots)
         plan = plan_until(end_s, frames_per_s, slow_motion)
         if suffix == ".gif":
@@ -123,10 +125,23 @@ def _full_kpa(results: Sequence[GasResult]) -> float:
     return nice_ceiling(max(*peaks, 1.0) / PA_PER_KPA)
 
 
-def _record(
-    blast: GasBlast, height_m: float, section: Section, progress: Callable[[float], None]
+def record_planes(
+    blast: GasBlast,
+    height_m: float,
+    section: Section,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> PressureShot:
-    """Run a blast and take pictures all the while."""
+    """Run a blast and take pictures of two planes all the while.
+
+    Args:
+        blast: The blast.
+        height_m: Height of the plan.
+        section: The section.
+        progress: Called from time to time with the share of the time limit that has passed.
+
+    Raises:
+        BlastEnvError: If a plane is outside the grid.
+    """
     made: list[Snapshots] = []
     site_m = in_metres(blast.site.site)
     scale = cbrt(blast.site.charge.tnt_kg / 100.0)

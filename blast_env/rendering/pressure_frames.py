@@ -154,7 +154,7 @@ class PressureShot:
         return np.asarray(np.sqrt(first[:, np.newaxis] ** 2 + second**2 + away_m**2))
 
 
-class _Smooth:
+class Smooth:
     """Draws cells as pixels between whose centres values go over evenly, but never through walls.
 
     Args:
@@ -189,7 +189,7 @@ class _Picture(NamedTuple):
     shot: int
     plane: int
     image: AxesImage
-    smooth: _Smooth
+    smooth: Smooth
     distances_m: FloatArray
 
 
@@ -365,7 +365,6 @@ class PressurePainter:
         charge = site.charge
         if abs(charge.position_m[shot.section.normal] - at_m) <= shot.result.run.grid.cell_m:
             draw_charge(axes, (charge.position_m[along], charge.height_m))
-            axes.lines[-1].set_clip_on(False)
         axes.axhline(shot.layer_m(0), color=unit_interval(INK), linewidth=0.8, linestyle=_CUT)
         self._let_move(axes, axes.lines[before:])
         self._frame(axes, (f"{'xy'[along]} (m)", "z (m)" if number == 0 else ""), QUIET_INK)
@@ -392,7 +391,7 @@ class PressurePainter:
         axes.add_artist(image)
         self._let_move(axes, [image])
         distances_m = shot.distances_m(plane, _FINER)
-        self._images.append(_Picture(number, plane, image, _Smooth(air), distances_m))
+        self._images.append(_Picture(number, plane, image, Smooth(air), distances_m))
 
     def _add_solid(
         self, axes: Axes, rectangle: Rectangle, outline: StructureOutline, *, is_cut: bool
@@ -456,7 +455,12 @@ class PressurePainter:
         ink = unit_interval(INK)
         handles.append(
             Line2D(
-                [], [], color=ink, linewidth=0.8, linestyle=(0, (6, 3, 1, 3)), label="other plane"
+                [],
+                [],
+                color=ink,
+                linewidth=0.8,
+                linestyle=(0, (6, 3, 1, 3)),
+                label="cut of the other view",
             )
         )
         return handles

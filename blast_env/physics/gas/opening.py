@@ -5,6 +5,7 @@ first obstacle. Whoever was nearer to the charge has missed the front by then.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -72,7 +73,12 @@ def opening_of(grid: GasGrid, charge: GasCharge) -> Opening:
         grid: The grid that takes the blast over.
         charge: The charge.
     """
-    profile = charge.profile(largest_radius_m(grid, charge))
+    return _opening(charge, largest_radius_m(grid, charge))
+
+
+@lru_cache(maxsize=4)
+def _opening(charge: GasCharge, radius_m: float) -> Opening:
+    profile = charge.profile(radius_m)
     surface_m = charge.least_radius_m * (1.0 + 1e-9)
     radii = np.linspace(surface_m, max(profile.front_m, surface_m), _RADII)
     blast = charge.explosive.in_free_air(charge.free_air_kg, radii)
