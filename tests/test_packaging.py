@@ -14,6 +14,8 @@ import pytest
 from blast_env import save_scenario
 from tests.scenarios import BALLISTIC_COURTYARD
 
+pytestmark = pytest.mark.slow
+
 REPOSITORY = Path(__file__).parents[1]
 CALIBRATIONS = (
     "ballistic_kb_100kg",
