@@ -84,8 +84,8 @@ def test_a_search_runs_beside_a_package_named_agents_and_without_extras(
     python = clean / "bin" / "python"
     # An engine that need not be compiled in every environment anew, and thin air.
     save_scenario(BALLISTIC_COURTYARD, tmp_path / "thin.toml")
-    command = (python, "-m", "blast_env", "search", "--scenario", "thin.toml", "--engine", "pymunk")
-    command += ("--budget", "4", "--held-out", "2")
+    search = (python, "-m", "blast_env", "search", "--budget", "4", "--held-out", "2")
+    command = (*search, "--scenario", "thin.toml", "--engine", "pymunk")
     done = started(*command, "--method", "random", "--out", "found", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert json.loads((tmp_path / "found" / "layout.json").read_text())["cells"]
