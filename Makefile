@@ -1,4 +1,4 @@
-# The two commands of the README: `make demo` and `make test`. Both do all set-up.
+# The commands of the README: `make demo`, `make test` and `make quick`. All do all set-up.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 export SDL_VIDEODRIVER ?= dummy
 export PYGAME_HIDE_SUPPORT_PROMPT := 1
 
-.PHONY: demo test lint types compiled check setup clean
+.PHONY: demo test quick lint types compiled check setup clean
 
 demo: $(STAMP)
 	$(BIN)/python scripts/demo.py
@@ -16,6 +16,12 @@ demo: $(STAMP)
 test: $(STAMP)
 	$(MAKE) --jobs 2 lint types compiled
 	$(MAKE) check
+
+# What a change of the model most often breaks. Neither types, nor agents, commands and studies.
+QUICK := envs evaluation export physics recording scenario test_golden.py test_simulation.py
+quick: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/pytest --numprocesses auto --dist worksteal -m "not slow" $(QUICK:%=tests/%)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -9,6 +9,8 @@ import pytest
 from blast_env.envs import simulator_env
 from blast_env.evaluation import LayoutEvaluation
 
+pytestmark = pytest.mark.slow
+
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 

@@ -12,6 +12,8 @@ from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.scenario import bundled_scenarios, load_scenario
 from tests.envs.small import make
 
+pytestmark = pytest.mark.slow
+
 IDS = sorted(name for name in gym.registry if name.startswith("BlastBarrier"))
 
 

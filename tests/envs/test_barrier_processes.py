@@ -13,6 +13,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from tests.envs.small import ThinEngine, make, play, same, small_scenario
 
+pytestmark = pytest.mark.slow
+
 FINISH = 40
 
 

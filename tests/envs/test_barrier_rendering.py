@@ -9,6 +9,8 @@ import pytest
 
 from tests.envs.small import make, play
 
+pytestmark = pytest.mark.slow
+
 FINISH = 40
 
 

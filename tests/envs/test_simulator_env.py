@@ -18,6 +18,8 @@ from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.scenario import Scenario, ScenarioError
 from tests.scenarios import BALLISTIC_COURTYARD
 
+pytestmark = pytest.mark.slow
+
 LAYOUT = ((4, 0), (5, 0), (6, 0))
 
 

@@ -154,6 +154,7 @@ def _fill(folder: Path, first: int, wrong: "multiprocessing.Queue[int]") -> None
     wrong.put(count)
 
 
+@pytest.mark.slow
 def test_two_processes_at_once_never_read_anything_half_written(tmp_path: Path) -> None:
     """Also while each deletes what the other one has just written."""
     context = multiprocessing.get_context("spawn")

@@ -186,6 +186,7 @@ def test_layouts_and_process_counts_are_checked_before_any_blast() -> None:
     assert evaluator.blasts == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2])
 def test_a_charge_in_a_building_is_refused_in_any_process(processes: int) -> None:
     inside = [Threat(Charge((29.0, 15.0), 100.0), seed) for seed in range(2)]

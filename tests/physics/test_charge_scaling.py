@@ -133,6 +133,7 @@ def mean_impulse(tnt_kg: float, scaled_distance: float) -> float:
     return float(np.mean(loads)) / scale
 
 
+@pytest.mark.slow
 def test_impulses_obey_hopkinson_cranz_scaling() -> None:
     """At Z = 3 m/kg^(1/3), 20 to 1000 kg; one standard error of a ratio is about 6 %.
 

@@ -7,8 +7,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 import blast_env
 from blast_env.physics.event import loop
+
+pytestmark = pytest.mark.slow
 
 NOTICE = "compiling the event engine"
 SEEDS = range(2)

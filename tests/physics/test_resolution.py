@@ -47,6 +47,7 @@ def test_the_presets_are_one_physics_at_two_resolutions() -> None:
                 assert value == expected[group][name], (group, name)
 
 
+@pytest.mark.slow
 def test_finer_balls_bring_about_the_same_impulse() -> None:
     """What makes a coarse preset usable: 15 % is more than three standard errors of these means."""
     field = load_scenario("free_field").at_stand_off(10.0)

@@ -44,6 +44,7 @@ def test_hits_without_air_equal_the_view_factor(engine: ParticleEngine, distance
     assert abs(len(finished(fan_scene(distance), engine).log) - expected) <= 1.0
 
 
+@pytest.mark.slow
 def test_a_facade_twice_as_far_gets_half_the_balls(engine: ParticleEngine) -> None:
     near, far = (len(finished(fan_scene(d, facade=16.0), engine).log) for d in (40.0, 80.0))
     assert near / far == pytest.approx(2.0, rel=0.08)
@@ -93,6 +94,7 @@ def test_no_scene_has_more_air_than_its_capacity(seed: int, spacing: float, widt
     assert len(lattice) <= lattice_capacity(air, site)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine_name", ENGINE_NAMES)
 @given(
     kind=st.sampled_from([EXPLOSIVE, AIR]),

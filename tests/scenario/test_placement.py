@@ -55,6 +55,7 @@ def assert_free_explain_and_place_agree(placement: Placement, cells: list[Cell])
 # --- Random zones against the rules written out the slow way.
 
 
+@pytest.mark.slow
 @given(zone_documents(), st.integers(0, 10**6))
 @settings(max_examples=250, deadline=None, derandomize=True)
 def test_free_cells_are_those_that_the_rules_allow(document: Document, seed: int) -> None:
