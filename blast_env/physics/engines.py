@@ -29,6 +29,9 @@ ENGINE_NAMES: Final = tuple(_CLASSES)
 GAS: Final = "gas"
 """Gas dynamics: no particles, no seed, no calibration."""
 
+PARTICLE_ENGINES: Final = tuple(name for name in ENGINE_NAMES if name != GAS)
+"""The engines of the particle model; the first one is the reference."""
+
 
 def find_engine(engine: str | Engine, cell_m: float | None = None) -> Engine:
     """Return an engine by its name, or the engine itself.

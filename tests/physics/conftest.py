@@ -3,10 +3,10 @@
 import pytest
 
 from blast_env.physics.engine import Engine
-from blast_env.physics.engines import ENGINE_NAMES, find_particle_engine
+from blast_env.physics.engines import PARTICLE_ENGINES, find_particle_engine
 
 
-@pytest.fixture(params=ENGINE_NAMES)
+@pytest.fixture(params=PARTICLE_ENGINES)
 def engine(request: pytest.FixtureRequest) -> Engine:
     """Every engine that comes with the package, one after the other."""
     return find_particle_engine(str(request.param))

@@ -5,7 +5,7 @@ import pytest
 
 from blast_env import load_scenario, simulate
 from blast_env.physics.collisions import COLLISION_DTYPE, incidence_angle_rad
-from blast_env.physics.engines import ENGINE_NAMES, find_particle_engine
+from blast_env.physics.engines import PARTICLE_ENGINES, find_particle_engine
 from blast_env.simulation import Blast
 from tests.physics.scenes import EVENT, KEEP_MASS, closed_box, hot_cloud, parameters
 
@@ -75,7 +75,7 @@ def test_earlier_collisions_are_those_of_a_recount() -> None:
 
 
 def test_every_engine_starts_from_the_same_state() -> None:
-    starts = [Blast(COURTYARD, [(4, 0)], seed=3, engine=name).start() for name in ENGINE_NAMES]
+    starts = [Blast(COURTYARD, [(4, 0)], seed=3, engine=name).start() for name in PARTICLE_ENGINES]
     reference, *others = [run.balls() for run in starts]
     for states in others:
         for field in ("index", "kind", "position", "velocity", "mass", "radius"):
@@ -86,7 +86,9 @@ def test_every_engine_starts_from_the_same_state() -> None:
 def test_both_engines_agree_on_a_blast_without_air() -> None:
     """Without collisions among balls nothing is chaotic: hit by hit the same, but for the steps."""
     sparse = COURTYARD.with_simulation("ballistic", {"air": {"spacing_units": 0.0}})
-    logs = [find_particle_engine(name).start(Blast(sparse, seed=4).scene) for name in ENGINE_NAMES]
+    logs = [
+        find_particle_engine(name).start(Blast(sparse, seed=4).scene) for name in PARTICLE_ENGINES
+    ]
     for run in logs:
         run.advance(0.2)
     stepped, exact = (np.sort(run.log.to_array(), order=["ball", "time_s"]) for run in logs)
@@ -101,4 +103,4 @@ def test_both_engines_agree_on_a_blast_without_air() -> None:
 
 
 def test_every_engine_of_the_package_has_the_name_that_it_is_found_by() -> None:
-    assert [find_particle_engine(name).name for name in ENGINE_NAMES] == list(ENGINE_NAMES)
+    assert [find_particle_engine(name).name for name in PARTICLE_ENGINES] == list(PARTICLE_ENGINES)

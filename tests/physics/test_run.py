@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from blast_env.geometry import Rectangle
 from blast_env.physics.engine import BlastRun, EndReason, ParticleEngine
-from blast_env.physics.engines import ENGINE_NAMES, find_particle_engine
+from blast_env.physics.engines import PARTICLE_ENGINES, find_particle_engine
 from blast_env.physics.particles import (
     Balls,
     CollisionType,
@@ -95,7 +95,7 @@ def test_no_scene_has_more_air_than_its_capacity(seed: int, spacing: float, widt
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine_name", ENGINE_NAMES)
+@pytest.mark.parametrize("engine_name", PARTICLE_ENGINES)
 @given(
     kind=st.sampled_from([EXPLOSIVE, AIR]),
     speed=st.floats(10.0, 1e6),
