@@ -25,6 +25,7 @@ from blast_env.studies.agreement.layouts import Layout
 from blast_env.studies.gas.cells import CellLoads, cell_loads, difference
 from blast_env.studies.gas.corners import corner_waves
 from blast_env.studies.gas.ending import Ending, ending
+from blast_env.studies.gas.handover import load_from_radius
 from blast_env.studies.gas.judgement import judge as judgement
 from blast_env.studies.gas.loads import protected_impulse_pa_s
 from blast_env.studies.gas.reference import free_field, wide_wall
@@ -170,6 +171,30 @@ def air_height(
             rows.append((name, "the end", *_against_last(at_end)))
             rows.append((name, f"{until:g} s", *_against_last(later)))
     print_line(markdown_table(("layout", "at", *(f"{m:g} m" for m in wanted)), rows))
+
+
+@app.command()
+def handover(
+    scenario: str = "courtyard",
+    radii_m: Annotated[
+        str, typer.Option("--radii", help="m, separated by commas.")
+    ] = "1.5,3,4,6,8,12,16,22",
+    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.09,
+    cell: Cell = 0.5,
+) -> None:
+    """Print how loads depend on where the front is when the grid takes a charge over.
+
+    Without a barrier, with real heights. Layouts of a scenario never differ in that.
+    """
+    with user_errors():
+        blast = GasBlast(with_heights(load_scenario(scenario)), engine=GasEngine(cell_m=cell))
+        own_m = blast.engine.start_on(blast.site).handover_radius_m
+        rows = [
+            (f"{radius_m:g}", f"{load_from_radius(blast, radius_m, until):.1f}")
+            for radius_m in _numbers(radii_m)
+        ]
+    print_line(markdown_table(("radius (m)", f"impulse (Pa s) at {until:g} s"), rows))
+    print_line(f"the engine's own radius is {own_m:.3g} m")
 
 
 _HEIGHTS: Final = f"building {BUILDING_M:g} m, wall {BARRIER_M:g} m"

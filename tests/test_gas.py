@@ -119,6 +119,31 @@ def test_a_run_ends_when_little_more_can_come(bare: GasResult) -> None:
     assert any("cut off" in note for note in late.impulse("hut").notes)
 
 
+@pytest.mark.parametrize(
+    ("charge", "radius_m"),
+    [
+        (Charge((2.0, 4.0), 5.0), 2.0),  # the zone, if it is the nearest
+        (Charge((2.0, 0.5), 5.0), np.hypot(2.0, 2.0)),  # its corner
+        (Charge((2.0, 4.0), 5.0, 1.75), 1.75),  # the ground below
+        (Charge((8.5, 6.5), 5.0), np.hypot(0.5, 1.5)),  # the hut
+        (Charge((4.5, 4.25), 5.0), 1.0),  # in the zone: two cells
+        (Charge((3.75, 4.0), 5.0), 1.0),  # right before it
+        (Charge((2.0, 4.0), 500.0), 2.0),
+        (Charge((4.5, 4.0), 500.0, 3.0), 1.5),  # over the zone
+    ],
+)
+def test_all_layouts_take_a_charge_over_at_one_radius(charge: Charge, radius_m: float) -> None:
+    """Loads depend on it: a barrier that moved it would seem to do what it doesn't."""
+    in_the_way = 3.0 < charge.position_m[0] < 5.0
+    layouts = ((), ((0, 1),)) if in_the_way else ((), ((0, 1),), WALL)
+    runs = []
+    for layout in layouts:
+        blast = GasBlast(HUT, layout, charge=charge)
+        runs.append(blast.engine.start_on(blast.site))
+    assert runs[0].handover_radius_m == pytest.approx(radius_m)
+    assert len({(run.handover_radius_m, run.time_s) for run in runs}) == 1
+
+
 def test_a_charge_that_hangs_or_lies_close_is_flagged_or_runs() -> None:
     hanging = blast_env.simulate(HUT, engine="gas", charge=Charge((2.0, 4.0), 5.0, 1.5))
     assert hanging.impulse("hut").pa_s > 0.0

@@ -47,6 +47,8 @@ class BlastSite:
         structures: The structures and, when there is one, the barrier; see `obstacles`.
         gauges: Virtual gauges, in metres; the particle engines have none.
         air_height_m: Height of the simulated air, metres; the particle engines know none.
+        build_zone: The whole build zone, as if full of modules, whatever the layout; `None`
+            without one. For gas dynamics only.
     """
 
     site: Rectangle
@@ -55,6 +57,7 @@ class BlastSite:
     structures: tuple["StructureOutline", ...]
     gauges: tuple[Gauge, ...] = ()
     air_height_m: float = 12.0
+    build_zone: "StructureOutline | None" = None
 
     def obstacles(self) -> tuple[ModularObstacle, ...]:
         """Return fresh obstacles without any hit, in the order of `structures`."""

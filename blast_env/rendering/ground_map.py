@@ -10,7 +10,6 @@ from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.opening import Opening, opening_of
 from blast_env.physics.gas.probes import GroundMap
-from blast_env.physics.gas.source import largest_radius_m
 from blast_env.physics.scene import BlastSite
 from blast_env.rendering.gas import (
     Quantity,
@@ -84,7 +83,7 @@ def ground_values(result: GasResult, quantity: Quantity) -> FloatArray:
     maps = [each for each in result.run.solver.recorders if isinstance(each, GroundMap)]
     if not maps:
         raise BlastEnvError("the blast has no map: run it with recorders=ground_recorders")
-    opening = opening_of(result.run.grid, result.run.charge)
+    opening = opening_of(result.run.charge, result.run.handover_radius_m)
     distance_m = _distances_m(result.run.grid, opening)
     if quantity == "peak":
         return np.maximum(maps[0].peak_pa, opening.peak_pa(distance_m))
@@ -228,10 +227,9 @@ def _draw_ground(
 
 def _taken_over(result: GasResult) -> Circle:
     """Return how far the front was when the grid took over: inside, peaks are sharper."""
-    radius_m = largest_radius_m(result.run.grid, result.run.charge)
     return Circle(
         result.run.site.charge.position_m,
-        radius_m,
+        result.run.handover_radius_m,
         fill=False,
         edgecolor=unit_interval(INK),
         linewidth=1.4,

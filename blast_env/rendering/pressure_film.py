@@ -155,5 +155,5 @@ def record_planes(
         return made
 
     result = blast.run(progress, recorders)
-    opening = opening_of(result.run.grid, result.run.charge)
+    opening = opening_of(result.run.charge, result.run.handover_radius_m)
     return PressureShot(result, section, opening, (made[0], made[1]))

@@ -79,6 +79,7 @@ def build_site(
         structures=structures,
         gauges=tuple(Gauge(each.name, each.position_m) for each in scenario.gauges),
         air_height_m=scenario.air_height_m,
+        build_zone=None if scenario.build_zone is None else barrier_outline(scenario.build_zone),
     )
 
 
@@ -125,6 +126,7 @@ def build_scene(
         structures=base.structures,
         gauges=base.gauges,
         air_height_m=base.air_height_m,
+        build_zone=base.build_zone,
         parameters=parameters,
     )
 
@@ -188,8 +190,8 @@ def _outline(section: AnyStructure) -> StructureOutline:
     )
 
 
-def barrier_outline(zone: BuildZone, cells: tuple[Cell, ...]) -> StructureOutline:
-    """Return the barrier that the modules on these cells of a zone make."""
+def barrier_outline(zone: BuildZone, cells: tuple[Cell, ...] | None = None) -> StructureOutline:
+    """Return the barrier that modules on these cells of a zone make, on all of them by default."""
     return StructureOutline(
         kind=ModularObstacle,
         name=BARRIER_NAME,

@@ -2,7 +2,8 @@
 
 The site becomes a grid of cubes: structures, barrier and ground are solid, the borders are open and
 lie outside the site by a margin. The charge expands with spherical symmetry until its front reaches
-the first solid, then the solver takes over, until the loads on the structures are complete.
+the first structure or the build zone, then the solver takes over, until the loads on the structures
+are complete.
 """
 
 from collections.abc import Callable, Sequence
@@ -137,6 +138,10 @@ class GasRun:
         grid: The grid.
         solver: The solver.
         charge: The charge.
+        handover_radius_m: Where the charge's front was when the grid took over: at the first
+            structure, the ground below a charge in the air, or the build zone, whatever stands in
+            it; and at least where `least_clearance_m` says, in or beside the zone too. So all
+            layouts of a scenario have the same one for a charge.
         table: The faces on which loads are recorded.
         loads: The loads on them.
         gauges: The gauges, `None` without any.
@@ -148,6 +153,8 @@ class GasRun:
         self.engine, self.site = engine, site
         self.grid, owner = _grid(engine, site)
         self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
+        reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
+        self.handover_radius_m = largest_radius_m(self.grid, self.charge, reserved)
         self.notes = self._notes()
         self.table = _face_table(self.grid, owner)
         self.loads = FaceLoads(len(self.table.faces))
@@ -161,9 +168,9 @@ class GasRun:
             burning=self.charge.burning,
             threads=engine.threads,
         )
-        set_charge(self.solver, self.charge)
+        set_charge(self.solver, self.charge, self.handover_radius_m)
         if self.gauges is not None:
-            _add_opening(self.gauges, self.grid, self.charge)
+            _add_opening(self.gauges, self.grid, self.charge, self.handover_radius_m)
         self.end_reason: EndReason | None = None
         self._groups = _groups(self.table, site)
         # When the wave has come all over a structure; sound would not take longer than this.
@@ -268,23 +275,28 @@ def _grid(engine: GasEngine, site: BlastSite) -> tuple[GasGrid, NDArray[np.int64
             f"{needed / 2**30:.1f} GiB, must be at most {_MOST_BYTES / 2**30:g}: take larger cells"
         )
     origin = low - margin * cell_m
-    x, y = (origin[axis] + cell_m * (np.arange(shape[axis]) + 0.5) for axis in (0, 1))
-    z = cell_m * (np.arange(shape[2]) + 0.5)
     owner = np.full((3, shape[0], shape[1]), -1)
-    solid = np.zeros(shape, dtype=bool)
+    grid = GasGrid(cell_m, np.zeros(shape, dtype=bool), (float(origin[0]), float(origin[1]), 0.0))
     for index, outline in enumerate(site.structures):
-        row, column = _modules_at(outline, x, y)
+        row, column = _modules_at(outline, grid)
         here = row >= 0
         owner[:, here] = np.stack([np.full(here.sum(), index), row[here], column[here]])
-        height_m = site.air_height_m if outline.height_m is None else outline.height_m
-        solid |= here[:, :, np.newaxis] & (z < height_m)
-    return GasGrid(cell_m, solid, (float(origin[0]), float(origin[1]), 0.0)), owner
+        grid.solid[_cells_of(outline, grid, site)] = True
+    return grid, owner
+
+
+def _cells_of(outline: StructureOutline, grid: GasGrid, site: BlastSite) -> NDArray[np.bool_]:
+    """Return the cells that a structure fills (nx, ny, nz)."""
+    height_m = site.air_height_m if outline.height_m is None else outline.height_m
+    row, _ = _modules_at(outline, grid)
+    return np.asarray((row >= 0)[:, :, np.newaxis] & (grid.centres_m(2) < height_m))
 
 
 def _modules_at(
-    outline: StructureOutline, x_m: FloatArray, y_m: FloatArray
+    outline: StructureOutline, grid: GasGrid
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return row and column of the module at each point (nx, ny); -1 where there is none."""
+    """Return row and column of the module at each column of cells (nx, ny), -1 for none."""
+    x_m, y_m = grid.centres_m(0), grid.centres_m(1)
     left, bottom = (coordinate / UNITS_PER_M for coordinate in outline.corner)
     column = np.floor((x_m - left) / MODULE_SIDE_M).astype(np.int64)[:, np.newaxis]
     row = np.floor((y_m - bottom) / MODULE_SIDE_M).astype(np.int64)[np.newaxis, :]
@@ -343,14 +355,14 @@ def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:
     return Gauges(grid, [_air_cell(grid, each.name, each.position_m) for each in site.gauges])
 
 
-def _add_opening(gauges: Gauges, grid: GasGrid, charge: GasCharge) -> None:
-    """Add what gauges nearer than the first obstacle had before the grid took over."""
+def _add_opening(gauges: Gauges, grid: GasGrid, charge: GasCharge, radius_m: float) -> None:
+    """Add what gauges within a radius had before the grid took over."""
     centres_m = np.array(grid.origin_m) + grid.cell_m * (gauges.cells + 0.5)
     x_m, y_m, z_m = charge.position_m
     centre_m = np.array([x_m, y_m, 0.0 if charge.on_ground else z_m])
     distance_m = np.sqrt(((centres_m - centre_m) ** 2).sum(axis=1))
-    if distance_m.min() < largest_radius_m(grid, charge):
-        opening = opening_of(grid, charge)
+    if distance_m.min() < radius_m:
+        opening = opening_of(charge, radius_m)
         gauges.add_before(opening.time_s, opening.overpressures_pa(distance_m))
 
 

@@ -1,7 +1,7 @@
 """What happened before the grid took a blast over: its first, spherical stage, seen again.
 
-The solver's recorders begin when the charge is laid onto the grid, with its front already at the
-first obstacle. Whoever was nearer to the charge has missed the front by then.
+The solver's recorders begin when the charge is laid onto the grid, with its front already some way
+off. Whoever was nearer to the charge has missed the front by then.
 """
 
 from dataclasses import dataclass
@@ -11,8 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.source import GasCharge, largest_radius_m
+from blast_env.physics.gas.source import GasCharge
 
 _RADII: Final = 240
 
@@ -66,18 +65,14 @@ class Opening:
         return np.interp(np.asarray(distance_m), self.radius_m, values, right=0.0)
 
 
-def opening_of(grid: GasGrid, charge: GasCharge) -> Opening:
+@lru_cache(maxsize=4)
+def opening_of(charge: GasCharge, radius_m: float) -> Opening:
     """Return the first stage of a blast; it takes a good part of a second.
 
     Args:
-        grid: The grid that takes the blast over.
         charge: The charge.
+        radius_m: Where the front is when the grid takes the blast over.
     """
-    return _opening(charge, largest_radius_m(grid, charge))
-
-
-@lru_cache(maxsize=4)
-def _opening(charge: GasCharge, radius_m: float) -> Opening:
     profile = charge.profile(radius_m)
     surface_m = charge.least_radius_m * (1.0 + 1e-9)
     radii = np.linspace(surface_m, max(profile.front_m, surface_m), _RADII)

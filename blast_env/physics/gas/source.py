@@ -1,8 +1,8 @@
 """The charge of the gas: TNT from its detonation products to a state of the grid.
 
 A charge burns and expands with spherical symmetry (`SphericalBlast`) until its front reaches the
-first obstacle. Then density, momentum, energy and unburnt fuel are laid onto the grid, and the
-solver goes on, fuel burning with the same time constant.
+first obstacle, or where one could stand. Then density, momentum, energy and unburnt fuel are laid
+onto the grid, and the solver goes on, fuel burning with the same time constant.
 
 One run, for 1 kg in free air, serves all charges: lengths and times grow with the cube root of the
 mass (Hopkinson-Cranz), the time constant of afterburning too. `python -m scripts.gas source` shows
@@ -198,8 +198,8 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
     Args:
         solver: Made `with_fuel` and with `burning=charge.burning`.
         charge: The charge.
-        radius_m: Where the front is then. By default it has just reached the first solid cell or
-            the ground, at least `LEAST_RADIUS_CELLS` cells away.
+        radius_m: Where the front is then, `largest_radius_m` by default. Loads depend on it (by
+            some per cent), so take one for all runs that are to be compared.
 
     Raises:
         BlastEnvError: If the charge is outside the grid or in a solid cell.
@@ -220,17 +220,27 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
     solver.time_s = profile.time_s
 
 
-def largest_radius_m(grid: GasGrid, charge: GasCharge) -> float:
+def largest_radius_m(
+    grid: GasGrid, charge: GasCharge, kept_clear: NDArray[np.bool_] | None = None
+) -> float:
     """Return how far the front of a charge can run before it meets a solid cell or the ground.
 
     At least `least_clearance_m`. Below that the ground does not count: what has passed through it
     is laid onto the grid as its mirror image.
+
+    Args:
+        grid: The grid.
+        charge: The charge.
+        kept_clear: Further cells that count as solid here (nx, ny, nz): where something could
+            stand. The charge may be among them.
 
     Raises:
         BlastEnvError: If the charge is outside the grid or in a solid cell.
     """
     clear, least = clearance_m(grid, charge), least_clearance_m(grid, charge)
     x, y, z = _centre(charge)
+    if kept_clear is not None:
+        clear = min(clear, _distance_to(kept_clear, grid, (x, y, z)))
     if not charge.on_ground:
         clear = min(clear, max(z, least))
     return min(max(clear, least), _farthest_corner(grid, (x, y, z)))
@@ -243,7 +253,7 @@ def clearance_m(grid: GasGrid, charge: GasCharge) -> float:
         BlastEnvError: If the charge is outside the grid or in a solid cell.
     """
     grid.cell_at(charge.position_m)  # says what is wrong outside the grid
-    clear = _distance_to_solid(grid, _centre(charge))
+    clear = _distance_to(grid.solid, grid, _centre(charge))
     if clear <= 0.0:
         raise BlastEnvError(
             f"the charge of {charge.mass_kg:g} kg at {charge.position_m} is inside a solid cell"
@@ -297,12 +307,14 @@ def _centre(charge: GasCharge) -> tuple[float, float, float]:
     return x, y, 0.0 if charge.on_ground else z
 
 
-def _distance_to_solid(grid: GasGrid, point: tuple[float, float, float]) -> float:
-    """Return the distance to the nearest solid cell, infinite if there is none."""
-    solid = np.argwhere(grid.solid)
-    if len(solid) == 0:
+def _distance_to(
+    cells: NDArray[np.bool_], grid: GasGrid, point: tuple[float, float, float]
+) -> float:
+    """Return the distance to the nearest of some cells, infinite if there is none."""
+    chosen = np.argwhere(cells)
+    if len(chosen) == 0:
         return inf
-    low = np.array(grid.origin_m) + grid.cell_m * solid
+    low = np.array(grid.origin_m) + grid.cell_m * chosen
     outside = np.maximum(np.maximum(low - point, point - low - grid.cell_m), 0.0)
     return sqrt(float((outside**2).sum(axis=1).min()))
 
