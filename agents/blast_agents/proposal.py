@@ -8,7 +8,7 @@ from typing import Protocol
 
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
-from blast_env.scenario import Scenario
+from blast_env.scenario import AnyScenario, Scenario, find_scenario
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,12 @@ def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
     return Proposal(layout, perf_counter() - began_s)
 
 
-def propose(agent: LayoutAgent, scenario: Scenario, charge: Charge | None) -> Proposal:
-    """Return what an agent proposes, and how long it took."""
-    return timed_proposal(partial(agent.propose, scenario, charge))
+def propose(agent: LayoutAgent, scenario: AnyScenario, charge: Charge | None) -> Proposal:
+    """Return what an agent proposes, and how long it took.
+
+    Args:
+        agent: The agent.
+        scenario: The scenario, or its bundled name or path; it has a build zone.
+        charge: As for `LayoutAgent.propose`.
+    """
+    return timed_proposal(partial(agent.propose, find_scenario(scenario), charge))

@@ -12,7 +12,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell
 from blast_env.physics.scene import Charge
-from blast_env.scenario import AnySource, Placement, Scenario
+from blast_env.scenario import AnyScenario, AnySource, Placement, Scenario
 from blast_env.scenario.sections import PointM
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
@@ -35,7 +35,7 @@ _TOLERANCE_M: Final = 1e-9
 Layout = tuple[Cell, ...]
 
 
-def line_of_sight_wall(scenario: Scenario, charge: Charge, share: float = 0.5) -> Layout:
+def line_of_sight_wall(scenario: AnyScenario, charge: Charge, share: float = 0.5) -> Layout:
     """Return a wall across the line of sight from a charge to the protected structures.
 
     The wall stands at right angles to the line from the charge to the middle of the protected
@@ -47,7 +47,7 @@ def line_of_sight_wall(scenario: Scenario, charge: Charge, share: float = 0.5) -
     Every module goes through `Placement`: budget, access way and all other conditions hold.
 
     Args:
-        scenario: The scenario; it has a build zone.
+        scenario: The scenario, or its bundled name or path; it has a build zone.
         charge: Where the charge is; its mass plays no part. See `expected_charge` for one whose
             place is not known.
         share: How far through the build zone: 0 as near to the charge as a module can stand on
@@ -64,7 +64,7 @@ def line_of_sight_wall(scenario: Scenario, charge: Charge, share: float = 0.5) -
     if not 0.0 <= share <= 1.0:
         raise BlastEnvError(f"share is {share:g}, must be from 0 to 1")
     placement = Placement.empty(scenario)
-    view = _View.of(scenario, charge.position_m, placement.free)
+    view = _View.of(placement.scenario, charge.position_m, placement.free)
     if not view.between.any():
         return ()
     wall_m = view.wall_depth_m(share)
@@ -80,17 +80,17 @@ def line_of_sight_wall(scenario: Scenario, charge: Charge, share: float = 0.5) -
     return placement.cells
 
 
-def wall_near_charge(scenario: Scenario, charge: Charge) -> Layout:
+def wall_near_charge(scenario: AnyScenario, charge: Charge) -> Layout:
     """Return the line-of-sight wall as near to the charge as a module can stand."""
     return line_of_sight_wall(scenario, charge, NEAR_CHARGE)
 
 
-def wall_near_building(scenario: Scenario, charge: Charge) -> Layout:
+def wall_near_building(scenario: AnyScenario, charge: Charge) -> Layout:
     """Return the line-of-sight wall as near to the protected structures as a module can stand."""
     return line_of_sight_wall(scenario, charge, NEAR_BUILDING)
 
 
-RULES: Final[Mapping[str, Callable[[Scenario, Charge], Layout]]] = MappingProxyType(
+RULES: Final[Mapping[str, Callable[[AnyScenario, Charge], Layout]]] = MappingProxyType(
     {"wall near the charge": wall_near_charge, "wall near the building": wall_near_building}
 )
 """The two rules that an engineer would try first, by name."""
@@ -220,7 +220,7 @@ def _protected_middle_m(scenario: Scenario) -> tuple[float, float]:
     return float(x_m), float(y_m)
 
 
-def random_layout(scenario: Scenario, rng: np.random.Generator) -> tuple[Cell, ...]:
+def random_layout(scenario: AnyScenario, rng: np.random.Generator) -> tuple[Cell, ...]:
     """Return a layout with every module on a random cell, as many as can be placed.
 
     One module after the other goes on a cell that is available then, all of them as likely. It
@@ -228,7 +228,7 @@ def random_layout(scenario: Scenario, rng: np.random.Generator) -> tuple[Cell, .
     another module would close the access way.
 
     Args:
-        scenario: The scenario.
+        scenario: The scenario, or its bundled name or path.
         rng: Decides everything.
 
     Returns:

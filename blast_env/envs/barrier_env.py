@@ -41,7 +41,7 @@ from blast_env.evaluation.store import BlastCache
 from blast_env.geometry import Cell
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
-from blast_env.scenario import Placement, Scenario
+from blast_env.scenario import AnyScenario, Placement
 from blast_env.statistics import Risk
 
 
@@ -184,7 +184,7 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     @checked_keywords
     def __init__(
         self,
-        scenario: str | Path | Scenario | ScenarioSource = "courtyard",
+        scenario: AnyScenario | ScenarioSource = "courtyard",
         reward: str | Reward = "terminal",
         observation: str | Observation = "grid",
         threat: str | ThreatModel = "visible",

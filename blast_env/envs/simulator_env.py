@@ -1,7 +1,6 @@
 """The bare simulator as a Gymnasium environment."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium as gym
@@ -17,7 +16,7 @@ from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import BARRIER_NAME, ModularPart
 from blast_env.recording.tables import collision_table
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario import AnyScenario, find_scenario
 from blast_env.simulation import Blast, BlastResult
 
 if TYPE_CHECKING:  # drawing is an optional extra
@@ -110,7 +109,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
     @checked_keywords
     def __init__(
         self,
-        scenario: str | Path | Scenario = "courtyard",
+        scenario: AnyScenario = "courtyard",
         layout: Sequence[Cell] = (),
         engine: str | Engine = "pymunk",
         step_s: float = 0.002,
@@ -120,7 +119,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
             raise BlastEnvError(f"step_s is {step_s} s, must be between 1e-06 and 10 s")
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
-        self.scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+        self.scenario = find_scenario(scenario)
         self.layout: Sequence[Cell] = layout
         self.engine = engine
         self.step_s = step_s

@@ -12,7 +12,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.comparison import Objective
 from blast_env.geometry import Cell
 from blast_env.physics.scene import Charge
-from blast_env.scenario import AnySource, PointSource, Scenario, load_scenario
+from blast_env.scenario import AnyScenario, AnySource, PointSource, Scenario, ScenarioField
 
 
 class ThreatModel(Protocol):
@@ -85,10 +85,10 @@ class SingleScenario:
     """Gives every episode the same scenario.
 
     Attributes:
-        scenario: The scenario.
+        scenario: The scenario; its bundled name or path will do.
     """
 
-    scenario: Scenario
+    scenario: ScenarioField = ScenarioField()
 
     @property
     def representative(self) -> Scenario:
@@ -100,7 +100,7 @@ class SingleScenario:
         return self.scenario
 
 
-def scenario_source(scenario: str | Path | Scenario | ScenarioSource) -> ScenarioSource:
+def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
     """Return the source for what a user calls a scenario.
 
     Args:
@@ -110,9 +110,10 @@ def scenario_source(scenario: str | Path | Scenario | ScenarioSource) -> Scenari
         ScenarioError: If there is no such scenario, or anything is wrong with it.
         BlastEnvError: If it has no build zone, or is anything else.
     """
-    if isinstance(scenario, str | Path):
-        scenario = load_scenario(scenario)
-    source = SingleScenario(scenario) if isinstance(scenario, Scenario) else scenario
+    if isinstance(scenario, str | Path | Scenario):
+        source: ScenarioSource = SingleScenario(scenario)
+    else:
+        source = scenario
     if not (hasattr(source, "sample") and hasattr(source, "representative")):
         raise BlastEnvError(
             f"scenario is {source!r}, must be a name, a path, a Scenario or a ScenarioSource"

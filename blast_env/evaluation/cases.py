@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.physics.scene import Charge
-from blast_env.scenario import Scenario
+from blast_env.scenario import AnyScenario, ScenarioField, find_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.statistics import MeanRisk, Risk
 
@@ -49,11 +49,11 @@ class Threat:
         object.__setattr__(self, "seed", _seed(self.seed, "seed"))
 
 
-def draw_threats(scenario: Scenario, seeds: Iterable[int]) -> tuple[Threat, ...]:
+def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, ...]:
     """Return one threat a seed, its charge drawn from the scenario as `simulate` draws it.
 
     Args:
-        scenario: The scenario.
+        scenario: The scenario, or its bundled name or path.
         seeds: At least one, none twice; each is the seed of its blast as well.
 
     Raises:
@@ -65,7 +65,8 @@ def draw_threats(scenario: Scenario, seeds: Iterable[int]) -> tuple[Threat, ...]
     for index, seed in enumerate(plain):
         if seed in plain[:index]:
             raise BlastEnvError(f"seeds[{index}] is {seed}, is there already: must be none twice")
-    return tuple(Threat(draw_charge(scenario, seed), seed) for seed in plain)
+    found = find_scenario(scenario)
+    return tuple(Threat(draw_charge(found, seed), seed) for seed in plain)
 
 
 class SeedRange(Enum):
@@ -123,7 +124,7 @@ class Case:
     is due to the layouts.
 
     Attributes:
-        scenario: The scenario.
+        scenario: The scenario; its bundled name or path will do.
         threats: What layouts meet, at least one. With several realisations first one of each
             charge, then another of each, and so on: threat k is of charge k modulo the number of
             charges.
@@ -139,8 +140,8 @@ class Case:
             `practice` is among them.
     """
 
-    scenario: Scenario
-    threats: tuple[Threat, ...]
+    scenario: ScenarioField = ScenarioField()
+    threats: tuple[Threat, ...]  # type: ignore[misc]  # a scenario has no default
     realisations: int = 1
     risk: Risk = MEAN
     charge: Charge | None = None
@@ -186,7 +187,7 @@ class Case:
 
 
 def visible_case(
-    scenario: Scenario, charge: Charge, seeds: Sequence[int], risk: Risk = MEAN
+    scenario: AnyScenario, charge: Charge, seeds: Sequence[int], risk: Risk = MEAN
 ) -> Case:
     """Return the case of a known charge: it goes off once a seed, with another fan and air."""
     threats = tuple(Threat(charge, seed) for seed in seeds)
@@ -194,7 +195,7 @@ def visible_case(
 
 
 def practice_visible(
-    scenario: Scenario,
+    scenario: AnyScenario,
     charge: Charge,
     realisations: int,
     seed: int,
@@ -203,7 +204,7 @@ def practice_visible(
     """Return what a search for a known charge may spend its blasts on.
 
     Args:
-        scenario: The scenario.
+        scenario: The scenario, or its bundled name or path.
         charge: The charge.
         realisations: How many fans and airs, at least one.
         seed: Decides the seeds of the blasts, and what the search draws.
@@ -218,12 +219,13 @@ def practice_visible(
 
 
 def practice_hidden(
-    scenario: Scenario, charges: int, realisations: int, seed: int, risk: Risk = MEAN
+    scenario: AnyScenario, charges: int, realisations: int, seed: int, risk: Risk = MEAN
 ) -> Case:
     """Return what a search for a hidden charge may spend its blasts on.
 
     Args:
-        scenario: The scenario; the charges are drawn from where it lets them be.
+        scenario: The scenario, or its bundled name or path; the charges are drawn from where it
+            lets them be.
         charges: How many charges, at least one.
         realisations: How many fans and airs for each of them, at least one.
         seed: Decides the charges, the seeds of the blasts, and what the search draws.
@@ -239,10 +241,11 @@ def practice_hidden(
     _at_least_one("charges", charges)
     _at_least_one("realisations", realisations)
     rng = np.random.default_rng(seed)
-    drawn = _spread_first([scenario.sample_charge(rng) for _ in range(charges)])
+    found = find_scenario(scenario)
+    drawn = _spread_first([found.sample_charge(rng) for _ in range(charges)])
     seeds = SeedRange.SEARCH.draw_distinct(rng, realisations * charges)
     threats = [Threat(drawn[index % charges], each) for index, each in enumerate(seeds)]
-    return Case(scenario, tuple(threats), realisations, risk, seed=seed)
+    return Case(found, tuple(threats), realisations, risk, seed=seed)
 
 
 def check_distinct(threats: Sequence[Threat]) -> None:

@@ -24,7 +24,7 @@ from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.scene import Charge
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
-from blast_env.scenario import Scenario, check_layout
+from blast_env.scenario import AnyScenario, Scenario, check_layout, find_scenario
 from blast_env.simulation import Blast
 
 
@@ -38,14 +38,15 @@ class BlastEvaluator:
     It can be pickled, with what it remembers.
 
     Args:
-        scenario: The scenario; it must name a calibration.
+        scenario: The scenario, or its bundled name or path; for the particle engines it must name
+            a calibration.
         engine: Name of an engine, or an engine.
         cache_size: Most loads that the evaluator itself remembers; see `LoadsCache`.
         cache: Asked for what it does not remember, and told all: a folder (`DiskCache`), for other
             processes and later runs, or a cache that several evaluators share.
 
     Attributes:
-        scenario: As given.
+        scenario: The scenario.
         engine: The engine.
         calibration: The scenario's calibration, checked against its parameters and the engine;
             `None` for gas dynamics, which needs none.
@@ -61,22 +62,22 @@ class BlastEvaluator:
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: AnyScenario,
         engine: str | Engine = "event",
         cache_size: int = 4096,
         cache: str | Path | BlastCache | None = None,
     ) -> None:
-        self.scenario = scenario
+        self.scenario = find_scenario(scenario)
         self.engine = find_engine(engine)
         self.calibration: Calibration | None = None
         if not is_gas(self.engine):
-            self.calibration = scenario_calibration(scenario, self.engine.name)
+            self.calibration = scenario_calibration(self.scenario, self.engine.name)
         self.blasts = 0
         self.cache_hits = 0
         self._remembered = LoadsCache(cache_size)
         self._cache = find_cache(cache)
         self._key_of_nothing = BlastKey(
-            scenario_hash=scenario.content_hash,
+            scenario_hash=self.scenario.content_hash,
             layout=(),
             charge=Charge((0.0, 0.0), 0.0),
             seed=0,
@@ -240,8 +241,11 @@ class Evaluators:
         asked = self.blasts + self.cache_hits
         return self.cache_hits / asked if asked else 0.0
 
-    def of(self, scenario: Scenario) -> BlastEvaluator:
+    def of(self, scenario: AnyScenario) -> BlastEvaluator:
         """Return the evaluator of a scenario.
+
+        Args:
+            scenario: The scenario, or its bundled name or path.
 
         Raises:
             CalibrationError: If the scenario names no calibration, or one that was made with other
@@ -251,11 +255,10 @@ class Evaluators:
         newest = next(reversed(self._kept.values()), None)
         if newest is not None and newest.scenario is scenario:
             return newest  # the usual case, without the time that a content hash takes
-        key = scenario.content_hash
+        found = find_scenario(scenario)
+        key = found.content_hash
         if key not in self._kept:
-            self._kept[key] = BlastEvaluator(
-                scenario, self.engine, _LOADS_PER_EVALUATOR, self._cache
-            )
+            self._kept[key] = BlastEvaluator(found, self.engine, _LOADS_PER_EVALUATOR, self._cache)
         self._kept.move_to_end(key)
         if len(self._kept) > self._most:
             _, gone = self._kept.popitem(last=False)

@@ -26,7 +26,7 @@ from blast_env.physics.engine import Engine
 from blast_env.physics.engines import GAS, find_engine
 from blast_env.provenance import versions
 from blast_env.recording.tables import module_table
-from blast_env.scenario import Scenario, check_layout, load_scenario
+from blast_env.scenario import AnyScenario, Scenario, check_layout
 from blast_env.scenario.build_scene import build_site
 from blast_env.statistics import (
     Estimate,
@@ -470,7 +470,7 @@ class LayoutEvaluation:
 
 
 def evaluate_layout(
-    scenario: Scenario | str | Path,
+    scenario: AnyScenario,
     layout: Sequence[Cell],
     seeds: Iterable[int] = range(16),
     processes: int = 1,
@@ -511,10 +511,8 @@ def evaluate_layout(
             `processes` or `cvar_level` is out of bounds, or if nothing arrives at the protected
             structures even without a barrier.
     """
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
     evaluator = BlastEvaluator(scenario, find_engine(engine, cell_m), cache=cache)
-    drawn = draw_threats(scenario, seeds) if threats is None else tuple(threats)
+    drawn = draw_threats(evaluator.scenario, seeds) if threats is None else tuple(threats)
     return evaluate_against(
         evaluator, layout, drawn, processes, cvar_level=cvar_level, progress=progress
     )

@@ -16,7 +16,7 @@ from blast_env.scenario import (
     AnySource,
     BuildZone,
     RectangleSource,
-    Scenario,
+    ScenarioField,
     SegmentSource,
     check_layout,
 )
@@ -65,7 +65,7 @@ class LayoutPlan:
     """A layout on its site.
 
     Attributes:
-        scenario: The scenario.
+        scenario: The scenario; its bundled name or path will do.
         layout: (row, column) of each module; their order is kept.
         charge: The charge that the layout was made for; `None` where it is for all the places
             where the scenario may have one, or nobody knows.
@@ -75,8 +75,8 @@ class LayoutPlan:
         LayoutError: If the layout does not fit the scenario.
     """
 
-    scenario: Scenario
-    layout: tuple[Cell, ...]
+    scenario: ScenarioField = ScenarioField()
+    layout: tuple[Cell, ...]  # type: ignore[misc]  # a scenario has no default
     charge: Charge | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 

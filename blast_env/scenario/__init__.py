@@ -3,8 +3,11 @@
 from blast_env.geometry import Cell
 from blast_env.physics.scene import Charge
 from blast_env.scenario.files import (
+    AnyScenario,
+    ScenarioField,
     bundled_scenarios,
     find_problems,
+    find_scenario,
     load_scenario,
     parse_scenario,
     save_scenario,
@@ -32,6 +35,7 @@ from blast_env.scenario.zone import AccessWay, BuildZone, CostArea, KeepOut
 __all__ = [
     "SCHEMA_VERSION",
     "AccessWay",
+    "AnyScenario",
     "AnySource",
     "AnyStructure",
     "BuildZone",
@@ -49,12 +53,14 @@ __all__ = [
     "RectangleSource",
     "Scenario",
     "ScenarioError",
+    "ScenarioField",
     "SegmentSource",
     "SimulationSection",
     "Site",
     "bundled_scenarios",
     "check_layout",
     "find_problems",
+    "find_scenario",
     "load_layout",
     "load_scenario",
     "parse_scenario",

@@ -4,10 +4,11 @@ import os
 import re
 import tomllib
 from pathlib import Path
-from typing import Final
+from typing import Final, Self, overload
 
 import tomli_w
 
+from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.scenario.models import Scenario
 from blast_env.scenario.problems import Problem, ScenarioError, shortened, unknown_name
@@ -70,6 +71,55 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     return parse_scenario(text, str(path))
 
 
+AnyScenario = Scenario | str | Path
+"""What a user may call a scenario: itself, its bundled name, or the path of its file."""
+
+
+def find_scenario(scenario: AnyScenario) -> Scenario:
+    """Return the scenario that a user means.
+
+    Args:
+        scenario: A scenario, which is returned as it is, or what `load_scenario` takes.
+
+    Raises:
+        ScenarioError: If there is no such scenario, or anything is wrong with it.
+        BlastEnvError: If it is anything else.
+    """
+    if isinstance(scenario, Scenario):
+        return scenario
+    if not isinstance(scenario, str | Path):
+        raise BlastEnvError(f"scenario is {scenario!r}, must be a name, a path or a Scenario")
+    return load_scenario(scenario)
+
+
+class ScenarioField:
+    """A field of a dataclass that is set to whatever a user calls a scenario, and is a scenario.
+
+    It raises what `find_scenario` raises when the dataclass is made.
+    """
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        """Take the name of the field."""
+        self._name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+
+    @overload
+    def __get__(self, instance: object, owner: type) -> Scenario: ...
+
+    def __get__(self, instance: object | None, owner: type) -> "Scenario | Self":
+        """Return the scenario; to the class itself there is none, so that the field is required."""
+        if instance is None:
+            raise AttributeError(self._name)
+        found: Scenario = instance.__dict__[self._name]
+        return found
+
+    def __set__(self, instance: object, scenario: AnyScenario) -> None:
+        """Load the scenario, if it is a name or a path."""
+        instance.__dict__[self._name] = find_scenario(scenario)
+
+
 def parse_scenario(text: str, source: str) -> Scenario:
     """Return the scenario that the text of a file describes.
 
@@ -103,28 +153,36 @@ def find_problems(name_or_path: str | Path) -> tuple[Problem, ...]:
     return ()
 
 
-def save_scenario(scenario: Scenario, path: str | Path) -> None:
+def save_scenario(scenario: AnyScenario, path: str | Path) -> None:
     """Write a scenario to a file that `load_scenario` reads back as an equal scenario.
 
     The file is replaced as a whole: after an error the old one is untouched.
 
+    Args:
+        scenario: The scenario, or its bundled name or path: a copy to begin one's own with.
+        path: The file; a `.toml` file.
+
     Raises:
-        ScenarioError: If the scenario could not be read back: one that `model_copy` made unsound,
-            or a name that is not a `.toml` file's.
+        ScenarioError: If there is no such scenario, or it could not be read back: one that
+            `model_copy` made unsound, or a name that is not a `.toml` file's.
         BlastEnvError: If the file cannot be written.
     """
     if Path(path).suffix != SUFFIX:
         raise ScenarioError(str(path), [Problem("", f"must be a {SUFFIX} file")])
-    document = scenario.model_dump(mode="json", exclude_none=True)
+    document = find_scenario(scenario).model_dump(mode="json", exclude_none=True)
     Scenario.from_document(document, str(path))
     content = tomli_w.dumps(document)
     with write_atomically(path) as temporary:
         temporary.write_text(content, encoding="utf-8", newline="\n")
 
 
-def scenario_hash(scenario: Scenario) -> str:
-    """Return the SHA-256 of everything in a scenario that affects a result."""
-    return scenario.content_hash
+def scenario_hash(scenario: AnyScenario) -> str:
+    """Return the SHA-256 of everything in a scenario that affects a result.
+
+    Args:
+        scenario: The scenario, or its bundled name or path.
+    """
+    return find_scenario(scenario).content_hash
 
 
 def _bundled_folder() -> Path:

@@ -10,7 +10,7 @@ from typing import Any, Final
 from blast_env.errors import LayoutError, suggestion
 from blast_env.files import write_atomically
 from blast_env.geometry import Cell
-from blast_env.scenario.files import MAX_BYTES, read_text
+from blast_env.scenario.files import MAX_BYTES, AnyScenario, find_scenario, read_text
 from blast_env.scenario.models import Scenario
 from blast_env.scenario.placement import cell_from, check_layout
 from blast_env.scenario.problems import key_path, shortened, type_word, value_text
@@ -57,34 +57,44 @@ class LayoutFile:
     @classmethod
     def of(
         cls,
-        scenario: Scenario,
+        scenario: AnyScenario,
         layout: Sequence[Cell],
         provenance: Mapping[str, Any] | None = None,
     ) -> "LayoutFile":
         """Return the file of a layout for a scenario.
 
+        Args:
+            scenario: The scenario, or its bundled name or path.
+            layout: (row, column) of each module.
+            provenance: How the layout was made.
+
         Raises:
             LayoutError: If the layout does not fit the scenario.
         """
+        found = find_scenario(scenario)
         return cls(
-            cells=check_layout(scenario, layout),
-            scenario=scenario.name,
-            scenario_hash=scenario.content_hash,
+            cells=check_layout(found, layout),
+            scenario=found.name,
+            scenario_hash=found.content_hash,
             provenance=dict(provenance or {}),
         )
 
-    def cells_for(self, scenario: Scenario) -> tuple[Cell, ...]:
+    def cells_for(self, scenario: AnyScenario) -> tuple[Cell, ...]:
         """Return the cells, if they are a layout for this scenario.
 
         A file without a hash is taken for any scenario that its cells fit.
+
+        Args:
+            scenario: The scenario, or its bundled name or path.
 
         Raises:
             LayoutError: If the file is for another scenario or another state of it, or if a cell
                 is off the grid, not available, repeated or beyond the stock.
         """
-        if self.scenario_hash not in (None, scenario.content_hash):
-            raise LayoutError(self._mismatch(scenario))
-        return check_layout(scenario, self.cells)
+        found = find_scenario(scenario)
+        if self.scenario_hash not in (None, found.content_hash):
+            raise LayoutError(self._mismatch(found))
+        return check_layout(found, self.cells)
 
     def save(self, path: str | Path) -> Path:
         """Write the file; an existing one is replaced as a whole.
@@ -135,7 +145,7 @@ class LayoutFile:
         )
 
 
-def load_layout(path: str | Path, scenario: Scenario | None = None) -> tuple[Cell, ...]:
+def load_layout(path: str | Path, scenario: AnyScenario | None = None) -> tuple[Cell, ...]:
     """Return the cells of a layout file.
 
     The file is `[[row, column], ...]`, or a table with `cells` and, if it says so, the scenario
@@ -143,8 +153,8 @@ def load_layout(path: str | Path, scenario: Scenario | None = None) -> tuple[Cel
 
     Args:
         path: The file.
-        scenario: The scenario that the layout must be for. Without it, only the form of the file
-            is checked; `check_layout` checks the cells later.
+        scenario: The scenario that the layout must be for, or its bundled name or path. Without
+            it, only the form of the file is checked; `check_layout` checks the cells later.
 
     Raises:
         LayoutError: If the file cannot be read or is anything else, or if the layout is not one
@@ -161,7 +171,7 @@ def load_layout(path: str | Path, scenario: Scenario | None = None) -> tuple[Cel
 
 def write_layout(
     path: str | Path,
-    scenario: Scenario,
+    scenario: AnyScenario,
     layout: Sequence[Cell],
     provenance: Mapping[str, Any] | None = None,
 ) -> Path:
@@ -169,7 +179,7 @@ def write_layout(
 
     Args:
         path: The file; an existing one is replaced as a whole.
-        scenario: The scenario that the layout is for.
+        scenario: The scenario that the layout is for, or its bundled name or path.
         layout: (row, column) of each module.
         provenance: How the layout was made, e.g. method, command, seed, versions, blasts.
 

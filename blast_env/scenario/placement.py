@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell
+from blast_env.scenario.files import AnyScenario, find_scenario
 from blast_env.scenario.models import Scenario
 from blast_env.scenario.problems import type_word, value_text
 from blast_env.scenario.zone import (
@@ -94,16 +95,20 @@ class Placement:
     cells: tuple[Cell, ...]
 
     @classmethod
-    def empty(cls, scenario: Scenario) -> "Placement":
-        """Return the placement without modules."""
-        return cls(scenario, ())
+    def empty(cls, scenario: AnyScenario) -> "Placement":
+        """Return the placement without modules.
+
+        Args:
+            scenario: The scenario, or its bundled name or path.
+        """
+        return cls(find_scenario(scenario), ())
 
     @classmethod
-    def of(cls, scenario: Scenario, cells: Sequence[Cell]) -> "Placement":
+    def of(cls, scenario: AnyScenario, cells: Sequence[Cell]) -> "Placement":
         """Return the placement of a whole layout.
 
         Args:
-            scenario: The scenario.
+            scenario: The scenario, or its bundled name or path.
             cells: (row, column) of each module. NumPy integers and arrays are welcome.
 
         Raises:
@@ -111,8 +116,8 @@ class Placement:
                 repeated or not available once the cells before it are taken.
         """
         layout = cells_from(cells)
-        whole = cls(scenario, layout)
-        return whole if whole._is_sound else _placed_one_by_one(scenario, layout)
+        whole = cls(find_scenario(scenario), layout)
+        return whole if whole._is_sound else _placed_one_by_one(whole.scenario, layout)
 
     def place(self, cell: Cell) -> "Placement":
         """Return the placement with one more module.
@@ -307,11 +312,14 @@ def _counted_modules(count: int) -> str:
     return "1 module" if count == 1 else f"{count} modules"
 
 
-def usable_cells(scenario: Scenario) -> NDArray[np.bool_]:
+def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
     """Return which cells may hold a module as far as the site is concerned.
 
     That leaves out keep-outs, structures, their clearance and the charge; what depends on the
     modules already placed (stock, budget, access way) is for `Placement` to say.
+
+    Args:
+        scenario: The scenario, or its bundled name or path.
 
     Returns:
         An array of shape (rows, columns), read-only; (0, 0) without a build zone.
@@ -319,11 +327,11 @@ def usable_cells(scenario: Scenario) -> NDArray[np.bool_]:
     return Placement.empty(scenario).usable
 
 
-def check_layout(scenario: Scenario, layout: Sequence[Cell]) -> tuple[Cell, ...]:
+def check_layout(scenario: AnyScenario, layout: Sequence[Cell]) -> tuple[Cell, ...]:
     """Return the cells of a layout as plain integers, in their order.
 
     Args:
-        scenario: The scenario that the layout is for.
+        scenario: The scenario that the layout is for, or its bundled name or path.
         layout: (row, column) of each module. NumPy integers and arrays are welcome.
 
     Raises:

@@ -33,7 +33,7 @@ from blast_env.recording.tables import (
     structure_table,
 )
 from blast_env.runner import check_workers, in_order
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario import AnyScenario, ScenarioField
 from blast_env.scenario.build_scene import build_scene, draw_charge
 
 if TYPE_CHECKING:
@@ -48,14 +48,14 @@ class Blast:
     """One blast that can be run: what `simulate` is called with.
 
     Attributes:
-        scenario: The scenario.
+        scenario: The scenario; its bundled name or path will do.
         layout: Cells of the build zone that hold a barrier module.
         seed: Decides the charge, where the scenario leaves it open, the fan and the air.
         engine: The engine that runs it.
         charge: The charge, instead of one drawn from the scenario.
     """
 
-    scenario: Scenario
+    scenario: ScenarioField = ScenarioField()
     layout: Sequence[Cell] = ()
     seed: int = 0
     engine: str | Engine = "pymunk"
@@ -304,7 +304,7 @@ class BlastResult:
 
 @overload
 def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
-    scenario: Scenario | str | Path,
+    scenario: AnyScenario,
     layout: Sequence[Cell] = ...,
     seed: int = ...,
     *,
@@ -317,7 +317,7 @@ def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
 
 @overload
 def simulate(
-    scenario: Scenario | str | Path,
+    scenario: AnyScenario,
     layout: Sequence[Cell] = ...,
     seed: int = ...,
     engine: str | Engine = ...,
@@ -327,7 +327,7 @@ def simulate(
 
 
 def simulate(
-    scenario: Scenario | str | Path,
+    scenario: AnyScenario,
     layout: Sequence[Cell] = (),
     seed: int = 0,
     engine: str | Engine = "pymunk",
@@ -360,8 +360,6 @@ def simulate(
             that has no cells.
         ValueError: If the seed is negative.
     """
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
     found = find_engine(engine, cell_m)
     if is_gas(found):
         from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import

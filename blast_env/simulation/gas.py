@@ -36,7 +36,7 @@ from blast_env.provenance import versions
 from blast_env.recording.excel import SheetTable, write_tables
 from blast_env.recording.parquet import write_table
 from blast_env.recording.tables import RunRecord
-from blast_env.scenario import Scenario
+from blast_env.scenario import ScenarioField
 from blast_env.scenario.build_scene import build_site
 from blast_env.tables import Column, table_of
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
@@ -107,14 +107,14 @@ class GasBlast:
     """One blast of the gas engine that can be run.
 
     Attributes:
-        scenario: The scenario.
+        scenario: The scenario; its bundled name or path will do.
         layout: Cells of the build zone that hold a barrier module.
         seed: Decides the charge, where the scenario leaves it open; nothing else.
         engine: The engine.
         charge: The charge, instead of one drawn from the scenario.
     """
 
-    scenario: Scenario
+    scenario: ScenarioField = ScenarioField()
     layout: Sequence[Cell] = ()
     seed: int = 0
     engine: GasEngine = field(default_factory=GasEngine)

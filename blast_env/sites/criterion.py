@@ -7,7 +7,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Cell
-from blast_env.scenario import Placement, Scenario, usable_cells
+from blast_env.scenario import AnyScenario, Placement, Scenario, find_scenario, usable_cells
 from blast_env.sites.visibility import Visibility
 
 
@@ -30,12 +30,16 @@ class SiteMeasures:
     random_share: float
 
     @classmethod
-    def of(cls, scenario: Scenario) -> "SiteMeasures":
+    def of(cls, scenario: AnyScenario) -> "SiteMeasures":
         """Return the measures of a scenario.
+
+        Args:
+            scenario: The scenario, or its bundled name or path.
 
         Raises:
             BlastEnvError: If it has no build zone.
         """
+        scenario = find_scenario(scenario)
         lines = Visibility.of(scenario)
         return cls(
             open_share=lines.open_share,
@@ -45,13 +49,13 @@ class SiteMeasures:
         )
 
 
-def visibility_layout(scenario: Scenario, lines: Visibility) -> tuple[Cell, ...]:
+def visibility_layout(scenario: AnyScenario, lines: Visibility) -> tuple[Cell, ...]:
     """Return a layout of which each module cuts as many lines by its cost as one more can.
 
     It keeps every condition of the build zone, and ends where no module would cut another line.
 
     Args:
-        scenario: The scenario.
+        scenario: The scenario, or its bundled name or path.
         lines: Its lines of sight.
     """
     placement = Placement.empty(scenario)
@@ -143,8 +147,11 @@ class VisibilityCriterion:
     most_layout_share: float = 0.9
     least_advantage: float = 0.3
 
-    def objection(self, scenario: Scenario) -> Objection | None:
+    def objection(self, scenario: AnyScenario) -> Objection | None:
         """Return why a site is not used, or `None` if it is.
+
+        Args:
+            scenario: The scenario, or its bundled name or path.
 
         Raises:
             BlastEnvError: If it has no build zone.

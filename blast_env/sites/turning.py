@@ -7,6 +7,7 @@ from blast_env.geometry import Rectangle
 from blast_env.physics.scene import WallName
 from blast_env.scenario import (
     AccessWay,
+    AnyScenario,
     AnySource,
     AnyStructure,
     BuildZone,
@@ -15,6 +16,7 @@ from blast_env.scenario import (
     PointSource,
     Scenario,
     SegmentSource,
+    find_scenario,
 )
 from blast_env.scenario.sections import PointM
 from blast_env.scenario.zone import Area
@@ -27,15 +29,16 @@ _TURNED_WALL: Final[Mapping[WallName, WallName]] = {
 }
 
 
-def turned(scenario: Scenario, quarter_turns: int) -> Scenario:
+def turned(scenario: AnyScenario, quarter_turns: int) -> Scenario:
     """Return a scenario turned to the left: what was on its right is now at its top.
 
     It is the same problem, seen from another side; the cells of the build zone turn too.
 
     Args:
-        scenario: The scenario.
+        scenario: The scenario, or its bundled name or path.
         quarter_turns: By how many right angles.
     """
+    scenario = find_scenario(scenario)
     for _ in range(quarter_turns % 4):
         scenario = _turned_once(scenario)
     return Scenario.from_document(scenario.model_dump(), scenario.name)

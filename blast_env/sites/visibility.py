@@ -10,7 +10,14 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Cell, Rectangle
-from blast_env.scenario import AnySource, PointSource, Scenario, SegmentSource
+from blast_env.scenario import (
+    AnyScenario,
+    AnySource,
+    PointSource,
+    Scenario,
+    SegmentSource,
+    find_scenario,
+)
 from blast_env.scenario.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 
@@ -41,12 +48,16 @@ class Visibility:
     open_share: float
 
     @classmethod
-    def of(cls, scenario: Scenario) -> "Visibility":
+    def of(cls, scenario: AnyScenario) -> "Visibility":
         """Return the lines of sight of a scenario.
+
+        Args:
+            scenario: The scenario, or its bundled name or path.
 
         Raises:
             BlastEnvError: If it has no build zone.
         """
+        scenario = find_scenario(scenario)
         origin, direction, source_weight = _all_lines(scenario)
         protected_m, other_m = np.full((2, len(origin)), np.inf)
         weight = np.zeros(len(origin))

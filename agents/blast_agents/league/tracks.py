@@ -9,7 +9,7 @@ from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, SeedRange, draw_threats
 from blast_env.evaluation.cases import practice_hidden, practice_visible, visible_case
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario import AnyScenario, Scenario, find_scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.sites import SiteSource
 
@@ -50,13 +50,13 @@ class Track:
     reference_budget: int
 
 
-def known_track(scenario: Scenario, cases: int, seeds: int, seed: int = 0) -> Track:
+def known_track(scenario: AnyScenario, cases: int, seeds: int, seed: int = 0) -> Track:
     """Return the track of a known threat at unseen positions.
 
     A search meets `VISIBLE_REALISATIONS` fans and airs of the case's own charge.
 
     Args:
-        scenario: The scenario; it has a build zone.
+        scenario: The scenario, or its bundled name or path; it has a build zone.
         cases: How many charges are drawn, at most 1,000.
         seeds: Held-out fans and airs of each, at most 1,000.
         seed: Decides everything, at most 1,000.
@@ -64,6 +64,7 @@ def known_track(scenario: Scenario, cases: int, seeds: int, seed: int = 0) -> Tr
     Raises:
         BlastEnvError: If a number is out of bounds, or there is no build zone.
     """
+    scenario = find_scenario(scenario)
     scenario.zone  # noqa: B018  # refuses a scenario without one
     drawn = []
     for index, first in enumerate(_first_seeds(cases, seeds, seed)):
@@ -87,7 +88,7 @@ def known_track(scenario: Scenario, cases: int, seeds: int, seed: int = 0) -> Tr
     )
 
 
-def hidden_track(scenario: Scenario, seeds: int, seed: int = 0) -> Track:
+def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
     """Return the track of a hidden threat on a known site: one case.
 
     A search meets `HIDDEN_THREATS` charges, one fan and air each.
@@ -100,6 +101,7 @@ def hidden_track(scenario: Scenario, seeds: int, seed: int = 0) -> Track:
     Raises:
         BlastEnvError: As for `known_track`.
     """
+    scenario = find_scenario(scenario)
     scenario.zone  # noqa: B018  # refuses a scenario without one
     (first,) = _first_seeds(1, seeds, seed)
     return Track(

@@ -40,7 +40,14 @@ from blast_env.evaluation.evaluator import Evaluators
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
-from blast_env.scenario import AnySource, Placement, PointSource, Scenario
+from blast_env.scenario import (
+    AnyScenario,
+    AnySource,
+    Placement,
+    PointSource,
+    Scenario,
+    find_scenario,
+)
 
 CHECKPOINT_FORMAT: Final = 1
 
@@ -305,21 +312,22 @@ class TrainedAgent:
         """Return loads as the observation asks for them; nothing is made ready before."""
         return SimulatedModuleLoads(self._evaluators)(scenario, sources, blasts)
 
-    def propose(self, scenario: Scenario, charge: Charge | None = None) -> Layout:
+    def propose(self, scenario: AnyScenario, charge: Charge | None = None) -> Layout:
         """Return the layout of the most likely legal actions.
 
         Args:
-            scenario: A scenario of the size of the one that the agent was trained on.
+            scenario: A scenario of the size of the one that the agent was trained on, or its
+                bundled name or path.
             charge: Where the charge is, one that the scenario may draw; `None` where it is
                 hidden.
 
         Raises:
             BlastEnvError: If the scenario has another size, or no build zone.
         """
-        return self._layouts(scenario, charge, None, 1)[0]
+        return self._layouts(find_scenario(scenario), charge, None, 1)[0]
 
     def sample(
-        self, scenario: Scenario, charge: Charge | None = None, count: int = 8, seed: int = 0
+        self, scenario: AnyScenario, charge: Charge | None = None, count: int = 8, seed: int = 0
     ) -> tuple[Layout, ...]:
         """Return layouts of actions drawn as the policy would draw them in training.
 
@@ -335,7 +343,7 @@ class TrainedAgent:
         if count < 1:
             raise BlastEnvError(f"count is {count}, must be at least 1")
         generator = torch.Generator().manual_seed(seed)
-        return self._layouts(scenario, charge, generator, count)
+        return self._layouts(find_scenario(scenario), charge, generator, count)
 
     def _layouts(
         self, scenario: Scenario, charge: Charge | None, draw: torch.Generator | None, count: int
@@ -425,7 +433,7 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
 def load_archive(
     path: str | Path,
     algorithm: Literal["ppo", "maskable_ppo"],
-    scenario: Scenario,
+    scenario: AnyScenario,
     *,
     trust_archive: bool = False,
     observation: str = "grid",
@@ -439,7 +447,7 @@ def load_archive(
     Args:
         path: The archive, a `.zip` file.
         algorithm: Of the archive.
-        scenario: A scenario of the size that the policy is for.
+        scenario: A scenario of the size that the policy is for, or its bundled name or path.
         trust_archive: Whether the archive may run code: only for one whose maker you trust.
         observation: Name of the observation that the policy is for.
         engine: For an observation that shows loads; see `TrainedAgent`.
@@ -456,4 +464,4 @@ def load_archive(
     except (OSError, ImportError, ValueError, KeyError, RuntimeError, AttributeError) as error:
         raise BlastEnvError(f"{path}: cannot be read: {error}") from error
     policy.set_training_mode(False)
-    return TrainedAgent(policy, scenario, observation, engine)
+    return TrainedAgent(policy, find_scenario(scenario), observation, engine)
