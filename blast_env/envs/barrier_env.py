@@ -58,8 +58,9 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     ## Action space
     `Discrete(rows * columns + 1)`: action `row * columns + column` places a module on that cell
     of the build zone (row 0 at the bottom, column 0 on the left); the last action finishes.
-    `action_masks()` and `info["action_mask"]` (bool, one an action) say which actions are legal;
-    to finish always is. `explain(cell)` says in a sentence why a cell is not available.
+    Which actions are legal (to finish always is) say `info["action_mask"]`, int8 as
+    `action_space.sample(mask=...)` wants it, and `action_masks()`, bool as MaskablePPO does.
+    `explain(cell)` says in a sentence why a cell is not available.
 
     ## Observation space
     By the argument `observation`:

@@ -120,7 +120,8 @@ class Episode:
 
     def information(self) -> dict[str, Any]:
         """Return what is told after every action and after `reset`."""
-        return {"action_mask": self.action_mask(), "illegal_actions": self.illegal_actions}
+        mask = self.action_mask().astype(np.int8)  # what `sample(mask=...)` of a space takes
+        return {"action_mask": mask, "illegal_actions": self.illegal_actions}
 
     def final_information(self, evaluators: Evaluators) -> dict[str, Any]:
         """Return what is told when the charge has gone off.

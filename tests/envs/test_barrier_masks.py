@@ -40,8 +40,8 @@ def test_an_action_is_legal_exactly_if_the_layout_with_it_is_accepted(name: str)
         _, info = env.reset(seed=episode)
         ended = False
         while not ended:
-            mask = info["action_mask"]
-            assert (mask == env.action_masks()).all()
+            mask = env.action_masks()
+            assert (mask == info["action_mask"]).all()
             assert mask[-1]
             layout = env.placement.cells
             for action in _some_of_each(mask[:-1], rng):
@@ -95,6 +95,20 @@ def test_finishing_stays_legal_when_the_stock_is_not_used_up_but_no_cell_is_left
     assert env.step(1)[2]
     assert env.placement.stock_left == 1
     assert env.placement.is_full
+
+
+def test_the_mask_of_the_information_is_what_a_space_samples_with() -> None:
+    env = make(restricted_scenario())
+    _, info = env.reset(seed=0)
+    assert env.action_masks().dtype == np.bool_  # as MaskablePPO wants it
+    assert info["action_mask"].dtype == np.int8
+    env.action_space.seed(0)
+    sampled = {int(env.action_space.sample(mask=info["action_mask"])) for _ in range(500)}
+    assert sampled < set(np.flatnonzero(env.action_masks()))
+    assert len(sampled) > 50
+    _, _, _, _, info = env.step(min(sampled))
+    assert info["action_mask"].dtype == np.int8
+    assert env.action_space.sample(mask=info["action_mask"]) != min(sampled)
 
 
 def test_an_empty_zone_offers_what_the_placement_offers() -> None:
