@@ -32,6 +32,7 @@ from blast_env.scenario.checks import (
     check_sources,
     sound_parts,
 )
+from blast_env.scenario.georeference import AnyGeoreference
 from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
 from blast_env.scenario.problems import ScenarioError, problems_from
 from blast_env.scenario.sections import (
@@ -93,6 +94,10 @@ _LATER_KEYS: Final = (
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
 
+_NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference"}
+"""Sections that do not count for the hash; what `simulation` says is there as parameters."""
+
+
 Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
 """Where the charge comes from."""
 
@@ -111,6 +116,7 @@ class Scenario(Section):
         simulation: Parameters of the blast model.
         calibration: Name of the calibration that turns impulses into pascal seconds.
         gauges: Where overpressure is recorded, by engines that know it.
+        georeference: Where on a map or drawing the site lies; no result depends on it.
     """
 
     schema_version: Annotated[StrictInt, AfterValidator(check_version)]
@@ -123,6 +129,7 @@ class Scenario(Section):
     simulation: SimulationSection = SimulationSection()
     calibration: Name | None = None
     gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100)] = ()
+    georeference: AnyGeoreference | None = None
 
     @property
     def zone(self) -> BuildZone:
@@ -164,10 +171,13 @@ class Scenario(Section):
     def content_hash(self) -> str:
         """SHA-256 of everything that affects a result: not of the words for people.
 
-        Two scenarios that differ only in name, description, the reasons of areas, the order of
-        keys or in how they arrive at the same simulation parameters have the same hash.
+        Two scenarios that differ only in name, description, the reasons of areas, the names of
+        buildings, the place on a map, the order of keys or in how they arrive at the same
+        simulation parameters have the same hash.
         """
-        content = self.model_dump(mode="json", exclude={"name", "description", "simulation"})
+        content = self.model_dump(mode="json", exclude=_NO_INFLUENCE)
+        for structure in content["structures"]:
+            structure.pop("building", None)
         content["schema_version"] = FIRST_VERSION  # newer keys are there or not, which says it all
         if self.site.air_height_m == default_air_height_m(self.structures, self.build_zone):
             del content["site"]["air_height_m"]

@@ -307,7 +307,8 @@ def _options(annotation: Any) -> tuple[Any, ...]:
     if hasattr(annotation, "__metadata__"):
         return _options(annotation.__origin__)
     if get_origin(annotation) in (Union, UnionType):
-        return tuple(member for member in get_args(annotation) if member is not type(None))
+        members = (member for member in get_args(annotation) if member is not type(None))
+        return tuple(option for member in members for option in _options(member))
     return (annotation,)
 
 

@@ -192,6 +192,8 @@ class StructureSection(Section):
             without it modules never fail.
         height_m: Height; without it, as high as the air.
         faces: The walls whose load counts; a wall is named by the side that it looks to.
+        building: The building that the structure is a part of, where several make one; for
+            people and tables, no result depends on it.
     """
 
     name: Name
@@ -205,6 +207,7 @@ class StructureSection(Section):
         Field(min_length=1, max_length=len(WALLS)),
         AfterValidator(_check_faces),
     ] = WALLS
+    building: Name | None = None
 
 
 class ModularObstacleSection(StructureSection):

@@ -16,10 +16,10 @@ FIRST_VERSION: Final = 1
 
 
 NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
-    "": ("gauges",),
+    "": ("gauges", "georeference"),
     "site": ("air_height_m",),
     "charge": ("height_m",),
-    "structures": ("height_m", "faces"),
+    "structures": ("height_m", "faces", "building"),
     "build_zone": ("height_m",),
 }
 """What version 2 added, by section; all of it has a default, which is what version 1 means."""

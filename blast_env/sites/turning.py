@@ -32,7 +32,8 @@ _TURNED_WALL: Final[Mapping[WallName, WallName]] = {
 def turned(scenario: AnyScenario, quarter_turns: int) -> Scenario:
     """Return a scenario turned to the left: what was on its right is now at its top.
 
-    It is the same problem, seen from another side; the cells of the build zone turn too.
+    It is the same problem, seen from another side; the cells of the build zone turn too. The
+    place on a map is left out.
 
     Args:
         scenario: The scenario, or its bundled name or path.
@@ -53,6 +54,7 @@ def _turned_once(scenario: Scenario) -> Scenario:
         "structures": tuple(_structure(each, site.height_m) for each in scenario.structures),
         "gauges": tuple(_gauge(each, site.height_m) for each in scenario.gauges),
         "build_zone": None if zone is None else _zone(zone, site.height_m),
+        "georeference": None,  # another place than that of the map
     }
     return scenario.model_copy(update=changes)
 

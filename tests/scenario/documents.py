@@ -81,10 +81,17 @@ def tall_document() -> Document:
             {"name": "door", "position_m": [19.75, 10.0, 1.5]},
             {"name": "roof", "position_m": [20.25, 10.0, 6.5]},
         ],
+        "georeference": {
+            "kind": "map",
+            "longitude_deg": 7.5,
+            "latitude_deg": 54.2,
+            "rotation_deg": 20.0,
+            "crs": "EPSG:25832",
+        },
     }
     document["site"]["air_height_m"] = 14.0
     document["charge"][0]["height_m"] = 1.0
-    document["structures"][0] |= {"height_m": 6.0, "faces": ["west", "south"]}
+    document["structures"][0] |= {"height_m": 6.0, "faces": ["west", "south"], "building": "farm"}
     document["build_zone"]["height_m"] = 3.0
     return document
 

@@ -29,6 +29,7 @@ OPTIONAL = {
     *("jitter", "ball_count", "collide_within_charge"),
     *("clearance_m", "module_cost", "cost_areas", "budget", "access_way"),
     *("air_height_m", "height_m", "faces", "gauges"),
+    *("building", "georeference", "crs", "rotation_deg"),
 }
 CASES = [(document, path) for document in all_documents() for path in key_paths(document)]
 KEYS = [(document, path) for document, path in CASES if isinstance(path[-1], str)]

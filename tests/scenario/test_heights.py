@@ -1,4 +1,4 @@
-"""Version 2 of the file format: heights, faces and gauges."""
+"""Version 2 of the file format: heights, faces, gauges, buildings and georeferences."""
 
 from pathlib import Path
 
@@ -85,7 +85,7 @@ def test_defaults_written_out_leave_the_hash_as_it_is() -> None:
     )
 
 
-NEW_PATHS: list[KeyPath] = [
+COUNTING_PATHS: list[KeyPath] = [
     ("gauges",),
     ("site", "air_height_m"),
     ("charge", 0, "height_m"),
@@ -94,6 +94,11 @@ NEW_PATHS: list[KeyPath] = [
     ("build_zone", "height_m"),
 ]
 
+WORDS: list[KeyPath] = [("georeference",), ("structures", 0, "building")]
+"""Keys that no result depends on."""
+
+NEW_PATHS = COUNTING_PATHS + WORDS
+
 
 def test_new_keys_are_all_tried() -> None:
     listed = {(section, key) for section, keys in NEW_KEYS.items() for key in keys}
@@ -101,9 +106,10 @@ def test_new_keys_are_all_tried() -> None:
 
 
 @pytest.mark.parametrize("path", NEW_PATHS, ids=written)
-def test_each_new_key_counts_in_the_hash(path: KeyPath) -> None:
+def test_each_new_key_counts_in_the_hash_unless_no_result_depends_on_it(path: KeyPath) -> None:
     fewer = without(tall_document(), path)
-    assert scenario_from(fewer).content_hash != scenario_from(tall_document()).content_hash
+    same = scenario_from(fewer).content_hash == scenario_from(tall_document()).content_hash
+    assert same == (path in WORDS)
 
 
 @pytest.mark.parametrize("path", NEW_PATHS, ids=written)
@@ -116,6 +122,32 @@ def test_new_key_in_a_file_of_version_1_is_named(path: KeyPath, section: str | N
     message = "schema_version 2 has this key, the file has schema_version 1"
     assert f"f.toml: {written(path)}: {message}" in lines
     assert len(lines) >= 6 if section is None else True
+
+
+@pytest.mark.parametrize(
+    ("georeference", "lines"),
+    [
+        ({"kind": "mp"}, ["georeference.kind: is 'mp', must be 'map' or 'drawing'"]),
+        ({"x_m": 1.0}, ["georeference.kind: missing, must be 'map' or 'drawing'"]),
+        (
+            {"kind": "map", "longitude_deg": 181.0, "latitude_deg": 91.0, "z_m": 1.0},
+            [
+                "georeference.longitude_deg: is 181.0, must be at most 180",
+                "georeference.latitude_deg: is 91.0, must be at most 89",
+                "georeference.z_m: unknown key; known: ",
+            ],
+        ),
+        (
+            {"kind": "drawing", "x_m": 0.0, "y_m": 0.0, "metres_per_unit": 0.0},
+            ["georeference.metres_per_unit: is 0.0, must be greater than 0"],
+        ),
+        (4, ["georeference: is 4, must be a table"]),
+    ],
+)
+def test_georeference_out_of_bounds_is_named(georeference: object, lines: list[str]) -> None:
+    found = lines_for(changed(tall_document(), ("georeference",), georeference))
+    for line in lines:
+        assert any(each.startswith(f"f.toml: {line}") for each in found), (line, found)
 
 
 def test_default_of_version_2_is_a_new_key_too() -> None:
@@ -376,7 +408,7 @@ def test_engines_without_heights_can_say_what_they_leave_aside() -> None:
     assert all(word in note for word, note in zip(words, notes, strict=True))
 
 
-@pytest.mark.parametrize("path", [path for path in NEW_PATHS if path[-1] != "air_height_m"])
+@pytest.mark.parametrize("path", [path for path in COUNTING_PATHS if path[-1] != "air_height_m"])
 def test_each_note_has_its_cause(path: KeyPath) -> None:
     document = changed(minimal_document(), ("schema_version",), 2)
     zone = {"corner_m": [5.0, 0.0], "rows": 20, "columns": 4, "stock": 12}
