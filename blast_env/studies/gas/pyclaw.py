@@ -1,0 +1,142 @@
+"""The gas solver against PyClaw's Euler equations with walls, on one plane scene.
+
+A cylinder of hot compressed air bursts beside a wall and a building, both endlessly high. The same
+cells and the same state to begin with; the schemes differ: HLLC and MUSCL-Hancock here, HLLE and
+limited waves, split by dimension, there. PyClaw runs in an interpreter of its own, so that what it
+needs does not mix with what this project needs.
+"""
+
+import subprocess
+import tempfile
+from pathlib import Path
+from time import process_time
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.physics.gas.grid import FaceKind, GasGrid
+from blast_env.physics.gas.kernels import GAMMA
+from blast_env.physics.gas.probes import Gauges
+from blast_env.physics.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA, GasSolver
+from blast_env.studies.gas.histories import Histories
+
+GAUGES_M: Final = MappingProxyType(
+    {
+        "before the wall": (6.9, 8.1),
+        "behind the wall": (7.6, 8.1),
+        "before the building": (12.4, 8.1),
+        "side of the building": (13.6, 5.9),
+        "behind the building": (14.6, 8.1),
+    }
+)
+_SIZE_M: Final = (20.0, 16.0)
+_SOLIDS_M: Final = (((7.0, 4.0), (7.5, 12.0)), ((12.5, 6.0), (14.5, 10.0)))
+_CENTRE_M: Final = (4.0, 8.0)
+_RADIUS_M: Final = 0.8
+_RATIO: Final = 10.0
+"""Of the pressure in the cylinder to that of still air, and of the densities."""
+_WORKER: Final = Path(__file__).with_name("pyclaw_worker.py")
+
+
+def plane_grid(cell_m: float) -> GasGrid:
+    """Return the scene as one layer of cells between two mirrors.
+
+    Raises:
+        BlastEnvError: If 0.5 m is not a whole number of cells.
+    """
+    if not (0.0 < cell_m <= 0.5 and np.isclose(0.5 / cell_m, round(0.5 / cell_m))):
+        raise BlastEnvError(f"cell_m is {cell_m:g}, must be 0.5 m divided by a whole number")
+    solid = np.zeros((round(_SIZE_M[0] / cell_m), round(_SIZE_M[1] / cell_m), 1), dtype=np.bool_)
+    for low, high in _SOLIDS_M:
+        inside = (
+            slice(round(a / cell_m), round(b / cell_m)) for a, b in zip(low, high, strict=True)
+        )
+        solid[tuple(inside)] = True
+    return GasGrid(cell_m, solid, z_high=FaceKind.MIRROR)
+
+
+def _started(grid: GasGrid, gauges: Gauges) -> GasSolver:
+    """Return our solver with the cylinder in it; its edge is smooth, so that cells resolve it."""
+    x_m, y_m = grid.centres_m(0)[:, None, None], grid.centres_m(1)[None, :, None]
+    away = np.hypot(x_m - _CENTRE_M[0], y_m - _CENTRE_M[1]) / _RADIUS_M
+    ratio = 1.0 + (_RATIO - 1.0) * np.exp(-(away**4))
+    solver = GasSolver(grid, recorders=[gauges])
+    solver.set_state(density_kg_m3=AIR_DENSITY_KG_M3 * ratio, pressure_pa=AIR_PRESSURE_PA * ratio)
+    return solver
+
+
+def _gauges(grid: GasGrid) -> Gauges:
+    middle_m = 0.5 * grid.cell_m
+    return Gauges(grid, [grid.cell_at((x_m, y_m, middle_m)) for x_m, y_m in GAUGES_M.values()])
+
+
+def ours(cell_m: float, until_s: float) -> Histories:
+    """Run the scene with the project's own solver; one layer of cells uses it at its worst."""
+    gauges = _gauges(plane_grid(cell_m))
+    solver = _started(plane_grid(cell_m), gauges)
+    begin = process_time()
+    solver.advance(until_s)
+    cpu_s = process_time() - begin
+    return Histories(gauges.time_s, gauges.history_pa, float(solver.cell_updates), cpu_s)
+
+
+def by_pyclaw(cell_m: float, until_s: float, python: Path) -> Histories:
+    """Run the scene with PyClaw.
+
+    Args:
+        cell_m: Side of a cell.
+        until_s: Simulated time to end at.
+        python: An interpreter with clawpack.
+
+    Raises:
+        BlastEnvError: If it cannot be run, or fails.
+    """
+    grid = plane_grid(cell_m)
+    gauges = _gauges(grid)
+    solver = _started(grid, gauges)
+    density, pressure = (
+        values[:, :, 0] / still
+        for values, still in (
+            (solver.density(), AIR_DENSITY_KG_M3),
+            (solver.pressure(), AIR_PRESSURE_PA),
+        )
+    )
+    nothing = np.zeros_like(density)
+    with tempfile.TemporaryDirectory() as folder:
+        given, found = Path(folder) / "scene.npz", Path(folder) / "found.npz"
+        np.savez(
+            given,
+            state=np.stack([density, nothing, nothing, pressure / (GAMMA - 1.0)]),
+            air=~grid.solid[:, :, 0],
+            cell_m=cell_m,
+            gauges=gauges.cells[:, :2],
+            until=until_s * solver.velocity_m_s,
+        )
+        _run(python, given, found)
+        with np.load(found) as arrays:
+            times: FloatArray = arrays["times"] / solver.velocity_m_s
+            overpressure: FloatArray = arrays["overpressure"] * AIR_PRESSURE_PA
+            cpu_s = float(arrays["cpu_s"])
+    return Histories(times, overpressure, float(density.size * len(times)), cpu_s)
+
+
+def _run(python: Path, given: Path, found: Path) -> None:
+    try:
+        done = subprocess.run(
+            [python.absolute(), _WORKER, given, found],
+            cwd=given.parent,  # PyClaw writes a log where it runs
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    except OSError as error:
+        raise BlastEnvError(f"{python} cannot be run: {error}") from error
+    if done.returncode != 0:
+        last = done.stderr.strip().splitlines()[-1:] or [""]
+        raise BlastEnvError(
+            f"PyClaw failed with status {done.returncode}: {last[0]}; {python} must be an "
+            "interpreter with clawpack (pip install clawpack; needs gfortran)"
+        )
