@@ -10,7 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.geometry import Cell
+from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
 
 _Parameters = ParamSpec("_Parameters")
@@ -127,7 +127,7 @@ class ResetOptions:
     charge_position_m: tuple[float, float] | None = None
     tnt_kg: float | None = None
     charge_height_m: float | None = None
-    layout: Sequence[Cell] = ()
+    layout: Sequence[Element] = ()
     blast_seed: int | None = None
 
     @classmethod

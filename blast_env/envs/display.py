@@ -188,12 +188,12 @@ def _screening(episode: Episode) -> "BlastScreening":
 
     objective = episode.objective
     case, evaluator = objective.case, objective.evaluator
-    impulses = np.array(objective.impulses_pa_s(episode.placement.cells))
+    impulses = np.array(objective.impulses_pa_s(episode.placement.layout))
     of_charges = impulses.reshape(case.realisations, -1).mean(axis=0)
     threat = case.threats[int(of_charges.argmax())]
-    # Sorted, as for the assessment: the order of the cells may change the last bits.
-    cells = tuple(sorted(episode.placement.cells))
-    blast = Blast(evaluator.scenario, cells, threat.seed, evaluator.engine, threat.charge)
+    # Sorted, as for the assessment: the order of the layout may change the last bits.
+    layout = tuple(sorted(episode.placement.layout))
+    blast = Blast(evaluator.scenario, layout, threat.seed, evaluator.engine, threat.charge)
     remark = f": the worst of {len(case.charges)} charges" if len(case.charges) > 1 else ""
     return BlastScreening(blast, _outcome(episode), remark)
 

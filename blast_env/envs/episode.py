@@ -34,7 +34,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, SeedRange, Threat
 from blast_env.evaluation.comparison import Assessment, Objective
 from blast_env.evaluation.evaluator import Evaluators
-from blast_env.geometry import Cell
+from blast_env.geometry import Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import is_gas
 from blast_env.physics.scene import Charge
@@ -75,7 +75,7 @@ class Episode:
     observable: Observable
     objective: Objective
     observation: EpisodeObservation
-    initial: tuple[Cell, ...]
+    initial: Layout
     placement: Placement
     illegal_actions: int = 0
     ended: bool = False
@@ -110,13 +110,13 @@ class Episode:
         exhausted = self.illegal_actions >= illegal.limit
         self.ended = finishes or exhausted or self.placement.is_full
         transition = Transition(
-            self.initial, before.cells, self.placement.cells, self.ended, self.objective
+            self.initial, before.layout, self.placement.layout, self.ended, self.objective
         )
         return _with_illegal_term(reward(transition), -illegal.cost if is_illegal else 0.0)
 
     def assess(self) -> tuple[Assessment, Assessment]:
         """Return what the layout is worth, and what no barrier is."""
-        return self.objective.assess(self.placement.cells), self.objective.assess(())
+        return self.objective.assess(self.placement.layout), self.objective.assess(())
 
     def information(self) -> dict[str, Any]:
         """Return what is told after every action and after `reset`."""
@@ -137,7 +137,7 @@ class Episode:
             "impulse_pa_s": protected.impulse_pa_s,
             "unprotected_impulse_pa_s": unprotected.impulse_pa_s,
             "reduction": protected.reduction_from(unprotected),
-            "layout": self.placement.cells,
+            "layout": self.placement.layout,
             "scenario_hash": self.observable.scenario.content_hash,
             "calibration": self.objective.evaluator.calibration_name,
             "calibration_in_range": protected.in_range,
@@ -219,7 +219,7 @@ class Task:
             observable=observable,
             objective=Objective(evaluator, self._case(scenario, charges, seeds)),
             observation=self.observation.episode(observable),
-            initial=placement.cells,
+            initial=placement.layout,
             placement=placement,
         )
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from blast_env.envs.arguments import check_names, checked_keywords
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell
+from blast_env.geometry import Element
 from blast_env.physics.engine import BlastRun, Engine
 from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.scene import Charge
@@ -111,7 +111,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
     def __init__(
         self,
         scenario: str | Path | Scenario = "courtyard",
-        layout: Sequence[Cell] = (),
+        layout: Sequence[Element] = (),
         engine: str | Engine = "pymunk",
         step_s: float = 0.002,
         render_mode: str | None = None,
@@ -121,7 +121,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
-        self.layout: Sequence[Cell] = layout
+        self.layout: Sequence[Element] = layout
         self.engine = engine
         self.step_s = step_s
         self.render_mode = render_mode

@@ -10,7 +10,7 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.comparison import Objective
-from blast_env.geometry import Cell
+from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnySource, PointSource, Scenario, load_scenario
 
@@ -160,9 +160,9 @@ class Transition:
         objective: Assesses layouts under the threats of the episode.
     """
 
-    initial: tuple[Cell, ...]
-    before: tuple[Cell, ...]
-    after: tuple[Cell, ...]
+    initial: Layout
+    before: Layout
+    after: Layout
     ended: bool
     objective: Objective
 

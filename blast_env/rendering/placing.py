@@ -224,7 +224,7 @@ class PlacingPainter:
         surface = self._ground.copy()
         if self._scenario.build_zone is not None:
             self._draw_cells(surface, self._scenario.build_zone, placement)
-        scene = build_site(self._scenario, placement.cells)
+        scene = build_site(self._scenario, placement.layout)
         for obstacle in scene.obstacles():
             draw_obstacle(surface, self._view, obstacle, full_impulse=1.0)
         draw_charges(surface, self._view, self._sources, self._scenario.charge_radius_m)

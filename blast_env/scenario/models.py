@@ -88,7 +88,7 @@ __all__ = [
 
 
 _LATER_KEYS: Final = (
-    *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m"),
+    *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
 )
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
@@ -339,6 +339,10 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
     content = zone.model_dump(mode="json")
     for area in (*content["keep_outs"], *content["cost_areas"]):
         del area["reason"]
+    for area in content["cost_areas"]:
+        del area["module_cost" if zone.items else "cost_factor"]
+    for item in content["items"]:
+        del item["description"]
     for key in _LATER_KEYS:
         if getattr(zone, key) == BuildZone.model_fields[key].default:
             del content[key]

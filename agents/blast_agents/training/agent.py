@@ -360,7 +360,7 @@ class TrainedAgent:
                 if not placements[index].is_full:
                     going_on.append(index)
             open_ones = going_on
-        return tuple(placement.cells for placement in placements)
+        return tuple(placement.layout for placement in placements)
 
     def _episode(self, scenario: Scenario, charge: Charge | None) -> EpisodeObservation:
         sources = scenario.charge
