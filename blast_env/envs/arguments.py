@@ -120,7 +120,7 @@ class ResetOptions:
         charge_position_m: (x, y) of every charge.
         tnt_kg: TNT-equivalent mass of every charge.
         charge_height_m: Height of every charge above the ground.
-        layout: Cells that hold a module from the start.
+        layout: Cells that hold a module, or pieces, from the start.
         blast_seed: Seed of the first blast; the others have the following ones.
     """
 

@@ -81,32 +81,31 @@ class Episode:
     ended: bool = False
 
     def action_mask(self) -> NDArray[np.bool_]:
-        """Return which actions are legal (cells + 1,); the last one, to finish, always is."""
-        return np.append(self.placement.free.ravel(), True)
+        """Return which actions are legal (actions,); the last one, to finish, always is."""
+        return np.append(self.placement.legal.ravel(), True)
 
     def observe(self) -> Array:
         """Return the observation."""
         return self.observation.observe(self.placement)
 
     def act(self, action: int, reward: Reward, illegal: IllegalActions) -> dict[str, float]:
-        """Place a module or finish; return the terms of the reward.
+        """Place a module or a piece, or finish; return the terms of the reward.
 
         Args:
-            action: Number of a cell, row by row, or the number of cells to finish.
+            action: As in `Catalogue`, which numbers the actions.
             reward: Pays for the action.
             illegal: What an illegal action leads to.
 
         Raises:
             BlastEnvError: If the reward names a term that is taken.
         """
-        before, free = self.placement, self.placement.free
-        finishes = action == free.size
-        cell = divmod(action, max(free.shape[1], 1))
-        is_illegal = not finishes and not free[cell]
+        before, legal = self.placement, self.placement.legal
+        finishes = action == legal.size
+        is_illegal = not finishes and not legal.flat[action]
         if is_illegal:
             self.illegal_actions += 1
         elif not finishes:
-            self.placement = before.place(cell)
+            self.placement = before.place(before.catalogue.element(action))
         exhausted = self.illegal_actions >= illegal.limit
         self.ended = finishes or exhausted or self.placement.is_full
         transition = Transition(

@@ -68,8 +68,9 @@ class HiddenThreat:
 class ScenarioSource(Protocol):
     """Gives each episode its scenario.
 
-    All scenarios of a source have sites of one size and build zones of as many rows and columns,
-    so that they share the observation and the action space.
+    All scenarios of a source have sites of one size, build zones of as many rows and columns, and
+    catalogues with items of the same names and sizes, so that they share the observation and the
+    action space.
     """
 
     @property
@@ -129,10 +130,14 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
         representative: The scenario that the spaces were made for.
 
     Raises:
-        BlastEnvError: If site or build zone have another size, or there is no build zone.
+        BlastEnvError: If site, build zone or items have another size, or there is no build zone.
     """
     for what, size, expected in zip(
-        ("site (width, height in m)", "build zone (rows, columns)"),
+        (
+            "site (width, height in m)",
+            "build zone (rows, columns)",
+            "catalogue (item, turned, size)",
+        ),
         _sizes(scenario),
         _sizes(representative),
         strict=True,
@@ -144,8 +149,12 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
             )
 
 
-def _sizes(scenario: Scenario) -> tuple[tuple[float, float], tuple[int, int]]:
-    return (scenario.site.width_m, scenario.site.height_m), scenario.zone.shape
+def _sizes(scenario: Scenario) -> tuple[tuple[object, ...], ...]:
+    site, zone = scenario.site, scenario.zone
+    variants = [
+        (each.name, each.turned, each.rows, each.columns) for each in zone.catalogue.variants
+    ]
+    return (site.width_m, site.height_m), zone.shape, tuple(variants)
 
 
 @dataclass(frozen=True)

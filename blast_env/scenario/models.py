@@ -339,8 +339,6 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
     content = zone.model_dump(mode="json")
     for area in (*content["keep_outs"], *content["cost_areas"]):
         del area["reason"]
-    for area in content["cost_areas"]:
-        del area["module_cost" if zone.items else "cost_factor"]
     for item in content["items"]:
         del item["description"]
     for key in _LATER_KEYS:

@@ -110,15 +110,16 @@ class Placement:
         Shape (variants, rows, columns) as in `Catalogue`: raveled, it is a mask of actions.
         (1, 0, 0) without a build zone.
         """
-        cells, catalogue = self._empty_zone, self.catalogue
-        stock = [self._stock_left_of(variant.item) > 0 for variant in catalogue.variants]
-        if not any(stock):
+        cells = self._empty_zone
+        if self.stock_left <= 0:
             legal = np.zeros(cells.fits.shape, dtype=bool)
         else:
             legal = cells.places(cells.usable & ~self._taken) & (cells.costs <= self._spendable)
-            legal &= np.array(stock)[:, np.newaxis, np.newaxis]
             if self._closing is not None:
                 legal &= ~self._closing
+        if self.catalogue.has_items:
+            left = np.array(self.stocks_left)
+            legal &= left[[each.item for each in self.catalogue.variants], None, None] > 0
         legal.flags.writeable = False
         return legal
 
@@ -129,9 +130,22 @@ class Placement:
         With a catalogue: on which cells some piece may have its lower left one. (0, 0) without a
         build zone.
         """
-        free: BoolArray = np.any(self.legal, axis=0)
+        free: BoolArray = np.any(self.legal, axis=0) if len(self.legal) > 1 else self.legal[0]
         free.flags.writeable = False
         return free
+
+    @cached_property
+    def open_ground(self) -> BoolArray:
+        """Which cells a piece that may be placed now could cover, (rows, columns), read-only."""
+        if not self.catalogue.has_items:
+            return self.free
+        ground = np.zeros(self._zone.shape, dtype=bool)
+        rows, columns = ground.shape
+        for legal, variant in zip(self.legal, self.catalogue.variants, strict=True):
+            for up, right in variant.cells_at(0, 0):
+                ground[up:, right:] |= legal[: rows - up, : columns - right]
+        ground.flags.writeable = False
+        return ground
 
     @property
     def usable(self) -> BoolArray:
@@ -167,7 +181,10 @@ class Placement:
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
         """The cells that hold a module, piece by piece."""
-        return tuple(cell for element in self.layout for cell in self.catalogue.cells(element))
+        cells: list[Cell] = []
+        for element in self.layout:
+            cells += self.catalogue.cells(element) if isinstance(element, Piece) else (element,)
+        return tuple(cells)
 
     @property
     def is_full(self) -> bool:
@@ -188,7 +205,8 @@ class Placement:
     def cost(self) -> float:
         """What the modules or pieces cost together."""
         # Summed exactly, so that the order of the layout does not matter.
-        number, costs = self.catalogue.variant_number, self._empty_zone.costs
+        costs = self._empty_zone.costs
+        number = self.catalogue.variant_number
         return fsum(costs[number(each), each[0], each[1]] for each in self.layout)
 
     @property

@@ -8,7 +8,14 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, StrictFloat, StrictInt, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    StrictFloat,
+    StrictInt,
+    model_serializer,
+    model_validator,
+)
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Cell, Element, Piece, Rectangle
@@ -67,6 +74,11 @@ class CostArea(Area):
 
     module_cost: Cost | None = None
     cost_factor: Cost | None = None
+
+    @model_serializer(mode="wrap")
+    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the one that the zone has no use for."""
+        return {key: value for key, value in handler(self).items() if value is not None}
 
 
 class BuildZone(Section):

@@ -189,7 +189,7 @@ def _time_parts(
     observation = env.task.observation.episode(env.observable)
     # A placement remembers its free cells: a fresh one has to work them out.
     placement = Placement.of(env.observable.scenario, env.placement.layout)
-    mask_s = _timed(lambda: np.append(placement.free.ravel(), True))
+    mask_s = _timed(lambda: np.append(placement.legal.ravel(), True))
     return reset_s, mask_s, _timed(partial(observation.observe, placement))
 
 
