@@ -1,9 +1,30 @@
 """Axis-parallel rectangles, the only plane figure that sites are made of; cells of a grid."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 Cell = tuple[int, int]
 """(row, column) of a build-zone cell, from 0; rows count upwards, columns to the right."""
+
+
+class Piece(NamedTuple):
+    """An item of a build zone's catalogue that was set down.
+
+    Attributes:
+        row: Row of its lower left cell.
+        column: Column of that cell.
+        item: Name of the item.
+        turned: Whether its length runs upwards rather than to the right.
+    """
+
+    row: int
+    column: int
+    item: str
+    turned: bool = False
+
+
+Element = Cell | Piece
+"""What a layout consists of: single modules, or pieces where the build zone has a catalogue."""
 
 
 class Rectangle(NamedTuple):
@@ -67,5 +88,16 @@ class Rectangle(NamedTuple):
         return enter < leave or (start == end and enter <= leave)
 
 
-Layout = tuple[Cell, ...]
-"""(row, column) of the modules in the order of their placing."""
+Layout = tuple[Element, ...]
+"""The modules, or the pieces, in the order of their placing."""
+
+
+def layout_text(layout: Iterable[Element]) -> str:
+    """Return a layout for one field of a table: `3,4 3,5`, `3,4,t_wall 7,4,t_wall,turned`."""
+    return " ".join(map(_element_text, layout))
+
+
+def _element_text(element: Element) -> str:
+    row, column, *item = element
+    words = [str(each) for each in item[:1]] + ["turned" for each in item[1:] if each]
+    return ",".join((f"{row},{column}", *words))

@@ -14,10 +14,10 @@ from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.files import make_folder
-from blast_env.geometry import Cell
+from blast_env.geometry import Cell, Layout
 from blast_env.scenario import Placement, Scenario, load_scenario
 from blast_env.studies.agreement import layouts as study
-from blast_env.studies.agreement.layouts import AVERAGED, Layout, Noise
+from blast_env.studies.agreement.layouts import AVERAGED, Noise
 from blast_env.tables import markdown_table, write_csv
 
 SCENARIOS: Final = ("courtyard", "perimeter_gate", "street_junction")
@@ -159,7 +159,7 @@ def walled_layout(scenario: Scenario, rng: np.random.Generator) -> Layout:
         while placement.explain((row, column)) is None:
             placement = placement.place((row, column))
             row, column = row + down, column + right
-    return placement.cells
+    return placement.layout
 
 
 def _any_free(placement: Placement, rng: np.random.Generator) -> Cell:

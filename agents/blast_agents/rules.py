@@ -10,7 +10,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell
+from blast_env.geometry import Cell, Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyScenario, AnySource, Placement, Scenario
 from blast_env.scenario.sections import PointM
@@ -30,9 +30,6 @@ _LEAST_GAIN_M: Final = MODULE_SIDE_M / 2.0
 
 
 _TOLERANCE_M: Final = 1e-9
-
-
-Layout = tuple[Cell, ...]
 
 
 def line_of_sight_wall(scenario: AnyScenario, charge: Charge, share: float = 0.5) -> Layout:
@@ -77,7 +74,7 @@ def line_of_sight_wall(scenario: AnyScenario, charge: Charge, share: float = 0.5
             continue
         placement = placement.place(cell)
         ends = [view.end_with(cell, wall_m, each) for each in ends]
-    return placement.cells
+    return placement.layout
 
 
 def wall_near_charge(scenario: AnyScenario, charge: Charge) -> Layout:
@@ -220,7 +217,7 @@ def _protected_middle_m(scenario: Scenario) -> tuple[float, float]:
     return float(x_m), float(y_m)
 
 
-def random_layout(scenario: AnyScenario, rng: np.random.Generator) -> tuple[Cell, ...]:
+def random_layout(scenario: AnyScenario, rng: np.random.Generator) -> Layout:
     """Return a layout with every module on a random cell, as many as can be placed.
 
     One module after the other goes on a cell that is available then, all of them as likely. It
@@ -239,4 +236,4 @@ def random_layout(scenario: AnyScenario, rng: np.random.Generator) -> tuple[Cell
         cells = np.argwhere(placement.free)
         row, column = cells[rng.integers(len(cells))].tolist()
         placement = placement.place((row, column))
-    return placement.cells
+    return placement.layout

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
-from blast_env.geometry import Cell
+from blast_env.geometry import Element
 from blast_env.physics.gas.engine import GasEngine
 from blast_env.scenario import Scenario
 from blast_env.scenario.build_scene import draw_charge
@@ -40,7 +40,7 @@ class GasOutput:
 
 def report_gas_blast(
     scenario: Scenario,
-    layout: Sequence[Cell],
+    layout: Sequence[Element],
     seed: int,
     engine: GasEngine,
     charge_m: tuple[float, float] | None,

@@ -11,7 +11,7 @@ import typer
 
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell
+from blast_env.geometry import Element
 from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Scenario, load_layout, load_scenario
@@ -74,7 +74,7 @@ def simulate(
         named = load_scenario(scenario)
         chosen = _changed(named, preset, stand_off)
         # A layout is for the site of the file; preset and stand-off are this command's.
-        cells: Sequence[Cell] = () if layout is None else load_layout(layout, named)
+        cells: Sequence[Element] = () if layout is None else load_layout(layout, named)
         found = find_engine(engine, cell)
         if is_gas(found):
             # Here, because Numba takes half a second to import.

@@ -10,7 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.geometry import Cell
+from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
 
 _Parameters = ParamSpec("_Parameters")
@@ -120,14 +120,14 @@ class ResetOptions:
         charge_position_m: (x, y) of every charge.
         tnt_kg: TNT-equivalent mass of every charge.
         charge_height_m: Height of every charge above the ground.
-        layout: Cells that hold a module from the start.
+        layout: Cells that hold a module, or pieces, from the start.
         blast_seed: Seed of the first blast; the others have the following ones.
     """
 
     charge_position_m: tuple[float, float] | None = None
     tnt_kg: float | None = None
     charge_height_m: float | None = None
-    layout: Sequence[Cell] = ()
+    layout: Sequence[Element] = ()
     blast_seed: int | None = None
 
     @classmethod

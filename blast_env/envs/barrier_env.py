@@ -1,4 +1,4 @@
-"""The environment `BlastBarrier-v0`: placing barrier modules to protect a structure."""
+"""The environment `BlastBarrier-v0`: placing barriers to protect a structure."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -38,7 +38,7 @@ from blast_env.envs.strategies import (
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.evaluation.store import BlastCache
-from blast_env.geometry import Cell
+from blast_env.geometry import Element
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
 from blast_env.scenario import AnyScenario, Placement
@@ -46,14 +46,16 @@ from blast_env.statistics import Risk
 
 
 class BlastBarrierEnv(gym.Env[Array, np.int64]):
-    """Barrier modules are placed one by one to shield a structure; then a charge goes off.
+    """Barriers are placed one by one to shield a structure; then a charge goes off.
 
     ## Description
     A site has structures, some of them protected, places where a charge may be, and a build zone
     with a stock of barrier modules. One module after the other is put on a cell of the zone. When
     the stock is used up, or the agent has enough, the charge goes off, and the less impulse the
     protected structures take, the better the layout was. The zone's conditions (keep-outs,
-    clearance, budget, an access way that must stay open) are those of the scenario file.
+    clearance, budget, an access way that must stay open) are those of the scenario file. Where the
+    zone has a catalogue, pieces of its items are placed instead of single modules: walls of a
+    length, a height and a price, turned or not.
 
     ## Action space
     `Discrete(rows * columns + 1)`: action `row * columns + column` places a module on that cell
@@ -61,6 +63,11 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     Which actions are legal (to finish always is) say `info["action_mask"]`, int8 as
     `action_space.sample(mask=...)` wants it, and `action_masks()`, bool as MaskablePPO does.
     `explain(cell)` says in a sentence why a cell is not available.
+
+    With a catalogue, `Discrete(variants * rows * columns + 1)`: a variant is an item in one
+    orientation, item by item, not turned before turned, and its lower left cell is what the
+    action names. `placement.catalogue` translates: `element(action)`, `action(piece)`,
+    `variants`. `explain` takes a piece (`blast_env.scenario.Piece`).
 
     ## Observation space
     By the argument `observation`:
@@ -72,6 +79,9 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
       barrier (`GridWithLoadObservation`), for four more blasts a charge;
     - `"features"`: `Box(0, 1, (features,), float32)`, a flat vector, value by value in
       `blast_env.envs.observations.FeaturesObservation`.
+
+    With a catalogue each of them shows more: heights, the items with what is left of them, and
+    which piece may be placed where. Those planes and values come last.
 
     ## Rewards
     The sum of two terms, both in psi s and in `info["reward_terms"]`:
@@ -94,11 +104,11 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
 
     Options of `reset`: `"charge_position_m"`, (x, y) of every charge; `"tnt_kg"`, the mass of
     every charge; `"charge_height_m"`, the height of its centre above the ground (the particle
-    engines know no height); `"layout"`, cells that hold a module from the start; `"blast_seed"`,
-    the seed of the first blast, the others have the following ones.
+    engines know no height); `"layout"`, cells that hold a module, or pieces, from the start;
+    `"blast_seed"`, the seed of the first blast, the others have the following ones.
 
     ## Episode end
-    Terminated when the agent finishes, when no cell can take another module, or after
+    Terminated when the agent finishes, when nothing more can be placed, or after
     `illegal_action_limit` illegal actions. Never truncated.
 
     ## Information
@@ -219,8 +229,7 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
         )
         representative = self.task.source.representative
         self.task.evaluators.of(representative)  # so that a wrong engine fails here, not later
-        zone = representative.zone
-        self.action_space = spaces.Discrete(zone.rows * zone.columns + 1)
+        self.action_space = spaces.Discrete(representative.zone.catalogue.finish + 1)
         self.observation_space = self.task.observation.space(representative)
         self._display = Display(render_mode, self.metadata["render_fps"])
         self._begun: Episode | None = None
@@ -271,21 +280,21 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
         """
         return self._episode.action_mask()
 
-    def explain(self, cell: Cell) -> str | None:
-        """Return a sentence that says why a cell is not available, or `None` if it is.
+    def explain(self, element: Element) -> str | None:
+        """Return a sentence that says why something cannot be placed, or `None` if it can.
 
         Args:
-            cell: (row, column) of the build zone.
+            element: (row, column) of the build zone; with a catalogue, a piece.
 
         Raises:
-            LayoutError: If it is not a pair of integers.
+            LayoutError: If it is neither.
             gymnasium.error.ResetNeeded: If `reset` has not been called.
         """
-        return self.placement.explain(cell)
+        return self.placement.explain(element)
 
     @property
     def placement(self) -> Placement:
-        """The modules placed so far."""
+        """The modules or pieces placed so far."""
         return self._episode.placement
 
     @property

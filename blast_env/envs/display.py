@@ -60,9 +60,9 @@ def _map(
     )
     y, x = _centres_m(rows)[:, np.newaxis], _centres_m(columns)[np.newaxis, :]
     characters = np.full((rows, columns), " ")
-    zone, free = scenario.zone, placement.free
+    zone, free, taken = scenario.zone, placement.open_ground, set(placement.cells)
     for cell in zone.cells():
-        sign = "M" if cell in placement.cells else "." if free[cell] else "x"
+        sign = "M" if cell in taken else "." if free[cell] else "x"
         characters[_inside(zone.cell_rectangle_m(cell), x, y)] = sign
     known = len(sources) == 1 and isinstance(sources[0], PointSource)
     for source in sources:
@@ -188,12 +188,12 @@ def _screening(episode: Episode) -> "BlastScreening":
 
     objective = episode.objective
     case, evaluator = objective.case, objective.evaluator
-    impulses = np.array(objective.impulses_pa_s(episode.placement.cells))
+    impulses = np.array(objective.impulses_pa_s(episode.placement.layout))
     of_charges = impulses.reshape(case.realisations, -1).mean(axis=0)
     threat = case.threats[int(of_charges.argmax())]
-    # Sorted, as for the assessment: the order of the cells may change the last bits.
-    cells = tuple(sorted(episode.placement.cells))
-    blast = Blast(evaluator.scenario, cells, threat.seed, evaluator.engine, threat.charge)
+    # Sorted, as for the assessment: the order of the layout may change the last bits.
+    layout = tuple(sorted(episode.placement.layout))
+    blast = Blast(evaluator.scenario, layout, threat.seed, evaluator.engine, threat.charge)
     remark = f": the worst of {len(case.charges)} charges" if len(case.charges) > 1 else ""
     return BlastScreening(blast, _outcome(episode), remark)
 
@@ -212,8 +212,10 @@ def _outcome(episode: Episode) -> str:
 def _state_lines(episode: Episode) -> list[str]:
     """Return what is left to build with, and how many illegal actions there were."""
     placement, zone = episode.placement, episode.placement.scenario.zone
-    lines = [f"{placement.stock_left} of {zone.stock} modules left"]
-    extras = []
+    what = "pieces" if zone.items else "modules"
+    lines = [f"{placement.stock_left} of {zone.stock} {what} left"]
+    left = zip(placement.catalogue.names, placement.stocks_left, strict=False)
+    extras = [f"{count} {name}" for name, count in left if count]
     if zone.budget is not None:
         extras.append(f"budget: {placement.budget_left:g} of {zone.budget:g} left")
     if episode.illegal_actions:

@@ -34,7 +34,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, SeedRange, Threat
 from blast_env.evaluation.comparison import Assessment, Objective
 from blast_env.evaluation.evaluator import Evaluators
-from blast_env.geometry import Cell
+from blast_env.geometry import Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import is_gas
 from blast_env.physics.scene import Charge
@@ -75,48 +75,47 @@ class Episode:
     observable: Observable
     objective: Objective
     observation: EpisodeObservation
-    initial: tuple[Cell, ...]
+    initial: Layout
     placement: Placement
     illegal_actions: int = 0
     ended: bool = False
 
     def action_mask(self) -> NDArray[np.bool_]:
-        """Return which actions are legal (cells + 1,); the last one, to finish, always is."""
-        return np.append(self.placement.free.ravel(), True)
+        """Return which actions are legal (actions,); the last one, to finish, always is."""
+        return np.append(self.placement.legal.ravel(), True)
 
     def observe(self) -> Array:
         """Return the observation."""
         return self.observation.observe(self.placement)
 
     def act(self, action: int, reward: Reward, illegal: IllegalActions) -> dict[str, float]:
-        """Place a module or finish; return the terms of the reward.
+        """Place a module or a piece, or finish; return the terms of the reward.
 
         Args:
-            action: Number of a cell, row by row, or the number of cells to finish.
+            action: As in `Catalogue`, which numbers the actions.
             reward: Pays for the action.
             illegal: What an illegal action leads to.
 
         Raises:
             BlastEnvError: If the reward names a term that is taken.
         """
-        before, free = self.placement, self.placement.free
-        finishes = action == free.size
-        cell = divmod(action, max(free.shape[1], 1))
-        is_illegal = not finishes and not free[cell]
+        before, legal = self.placement, self.placement.legal
+        finishes = action == legal.size
+        is_illegal = not finishes and not legal.flat[action]
         if is_illegal:
             self.illegal_actions += 1
         elif not finishes:
-            self.placement = before.place(cell)
+            self.placement = before.place(before.catalogue.element(action))
         exhausted = self.illegal_actions >= illegal.limit
         self.ended = finishes or exhausted or self.placement.is_full
         transition = Transition(
-            self.initial, before.cells, self.placement.cells, self.ended, self.objective
+            self.initial, before.layout, self.placement.layout, self.ended, self.objective
         )
         return _with_illegal_term(reward(transition), -illegal.cost if is_illegal else 0.0)
 
     def assess(self) -> tuple[Assessment, Assessment]:
         """Return what the layout is worth, and what no barrier is."""
-        return self.objective.assess(self.placement.cells), self.objective.assess(())
+        return self.objective.assess(self.placement.layout), self.objective.assess(())
 
     def information(self) -> dict[str, Any]:
         """Return what is told after every action and after `reset`."""
@@ -138,7 +137,7 @@ class Episode:
             "impulse_pa_s": protected.impulse_pa_s,
             "unprotected_impulse_pa_s": unprotected.impulse_pa_s,
             "reduction": protected.reduction_from(unprotected),
-            "layout": self.placement.cells,
+            "layout": self.placement.layout,
             "scenario_hash": self.observable.scenario.content_hash,
             "calibration": self.objective.evaluator.calibration_name,
             "calibration_in_range": protected.in_range,
@@ -220,7 +219,7 @@ class Task:
             observable=observable,
             objective=Objective(evaluator, self._case(scenario, charges, seeds)),
             observation=self.observation.episode(observable),
-            initial=placement.cells,
+            initial=placement.layout,
             placement=placement,
         )
 

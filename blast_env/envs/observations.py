@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import ceil
 from types import MappingProxyType
 from typing import Any, ClassVar, Final, Protocol
 
@@ -10,14 +9,24 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from blast_env.envs.item_observations import (
+    CHANGING_SITE,
+    STRUCTURE_HEIGHT,
+    ItemChannels,
+    PlacedItems,
+    height_share,
+    item_costs,
+    item_heights,
+    items_left,
+)
+from blast_env.envs.site_grid import Lattice, Plane, SiteGrid
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import draw_threats
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Rectangle
-from blast_env.scenario import AnySource, Placement, RectangleSource, Scenario, Site
+from blast_env.scenario import AnySource, Placement, Scenario
 from blast_env.scenario.models import AnyStructure
 from blast_env.scenario.zone import source_bounds_m
-from blast_env.units import MODULE_SIDE_M
 
 Array = NDArray[Any]
 """An observation; its data type is that of the space."""
@@ -75,7 +84,7 @@ class SimulatedModuleLoads:
 class Observable:
     """What may be observed of an episode before the charge goes off.
 
-    Observations are made from this and from the modules placed so far, so that nothing else can
+    Observations are made from this and from what has been placed so far, so that nothing else can
     slip into them: with a hidden threat, `sources` are those of the scenario.
 
     Attributes:
@@ -114,7 +123,10 @@ class Observation(Protocol):
     """A kind of observation."""
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
-        """Return the space, a `Box` that depends on the sizes of site and build zone alone."""
+        """Return the space, a `Box` that depends on site, build zone and catalogue alone.
+
+        On their sizes, and on names and sizes of the items.
+        """
 
     def episode(self, observable: Observable) -> EpisodeObservation:
         """Prepare the observations of an episode; what does not change is worked out here."""
@@ -133,8 +145,8 @@ def stock_shares(placement: Placement) -> tuple[float, float, float]:
     """Return what there is left to build with, each from 0 to 1.
 
     Returns:
-        The share of the stock, the number of modules as a share of 100 (at most 1), and the share
-        of the budget (1 without a budget).
+        The share of the stock, the number of modules or pieces as a share of 100 (at most 1), and
+        the share of the budget (1 without a budget).
     """
     zone = placement.scenario.zone
     left, budget_left = placement.stock_left, placement.budget_left
@@ -144,128 +156,17 @@ def stock_shares(placement: Placement) -> tuple[float, float, float]:
 
 def occupied_cells(placement: Placement) -> NDArray[np.bool_]:
     """Return which cells of the build zone hold a module, shape (rows, columns)."""
-    occupied = np.zeros(placement.free.shape, dtype=bool)
+    occupied = np.zeros(placement.usable.shape, dtype=bool)
     if placement.cells:
         occupied[tuple(np.array(placement.cells).T)] = True
     return occupied
 
 
 def cost_shares(scenario: Scenario) -> NDArray[np.float64]:
-    """Return the cost of a module on each cell as a share of the highest, (rows, columns)."""
+    """Return the cost of building on each cell as a share of the highest, (rows, columns)."""
     costs = Placement.empty(scenario).module_costs
     shares: NDArray[np.float64] = costs / costs.max()
     return shares
-
-
-Plane = NDArray[np.float32]
-
-
-_POINTS_PER_MODULE: Final = 8  # along a segment where a charge may be
-
-
-@dataclass(frozen=True)
-class SiteGrid:
-    """Planes of (rows, columns) squares of 0.5 m; row 0 is the lower edge of the site.
-
-    Attributes:
-        rows: Squares upwards.
-        columns: Squares to the right.
-    """
-
-    rows: int
-    columns: int
-
-    @classmethod
-    def of(cls, site: Site) -> "SiteGrid":
-        """Return the grid of a site; the last squares jut out of one that is no whole number."""
-        rows, columns = (ceil(m / MODULE_SIDE_M - 1e-9) for m in (site.height_m, site.width_m))
-        return cls(rows, columns)
-
-    def lattice(self, corner_m: tuple[float, float], rows: int, columns: int) -> "Lattice":
-        """Return where a lattice of modules lies on the grid.
-
-        Args:
-            corner_m: Its lower left corner.
-            rows: Modules upwards.
-            columns: Modules to the right.
-        """
-        return Lattice(
-            _shares(self.rows, corner_m[1], rows), _shares(self.columns, corner_m[0], columns)
-        )
-
-    def rectangle(self, rectangle_m: Rectangle) -> Plane:
-        """Return the share of each square that a rectangle covers, (rows, columns)."""
-        left, bottom, right, top = rectangle_m
-        along_y = _covered(self.rows, np.array([bottom]), np.array([top]))
-        along_x = _covered(self.columns, np.array([left]), np.array([right]))
-        return (along_y @ along_x.T).astype(np.float32)
-
-    def source(self, source: AnySource) -> Plane:
-        """Return how likely the charge of a source is in each square, (rows, columns).
-
-        The plane adds up to 1. A point is shared between the four squares around it such that
-        their mean place is the point's.
-        """
-        if isinstance(source, RectangleSource):
-            plane = self.rectangle(source.rectangle_m)
-        else:
-            start, end = (np.array(point) for point in source.segment_m)
-            length_m = float(np.hypot(*(end - start)))
-            count = 1 + _POINTS_PER_MODULE * ceil(length_m / MODULE_SIDE_M)
-            share = (np.arange(count) + 0.5) / count
-            plane = self._points(start + share[:, np.newaxis] * (end - start))
-        # A narrow rectangle covers next to nothing of its squares, which rounding must not lose.
-        return plane / np.float32(plane.sum(dtype=np.float64))
-
-    def _points(self, points_m: NDArray[np.float64]) -> Plane:
-        """Return points (n, 2), each shared between the four squares around it."""
-        plane = np.zeros((self.rows, self.columns), dtype=np.float32)
-        places = points_m[:, ::-1] / MODULE_SIDE_M - 0.5
-        low = np.floor(places).astype(int)
-        beyond = places - low
-        for up in (0, 1):
-            for right in (0, 1):
-                row = np.clip(low[:, 0] + up, 0, self.rows - 1)
-                column = np.clip(low[:, 1] + right, 0, self.columns - 1)
-                along_y = beyond[:, 0] if up else 1.0 - beyond[:, 0]
-                along_x = beyond[:, 1] if right else 1.0 - beyond[:, 1]
-                np.add.at(plane, (row, column), along_y * along_x)
-        return plane
-
-
-@dataclass(frozen=True, eq=False)
-class Lattice:
-    """Where a lattice of modules lies on the grid; modules on the 0.5 m grid fill one square each.
-
-    Attributes:
-        along_y: Share of each row of squares that each row of modules covers (grid rows, rows).
-        along_x: The same for columns (grid columns, columns).
-    """
-
-    along_y: Plane
-    along_x: Plane
-
-    def plane(self, values: NDArray[np.generic]) -> Plane:
-        """Return values of the modules (..., rows, columns) on the grid, by the area covered."""
-        plane: Plane = self.along_y @ values.astype(np.float32) @ self.along_x.T
-        return plane
-
-
-def _shares(squares: int, start_m: float, modules: int) -> Plane:
-    low_m = np.asarray(start_m + MODULE_SIDE_M * np.arange(modules), dtype=np.float64)
-    return _covered(squares, low_m, low_m + MODULE_SIDE_M).astype(np.float32)
-
-
-def _covered(
-    squares: int, low_m: NDArray[np.float64], high_m: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the share of each square that each interval covers (squares, intervals)."""
-    first = np.arange(squares)[:, np.newaxis]
-    low, high = low_m / MODULE_SIDE_M, high_m / MODULE_SIDE_M
-    common = np.minimum(first + 1, high) - np.maximum(first, low)
-    # Rounded, so that what lies on the grid but for the last bit fills whole squares.
-    covered: NDArray[np.float64] = np.round(np.clip(common, 0.0, 1.0), 9)
-    return covered
 
 
 @dataclass(frozen=True)
@@ -283,7 +184,7 @@ class GridObservation:
     | 2 | `cost` | cost of a module on this cell of the build zone / the highest; 0 outside |
     | 3 | `charge` | see below |
     | 4 | `barrier` | 1 where a module stands |
-    | 5 | `free` | 1 where a module may be placed now |
+    | 5 | `free` | 1 where a module, or the lower left cell of some piece, may be placed now |
     | 6 | `stock_share` | modules left / modules at first, the same everywhere |
     | 7 | `stock` | modules left / 100, at most 1, the same everywhere |
     | 8 | `budget_share` | budget left / budget, 1 without a budget, the same everywhere |
@@ -293,6 +194,19 @@ class GridObservation:
     up to four, and the largest value tells its mass. A hidden one fills all squares where it may
     be, and where it may have different masses, their mean counts; the root lets wide areas be
     seen beside single points.
+
+    Where the build zone has a catalogue, planes follow the ones above (`channels_of`); heights
+    are shares of 12 m, and what has the same value everywhere is marked =:
+
+    | plane | value, from 0 to 1 |
+    |---|---|
+    | `structure_height` | height of the structure here, 1 where it is as high as the air |
+    | `<item>_height`, for each item | its height = |
+    | `<item>_cost`, for each item | its cost / the budget (or the dearest item's), at most 1 = |
+    | `barrier_height` | height of the module that stands here |
+    | `stops_vehicles` | 1 where a module stands that stops vehicles |
+    | `<item>_left`, for each item | pieces that may still be placed / pieces at first = |
+    | `<item>_legal`, `<item>_turned_legal` | 1 where a piece may have its lower left cell now |
 
     Whole numbers up to 255 are how stable-baselines3 knows an image: its `CnnPolicy` takes the
     planes as they are and divides by 255 itself. Its network wants sites of 18 m x 18 m or more.
@@ -310,10 +224,15 @@ class GridObservation:
         "budget_share",
     )
 
+    def channels_of(self, scenario: Scenario) -> tuple[str, ...]:
+        """Return the names of the planes; those of the catalogue, if there is one, come last."""
+        return (*self.channels, *ItemChannels.of(scenario.zone.catalogue).all)
+
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (channels, rows, columns)."""
         grid = SiteGrid.of(scenario.site)
-        return spaces.Box(0, 255, (len(self.channels), grid.rows, grid.columns), np.uint8)
+        shape = (len(self.channels_of(scenario)), grid.rows, grid.columns)
+        return spaces.Box(0, 255, shape, np.uint8)
 
     def episode(self, observable: Observable) -> "GridEpisode":
         """Draw the planes that do not change."""
@@ -327,10 +246,18 @@ class GridObservation:
             "cost": lattice.plane(cost_shares(scenario)),
             "charge": _charge_plane(grid, observable.sources),
         }
-        static = np.zeros((len(self.channels), grid.rows, grid.columns), dtype=np.uint8)
+        items = ItemChannels.of(zone.catalogue)
+        if zone.items:
+            whole = np.ones((grid.rows, grid.columns), dtype=np.float32)
+            planes[STRUCTURE_HEIGHT] = _height_plane(grid, scenario)
+            names = (*items.heights, *items.costs)
+            values = np.concatenate([item_heights(zone), item_costs(zone)]).astype(np.float32)
+            planes |= {name: value * whole for name, value in zip(names, values, strict=True)}
+        channels = self.channels_of(scenario)
+        static = np.zeros((len(channels), grid.rows, grid.columns), dtype=np.uint8)
         for name, plane in planes.items():
-            static[self.channels.index(name)] = _levels(plane)
-        return GridEpisode(static, lattice, self.channels)
+            static[channels.index(name)] = _levels(plane)
+        return GridEpisode(static, lattice, channels, items)
 
 
 @dataclass(frozen=True)
@@ -376,11 +303,13 @@ class GridEpisode:
         static: What does not change (channels, rows, columns); the rest is 0.
         zone: Where the build zone lies on the grid.
         channels: Names of the planes.
+        items: Names of those of the catalogue.
     """
 
     static: NDArray[np.uint8]
     zone: Lattice
     channels: tuple[str, ...]
+    items: ItemChannels
 
     def observe(self, placement: Placement) -> NDArray[np.uint8]:
         """Return all planes for the modules placed so far, (channels, rows, columns)."""
@@ -390,7 +319,17 @@ class GridEpisode:
         shares = np.array(stock_shares(placement), dtype=np.float32)
         levels = _levels(shares)[:, np.newaxis, np.newaxis]
         planes[self._of("stock_share", "stock", "budget_share")] = levels
+        if self.items.all:
+            self._show_items(planes, placement)
         return planes
+
+    def _show_items(self, planes: NDArray[np.uint8], placement: Placement) -> None:
+        """Fill in what changes of the planes of the catalogue."""
+        placed = PlacedItems.of(placement)
+        cells = np.concatenate(([placed.heights, placed.stops_vehicles], placement.legal))
+        planes[self._of(*CHANGING_SITE, *self.items.legal)] = _levels(self.zone.plane(cells))
+        left = _levels(items_left(placement).astype(np.float32))
+        planes[self._of(*self.items.left)] = left[:, np.newaxis, np.newaxis]
 
     def _of(self, *names: str) -> list[int]:
         return [self.channels.index(name) for name in names]
@@ -412,6 +351,15 @@ def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane]
         else:
             others += covered
     return protected, others
+
+
+def _height_plane(grid: SiteGrid, scenario: Scenario) -> Plane:
+    """Return the heights of the structures as shares of 12 m."""
+    heights: Plane = np.zeros((grid.rows, grid.columns), dtype=np.float32)
+    for structure in scenario.structures:
+        share = np.float32(height_share(structure.height_m))
+        heights += share * grid.rectangle(structure.rectangle_m)
+    return heights
 
 
 def _charge_plane(grid: SiteGrid, sources: tuple[AnySource, ...]) -> Plane:
@@ -454,12 +402,29 @@ class FeaturesObservation:
 
     Protected structures come first, in the order of the scenario. The weight of another structure
     is 0, and all six values are 0 where there is no structure.
+
+    Where the build zone has a catalogue, more values follow; heights are shares of 12 m, and the
+    values of cells are row by row:
+
+    | length | what |
+    |---|---|
+    | 8 | height of each structure, in the order above; 1 where it is as high as the air |
+    | items | height of each item |
+    | items | cost of each item / the budget (or the dearest item's cost), at most 1 |
+    | items | pieces of each item that may still be placed / pieces at first |
+    | cells | height of the module that stands on a cell |
+    | cells | 1 where a module stands that stops vehicles |
+    | variants x cells | 1 where a piece may have its lower left cell now, variant by variant |
     """
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (features,)."""
-        zone = scenario.zone
-        return spaces.Box(0.0, 1.0, (_FIXED + 3 * zone.rows * zone.columns,), np.float32)
+        zone, catalogue = scenario.zone, scenario.zone.catalogue
+        cells = zone.rows * zone.columns
+        length = _FIXED + 3 * cells
+        if catalogue.has_items:
+            length += MOST_STRUCTURES + 3 * len(zone.items) + (2 + len(catalogue.variants)) * cells
+        return spaces.Box(0.0, 1.0, (length,), np.float32)
 
     def episode(self, observable: Observable) -> "FeaturesEpisode":
         """Work out the values that do not change.
@@ -481,6 +446,12 @@ class FeaturesObservation:
             np.zeros(2 * zone.rows * zone.columns),
             cost_shares(scenario).ravel(),
         ]
+        if zone.items:
+            changing = (
+                len(zone.items) + (2 + len(zone.catalogue.variants)) * zone.rows * zone.columns
+            )
+            fixed += [_structure_heights(scenario), item_heights(zone), item_costs(zone)]
+            fixed.append(np.zeros(changing))
         values = np.concatenate(fixed).astype(np.float32)
         return FeaturesEpisode(np.clip(values, 0.0, 1.0))
 
@@ -502,12 +473,17 @@ class FeaturesEpisode:
         cells = placement.free.size
         values[_FIXED : _FIXED + cells] = occupied_cells(placement).ravel()
         values[_FIXED + cells : _FIXED + 2 * cells] = placement.free.ravel()
+        if placement.catalogue.has_items:
+            placed = PlacedItems.of(placement)
+            shown = (placed.heights, placed.stops_vehicles, placement.legal)
+            ending = np.concatenate([items_left(placement), *(each.ravel() for each in shown)])
+            values[-len(ending) :] = ending
         return values
 
 
 def _structures(scenario: Scenario) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """Return the features of the structures, (MOST_STRUCTURES, 6)."""
-    structures = sorted(scenario.structures, key=lambda structure: not structure.protected)
+    structures = _protected_first(scenario)
     if len(structures) > MOST_STRUCTURES:
         raise BlastEnvError(
             f"scenario {scenario.name!r} has {len(structures)} structures, the observation"
@@ -519,6 +495,18 @@ def _structures(scenario: Scenario) -> np.ndarray[tuple[int, int], np.dtype[np.f
     for row, structure in zip(rows, structures, strict=False):
         row[:] = _structure(structure, site, largest)
     return rows
+
+
+def _structure_heights(scenario: Scenario) -> NDArray[np.float64]:
+    """Return the heights of the structures, (MOST_STRUCTURES,)."""
+    heights = np.zeros(MOST_STRUCTURES)
+    structures = _protected_first(scenario)
+    heights[: len(structures)] = [height_share(each.height_m) for each in structures]
+    return heights
+
+
+def _protected_first(scenario: Scenario) -> list[AnyStructure]:
+    return sorted(scenario.structures, key=lambda structure: not structure.protected)
 
 
 def _structure(structure: AnyStructure, site: Rectangle, largest_weight: float) -> list[float]:

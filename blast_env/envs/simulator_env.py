@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from blast_env.envs.arguments import check_names, checked_keywords
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell
+from blast_env.geometry import Element
 from blast_env.physics.engine import BlastRun, Engine
 from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.scene import Charge
@@ -110,7 +110,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
     def __init__(
         self,
         scenario: AnyScenario = "courtyard",
-        layout: Sequence[Cell] = (),
+        layout: Sequence[Element] = (),
         engine: str | Engine = "pymunk",
         step_s: float = 0.002,
         render_mode: str | None = None,
@@ -120,7 +120,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.scenario = find_scenario(scenario)
-        self.layout: Sequence[Cell] = layout
+        self.layout: Sequence[Element] = layout
         self.engine = engine
         self.step_s = step_s
         self.render_mode = render_mode

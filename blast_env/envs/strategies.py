@@ -10,7 +10,7 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.comparison import Objective
-from blast_env.geometry import Cell
+from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyScenario, AnySource, PointSource, Scenario, ScenarioField
 
@@ -68,8 +68,9 @@ class HiddenThreat:
 class ScenarioSource(Protocol):
     """Gives each episode its scenario.
 
-    All scenarios of a source have sites of one size and build zones of as many rows and columns,
-    so that they share the observation and the action space.
+    All scenarios of a source have sites of one size, build zones of as many rows and columns, and
+    catalogues with items of the same names and sizes, so that they share the observation and the
+    action space.
     """
 
     @property
@@ -130,10 +131,14 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
         representative: The scenario that the spaces were made for.
 
     Raises:
-        BlastEnvError: If site or build zone have another size, or there is no build zone.
+        BlastEnvError: If site, build zone or items have another size, or there is no build zone.
     """
     for what, size, expected in zip(
-        ("site (width, height in m)", "build zone (rows, columns)"),
+        (
+            "site (width, height in m)",
+            "build zone (rows, columns)",
+            "catalogue (item, turned, size)",
+        ),
         _sizes(scenario),
         _sizes(representative),
         strict=True,
@@ -145,8 +150,12 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
             )
 
 
-def _sizes(scenario: Scenario) -> tuple[tuple[float, float], tuple[int, int]]:
-    return (scenario.site.width_m, scenario.site.height_m), scenario.zone.shape
+def _sizes(scenario: Scenario) -> tuple[tuple[object, ...], ...]:
+    site, zone = scenario.site, scenario.zone
+    variants = [
+        (each.name, each.turned, each.rows, each.columns) for each in zone.catalogue.variants
+    ]
+    return (site.width_m, site.height_m), zone.shape, tuple(variants)
 
 
 @dataclass(frozen=True)
@@ -161,9 +170,9 @@ class Transition:
         objective: Assesses layouts under the threats of the episode.
     """
 
-    initial: tuple[Cell, ...]
-    before: tuple[Cell, ...]
-    after: tuple[Cell, ...]
+    initial: Layout
+    before: Layout
+    after: Layout
     ended: bool
     objective: Objective
 

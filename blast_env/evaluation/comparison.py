@@ -17,7 +17,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, check_distinct
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
 from blast_env.evaluation.loads import BlastLoads
-from blast_env.geometry import Cell, Layout
+from blast_env.geometry import Element, Layout
 from blast_env.scenario import check_layout
 from blast_env.statistics import (
     Estimate,
@@ -75,7 +75,7 @@ class Objective:
     processes: int = 1
     _assessed: dict[Layout, Assessment] = field(default_factory=dict, init=False)
 
-    def assess(self, layout: Sequence[Cell]) -> Assessment:
+    def assess(self, layout: Sequence[Element]) -> Assessment:
         """Return what a layout is worth; a blast for each threat, unless known.
 
         Args:
@@ -94,7 +94,7 @@ class Objective:
             )
         return self._assessed[key]
 
-    def loads(self, layout: Sequence[Cell]) -> list[BlastLoads]:
+    def loads(self, layout: Sequence[Element]) -> list[BlastLoads]:
         """Return the loads with a layout, one a threat of the case.
 
         Raises:
@@ -103,7 +103,7 @@ class Objective:
         pairs = [(layout, threat) for threat in self.case.threats]
         return self.evaluator.loads_of_many(pairs, self.processes)
 
-    def impulses_pa_s(self, layout: Sequence[Cell]) -> tuple[float, ...]:
+    def impulses_pa_s(self, layout: Sequence[Element]) -> tuple[float, ...]:
         """Return the impulse on the protected structures with a layout, Pa*s, one a threat."""
         return tuple(each.protected_impulse_pa_s for each in self.loads(layout))
 
@@ -212,7 +212,7 @@ class Comparison:
 def compare(
     evaluators: Evaluators,
     cases: Sequence[Case],
-    layouts: Sequence[Sequence[Cell]],
+    layouts: Sequence[Sequence[Element]],
     processes: int = 1,
     *,
     cvar_level: float = CVAR_LEVEL,
@@ -256,7 +256,7 @@ def compare(
 def loads_of_both(
     evaluator: BlastEvaluator,
     case: Case,
-    layout: Sequence[Cell],
+    layout: Sequence[Element],
     processes: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]:

@@ -18,7 +18,7 @@ from blast_env.evaluation.store import (
     engine_text,
     find_cache,
 )
-from blast_env.geometry import Cell
+from blast_env.geometry import Element
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.scene import Charge
@@ -97,7 +97,7 @@ class BlastEvaluator:
         asked = self.blasts + self.cache_hits
         return self.cache_hits / asked if asked else 0.0
 
-    def loads(self, layout: Sequence[Cell], threat: Threat) -> BlastLoads:
+    def loads(self, layout: Sequence[Element], threat: Threat) -> BlastLoads:
         """Return the loads of one blast.
 
         Args:
@@ -112,7 +112,7 @@ class BlastEvaluator:
 
     def loads_of_many(
         self,
-        pairs: Iterable[tuple[Sequence[Cell], Threat]],
+        pairs: Iterable[tuple[Sequence[Element], Threat]],
         processes: int = 1,
         progress: Callable[[float], None] | None = None,
     ) -> list[BlastLoads]:
@@ -149,7 +149,7 @@ class BlastEvaluator:
         self.cache_hits += len(keys) - len(missing)
         return [found[key] for key in keys]
 
-    def _key(self, layout: Sequence[Cell], threat: Threat) -> BlastKey:
+    def _key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
         cells = tuple(sorted(check_layout(self.scenario, layout)))
         # Gas dynamics has no fan and no air to draw: a charge has one realisation.
         seed = 0 if is_gas(self.engine) else threat.seed

@@ -21,7 +21,7 @@ from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastCache
 from blast_env.files import write_atomically
-from blast_env.geometry import Cell, Layout
+from blast_env.geometry import Element, Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import GAS, find_engine
 from blast_env.provenance import versions
@@ -471,7 +471,7 @@ class LayoutEvaluation:
 
 def evaluate_layout(
     scenario: AnyScenario,
-    layout: Sequence[Cell],
+    layout: Sequence[Element],
     seeds: Iterable[int] = range(16),
     processes: int = 1,
     engine: str | Engine = "event",
@@ -520,7 +520,7 @@ def evaluate_layout(
 
 def evaluate_against(
     evaluator: BlastEvaluator,
-    layout: Sequence[Cell],
+    layout: Sequence[Element],
     threats: Sequence[Threat],
     processes: int = 1,
     *,

@@ -15,7 +15,7 @@ from blast_env.calibration.model import Calibration
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.files import FolderStore
-from blast_env.geometry import Cell
+from blast_env.geometry import Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.scene import Charge
 
@@ -34,7 +34,7 @@ class BlastKey(NamedTuple):
     """
 
     scenario_hash: str
-    layout: tuple[Cell, ...]
+    layout: Layout
     charge: Charge
     seed: int
     engine: str

@@ -9,7 +9,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
-from blast_env.geometry import Cell, Rectangle
+from blast_env.geometry import Layout, Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import ModularPart
 from blast_env.scenario import (
@@ -76,7 +76,7 @@ class LayoutPlan:
     """
 
     scenario: ScenarioField = ScenarioField()
-    layout: tuple[Cell, ...]  # type: ignore[misc]  # a scenario has no default
+    layout: Layout  # type: ignore[misc]  # a scenario has no default
     charge: Charge | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -133,8 +133,8 @@ def _zone_features(zone: BuildZone) -> Iterator[Feature]:
         conditions["access_way"] = zone.access_way.description
     yield _area(FeatureKind.BUILD_ZONE, zone.rectangle_m, "build zone", **conditions)
     for area in zone.cost_areas:
-        cost = area.module_cost
-        yield _area(FeatureKind.COST_AREA, area.rectangle_m, area.reason, module_cost=cost)
+        costs = area.model_dump(include={"module_cost", "cost_factor"}, exclude_none=True)
+        yield _area(FeatureKind.COST_AREA, area.rectangle_m, area.reason, **costs)
     for keep_out in zone.keep_outs:
         yield _area(FeatureKind.KEEP_OUT, keep_out.rectangle_m, keep_out.reason)
 

@@ -101,8 +101,9 @@ class Scene(BlastSite):
 class StructureOutline:
     """What a structure is before any blast; attributes as in `ModularObstacle`.
 
-    Two more are for gas dynamics: `height_m`, `None` for as high as the air, and `faces`, the
-    walls whose load counts ("west", "east", "south", "north").
+    Three more are for gas dynamics: `height_m`, `None` for as high as the air; `heights_m`, the
+    heights of single cells, in the order of `cells`, where they are not all `height_m`; and
+    `faces`, the walls whose load counts ("west", "east", "south", "north").
     """
 
     kind: type[ModularObstacle]
@@ -116,6 +117,8 @@ class StructureOutline:
     capacity: float | None
     height_m: float | None = None
     faces: tuple[WallName, ...] = WALLS
+    heights_m: tuple[float | None, ...] | None = None
+    pieces: tuple[str, ...] | None = None
 
     @property
     def rectangle(self) -> Rectangle:
@@ -134,4 +137,5 @@ class StructureOutline:
             weight=self.weight,
             cells=self.cells,
             capacity=self.capacity,
+            pieces=self.pieces,
         )

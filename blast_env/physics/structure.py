@@ -138,6 +138,7 @@ class ModularPart:
         x: Centre, units.
         y: Centre, units.
         capacity: Impulse, simulation units, that it bears before it is removed; None: any.
+        piece: Name of the piece of a barrier that it is part of; empty if it is of none.
         hits: Collisions so far.
         impulse: Sum of m |v| of these collisions (section 2.8), simulation units.
         transferred_impulse: Sum of the momentum that the contacts really transferred along
@@ -153,6 +154,7 @@ class ModularPart:
     x: float
     y: float
     capacity: float | None = None
+    piece: str = ""
     hits: int = 0
     impulse: float = 0.0
     transferred_impulse: float = 0.0
@@ -210,6 +212,8 @@ class ModularObstacle:
         weight: Its weight among the protected structures.
         cells: The (row, column) that hold a module; None: all.
         capacity: Capacity of each module; None: modules never fail.
+        pieces: Names of the pieces that the modules are part of, in the order of `cells`; None:
+            of none.
     """
 
     name: str
@@ -220,6 +224,7 @@ class ModularObstacle:
     weight: float = 1.0
     cells: Sequence[tuple[int, int]] | None = None
     capacity: float | None = None
+    pieces: Sequence[str] | None = None
     parts: list[ModularPart] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -233,8 +238,9 @@ class ModularObstacle:
                 x=self.corner[0] + column * MODULE_SIDE_UNITS + half,
                 y=self.corner[1] + row * MODULE_SIDE_UNITS + half,
                 capacity=self.capacity,
+                piece="" if self.pieces is None else self.pieces[number],
             )
-            for row, column in self._used_cells()
+            for number, (row, column) in enumerate(self._used_cells())
         ]
 
     @property

@@ -69,6 +69,7 @@ MODULE_COLUMNS: Final = (
     Column("transferred_impulse_sim", "sim", "sum of the momentum really transferred"),
     Column("first_hit_s", "s", "time of the first collision"),
     Column("destroyed", "", "whether the impulse passed the module's capacity"),
+    Column("piece", "", "piece of a barrier that it is part of; empty if it is of none"),
 )
 
 
@@ -150,12 +151,13 @@ def module_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
             part.transferred_impulse,
             _or_nan(part.first_hit_s),
             part.destroyed,
+            part.piece,
         )
         for obstacle in obstacles
         for part in obstacle.parts
     ]
     table = pd.DataFrame(rows, columns=[column.name for column in MODULE_COLUMNS])
-    return table.astype({"module_id": "str", "structure": "str"})
+    return table.astype({"module_id": "str", "structure": "str", "piece": "str"})
 
 
 def structure_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:

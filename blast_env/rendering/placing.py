@@ -224,7 +224,7 @@ class PlacingPainter:
         surface = self._ground.copy()
         if self._scenario.build_zone is not None:
             self._draw_cells(surface, self._scenario.build_zone, placement)
-        scene = build_site(self._scenario, placement.cells)
+        scene = build_site(self._scenario, placement.layout)
         for obstacle in scene.obstacles():
             draw_obstacle(surface, self._view, obstacle, full_impulse=1.0)
         draw_charges(surface, self._view, self._sources, self._scenario.charge_radius_m)
@@ -280,7 +280,7 @@ class PlacingPainter:
         """Draw which cells are free and which are not."""
         whole = cell_rectangle(self._view, zone.rectangle_m)
         surface.blit(hatched_surface(whole.size), whole)
-        for row, column in zip(*np.nonzero(placement.free), strict=True):
+        for row, column in zip(*np.nonzero(placement.open_ground), strict=True):
             cell_m = zone.cell_rectangle_m((int(row), int(column)))
             place = cell_rectangle(self._view, cell_m)
             pygame.draw.rect(surface, FREE, place)
@@ -312,8 +312,9 @@ def _border(view: View) -> pygame.Rect:
 
 def _fullest_scene(scenario: Scenario) -> Scene:
     """Return a scene with everything that a blast of the scenario may show: it needs most room."""
-    free = np.argwhere(Placement.empty(scenario).free)
-    return build_scene(scenario, [(int(row), int(column)) for row, column in free[:1]])
+    empty = Placement.empty(scenario)
+    legal = np.flatnonzero(empty.legal)
+    return build_scene(scenario, [empty.catalogue.element(int(action)) for action in legal[:1]])
 
 
 _LEAST_FULL_IMPULSE: Final = 1e-9

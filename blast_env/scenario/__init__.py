@@ -1,7 +1,9 @@
 """Scenario files: models, validation, loading and saving."""
 
-from blast_env.geometry import Cell
+from blast_env.geometry import Cell, Element, Layout, Piece
 from blast_env.physics.scene import Charge
+from blast_env.scenario.access_way import AccessWay
+from blast_env.scenario.catalogue import Catalogue, Item, PlacedModule
 from blast_env.scenario.files import (
     AnyScenario,
     ScenarioField,
@@ -30,7 +32,7 @@ from blast_env.scenario.models import (
 from blast_env.scenario.placement import Placement, check_layout, usable_cells
 from blast_env.scenario.problems import Problem, ScenarioError
 from blast_env.scenario.versions import SCHEMA_VERSION
-from blast_env.scenario.zone import AccessWay, BuildZone, CostArea, KeepOut
+from blast_env.scenario.zone import BuildZone, CostArea, KeepOut
 
 __all__ = [
     "SCHEMA_VERSION",
@@ -39,14 +41,20 @@ __all__ = [
     "AnySource",
     "AnyStructure",
     "BuildZone",
+    "Catalogue",
     "Cell",
     "Charge",
     "ConcreteSquareSection",
     "CostArea",
+    "Element",
     "GaugeSection",
+    "Item",
     "KeepOut",
+    "Layout",
     "LayoutFile",
     "ModularObstacleSection",
+    "Piece",
+    "PlacedModule",
     "Placement",
     "PointSource",
     "Problem",

@@ -1,16 +1,18 @@
 """From a scenario to the site of one blast, and for particles to its scene."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from blast_env.geometry import Cell, Rectangle
+from blast_env.geometry import Element, Layout, Rectangle
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.presets import for_charge
 from blast_env.physics.scene import BlastSite, Charge, Gauge, Scene, StructureOutline
 from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
 from blast_env.scenario import (
     BuildZone,
+    Placement,
     PointSource,
     Problem,
     Scenario,
@@ -47,7 +49,7 @@ def draw_charge(scenario: Scenario, seed: int) -> Charge:
 
 def build_site(
     scenario: Scenario,
-    layout: Sequence[Cell] = (),
+    layout: Sequence[Element] = (),
     seed: int = 0,
     charge: Charge | None = None,
 ) -> BlastSite:
@@ -55,7 +57,7 @@ def build_site(
 
     Args:
         scenario: The scenario.
-        layout: (row, column) of the build-zone cells that hold a barrier module.
+        layout: (row, column) of the build-zone cells that hold a barrier module, or pieces.
         seed: Decides the charge, where the scenario leaves it open: the same one as for particles.
         charge: The charge, instead of one drawn from the scenario.
 
@@ -64,14 +66,14 @@ def build_site(
         ScenarioError: If the charge is not clear of a structure or the border.
         ValueError: If the seed is negative.
     """
-    cells = check_layout(scenario, layout)
+    placement = Placement.of(scenario, layout)
     if charge is not None:
-        _check_clear(scenario.with_charge(charge), cells)
+        _check_clear(scenario.with_charge(charge), placement)
     charge_rng, *_ = random_streams(seed)
     charge = scenario.sample_charge(charge_rng) if charge is None else charge
     structures = tuple(_outline(section) for section in scenario.structures)
-    if cells:
-        structures += (barrier_outline(scenario.zone, cells),)
+    if placement.layout:
+        structures += (barrier_outline(scenario.zone, placement.layout),)
     return BlastSite(
         site=scenario.site.rectangle_m.scaled(UNITS_PER_M),
         charge_centre=(charge.position_m[0] * UNITS_PER_M, charge.position_m[1] * UNITS_PER_M),
@@ -79,13 +81,13 @@ def build_site(
         structures=structures,
         gauges=tuple(Gauge(each.name, each.position_m) for each in scenario.gauges),
         air_height_m=scenario.air_height_m,
-        build_zone=None if scenario.build_zone is None else barrier_outline(scenario.build_zone),
+        build_zone=None if scenario.build_zone is None else _whole(scenario.build_zone),
     )
 
 
 def build_scene(
     scenario: Scenario,
-    layout: Sequence[Cell] = (),
+    layout: Sequence[Element] = (),
     seed: int = 0,
     charge: Charge | None = None,
 ) -> Scene:
@@ -93,7 +95,7 @@ def build_scene(
 
     Args:
         scenario: The scenario.
-        layout: (row, column) of the build-zone cells that hold a barrier module.
+        layout: (row, column) of the build-zone cells that hold a barrier module, or pieces.
         seed: Decides the charge (where the scenario leaves it open), the fan's phase and the
             air's jitter. The barrier does not shift any of them.
         charge: The charge, instead of one drawn from the scenario.
@@ -131,15 +133,15 @@ def build_scene(
     )
 
 
-def _check_clear(scenario: Scenario, cells: tuple[Cell, ...]) -> None:
+def _check_clear(scenario: Scenario, placement: Placement) -> None:
     """Refuse a layout with a module on the charge; nothing else depends on where that is.
 
     Raises:
         LayoutError: If there is one.
     """
     usable = usable_cells(scenario)
-    if not all(usable[cell] for cell in cells):
-        check_layout(scenario, cells)
+    if not all(usable[cell] for cell in placement.cells):
+        check_layout(scenario, placement.layout)
 
 
 def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
@@ -190,8 +192,18 @@ def _outline(section: AnyStructure) -> StructureOutline:
     )
 
 
-def barrier_outline(zone: BuildZone, cells: tuple[Cell, ...] | None = None) -> StructureOutline:
-    """Return the barrier that modules on these cells of a zone make, on all of them by default."""
+def _whole(zone: BuildZone) -> StructureOutline:
+    """Return the barrier that would fill a whole zone, as high as one can be there."""
+    return replace(barrier_outline(zone, ()), cells=None, heights_m=None, pieces=None)
+
+
+def barrier_outline(zone: BuildZone, layout: Layout) -> StructureOutline:
+    """Return the barrier that the modules or pieces of a layout make.
+
+    Raises:
+        LayoutError: If the catalogue has no such item, or it cannot be turned.
+    """
+    modules = zone.modules(layout)
     return StructureOutline(
         kind=ModularObstacle,
         name=BARRIER_NAME,
@@ -200,7 +212,9 @@ def barrier_outline(zone: BuildZone, cells: tuple[Cell, ...] | None = None) -> S
         columns=zone.columns,
         protected=False,
         weight=1.0,
-        cells=cells,
+        cells=tuple(module.cell for module in modules),
         capacity=zone.module_capacity,
-        height_m=zone.height_m,
+        height_m=zone.highest_m,
+        heights_m=tuple(module.height_m for module in modules) if zone.items else None,
+        pieces=tuple(module.piece for module in modules) if zone.items else None,
     )

@@ -1,13 +1,11 @@
 """Checks between the sections of a scenario: whether they fit each other."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Final, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from blast_env.errors import BlastEnvError
@@ -28,74 +26,15 @@ from blast_env.scenario.sections import (
 from blast_env.scenario.versions import MAX_ITEMS
 from blast_env.scenario.zone import (
     TOLERANCE_M,
-    AccessWay,
-    Area,
     BuildZone,
     Surroundings,
-    closing_cells,
     distance_m,
-    empty_zone,
-    is_open,
     source_bounds_m,
 )
+from blast_env.scenario.zone_checks import build_zone_problems
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
-
-def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
-    """Yield what is wrong between a build zone, its areas and what stands around it."""
-    zone = surroundings.zone
-    yield from _area_problems(zone)
-    cells = empty_zone(surroundings)
-    usable = int(cells.usable.sum())
-    if zone.stock > usable:
-        message = f"is {zone.stock}, must be at most {usable}, the number of usable cells"
-        yield Problem("build_zone.stock", message)
-    available = cells.usable
-    if zone.access_way is not None:
-        problem = _access_way_problem(zone, zone.access_way, cells.passable, available)
-        if problem is not None:
-            yield problem
-        else:
-            available = available & ~closing_cells(zone.access_way, cells.passable)
-    if zone.budget is not None and available.any():
-        cheapest = float(cells.module_costs[available].min())
-        if cheapest > zone.cost_limit:
-            yield Problem(
-                "build_zone.budget",
-                f"is {zone.budget:.10g}, must be at least {cheapest:.10g},"
-                " the cost of a module on the cheapest usable cell",
-            )
-
-
-def _area_problems(zone: BuildZone) -> Iterator[Problem]:
-    """Check that keep-outs and cost areas have something to do with the zone."""
-    listed: dict[str, Sequence[Area]] = {"keep_outs": zone.keep_outs, "cost_areas": zone.cost_areas}
-    for key, areas in listed.items():
-        for index, area in enumerate(areas):
-            if not area.rectangle_m.overlaps(zone.rectangle_m):
-                where, bound = extent(area.rectangle_m), extent(zone.rectangle_m)
-                message = f"covers {where}, must overlap the build zone ({bound})"
-                yield Problem(f"build_zone.{key}[{index}]", message)
-
-
-def _access_way_problem(
-    zone: BuildZone, way: AccessWay, passable: NDArray[np.bool_], usable: NDArray[np.bool_]
-) -> Problem | None:
-    """Return why the access way and the zone do not fit each other, or `None` if they do."""
-    widest_m = min(zone.shape) * MODULE_SIDE_M
-    if way.width_m > widest_m:
-        message = f"is {way.width_m:g}, must be at most {widest_m:g}, the zone's shorter side"
-        return Problem("build_zone.access_way.width_m", message)
-    if not is_open(way, passable):
-        message = f"the structures leave no {way.description} through the empty zone"
-        return Problem("build_zone.access_way", message)
-    if usable.any() and closing_cells(way, passable)[usable].all():
-        message = f"a module on any usable cell would close the {way.description}"
-        return Problem("build_zone.access_way", message)
-    return None
-
-
-Item = TypeVar("Item")
+Checked = TypeVar("Checked")
 
 
 MOST_AIR_BALLS: Final = 1_000_000
@@ -201,7 +140,7 @@ def check_sources(parts: Parts) -> tuple[Problem, ...]:
     return (*problems, *_charge_scaling_problems(parts.parameters, parts.sources))
 
 
-def _sound(adapter: TypeAdapter[Item], value: object) -> Item | None:
+def _sound(adapter: TypeAdapter[Checked], value: object) -> Checked | None:
     """Return the section, or `None` if it is missing or unsound."""
     try:
         return adapter.validate_python(value)
@@ -209,7 +148,7 @@ def _sound(adapter: TypeAdapter[Item], value: object) -> Item | None:
         return None
 
 
-def _sound_items(adapter: TypeAdapter[Item], values: object) -> dict[int, Item]:
+def _sound_items(adapter: TypeAdapter[Checked], values: object) -> dict[int, Checked]:
     """Return the sound items of an array by their index."""
     if not isinstance(values, list | tuple):
         return {}
@@ -294,6 +233,8 @@ def _height_problems(parts: Parts) -> Iterator[Problem]:
         yield from _above_the_air(parts, f"structures[{index}].height_m", structure.height_m)
     if parts.build_zone is not None:
         yield from _above_the_air(parts, "build_zone.height_m", parts.build_zone.height_m)
+        for index, item in enumerate(parts.build_zone.items):
+            yield from _above_the_air(parts, f"build_zone.items[{index}].height_m", item.height_m)
 
 
 def _gauge_problems(parts: Parts) -> Iterator[Problem]:

@@ -21,7 +21,7 @@ def default_air_height_m(structures: Iterable[AnyStructure], zone: BuildZone | N
     12 m, or 6 m more than the highest structure or barrier if that is more.
     """
     heights = [each.height_m for each in structures]
-    heights.append(None if zone is None else zone.height_m)
+    heights.append(None if zone is None else zone.highest_m)
     highest = max((height for height in heights if height is not None), default=0.0)
     return max(LEAST_AIR_HEIGHT_M, highest + AIR_ABOVE_M)
 
@@ -58,7 +58,7 @@ def height_notes(
     """Return what an engine without heights leaves aside, in sentences."""
     structures = tuple(structures)
     walls = any(each.height_m is not None for each in structures)
-    walls |= zone is not None and zone.height_m is not None
+    walls |= zone is not None and zone.highest_m is not None
     raised = any(source.height_m > 0.0 for source in sources)
     notes = []
     if walls:

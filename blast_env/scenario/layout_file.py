@@ -1,24 +1,43 @@
-"""Layout files: the cells of a layout, the scenario that they are for, and where they came from."""
+"""Layout files: a layout, the scenario that it is for, and where it came from."""
 
 import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 from blast_env.errors import LayoutError, suggestion
 from blast_env.files import write_atomically
-from blast_env.geometry import Cell
+from blast_env.geometry import Element, Layout, Piece
+from blast_env.scenario.catalogue import cell_from
 from blast_env.scenario.files import MAX_BYTES, AnyScenario, find_scenario, read_text
 from blast_env.scenario.models import Scenario
-from blast_env.scenario.placement import cell_from, check_layout
+from blast_env.scenario.placement import check_layout
 from blast_env.scenario.problems import key_path, shortened, type_word, value_text
 
 MAX_DIGITS: Final = 1000
 """Digits of an integer in a layout file."""
 
-_KEYS: Final = ("cells", "scenario", "scenario_hash", "provenance")
+CELLS_VERSION: Final = 1
+"""The version of a file whose layout consists of cells; it need not say so."""
+
+PIECES_VERSION: Final = 2
+"""The version of a file whose layout consists of pieces."""
+
+_LISTS: Final[Mapping[int, str]] = MappingProxyType(
+    {CELLS_VERSION: "cells", PIECES_VERSION: "pieces"}
+)
+"""The key of the layout, by the version of the file."""
+
+_OTHER_KEYS: Final = ("scenario", "scenario_hash", "provenance", "version")
+_PIECE_KEYS: Final[Mapping[str, type]] = MappingProxyType(
+    {"item": str, "row": int, "column": int, "turned": bool}
+)
+_KIND_WORDS: Final[Mapping[type, str]] = MappingProxyType(
+    {str: "a string", int: "a whole number", bool: "true or false"}
+)
 _HASH_DIGITS: Final = 12  # in messages
 
 
@@ -27,23 +46,23 @@ class LayoutFile:
     """What a layout file says.
 
     Attributes:
-        cells: (row, column) of each module, in the order of the file.
+        layout: (row, column) of each module, or the pieces, in the order of the file.
         scenario: Name of the scenario that the layout is for; None if the file does not say.
         scenario_hash: Its content hash, 64 hexadecimal digits; None if the file does not say.
         provenance: How the layout was made: anything that JSON can hold (method, command, seed,
             versions, blasts).
     """
 
-    cells: tuple[Cell, ...]
+    layout: Layout
     scenario: str | None = None
     scenario_hash: str | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def load(cls, path: str | Path) -> "LayoutFile":
-        """Read a file: a list of cells, or a table with the keys of this class.
+        """Read a file: a list of cells, or a table with a list of cells or pieces.
 
-        Whether the cells fit a scenario is for `cells_for` to say.
+        Whether the layout fits a scenario is for `layout_for` to say.
 
         Raises:
             LayoutError: If the file cannot be read or is anything else.
@@ -58,7 +77,7 @@ class LayoutFile:
     def of(
         cls,
         scenario: AnyScenario,
-        layout: Sequence[Cell],
+        layout: Sequence[Element],
         provenance: Mapping[str, Any] | None = None,
     ) -> "LayoutFile":
         """Return the file of a layout for a scenario.
@@ -73,28 +92,28 @@ class LayoutFile:
         """
         found = find_scenario(scenario)
         return cls(
-            cells=check_layout(found, layout),
+            layout=check_layout(found, layout),
             scenario=found.name,
             scenario_hash=found.content_hash,
             provenance=dict(provenance or {}),
         )
 
-    def cells_for(self, scenario: AnyScenario) -> tuple[Cell, ...]:
-        """Return the cells, if they are a layout for this scenario.
+    def layout_for(self, scenario: AnyScenario) -> Layout:
+        """Return the layout, if it is one for this scenario.
 
-        A file without a hash is taken for any scenario that its cells fit.
+        A file without a hash is taken for any scenario that its layout fits.
 
         Args:
             scenario: The scenario, or its bundled name or path.
 
         Raises:
-            LayoutError: If the file is for another scenario or another state of it, or if a cell
-                is off the grid, not available, repeated or beyond the stock.
+            LayoutError: If the file is for another scenario or another state of it, or if
+                something is off the grid, not available, repeated or beyond the stock.
         """
         found = find_scenario(scenario)
         if self.scenario_hash not in (None, found.content_hash):
             raise LayoutError(self._mismatch(found))
-        return check_layout(found, self.cells)
+        return check_layout(found, self.layout)
 
     def save(self, path: str | Path) -> Path:
         """Write the file; an existing one is replaced as a whole.
@@ -120,8 +139,13 @@ class LayoutFile:
         return Path(path)
 
     def _text(self, path: str | Path) -> str:
-        """Return the file as JSON, the cells on one line."""
-        cells = json.dumps([list(cell) for cell in self.cells])
+        """Return the file as JSON, the cells on one line, or each piece on one."""
+        pieces = [each for each in self.layout if isinstance(each, Piece)]
+        if pieces:
+            lines = ",\n".join(f"    {json.dumps(_piece_table(piece))}" for piece in pieces)
+            layout = f'  "version": {PIECES_VERSION},\n  "pieces": [\n{lines}\n  ]'
+        else:
+            layout = f'  "cells": {json.dumps([list(cell) for cell in self.layout])}'
         keys: dict[str, Any] = {"scenario": self.scenario, "scenario_hash": self.scenario_hash}
         given = {name: value for name, value in keys.items() if value is not None}
         if self.provenance:
@@ -130,7 +154,7 @@ class LayoutFile:
             rest = json.dumps(given, indent=2, allow_nan=False)
         except (TypeError, ValueError, RecursionError) as error:
             raise LayoutError(f"{path}: provenance: JSON cannot hold it: {error}") from error
-        return f'{{\n  "cells": {cells}' + (f",{rest[1:]}" if given else "\n}")
+        return f"{{\n{layout}" + (f",{rest[1:]}" if given else "\n}")
 
     def _mismatch(self, scenario: Scenario) -> str:
         """Say that the layout is for another scenario, and what can be done."""
@@ -145,26 +169,26 @@ class LayoutFile:
         )
 
 
-def load_layout(path: str | Path, scenario: AnyScenario | None = None) -> tuple[Cell, ...]:
-    """Return the cells of a layout file.
+def load_layout(path: str | Path, scenario: AnyScenario | None = None) -> Layout:
+    """Return the layout of a layout file.
 
-    The file is `[[row, column], ...]`, or a table with `cells` and, if it says so, the scenario
-    that they are for and how they were made; see `LayoutFile`.
+    The file is `[[row, column], ...]`, or a table with `cells` or `pieces` and, if it says so, the
+    scenario that they are for and how they were made; see `LayoutFile`.
 
     Args:
         path: The file.
         scenario: The scenario that the layout must be for, or its bundled name or path. Without
-            it, only the form of the file is checked; `check_layout` checks the cells later.
+            it, only the form of the file is checked; `check_layout` checks the layout later.
 
     Raises:
         LayoutError: If the file cannot be read or is anything else, or if the layout is not one
-            for the scenario; the message names the file, the cell and the reason.
+            for the scenario; the message names the file, the cell or piece and the reason.
     """
     file = LayoutFile.load(path)
     if scenario is None:
-        return file.cells
+        return file.layout
     try:
-        return file.cells_for(scenario)
+        return file.layout_for(scenario)
     except LayoutError as error:
         raise LayoutError(f"{path}: {error}") from error
 
@@ -172,7 +196,7 @@ def load_layout(path: str | Path, scenario: AnyScenario | None = None) -> tuple[
 def write_layout(
     path: str | Path,
     scenario: AnyScenario,
-    layout: Sequence[Cell],
+    layout: Sequence[Element],
     provenance: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write a layout for a scenario to a file that `load_layout` reads.
@@ -180,7 +204,7 @@ def write_layout(
     Args:
         path: The file; an existing one is replaced as a whole.
         scenario: The scenario that the layout is for, or its bundled name or path.
-        layout: (row, column) of each module.
+        layout: (row, column) of each module, or pieces.
         provenance: How the layout was made, e.g. method, command, seed, versions, blasts.
 
     Returns:
@@ -210,14 +234,14 @@ def _parse(content: Any, source: str) -> LayoutFile:
     """Return what a file says; `source` is its name, for errors."""
     if not isinstance(content, dict):
         return LayoutFile(_cells(content, source, ""))
-    for key in content:
-        if key not in _KEYS:
-            known = ", ".join(_KEYS)
-            raise LayoutError(
-                f"{source}: {key_path([key])}: unknown key{suggestion(key, _KEYS)}; known: {known}"
-            )
-    if "cells" not in content:
-        raise LayoutError(f"{source}: cells: missing")
+    version = content.get("version", CELLS_VERSION)
+    if type(version) is not int or version not in _LISTS:
+        known = " or ".join(map(str, _LISTS))
+        raise LayoutError(f"{source}: version: is {type_word(version)}, must be {known}")
+    key = _LISTS[version]
+    _check_keys(content, (key, *_OTHER_KEYS), f"{source}: ")
+    if key not in content:
+        raise LayoutError(f"{source}: {key}: missing")
     name, scenario_hash = content.get("scenario"), content.get("scenario_hash")
     if name is not None and not isinstance(name, str):
         raise LayoutError(f"{source}: scenario: is {type_word(name)}, must be a string")
@@ -233,11 +257,50 @@ def _parse(content: Any, source: str) -> LayoutFile:
     provenance = content.get("provenance", {})
     if not isinstance(provenance, dict):
         raise LayoutError(f"{source}: provenance: is {type_word(provenance)}, must be a table")
-    cells = _cells(content["cells"], source, "cells")
-    return LayoutFile(cells, name, scenario_hash, provenance)
+    read = _cells if version == CELLS_VERSION else _pieces
+    return LayoutFile(read(content[key], source, key), name, scenario_hash, provenance)
 
 
-def _cells(listed: Any, source: str, place: str) -> tuple[Cell, ...]:
+def _check_keys(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+    """Refuse a key that is not known; `where` begins the message (`LayoutError`)."""
+    for key in table:
+        if key not in known:
+            raise LayoutError(
+                f"{where}{key_path([key])}: unknown key{suggestion(key, known)};"
+                f" known: {', '.join(known)}"
+            )
+
+
+def _pieces(listed: Any, source: str, place: str) -> Layout:
+    """Return the pieces of a list; `place` is the key that it stands at."""
+    if not isinstance(listed, list):
+        raise LayoutError(f"{source}: {place}: is {type_word(listed)}, must be a list of tables")
+    return tuple(_piece(each, f"{source}: {place}[{i}]") for i, each in enumerate(listed))
+
+
+def _piece(table: Any, where: str) -> Piece:
+    """Return the piece of a table; `where` it is begins the message of an error."""
+    if not isinstance(table, dict):
+        raise LayoutError(f"{where}: is {type_word(table)}, must be a table")
+    _check_keys(table, tuple(_PIECE_KEYS), f"{where}: ")
+    given = {"turned": False, **table}
+    for key, kind in _PIECE_KEYS.items():
+        if key not in given:
+            raise LayoutError(f"{where}: {key}: missing")
+        if type(given[key]) is not kind:
+            raise LayoutError(
+                f"{where}: {key}: is {type_word(given[key])}, must be {_KIND_WORDS[kind]}"
+            )
+    return Piece(given["row"], given["column"], given["item"], given["turned"])
+
+
+def _piece_table(piece: Piece) -> dict[str, Any]:
+    """Return a piece as a file has it."""
+    table = {key: getattr(piece, key) for key in _PIECE_KEYS}
+    return table if piece.turned else {key: table[key] for key in ("item", "row", "column")}
+
+
+def _cells(listed: Any, source: str, place: str) -> Layout:
     """Return the cells of a list; `place` is the key that it stands at."""
     if not isinstance(listed, list):
         what = f"{place}: " if place else ""

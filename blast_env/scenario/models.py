@@ -89,7 +89,7 @@ __all__ = [
 
 
 _LATER_KEYS: Final = (
-    *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m"),
+    *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
 )
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
@@ -349,6 +349,8 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
     content = zone.model_dump(mode="json")
     for area in (*content["keep_outs"], *content["cost_areas"]):
         del area["reason"]
+    for item in content["items"]:
+        del item["description"]
     for key in _LATER_KEYS:
         if getattr(zone, key) == BuildZone.model_fields[key].default:
             del content[key]

@@ -1,102 +1,53 @@
-"""Placing modules: which cells are free, and layouts that are legal."""
+"""Placing modules or pieces: what may stand where, and layouts that are legal."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import fsum
-from operator import index
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray
 from blast_env.errors import LayoutError
-from blast_env.geometry import Cell
+from blast_env.geometry import Cell, Element, Layout, Piece
+from blast_env.scenario.access_way import closing_places, is_open
+from blast_env.scenario.catalogue import Catalogue, PlacedModule, cell_text, element_text
 from blast_env.scenario.files import AnyScenario, find_scenario
 from blast_env.scenario.models import Scenario
-from blast_env.scenario.problems import type_word, value_text
 from blast_env.scenario.zone import (
     NO_ZONE,
     BuildZone,
     EmptyZone,
     Surroundings,
-    closing_cells,
     empty_zone,
-    is_open,
     reason_against,
 )
-
-_PAIR: Final = "must be a pair of integers (row, column)"
-
-
-def cells_from(layout: Any) -> tuple[Cell, ...]:
-    """Return the cells of a layout as plain integers, in their order.
-
-    Args:
-        layout: A list of (row, column). NumPy integers and arrays are welcome.
-
-    Raises:
-        LayoutError: If it is anything else: a set has no order, and floats and truth values are
-            no integers.
-    """
-    is_array = isinstance(layout, np.ndarray) and layout.ndim > 0
-    if is_array or (isinstance(layout, Sequence) and not isinstance(layout, str | bytes)):
-        return tuple(cell_from(item, f"layout[{i}]") for i, item in enumerate(layout))
-    raise LayoutError(f"layout is {type_word(layout)}, must be a list of (row, column) pairs")
-
-
-def cell_from(item: Any, place: str) -> Cell:
-    """Return a pair of integers as a cell.
-
-    Args:
-        item: (row, column), as for `cells_from`.
-        place: Where it comes from, for the error.
-
-    Raises:
-        LayoutError: If it is anything else.
-    """
-    if type(item) is tuple and tuple(map(type, item)) == (int, int):
-        return item  # the usual case
-    listed = item.tolist() if isinstance(item, np.ndarray | np.generic) else item
-    if not isinstance(listed, list | tuple):
-        raise LayoutError(f"{place}: is {type_word(listed)}, {_PAIR}")
-    if len(listed) != 2:
-        raise LayoutError(f"{place}: has {len(listed)} values, {_PAIR}")
-    if not all(_is_integer(number) for number in listed):
-        raise LayoutError(f"{place}: is ({', '.join(map(type_word, listed))}), {_PAIR}")
-    return index(listed[0]), index(listed[1])
-
-
-def cell_text(cell: Cell) -> str:
-    """Return a cell for a message: `cell (3, 4)`."""
-    return f"cell ({value_text(cell[0])}, {value_text(cell[1])})"
-
-
-def _is_integer(value: Any) -> bool:
-    """Whether the value is an integer; `True` and 1.0 are not."""
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True)
 class Placement:
-    """A layout in the making: immutable, every module placed gives another placement.
+    """A layout in the making: immutable, everything placed gives another placement.
+
+    What is placed are single modules on cells or, where the build zone has a catalogue, pieces.
 
     Made with `Placement.empty`, `Placement.of` and `place`, which keep every condition of the
-    build zone; the constructor itself checks nothing. What may stand depends on which cells are
-    taken, not on their order, and whatever may stand may also stand with fewer modules around it.
+    build zone; the constructor itself checks nothing. What may stand depends on what stands
+    already, not on the order, and whatever may stand may also stand with less around it.
 
     Attributes:
         scenario: The scenario.
-        cells: (row, column) of each module, in the order in which they were placed.
+        layout: The modules' cells, or the pieces, in the order in which they were placed.
     """
 
     scenario: Scenario
-    cells: tuple[Cell, ...]
+    layout: Layout
 
     @classmethod
     def empty(cls, scenario: AnyScenario) -> "Placement":
-        """Return the placement without modules.
+        """Return the placement of nothing.
 
         Args:
             scenario: The scenario, or its bundled name or path.
@@ -104,100 +55,164 @@ class Placement:
         return cls(find_scenario(scenario), ())
 
     @classmethod
-    def of(cls, scenario: AnyScenario, cells: Sequence[Cell]) -> "Placement":
+    def of(cls, scenario: AnyScenario, layout: Sequence[Element]) -> "Placement":
         """Return the placement of a whole layout.
 
         Args:
             scenario: The scenario, or its bundled name or path.
-            cells: (row, column) of each module. NumPy integers and arrays are welcome.
+            layout: (row, column) of each module; with a catalogue, pieces (row, column, item,
+                turned). NumPy integers and arrays are welcome.
 
         Raises:
-            LayoutError: If a cell is not a pair of integers, lies outside the build zone, is
-                repeated or not available once the cells before it are taken.
+            LayoutError: If an element is anything else, lies outside the build zone, is repeated
+                or not available once those before it are placed.
         """
-        layout = cells_from(cells)
-        whole = cls(find_scenario(scenario), layout)
-        return whole if whole._is_sound else _placed_one_by_one(whole.scenario, layout)
+        empty = cls.empty(scenario)
+        whole = cls(empty.scenario, empty.catalogue.layout_from(layout))
+        return whole if whole._is_sound else _placed_one_by_one(empty, whole.layout)
 
-    def place(self, cell: Cell) -> "Placement":
-        """Return the placement with one more module.
+    def place(self, element: Element) -> "Placement":
+        """Return the placement with one more module or piece.
 
         Args:
-            cell: (row, column).
+            element: (row, column), or a piece.
 
         Raises:
-            LayoutError: If the cell is not available; the message is that of `explain`.
+            LayoutError: If it is not available; the message is that of `explain`.
         """
-        cell = cell_from(cell, "cell")
-        reason = self.explain(cell)
+        element = self.catalogue.element_from(element, self._word)
+        reason = self.explain(element)
         if reason is not None:
             raise LayoutError(reason)
-        placed = Placement(self.scenario, (*self.cells, cell))
+        placed = Placement(self.scenario, (*self.layout, element))
         # To look it up takes as long as all the rest of a step of the environment.
         vars(placed)["_empty_zone"] = self._empty_zone
         return placed
 
-    def explain(self, cell: Cell) -> str | None:
-        """Return a sentence that says why a cell is not available, or `None` if it is.
+    def explain(self, element: Element) -> str | None:
+        """Return a sentence that says why something cannot be placed, or `None` if it can.
 
         Args:
-            cell: (row, column), also of a cell that does not exist.
+            element: (row, column), or a piece; also one that does not exist.
 
         Raises:
-            LayoutError: If it is not a pair of integers.
+            LayoutError: If it is neither.
         """
-        cell = cell_from(cell, "cell")
-        reason = self._reason_against_site(cell)
-        if reason is None and cell in self.cells:
-            reason = "is taken by a module"
+        element = self.catalogue.element_from(element, self._word)
+        reason = self._reason_against_site(element) or self._reason_against_taken(element)
         if reason is not None:
-            return f"{cell_text(cell)} {reason}"
-        if self.stock_left == 0:
-            return f"the stock of {_counted_modules(len(self.cells))} is used up"
-        reason = self._reason_against_cost(cell) or self._reason_against_closing(cell)
-        return None if reason is None else f"{cell_text(cell)} {reason}"
+            return f"{element_text(element)} {reason}"
+        reason = self._reason_against_stock(element)
+        if reason is not None:
+            return reason
+        reason = self._reason_against_cost(element) or self._reason_against_closing(element)
+        return None if reason is None else f"{element_text(element)} {reason}"
+
+    @cached_property
+    def legal(self) -> BoolArray:
+        """What may be placed now, by variant and lower left cell, read-only.
+
+        Shape (variants, rows, columns) as in `Catalogue`: raveled, it is a mask of actions.
+        (1, 0, 0) without a build zone.
+        """
+        cells = self._empty_zone
+        if self.stock_left <= 0:
+            legal = np.zeros(cells.fits.shape, dtype=bool)
+        else:
+            legal = cells.places(cells.usable & ~self._taken) & (cells.costs <= self._spendable)
+            if self._closing is not None:
+                legal &= ~self._closing
+        if self.catalogue.has_items:
+            left = np.array(self.stocks_left)
+            legal &= left[[each.item for each in self.catalogue.variants], None, None] > 0
+        legal.flags.writeable = False
+        return legal
 
     @cached_property
     def free(self) -> BoolArray:
         """Which cells may take a module now, shape (rows, columns), read-only.
 
-        (0, 0) without a build zone.
+        With a catalogue: on which cells some piece may have its lower left one. (0, 0) without a
+        build zone.
         """
-        free = np.zeros(self._zone.shape, dtype=bool)
-        if self.stock_left > 0:
-            affordable = self._empty_zone.module_costs <= self._spendable
-            free = self._empty_zone.usable & affordable & ~self._taken & ~self._closing
+        free: BoolArray = np.any(self.legal, axis=0) if len(self.legal) > 1 else self.legal[0]
         free.flags.writeable = False
         return free
+
+    @cached_property
+    def open_ground(self) -> BoolArray:
+        """Which cells a piece that may be placed now could cover, (rows, columns), read-only."""
+        if not self.catalogue.has_items:
+            return self.free
+        ground = np.zeros(self._zone.shape, dtype=bool)
+        rows, columns = ground.shape
+        for legal, variant in zip(self.legal, self.catalogue.variants, strict=True):
+            for up, right in variant.cells_at(0, 0):
+                ground[up:, right:] |= legal[: rows - up, : columns - right]
+        ground.flags.writeable = False
+        return ground
 
     @property
     def usable(self) -> BoolArray:
         """Which cells may ever take a module, as far as the site is concerned, read-only.
 
-        Shape (rows, columns). Neither the modules nor stock, budget and access way count here.
+        Shape (rows, columns). Neither what stands nor stock, budget and access way count here.
         """
         return self._empty_zone.usable
 
     @property
     def module_costs(self) -> NDArray[np.float64]:
-        """What a module on each cell costs, shape (rows, columns), read-only."""
+        """What a module on each cell costs, shape (rows, columns), read-only.
+
+        With a catalogue, what the cost of an item is multiplied by there.
+        """
         return self._empty_zone.module_costs
 
     @property
+    def costs(self) -> NDArray[np.float64]:
+        """What each variant costs by its lower left cell, (variants, rows, columns), read-only."""
+        return self._empty_zone.costs
+
+    @property
+    def catalogue(self) -> Catalogue:
+        """What can be placed; it numbers the actions."""
+        return self._empty_zone.catalogue
+
+    @property
+    def modules(self) -> tuple[PlacedModule, ...]:
+        """The modules with their heights, piece by piece."""
+        return self._zone.modules(self.layout)
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """The cells that hold a module, piece by piece."""
+        cells: list[Cell] = []
+        for element in self.layout:
+            cells += self.catalogue.cells(element) if isinstance(element, Piece) else (element,)
+        return tuple(cells)
+
+    @property
     def is_full(self) -> bool:
-        """Whether no cell may take another module."""
-        return not self.free.any()
+        """Whether nothing more can be placed."""
+        return not self.legal.any()
 
     @property
     def stock_left(self) -> int:
-        """How many modules of the stock are left."""
-        return self._zone.stock - len(self.cells)
+        """How many modules of the stock are left, or how many pieces may still be placed."""
+        return self._zone.stock - len(self.layout)
+
+    @property
+    def stocks_left(self) -> tuple[int, ...]:
+        """How many pieces of each item may still be placed."""
+        return tuple(map(self._stock_left_of, range(len(self.catalogue.stocks))))
 
     @cached_property
     def cost(self) -> float:
-        """What the modules cost together."""
-        # Summed exactly, so that the order of the cells does not matter.
-        return fsum(self._empty_zone.module_costs[cell] for cell in self.cells)
+        """What the modules or pieces cost together."""
+        # Summed exactly, so that the order of the layout does not matter.
+        costs = self._empty_zone.costs
+        number = self.catalogue.variant_number
+        return fsum(costs[number(each), each[0], each[1]] for each in self.layout)
 
     @property
     def budget_left(self) -> float | None:
@@ -206,13 +221,18 @@ class Placement:
         return None if budget is None else max(0.0, budget - self.cost)
 
     @property
+    def _word(self) -> str:
+        """What an element of the layout is called in an error."""
+        return "piece" if self.catalogue.has_items else "cell"
+
+    @property
     def _zone(self) -> BuildZone:
         """The build zone; one without cells where the scenario has none."""
         return self.scenario.build_zone or NO_ZONE
 
     @property
     def _spendable(self) -> float:
-        """What the next module may cost."""
+        """What the next module or piece may cost."""
         return self._zone.cost_limit - self.cost
 
     @cached_property
@@ -231,25 +251,41 @@ class Placement:
     def _taken(self) -> BoolArray:
         """Which cells hold a module, shape (rows, columns)."""
         taken = np.zeros(self._zone.shape, dtype=bool)
-        if self.cells:
+        if self.layout:
             taken[tuple(zip(*self.cells, strict=True))] = True
         return taken
 
     @cached_property
-    def _closing(self) -> BoolArray:
-        """On which cells a module would close the access way, shape (rows, columns)."""
+    def _closing(self) -> BoolArray | None:
+        """From where each variant would close the access way, (variants, rows, columns)."""
         way = self._zone.access_way
         if way is None:
-            return np.zeros(self._zone.shape, dtype=bool)
-        return closing_cells(way, self._empty_zone.passable & ~self._taken)
+            return None
+        passable = self._empty_zone.passable & ~self._taken
+        return np.stack([*closing_places(way, passable, self.catalogue.variants)])
+
+    @cached_property
+    def _placed_of(self) -> Counter[str]:
+        """How many pieces of each item stand, or modules under the empty name."""
+        return Counter(each.item if isinstance(each, Piece) else "" for each in self.layout)
+
+    def _stock_left_of(self, item: int) -> int:
+        """Return how many pieces of an item may still be placed."""
+        catalogue = self.catalogue
+        if not catalogue.has_items:
+            return self.stock_left
+        left = catalogue.stocks[item] - self._placed_of[catalogue.names[item]]
+        return min(left, self.stock_left)
 
     @property
     def _is_sound(self) -> bool:
-        """Whether all cells together keep every condition."""
-        zone = self._zone
-        if not self.cells:
+        """Whether all elements together keep every condition."""
+        zone, catalogue = self._zone, self.catalogue
+        if not self.layout:
             return True
-        if self.stock_left < 0 or len(set(self.cells)) < len(self.cells):
+        if any(catalogue.reason_against(each) is not None for each in self.layout):
+            return False
+        if min(self.stock_left, *self.stocks_left) < 0 or len(set(self.cells)) < len(self.cells):
             return False
         if not all(map(zone.has, self.cells)):
             return False
@@ -258,20 +294,50 @@ class Placement:
         passable = self._empty_zone.passable & ~self._taken
         return zone.access_way is None or is_open(zone.access_way, passable)
 
-    def _reason_against_site(self, cell: Cell) -> str | None:
-        """Return why a cell may not be used even without modules, or `None` if it may."""
+    def _reason_against_site(self, element: Element) -> str | None:
+        """Return why something may not stand there even alone, or `None` if it may."""
         zone = self._zone
         if zone is NO_ZONE:
             return "is not usable: the scenario has no build zone"
-        if not zone.has(cell):
-            return f"is outside the build zone of {zone.rows} rows and {zone.columns} columns"
-        if self._empty_zone.usable[cell]:
-            return None
-        return reason_against(self._surroundings, cell)
+        reason = self.catalogue.reason_against(element)
+        if reason is not None:
+            return reason
+        size = f"the build zone of {zone.rows} rows and {zone.columns} columns"
+        if not zone.has((element[0], element[1])):
+            return f"is outside {size}"
+        cells = self.catalogue.cells(element)
+        if not zone.has(cells[-1]):
+            return f"sticks out of {size}"
+        for cell in cells:
+            if not self._empty_zone.usable[cell]:
+                reason = reason_against(self._surroundings, cell)
+                return _of_cell(element, cell, reason)
+        return None
 
-    def _reason_against_cost(self, cell: Cell) -> str | None:
-        """Return why a module on a cell cannot be paid for, or `None` if it can."""
-        cost = self._empty_zone.module_costs[cell]
+    def _reason_against_taken(self, element: Element) -> str | None:
+        """Return why something that stands already is in the way, or `None` if nothing is."""
+        if not isinstance(element, Piece):
+            return "is taken by a module" if element in self.layout else None
+        for cell in self.catalogue.cells(element):
+            if self._taken[cell]:
+                other = next(each for each in self.layout if cell in self.catalogue.cells(each))
+                return _of_cell(element, cell, f"is taken by {element_text(other)}")
+        return None
+
+    def _reason_against_stock(self, element: Element) -> str | None:
+        """Return that the stock is used up, or `None` if it is not."""
+        if self.stock_left == 0:
+            what = "piece" if self.catalogue.has_items else "module"
+            return f"the stock of {_counted(len(self.layout), what)} is used up"
+        item = self.catalogue.variant(element).item
+        if self._stock_left_of(item) > 0:
+            return None
+        stock = _counted(self.catalogue.stocks[item], f"{self.catalogue.names[item]!r}", "")
+        return f"the stock of {stock} is used up"
+
+    def _reason_against_cost(self, element: Element) -> str | None:
+        """Return why something cannot be paid for, or `None` if it can."""
+        cost = self.costs[self.catalogue.variant_number(element), element[0], element[1]]
         budget = self._zone.budget
         if budget is None or cost <= self._spendable:
             return None
@@ -280,36 +346,56 @@ class Placement:
             f" {budget:.10g} is left"
         )
 
-    def _reason_against_closing(self, cell: Cell) -> str | None:
-        """Return why a module on a cell would be in the way, or `None` if it would not."""
-        way = self._zone.access_way
-        if way is None or not self._closing[cell]:
+    def _reason_against_closing(self, element: Element) -> str | None:
+        """Return why something would be in the way, or `None` if it would not."""
+        way, number = self._zone.access_way, self.catalogue.variant_number(element)
+        if way is None or self._closing is None or not self._closing[number, *element[:2]]:
             return None
         return f"would close the {way.description}"
 
     def __reduce__(self) -> tuple[Callable[..., "Placement"], tuple[Any, ...]]:
         """Pickle only what cannot be worked out again: arrays would come back writeable."""
-        return Placement, (self.scenario, self.cells)
+        return Placement, (self.scenario, self.layout)
 
 
-def _placed_one_by_one(scenario: Scenario, layout: tuple[Cell, ...]) -> Placement:
-    """Place the cells of a layout in their order, or raise the error for the first that fails."""
-    placement = Placement.empty(scenario)
-    for cell in layout:
-        if cell in placement.cells:
-            raise LayoutError(f"{cell_text(cell)} is repeated")
-        reason = placement._reason_against_site(cell)
-        if reason is None and placement.stock_left == 0:
-            raise LayoutError(
-                f"{cell_text(cell)} is beyond the stock:"
-                f" the layout has {len(layout)} modules, must have at most {len(placement.cells)}"
-            )
-        placement = placement.place(cell)
+def _placed_one_by_one(empty: Placement, layout: Layout) -> Placement:
+    """Place a layout in its order, or raise the error for the first element that fails."""
+    placement = empty
+    for element in layout:
+        if element in placement.layout:
+            raise LayoutError(f"{element_text(element)} is repeated")
+        if placement._reason_against_site(element) is None:
+            _check_stock(placement, layout, element)
+        placement = placement.place(element)
     return placement
 
 
-def _counted_modules(count: int) -> str:
-    return "1 module" if count == 1 else f"{count} modules"
+def _check_stock(placement: Placement, layout: Layout, element: Element) -> None:
+    """Refuse an element for which there is nothing left in stock (`LayoutError`)."""
+    catalogue, what = placement.catalogue, "modules"
+    asked, most = len(layout), len(placement.layout)
+    if isinstance(element, Piece):
+        what = "pieces"
+        if placement.stock_left > 0:
+            what = f"of {element.item!r}"
+            asked = sum(each.item == element.item for each in layout if isinstance(each, Piece))
+            most = catalogue.stocks[catalogue.variant(element).item]
+    if placement.stock_left == 0 or placement._reason_against_stock(element) is not None:
+        raise LayoutError(
+            f"{element_text(element)} is beyond the stock:"
+            f" the layout has {asked} {what}, must have at most {most}"
+        )
+
+
+def _of_cell(element: Element, cell: Cell, reason: str | None) -> str | None:
+    """Return a reason against a cell as one against an element that covers it."""
+    if reason is None or not isinstance(element, Piece):
+        return reason
+    return f"would stand on {cell_text(cell)}, which {reason}"
+
+
+def _counted(count: int, word: str, plural: str = "s") -> str:
+    return f"1 {word}" if count == 1 else f"{count} {word}{plural}"
 
 
 def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
@@ -327,14 +413,14 @@ def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
     return Placement.empty(scenario).usable
 
 
-def check_layout(scenario: AnyScenario, layout: Sequence[Cell]) -> tuple[Cell, ...]:
-    """Return the cells of a layout as plain integers, in their order.
+def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:
+    """Return a layout as plain values, in its order.
 
     Args:
         scenario: The scenario that the layout is for, or its bundled name or path.
-        layout: (row, column) of each module. NumPy integers and arrays are welcome.
+        layout: (row, column) of each module, or pieces. NumPy integers and arrays are welcome.
 
     Raises:
-        LayoutError: As `Placement.of` does, if a cell is not available.
+        LayoutError: As `Placement.of` does, if something cannot be placed.
     """
-    return Placement.of(scenario, layout).cells
+    return Placement.of(scenario, layout).layout

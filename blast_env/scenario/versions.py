@@ -20,7 +20,7 @@ NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "site": ("air_height_m",),
     "charge": ("height_m",),
     "structures": ("height_m", "faces", "building"),
-    "build_zone": ("height_m",),
+    "build_zone": ("height_m", "items"),
 }
 """What version 2 added, by section; all of it has a default, which is what version 1 means."""
 

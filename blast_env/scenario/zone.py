@@ -1,18 +1,26 @@
-"""The build zone: its cells, which of them may take a module, and the access way."""
+"""The build zone: its cells, and which of them may take a module or a piece."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, StrictFloat, StrictInt
-from scipy.ndimage import label
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    StrictFloat,
+    StrictInt,
+    model_serializer,
+    model_validator,
+)
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Cell, Rectangle
+from blast_env.geometry import Cell, Element, Piece, Rectangle
+from blast_env.scenario.access_way import AccessWay, any_in_windows, counts_before
+from blast_env.scenario.catalogue import MOST_ITEMS, Catalogue, Cost, Item, PlacedModule, Variant
 from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
@@ -30,7 +38,8 @@ BUDGET_TOLERANCE: Final = 1e-9
 """Share of the budget by which rounding may exceed it."""
 
 
-Cost = Annotated[StrictFloat, Field(gt=0.0, le=1e9)]
+MOST_STOCK: Final = 10_000
+"""Modules, or pieces of all items together, that there may be to place."""
 
 
 Reason = Annotated[str, Field(min_length=1, max_length=200)]
@@ -54,71 +63,52 @@ class KeepOut(Area):
 
 
 class CostArea(Area):
-    """A part of the build zone in which a module has another cost, and why.
+    """A part of the build zone in which building has another cost, and why.
 
     Attributes:
-        module_cost: Cost of a module on a cell that overlaps the area.
+        module_cost: Cost of a module on a cell that overlaps the area, in a zone without a
+            catalogue.
+        cost_factor: In a zone with a catalogue, what the cost of an item is multiplied by on a
+            cell that overlaps the area.
     """
 
-    module_cost: Cost
+    module_cost: Cost | None = None
+    cost_factor: Cost | None = None
 
-
-def _check_whole_modules(width_m: float) -> float:
-    """Refuse a width that is not a whole number of cells."""
-    if abs(width_m - round(width_m / MODULE_SIDE_M) * MODULE_SIDE_M) > 1e-9:
-        raise ValueError(f"must be a multiple of {MODULE_SIDE_M:g}, the side of a module")
-    return width_m
-
-
-class AccessWay(Section):
-    """A way across the build zone that a vehicle must always be able to take.
-
-    The vehicle is a square of whole cells. It moves along rows and columns, stays inside the
-    zone, and covers neither a module nor a structure; keep-outs are open to it.
-
-    Attributes:
-        width_m: Side of the vehicle's square; whole modules.
-        between: The two sides of the zone that the way connects.
-    """
-
-    width_m: Annotated[
-        StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0), AfterValidator(_check_whole_modules)
-    ]
-    between: Literal["left_right", "bottom_top"]
-
-    @property
-    def width_cells(self) -> int:
-        """Side of the vehicle's square in cells."""
-        return round(self.width_m / MODULE_SIDE_M)
-
-    @property
-    def description(self) -> str:
-        """The way in words: `access way of 3 m from left to right`."""
-        return f"access way of {self.width_m:g} m from {self.between.replace('_', ' to ')}"
+    @model_serializer(mode="wrap")
+    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the one that the zone has no use for."""
+        return {key: value for key, value in handler(self).items() if value is not None}
 
 
 class BuildZone(Section):
-    """Where barrier modules may stand: a grid of cells of one module each.
+    """Where barriers may stand: a grid of cells of one module each.
+
+    What is placed are the items of a catalogue or, without one, single modules.
 
     Attributes:
         corner_m: Lower left corner of the cell (0, 0).
         rows: Number of rows, counted upwards.
         columns: Number of columns, counted to the right.
-        stock: How many modules there are to place.
+        items: The catalogue; without one, single modules are placed.
+        stock: How many modules there are to place; with a catalogue, the most pieces that may be
+            placed in all, which are all that there are unless it is given.
         keep_outs: Areas in which no cell may be used.
         module_capacity: As for structures, for the modules of the barrier.
         clearance_m: Least clear distance between a module and a structure.
-        module_cost: Cost of a module outside all cost areas.
+        module_cost: Cost of a module outside all cost areas; items have costs of their own.
         cost_areas: Areas in which a module has another cost; the highest one counts.
-        budget: What the modules may cost together; without it, anything.
+        budget: What modules or pieces may cost together; without it, anything.
         access_way: A way across the zone that must stay open; without it, none need.
-        height_m: Height of the modules; without it, as high as the air.
+        height_m: Height of the modules; without it, as high as the air. Items have heights of
+            their own.
     """
 
     corner_m: PointM
     rows: Count
     columns: Count
-    stock: Annotated[StrictInt, Field(ge=1, le=10_000)]
+    items: Annotated[tuple[Item, ...], Field(max_length=MOST_ITEMS)] = ()
+    stock: Annotated[StrictInt, Field(ge=1, le=MOST_STOCK)]
     keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=100)] = ()
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
     clearance_m: Annotated[StrictFloat, Field(ge=0.0, le=2000.0)] = 0.0
@@ -127,6 +117,64 @@ class BuildZone(Section):
     budget: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
     access_way: AccessWay | None = None
     height_m: Height | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _stock_of_items(cls, given: Any) -> Any:
+        """Fill in the stock of a zone with a catalogue: all the pieces that there are."""
+        if not isinstance(given, Mapping) or "stock" in given:
+            return given
+        items = given.get("items")
+        if not isinstance(items, list | tuple) or not items:
+            return given
+        pieces = sum(map(_pieces_of, items))
+        # An empty catalogue is an error of its own, `build_zone_problems`.
+        return {**given, "stock": min(max(pieces, 1), MOST_STOCK)}
+
+    @property
+    def catalogue(self) -> Catalogue:
+        """What can be placed."""
+        if self.items:
+            return Catalogue.of_items(self.items, self.shape)
+        return Catalogue.of_modules(self.stock, self.height_m, self.module_cost, self.shape)
+
+    @property
+    def highest_m(self) -> float | None:
+        """Height of the highest barrier; `None` is as high as the air."""
+        return max(item.height_m for item in self.items) if self.items else self.height_m
+
+    def modules(self, layout: Iterable[Element]) -> tuple[PlacedModule, ...]:
+        """Return the modules of a layout, piece by piece.
+
+        Raises:
+            LayoutError: If there is no such item, or it cannot be turned.
+        """
+        catalogue = self.catalogue
+        modules = []
+        for element in layout:
+            variant = catalogue.variant(element)
+            name = self.piece_name(element) if isinstance(element, Piece) else ""
+            modules += [
+                PlacedModule(cell, variant.height_m, name, variant.stops_vehicles)
+                for cell in variant.cells_at(element[0], element[1])
+            ]
+        return tuple(modules)
+
+    def piece_name(self, piece: Piece) -> str:
+        """Return what a piece is called in tables: its item and its centre in metres."""
+        x_m, y_m = self.element_rectangle_m(piece).centre
+        return f"{piece.item}_x{x_m:.3f}_y{y_m:.3f}"
+
+    def element_rectangle_m(self, element: Element) -> Rectangle:
+        """Return the rectangle that a module or a piece covers.
+
+        Raises:
+            LayoutError: If there is no such item, or it cannot be turned.
+        """
+        variant = self.catalogue.variant(element)
+        corner_m = self.cell_rectangle_m((element[0], element[1]))[:2]
+        size_m = (variant.columns * MODULE_SIDE_M, variant.rows * MODULE_SIDE_M)
+        return Rectangle.from_corner(corner_m, size_m)
 
     @property
     def rectangle_m(self) -> Rectangle:
@@ -172,6 +220,12 @@ class BuildZone(Section):
     def has(self, cell: Cell) -> bool:
         """Whether the grid has a cell."""
         return 0 <= cell[0] < self.rows and 0 <= cell[1] < self.columns
+
+
+def _pieces_of(item: Any) -> int:
+    """Return how many pieces an item of a catalogue, checked or not, says that there are."""
+    stock = item.get("stock") if isinstance(item, Mapping) else getattr(item, "stock", 0)
+    return stock if isinstance(stock, int) else 0
 
 
 NO_ZONE: Final = BuildZone.model_construct(corner_m=(0.0, 0.0), rows=0, columns=0, stock=0)
@@ -267,14 +321,34 @@ class EmptyZone:
     """The cells of a build zone without modules; all arrays are read-only.
 
     Attributes:
+        catalogue: What can be placed.
         usable: Which cells may be used, shape (rows, columns).
         passable: Which cells no structure covers, shape (rows, columns).
-        module_costs: What a module on each cell costs, shape (rows, columns).
+        module_costs: What a module on each cell costs, shape (rows, columns); with a catalogue,
+            what the cost of an item is multiplied by there.
+        fits: Where the cells under each variant may be used, by its lower left cell, shape
+            (variants, rows, columns).
+        costs: What each variant costs there, likewise; infinite where it sticks out of the zone.
     """
 
+    catalogue: Catalogue
     usable: BoolArray
     passable: BoolArray
     module_costs: NDArray[np.float64]
+    fits: BoolArray
+    costs: NDArray[np.float64]
+
+    def places(self, free: BoolArray) -> BoolArray:
+        """Return where each variant covers nothing but free cells, (variants, rows, columns)."""
+        variants = self.catalogue.variants
+        if len(variants) == 1 and variants[0].rows == variants[0].columns == 1:
+            return free[np.newaxis]  # the usual case
+        places = np.zeros((len(variants), *free.shape), dtype=bool)
+        taken = counts_before(~free)
+        for place, variant in zip(places, variants, strict=True):
+            anything = any_in_windows(taken, variant.rows, variant.columns)
+            place[: anything.shape[0], : anything.shape[1]] = ~anything
+        return places
 
 
 @lru_cache(maxsize=16)
@@ -288,10 +362,14 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
     passable = np.ones_like(usable)
     for structure in surroundings.structures:
         passable &= ~_overlapping(structure.rectangle_m, boxes)
-    costs = _module_costs(zone, boxes)
-    for array in (usable, passable, costs):
+    module_costs = _module_costs(zone, boxes)
+    catalogue = zone.catalogue
+    costs = np.stack([_costs(variant, module_costs, zone) for variant in catalogue.variants])
+    cells = EmptyZone(catalogue, usable, passable, module_costs, usable[np.newaxis], costs)
+    cells = replace(cells, fits=cells.places(usable))
+    for array in (usable, passable, module_costs, cells.fits, costs):
         array.flags.writeable = False
-    return EmptyZone(usable, passable, costs)
+    return cells
 
 
 def reason_against(surroundings: Surroundings, cell: Cell) -> str | None:
@@ -341,12 +419,36 @@ def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, 
 
 
 def _module_costs(zone: BuildZone, boxes: Boxes) -> NDArray[np.float64]:
-    """Return what a module on each cell costs: the highest cost of the areas around it."""
+    """Return what a module on each cell costs: the highest cost of the areas around it.
+
+    With a catalogue that is the factor on an item's cost, 1 outside all areas.
+    """
     highest = np.zeros(zone.shape)
     for area in zone.cost_areas:
         inside = _overlapping(area.rectangle_m, boxes)
-        highest[inside] = np.maximum(highest[inside], area.module_cost)
-    return np.where(highest > 0.0, highest, zone.module_cost)
+        cost = area.cost_factor if zone.items else area.module_cost
+        highest[inside] = np.maximum(highest[inside], 0.0 if cost is None else cost)
+    return np.where(highest > 0.0, highest, 1.0 if zone.items else zone.module_cost)
+
+
+def _costs(
+    variant: Variant, module_costs: NDArray[np.float64], zone: BuildZone
+) -> NDArray[np.float64]:
+    """Return what a variant costs by its lower left cell (rows, columns).
+
+    Every module of a piece bears its share of the cost, times the factor of its own cell.
+    """
+    if not zone.items:
+        return module_costs
+    costs = np.full(zone.shape, inf)
+    rows, columns = zone.rows - variant.rows + 1, zone.columns - variant.columns + 1
+    if rows > 0 and columns > 0:
+        factors = sum(
+            module_costs[up : up + rows, right : right + columns]
+            for up, right in variant.cells_at(0, 0)
+        )
+        costs[:rows, :columns] = variant.cost * (factors / (variant.rows * variant.columns))
+    return costs
 
 
 def _overlapping(rectangle: Rectangle, boxes: Boxes) -> BoolArray:
@@ -355,85 +457,3 @@ def _overlapping(rectangle: Rectangle, boxes: Boxes) -> BoolArray:
     along_x = (left < rectangle.right - TOLERANCE_M) & (right > rectangle.left + TOLERANCE_M)
     along_y = (bottom < rectangle.top - TOLERANCE_M) & (top > rectangle.bottom + TOLERANCE_M)
     return along_x & along_y
-
-
-def is_open(way: AccessWay, passable: BoolArray) -> bool:
-    """Return whether the vehicle can cross the zone.
-
-    Args:
-        way: The way; no wider than the zone.
-        passable: Which cells the vehicle may cover, shape (rows, columns).
-    """
-    return _Chains.of(way, passable).leave_a_way
-
-
-def closing_cells(way: AccessWay, passable: BoolArray) -> BoolArray:
-    """Return the cells on which a module would leave no way, shape (rows, columns).
-
-    If there is no way already, those are all cells.
-
-    Args:
-        way: The way; no wider than the zone.
-        passable: Which cells the vehicle may cover, shape (rows, columns).
-    """
-    chains = _Chains.of(way, passable)
-    if not chains.leave_a_way:
-        return np.ones_like(passable)
-    width = way.width_cells
-    closing = _beside(chains.below, width) & _beside(chains.above, width)
-    return _along_columns(way, closing)
-
-
-@dataclass(frozen=True)
-class _Chains:
-    """The places of the vehicle that chains of obstacles close, from either border.
-
-    Place (i, j) is that of the vehicle with its lower left cell at row i - 1 and column j; the
-    first and the last row are the borders, where the vehicle would leave the zone.
-
-    Attributes:
-        below: Places that hang together with the border below, shape (rows - width + 3,
-            columns - width + 1).
-        above: Places that hang together with the border above, of the same shape.
-    """
-
-    below: BoolArray
-    above: BoolArray
-
-    @classmethod
-    def of(cls, way: AccessWay, passable: BoolArray) -> "_Chains":
-        closed = _any_in_windows(~_along_columns(way, passable), way.width_cells)
-        bordered = np.ones((closed.shape[0] + 2, closed.shape[1]), dtype=bool)
-        bordered[1:-1] = closed
-        labels, _ = label(bordered, structure=np.ones((3, 3), dtype=bool))
-        return cls(below=labels == labels[0, 0], above=labels == labels[-1, 0])
-
-    @property
-    def leave_a_way(self) -> bool:
-        """Whether no chain reaches from border to border."""
-        return not self.below[-1, 0]
-
-
-def _beside(chain: BoolArray, width: int) -> BoolArray:
-    """Return the cells on which a module would close a place in or next to the chain.
-
-    A module on cell (i, j) closes the places from (i - width + 2, j - width + 1) to (i + 1, j), as
-    far as there are such.
-    """
-    rows, columns = chain.shape
-    framed = np.zeros((rows + 2 * width - 2, columns + 2 * width), dtype=bool)
-    framed[width - 1 : width - 1 + rows, width : width + columns] = chain
-    return _any_in_windows(framed, width + 2)
-
-
-def _any_in_windows(mask: BoolArray, side: int) -> BoolArray:
-    """Return for each square of side x side cells whether anything in it is true."""
-    counts = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), dtype=np.int32)
-    np.cumsum(np.cumsum(mask, axis=0, dtype=np.int32), axis=1, out=counts[1:, 1:])
-    strips = counts[side:] - counts[:-side]
-    return strips[:, side:] > strips[:, :-side]
-
-
-def _along_columns(way: AccessWay, cells: BoolArray) -> BoolArray:
-    """Return the cells turned such that the way runs along the columns, or turned back."""
-    return cells if way.between == "left_right" else cells.T

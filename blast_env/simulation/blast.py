@@ -17,7 +17,7 @@ from blast_env.calibration.model import (
     scenario_calibration,
 )
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.geometry import Cell
+from blast_env.geometry import Element, layout_text
 from blast_env.physics.collisions import CollisionArray
 from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, ParticleEngine
 from blast_env.physics.engines import find_engine, find_particle_engine, is_gas
@@ -56,7 +56,7 @@ class Blast:
     """
 
     scenario: ScenarioField = ScenarioField()
-    layout: Sequence[Cell] = ()
+    layout: Sequence[Element] = ()
     seed: int = 0
     engine: str | Engine = "pymunk"
     charge: Charge | None = None
@@ -258,7 +258,7 @@ class BlastResult:
         record: RunRecord = {
             "scenario": blast.scenario.name,
             "scenario hash": blast.scenario.content_hash,
-            "layout (row, column)": " ".join(f"{row},{column}" for row, column in blast.layout),
+            "layout (row, column)": layout_text(blast.layout),
             "seed": blast.seed,
             "charge x (m)": charge.position_m[0],
             "charge y (m)": charge.position_m[1],
@@ -305,7 +305,7 @@ class BlastResult:
 @overload
 def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
     scenario: AnyScenario,
-    layout: Sequence[Cell] = ...,
+    layout: Sequence[Element] = ...,
     seed: int = ...,
     *,
     engine: "Literal['gas'] | GasEngine",
@@ -318,7 +318,7 @@ def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
 @overload
 def simulate(
     scenario: AnyScenario,
-    layout: Sequence[Cell] = ...,
+    layout: Sequence[Element] = ...,
     seed: int = ...,
     engine: str | Engine = ...,
     charge: Charge | None = ...,
@@ -328,7 +328,7 @@ def simulate(
 
 def simulate(
     scenario: AnyScenario,
-    layout: Sequence[Cell] = (),
+    layout: Sequence[Element] = (),
     seed: int = 0,
     engine: str | Engine = "pymunk",
     charge: Charge | None = None,

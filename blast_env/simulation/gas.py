@@ -18,7 +18,7 @@ import pandas as pd
 from blast_env.arrays import FloatArray
 from blast_env.calibration.model import ScaledImpulse
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.geometry import Cell
+from blast_env.geometry import Element, layout_text
 from blast_env.physics.engine import EndReason
 from blast_env.physics.gas.engine import (
     CHECKED_SCALED_DISTANCE,
@@ -72,6 +72,7 @@ MODULE_COLUMNS: Final = (
     Column("face", "", "west, east, south, north or roof"),
     Column("area_m2", "m2", "area of that face over the whole height"),
     *_LOADS,
+    Column("piece", "", "piece of a barrier that it is part of; empty if it is of none"),
 )
 """A row a face of a module that touches air."""
 
@@ -115,7 +116,7 @@ class GasBlast:
     """
 
     scenario: ScenarioField = ScenarioField()
-    layout: Sequence[Cell] = ()
+    layout: Sequence[Element] = ()
     seed: int = 0
     engine: GasEngine = field(default_factory=GasEngine)
     charge: Charge | None = None
@@ -227,6 +228,14 @@ class GasResult:
         left, bottom = (table["structure"].map(lambda name, k=k: corners[name][k]) for k in (0, 1))
         table["x_m"] = left + (table["column"] + 0.5) * MODULE_SIDE_M
         table["y_m"] = bottom + (table["row"] + 0.5) * MODULE_SIDE_M
+        of_pieces = {
+            (outline.name, *cell): piece
+            for outline in self.run.site.structures
+            for cell, piece in zip(outline.cells or (), outline.pieces or (), strict=False)
+        }
+        modules = zip(table["structure"], table["row"], table["column"], strict=True)
+        pieces = [of_pieces.get(module, "") for module in modules]
+        table["piece"] = pd.array(pieces, dtype="str")
         return table[[column.name for column in MODULE_COLUMNS]]
 
     @cached_property
@@ -341,7 +350,7 @@ class GasResult:
         return {
             "scenario": blast.scenario.name,
             "scenario hash": blast.scenario.content_hash,
-            "layout (row, column)": " ".join(f"{row},{column}" for row, column in blast.layout),
+            "layout (row, column)": layout_text(blast.layout),
             "charge x (m)": charge.position_m[0],
             "charge y (m)": charge.position_m[1],
             "charge height (m)": charge.height_m,

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Cell
+from blast_env.geometry import Layout
 from blast_env.scenario import AnyScenario, Placement, Scenario, find_scenario, usable_cells
 from blast_env.sites.visibility import Visibility
 
@@ -49,7 +49,7 @@ class SiteMeasures:
         )
 
 
-def visibility_layout(scenario: AnyScenario, lines: Visibility) -> tuple[Cell, ...]:
+def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
     """Return a layout of which each module cuts as many lines by its cost as one more can.
 
     It keeps every condition of the build zone, and ends where no module would cut another line.
@@ -69,7 +69,7 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> tuple[Cell, .
             break
         placement = placement.place((row, column))
         left[lines.cut[:, row, column]] = 0.0
-    return placement.cells
+    return placement.layout
 
 
 def _wall_share(scenario: Scenario, lines: Visibility) -> float:

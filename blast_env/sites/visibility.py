@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Cell, Rectangle
+from blast_env.geometry import Element, Rectangle
 from blast_env.scenario import (
     AnyScenario,
     AnySource,
@@ -73,7 +73,7 @@ class Visibility:
         cut = _cut(scenario, origin[free], direction[free], protected_m[free])
         return cls(weight[free], cut, float(weight[free].sum() / max(weight.sum(), 1e-300)))
 
-    def cut_share(self, layout: Sequence[Cell]) -> float:
+    def cut_share(self, layout: Sequence[Element]) -> float:
         """Return the share of the lines, by weight, that a layout cuts.
 
         Args:

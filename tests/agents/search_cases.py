@@ -8,7 +8,7 @@ from blast_agents.search import Layout, LayoutProblem
 from blast_env import load_scenario
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.evaluation.cases import visible_case
-from blast_env.geometry import Cell
+from blast_env.geometry import Element
 from blast_env.scenario import Scenario
 from tests.agents.sites import site
 
@@ -52,7 +52,7 @@ class WatchedEvaluator(BlastEvaluator):
 
     def loads_of_many(
         self,
-        pairs: Iterable[tuple[Sequence[Cell], Threat]],
+        pairs: Iterable[tuple[Sequence[Element], Threat]],
         processes: int = 1,
         progress: Callable[[float], None] | None = None,
     ) -> list[BlastLoads]:

@@ -9,7 +9,6 @@ from blast_agents.rules import (
     NEAR_BUILDING,
     NEAR_CHARGE,
     RULES,
-    Layout,
     expected_charge,
     line_of_sight_wall,
     wall_near_building,
@@ -20,6 +19,7 @@ from hypothesis import strategies as st
 
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement, PointSource, RectangleSource, Scenario
 from tests.agents.sites import site
@@ -31,7 +31,7 @@ BUILDING_M = (32.0, 20.0)
 def centres_m(scenario: Scenario, layout: Layout) -> np.ndarray:
     """Return the centres of modules (n, 2)."""
     zone = scenario.zone
-    return np.array([zone.cell_centre_m(cell) for cell in layout])
+    return np.array([zone.element_rectangle_m(each).centre for each in layout])
 
 
 def covered_m(scenario: Scenario, layout: Layout, charge: Charge) -> list[tuple[float, float]]:

@@ -77,7 +77,7 @@ def test_random_walls_are_legal_and_use_what_there_is(name: str) -> None:
 
 
 def test_random_walls_hang_together_more_than_random_modules() -> None:
-    def neighbours(layout: tuple[tuple[int, int], ...]) -> int:
+    def neighbours(layout: Layout) -> int:
         return sum(
             max(abs(a[0] - b[0]), abs(a[1] - b[1])) == 1 for a in layout for b in layout if a < b
         )
@@ -120,7 +120,7 @@ def test_a_cut_takes_each_side_from_one_parent(seed: int) -> None:
     first, second = (tuple((row, column) for row in range(8)) for column in (0, 1))
     child = cut(first, second, np.random.default_rng(seed))
     assert len(child) == 8
-    rows = sorted(row for row, column in child if column == 0)
+    rows = sorted(each[0] for each in child if each[1] == 0)
     assert rows in (list(range(len(rows))), list(range(8 - len(rows), 8)))
 
 

@@ -6,12 +6,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.scenario import AccessWay
-from blast_env.scenario.zone import closing_cells, is_open
+from blast_env.scenario.access_way import closing_places, is_open
+from blast_env.scenario.catalogue import Catalogue
 from tests.scenario.zones import can_cross
 
 
 def way(width_cells: int, between: str = "left_right") -> AccessWay:
     return AccessWay.model_validate({"width_m": 0.5 * width_cells, "between": between})
+
+
+def closing_cells(way: AccessWay, passable: np.ndarray) -> np.ndarray:
+    """The cells on which a single module leaves no way."""
+    shape = (passable.shape[0], passable.shape[1])
+    (closing,) = closing_places(way, passable, Catalogue.of_modules(1, None, 1.0, shape).variants)
+    return closing
 
 
 def grid(picture: str, solid: str = "#") -> np.ndarray:

@@ -99,7 +99,7 @@ def test_no_public_function_insists_on_a_loaded_scenario(module_name: str) -> No
         lambda it: usable_cells(it).tolist(),
         lambda it: check_layout(it, [(1, 1)]),
         lambda it: LayoutFile.of(it, [(1, 1)]),
-        lambda it: LayoutFile.of(COURTYARD, [(1, 1)]).cells_for(it),
+        lambda it: LayoutFile.of(COURTYARD, [(1, 1)]).layout_for(it),
         lambda it: draw_threats(it, range(3)),
         lambda it: BlastEvaluator(it).scenario,
         lambda it: Evaluators("event").of(it).scenario,

@@ -102,6 +102,7 @@ NEW_PATHS = COUNTING_PATHS + WORDS
 
 def test_new_keys_are_all_tried() -> None:
     listed = {(section, key) for section, keys in NEW_KEYS.items() for key in keys}
+    listed.remove(("build_zone", "items"))  # test_catalogue.py
     assert listed == {(str(path[0]) if path[1:] else "", str(path[-1])) for path in NEW_PATHS}
 
 

@@ -70,7 +70,7 @@ def test_every_layout_that_can_be_placed_comes_back(
     path = tmp_path_factory.getbasetemp() / "placed_layout.json"
     write_layout(path, scenario(), placement.cells, provenance)
     file = LayoutFile.load(path)
-    assert file.cells_for(scenario()) == placement.cells
+    assert file.layout_for(scenario()) == placement.cells
     assert file.provenance == provenance
 
 

@@ -1,6 +1,6 @@
 """Scenarios with a small build zone, and the rules of building in it written out the slow way."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Collection
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from blast_env.geometry import Cell, Rectangle
+from blast_env.geometry import Cell, Piece, Rectangle
 from blast_env.scenario import BuildZone, Placement, Scenario, ScenarioError
 from tests.scenario.documents import Document
 
@@ -112,6 +112,13 @@ def may_stand(scenario: Scenario, cells: Collection[Cell]) -> bool:
     limit = np.inf if zone.budget is None else zone.budget * (1.0 + 1e-9)
     if sum(_cost(zone, square) for square in squares) > limit:
         return False
+    return modules_may_stand(scenario, cells)
+
+
+def modules_may_stand(scenario: Scenario, cells: Collection[Cell]) -> bool:
+    """Whether the site leaves room for modules on all these cells, whatever they cost."""
+    zone = scenario.zone
+    squares = [zone.cell_rectangle_m(cell) for cell in cells]
     if any(square.overlaps(each.rectangle_m) for square in squares for each in zone.keep_outs):
         return False
     solids = [each.rectangle_m for each in scenario.structures]
@@ -154,11 +161,76 @@ def can_cross(passable: np.ndarray, width: int) -> bool:
 
 
 def _cost(zone: BuildZone, square: Rectangle) -> float:
-    inside = [each.module_cost for each in zone.cost_areas if square.overlaps(each.rectangle_m)]
-    return max(inside, default=zone.module_cost)
+    areas = [each for each in zone.cost_areas if square.overlaps(each.rectangle_m)]
+    return max((each.module_cost or 0.0 for each in areas), default=zone.module_cost)
 
 
 def _distance_m(one: Rectangle, other: Rectangle) -> float:
     gap_x = max(0.0, one.left - other.right, other.left - one.right)
     gap_y = max(0.0, one.bottom - other.top, other.bottom - one.top)
     return float((gap_x**2 + gap_y**2) ** 0.5)
+
+
+# --- Zones with a catalogue.
+
+
+@st.composite
+def catalogue_documents(draw: st.DrawFn) -> Document:
+    """Drawn zones with a catalogue of up to three items instead of single modules."""
+    document = draw(zone_documents())
+    document["schema_version"] = 2
+    zone = document["build_zone"]
+    del zone["module_cost"]
+    zone["cost_areas"] = [
+        {"cost_factor": each.pop("module_cost"), **each} for each in zone["cost_areas"]
+    ]
+    lengths, costs = st.integers(1, 4), st.sampled_from([0.5, 1.0, 2.5])
+    zone["items"] = [
+        {
+            "name": f"item{number}",
+            "length_modules": draw(lengths),
+            "thickness_modules": draw(st.integers(1, 2)),
+            "height_m": 1.0 + number,
+            "cost": draw(costs),
+            "stock": draw(st.integers(0, 3)),
+            "rotatable": draw(st.booleans()),
+        }
+        for number in range(draw(st.integers(1, 3)))
+    ]
+    pieces = sum(item["stock"] for item in zone["items"])
+    zone["stock"] = draw(st.integers(1, max(pieces, 1)))
+    return document
+
+
+def pieces_may_stand(scenario: Scenario, layout: Collection[Piece]) -> bool:
+    """Whether all these pieces may stand, as the format's description says it."""
+    zone = scenario.zone
+    if len(layout) > zone.stock:
+        return False
+    items, cost = {item.name: item for item in zone.items}, 0.0
+    cells: list[Cell] = []
+    for piece in layout:
+        item = items[piece.item]
+        if piece.turned and (not item.rotatable or item.length_modules == item.thickness_modules):
+            return False
+        size = (item.thickness_modules, item.length_modules)
+        rows, columns = size[::-1] if piece.turned else size
+        own = [
+            (piece.row + up, piece.column + right) for up in range(rows) for right in range(columns)
+        ]
+        cells += own
+        squares = [zone.cell_rectangle_m(cell) for cell in own]
+        cost += item.cost * sum(_factor(zone, square) for square in squares) / len(own)
+    of_items = Counter(piece.item for piece in layout)
+    if any(of_items[name] > item.stock for name, item in items.items()):
+        return False
+    if len(set(cells)) < len(cells) or not all(zone.has(cell) for cell in cells):
+        return False
+    if zone.budget is not None and cost > zone.budget * (1.0 + 1e-9):
+        return False
+    return modules_may_stand(scenario, cells)
+
+
+def _factor(zone: BuildZone, square: Rectangle) -> float:
+    areas = [each for each in zone.cost_areas if square.overlaps(each.rectangle_m)]
+    return max((each.cost_factor or 0.0 for each in areas), default=1.0)

@@ -15,7 +15,7 @@ from blast_agents.proposal import Proposal
 from blast_env.arrays import FloatArray
 from blast_env.evaluation import Case
 from blast_env.files import write_atomically
-from blast_env.geometry import Layout
+from blast_env.geometry import layout_text
 from blast_env.provenance import package_version
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.style import count_of
@@ -95,13 +95,8 @@ def _case(
         "blasts": proposal.blasts,
         "seconds": proposal.seconds,
         "modules": len(proposal.layout),
-        "layout": _cells_text(proposal.layout),
+        "layout": layout_text(proposal.layout),
     }
-
-
-def _cells_text(layout: Layout) -> str:
-    """Return the cells of a layout for one field of a table: `3,4 3,5`."""
-    return " ".join(f"{row},{column}" for row, column in layout)
 
 
 HEADERS: Final = (

@@ -125,7 +125,7 @@ class GreedySearch:
             while not placement.is_full:
                 blasts = session.exploring_left // placement.stock_left
                 tried = self._cells(placement, gains_pa_s, max(1, blasts // plan.threats), rng)
-                impulses = session.assess([(*placement.cells, cell) for cell in tried])
+                impulses = session.assess([(*placement.layout, cell) for cell in tried])
                 gains_pa_s.update(zip(tried, (impulse_pa_s - impulses).tolist(), strict=True))
                 best = int(np.argmin(impulses))
                 placement = placement.place(tried[best])

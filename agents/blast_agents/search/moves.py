@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray
-from blast_env.geometry import Cell, Layout
+from blast_env.geometry import Cell, Element, Layout, Piece
 from blast_env.scenario import Placement, Scenario
 
 Draw = Callable[[Scenario, np.random.Generator], Layout]
@@ -18,20 +18,21 @@ Draw = Callable[[Scenario, np.random.Generator], Layout]
 _LEAST_WALL: Final = 2
 
 
-def legal_part(scenario: Scenario, cells: Iterable[Cell]) -> Placement:
-    """Return the placement of the cells, in their order, leaving out what may not stand.
+def legal_part(scenario: Scenario, layout: Iterable[Element]) -> Placement:
+    """Return the placement of a layout, in its order, leaving out what may not stand.
 
     Args:
         scenario: The scenario.
-        cells: (row, column), also of cells that do not exist.
+        layout: Modules or pieces, also of cells that do not exist.
     """
     placement = Placement.empty(scenario)
     rows, columns = placement.usable.shape
-    for row, column in cells:
+    for element in layout:
+        row, column = element[:2]
         if not (0 <= row < rows and 0 <= column < columns):
             continue
-        if placement.free[row, column]:
-            placement = placement.place((row, column))
+        if placement.legal[placement.catalogue.variant_number(element), row, column]:
+            placement = placement.place(element)
     return placement
 
 
@@ -56,7 +57,7 @@ def random_walls(scenario: Scenario, rng: np.random.Generator) -> Layout:
             if not inside or not placement.free[tuple(cell)]:
                 break
             placement = placement.place((cell[0], cell[1]))
-    return placement.cells
+    return placement.layout
 
 
 def random_part(scenario: Scenario, rng: np.random.Generator) -> Layout:
@@ -103,7 +104,7 @@ class Moves:
             return self._moved(layout, rng) if layout else layout
         if not layout:
             return (_one_of(placement.free, rng),)
-        return placement.place(self._near(placement.free, _any_of(layout, rng), rng)).cells
+        return placement.place(self._near(placement.free, _any_of(layout, rng), rng)).layout
 
     def _removed(self, layout: Layout, rng: np.random.Generator) -> Layout:
         return _without(layout, int(rng.integers(len(layout))))
@@ -113,13 +114,13 @@ class Moves:
         index = int(rng.integers(len(layout)))
         rest = Placement(self.scenario, _without(layout, index))
         to_another = len(layout) > 1 and rng.random() < 0.5
-        beside = _any_of(rest.cells, rng) if to_another else layout[index]
-        return rest.place(self._near(rest.free, beside, rng, layout[index])).cells
+        beside = _any_of(rest.layout, rng) if to_another else layout[index]
+        return rest.place(self._near(rest.free, beside, rng, layout[index])).layout
 
     def _swapped(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Take one module away and put one on any cell."""
         rest = Placement(self.scenario, _without(layout, int(rng.integers(len(layout)))))
-        return rest.place(_one_of(rest.free, rng)).cells
+        return rest.place(_one_of(rest.free, rng)).layout
 
     def _wall_moved(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Move the modules that hang together with one of them, or all, by the same way."""
@@ -127,19 +128,19 @@ class Moves:
         if rng.random() < 0.3:
             wall = set(layout)
         up, right = np.rint(rng.normal(0.0, self.reach_cells, 2)).astype(int).tolist()
-        moved = [(row + up, column + right) for row, column in layout if (row, column) in wall]
+        moved = [_shifted(each, up, right) for each in layout if each in wall]
         stay = [cell for cell in layout if cell not in wall]
         placement = legal_part(self.scenario, [*stay, *moved])
         # What cannot go along is put beside what could.
-        while len(placement.cells) < len(layout) and not placement.is_full:
-            if not placement.cells:
+        while len(placement.layout) < len(layout) and not placement.is_full:
+            if not placement.layout:
                 return layout
-            beside = _any_of(placement.cells, rng)
+            beside = _any_of(placement.layout, rng)
             placement = placement.place(self._near(placement.free, beside, rng))
-        return placement.cells
+        return placement.layout
 
     def _near(
-        self, free: BoolArray, cell: Cell, rng: np.random.Generator, but: Cell | None = None
+        self, free: BoolArray, cell: Element, rng: np.random.Generator, but: Element | None = None
     ) -> Cell:
         """Return a free cell near another one; at least one cell besides `but` should be free."""
         rows, columns = np.nonzero(free)
@@ -156,11 +157,11 @@ class Moves:
         return int(rows[index]), int(columns[index])
 
 
-def _connected(layout: Layout, start: Cell) -> set[Cell]:
+def _connected(layout: Layout, start: Element) -> set[Element]:
     """Return the modules that hang together with one, corners included."""
     found, todo, left = {start}, [start], set(layout) - {start}
     while todo:
-        row, column = todo.pop()
+        row, column = todo.pop()[:2]
         beside = {each for each in left if hypot(each[0] - row, each[1] - column) < 1.5}
         left -= beside
         found |= beside
@@ -168,11 +169,17 @@ def _connected(layout: Layout, start: Cell) -> set[Cell]:
     return found
 
 
+def _shifted(element: Element, up: int, right: int) -> Element:
+    """Return an element so many cells further up and to the right."""
+    row, column = element[0] + up, element[1] + right
+    return element._replace(row=row, column=column) if isinstance(element, Piece) else (row, column)
+
+
 def _without(layout: Layout, index: int) -> Layout:
     return layout[:index] + layout[index + 1 :]
 
 
-def _any_of(layout: Layout, rng: np.random.Generator) -> Cell:
+def _any_of(layout: Layout, rng: np.random.Generator) -> Element:
     return layout[int(rng.integers(len(layout)))]
 
 

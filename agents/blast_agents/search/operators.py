@@ -14,7 +14,7 @@ from blast_agents.search.moves import Moves, legal_part
 from blast_agents.search.session import SearchSession
 from blast_env.arrays import BoolArray
 from blast_env.errors import LayoutError, import_extra
-from blast_env.geometry import Cell, Layout
+from blast_env.geometry import Element, Layout
 from blast_env.scenario import Placement, Scenario
 
 with import_extra("search", "genetic search"):
@@ -83,7 +83,7 @@ def cut(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
     """Return the first modules of one layout and the last ones of another in some direction."""
     angle = rng.uniform(0.0, 2.0 * pi)
 
-    def along(cell: Cell) -> float:
+    def along(cell: Element) -> float:
         return cos(angle) * cell[0] + sin(angle) * cell[1]
 
     count = int(rng.integers(len(first) + 1))
@@ -163,10 +163,10 @@ def repaired(scenario: Scenario, layout: Layout, rng: np.random.Generator) -> La
         kept = rng.choice(len(layout), size=stock, replace=False)
         layout = tuple(layout[index] for index in sorted(kept))
     try:
-        return Placement.of(scenario, layout).cells
+        return Placement.of(scenario, layout).layout
     except LayoutError:
         order = rng.permutation(len(layout))
-        return legal_part(scenario, [layout[index] for index in order]).cells
+        return legal_part(scenario, [layout[index] for index in order]).layout
 
 
 Objectives = Callable[[list[Layout]], NDArray[np.float64]]

@@ -13,7 +13,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
 from blast_env.evaluation.cases import check_distinct
 from blast_env.evaluation.comparison import check_something_arrives
-from blast_env.geometry import Cell, Layout
+from blast_env.geometry import Element, Layout, layout_text
 from blast_env.physics.scene import Charge
 from blast_env.runner import check_workers
 from blast_env.scenario import Scenario
@@ -76,7 +76,7 @@ class LayoutProblem:
         loads = self.evaluator.loads_of_many(pairs, self.processes)
         return [each.protected_impulse_pa_s for each in loads]
 
-    def impulse_pa_s(self, layout: Sequence[Cell]) -> float:
+    def impulse_pa_s(self, layout: Sequence[Element]) -> float:
         """Return the impulse with a layout over all threats, Pa*s; outside any budget.
 
         Raises:
@@ -108,7 +108,7 @@ class Candidate:
 
     Attributes:
         blasts: Blasts that the search had spent by then.
-        layout: Its cells, sorted.
+        layout: Its cells or pieces, sorted.
         impulse_pa_s: Impulse over the threats that it had met, Pa*s.
         threats: How many threats that were, counted from the first.
     """
@@ -186,16 +186,17 @@ class SearchResult:
 def _table(candidates: tuple[Candidate, ...]) -> pd.DataFrame:
     return pd.DataFrame(
         [
-            (each.blasts, each.impulse_pa_s, each.threats, len(each.layout), _cells_text(each))
+            (
+                each.blasts,
+                each.impulse_pa_s,
+                each.threats,
+                len(each.layout),
+                layout_text(each.layout),
+            )
             for each in candidates
         ],
         columns=["blasts", "impulse_pa_s", "threats", "modules", "layout"],
     )
-
-
-def _cells_text(candidate: Candidate) -> str:
-    """Return the cells of a layout for one field of a table: `3,4 3,5`."""
-    return " ".join(f"{row},{column}" for row, column in candidate.layout)
 
 
 LAYOUTS_PER_REALISATION: Final = 500

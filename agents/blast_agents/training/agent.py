@@ -356,23 +356,23 @@ class TrainedAgent:
         self, scenario: Scenario, charge: Charge | None, draw: torch.Generator | None, count: int
     ) -> tuple[Layout, ...]:
         episode = self._episode(scenario, charge)
-        columns = scenario.zone.columns
+        catalogue = scenario.zone.catalogue
         placements = [Placement.empty(scenario)] * count
         open_ones = [index for index in range(count) if not placements[index].is_full]
         while open_ones:
             observations = np.stack([episode.observe(placements[index]) for index in open_ones])
-            free = np.stack([placements[index].free.ravel() for index in open_ones])
+            legal = np.stack([placements[index].legal.ravel() for index in open_ones])
             going_on = []
             for index, action in zip(
-                open_ones, self._actions(observations, free, draw), strict=True
+                open_ones, self._actions(observations, legal, draw), strict=True
             ):
-                if action == free.shape[1]:
+                if action == catalogue.finish:
                     continue
-                placements[index] = placements[index].place(divmod(action, columns))
+                placements[index] = placements[index].place(catalogue.element(action))
                 if not placements[index].is_full:
                     going_on.append(index)
             open_ones = going_on
-        return tuple(placement.cells for placement in placements)
+        return tuple(placement.layout for placement in placements)
 
     def _episode(self, scenario: Scenario, charge: Charge | None) -> EpisodeObservation:
         sources = scenario.charge
@@ -382,10 +382,10 @@ class TrainedAgent:
         return OBSERVATIONS[self.observation].episode(observable)
 
     def _actions(
-        self, observations: Array, free: NDArray[np.bool_], draw: torch.Generator | None
+        self, observations: Array, placeable: NDArray[np.bool_], draw: torch.Generator | None
     ) -> list[int]:
         """Return the action for each observation; the last one, to finish, is always legal."""
-        legal = torch.as_tensor(np.pad(free, ((0, 0), (0, 1)), constant_values=True))
+        legal = torch.as_tensor(np.pad(placeable, ((0, 0), (0, 1)), constant_values=True))
         with torch.no_grad():
             logits = logits_of(self.policy, torch.as_tensor(observations))
             logits = logits.masked_fill(~legal, -torch.inf)

@@ -287,8 +287,8 @@ def _grid(engine: GasEngine, site: BlastSite) -> tuple[GasGrid, NDArray[np.int64
 
 def _cells_of(outline: StructureOutline, grid: GasGrid, site: BlastSite) -> NDArray[np.bool_]:
     """Return the cells that a structure fills (nx, ny, nz)."""
-    height_m = site.air_height_m if outline.height_m is None else outline.height_m
-    row, _ = _modules_at(outline, grid)
+    row, column = _modules_at(outline, grid)
+    height_m = _heights_m(outline, site.air_height_m, row, column)[:, :, np.newaxis]
     return np.asarray((row >= 0)[:, :, np.newaxis] & (grid.centres_m(2) < height_m))
 
 
@@ -306,6 +306,21 @@ def _modules_at(
         present[tuple(np.array(outline.cells).T)] = True
         here &= present[np.clip(row, 0, outline.rows - 1), np.clip(column, 0, outline.columns - 1)]
     return np.where(here, row, -1), np.where(here, column, -1)
+
+
+def _heights_m(
+    outline: StructureOutline,
+    air_height_m: float,
+    row: NDArray[np.int64],
+    column: NDArray[np.int64],
+) -> FloatArray:
+    """Return how high an outline is at modules (nx, ny); where there is none, anything."""
+    whole_m = air_height_m if outline.height_m is None else outline.height_m
+    heights_m = np.full((outline.rows, outline.columns), whole_m)
+    if outline.cells is not None and outline.heights_m is not None:
+        of_cells = [air_height_m if each is None else each for each in outline.heights_m]
+        heights_m[tuple(np.array(outline.cells).T)] = of_cells
+    return np.asarray(heights_m[row, column])
 
 
 def _face_table(grid: GasGrid, owner: NDArray[np.int64]) -> FaceTable:

@@ -13,15 +13,13 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata, spearmanr
 
 from blast_env.arrays import FloatArray
-from blast_env.geometry import Cell
+from blast_env.geometry import Layout
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.presets import preset, with_resolution
 from blast_env.physics.scene import Charge
 from blast_env.runner import run_all
 from blast_env.scenario import Scenario
 from blast_env.simulation import Blast, simulate
-
-Layout = tuple[Cell, ...]
 
 AVERAGED: Final = (1, 2, 4, 8, 16)
 
@@ -99,7 +97,7 @@ class Correlation(NamedTuple):
 
 def measured_loads(
     scenario: Scenario,
-    layouts: list[Layout],
+    layouts: Sequence[Layout],
     charges: list[Charge],
     processes: int,
     progress: Callable[[float], None] | None = None,
@@ -226,7 +224,7 @@ def with_parameters(scenario: Scenario, parameters: SimulationParameters) -> Sce
 def blasts_of(
     name: str,
     scenario: Scenario,
-    layouts: list[Layout],
+    layouts: Sequence[Layout],
     seeds: range,
     processes: int,
     progress: Callable[[float], None] | None = None,

@@ -18,7 +18,7 @@ from scipy.stats import ks_2samp
 
 from blast_env.arrays import FloatArray
 from blast_env.files import write_atomically
-from blast_env.geometry import Cell
+from blast_env.geometry import Layout
 from blast_env.physics.collisions import incidence_angle_rad
 from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
@@ -56,7 +56,7 @@ class EngineScene:
     name: str
     scenario: Scenario
     structures: tuple[str, ...] = ("building",)
-    layout: tuple[Cell, ...] = ()
+    layout: Layout = ()
     steps_radii: tuple[float, ...] = _USUAL_STEPS
 
 

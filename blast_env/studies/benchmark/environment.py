@@ -188,8 +188,8 @@ def _time_parts(
             env.step(random_action(env.action_masks(), rng))
     observation = env.task.observation.episode(env.observable)
     # A placement remembers its free cells: a fresh one has to work them out.
-    placement = Placement.of(env.observable.scenario, env.placement.cells)
-    mask_s = _timed(lambda: np.append(placement.free.ravel(), True))
+    placement = Placement.of(env.observable.scenario, env.placement.layout)
+    mask_s = _timed(lambda: np.append(placement.legal.ravel(), True))
     return reset_s, mask_s, _timed(partial(observation.observe, placement))
 
 

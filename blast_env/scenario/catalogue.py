@@ -1,0 +1,325 @@
+"""The catalogue of barrier items, and every way in which one can be set down.
+
+An item is a rectangle of modules that are placed together. Here, and nowhere else, is which cells
+a piece covers, how high it is, and which number the action of placing it has.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from operator import index
+from typing import Annotated, Any, Final, NamedTuple
+
+import numpy as np
+from pydantic import Field, StrictBool, StrictFloat, StrictInt
+
+from blast_env.errors import LayoutError, suggestion
+from blast_env.geometry import Cell, Element, Piece
+from blast_env.scenario.problems import type_word, value_text
+from blast_env.scenario.sections import Count, Height, Name, Section
+
+Cost = Annotated[StrictFloat, Field(gt=0.0, le=1e9)]
+
+
+MOST_ITEMS: Final = 20
+"""Items of a catalogue; each has an action for every cell and orientation."""
+
+
+class Item(Section):
+    """A barrier that comes in one piece: modules that are placed together.
+
+    Attributes:
+        name: Name in layouts, tables and drawings.
+        description: What it is, for people.
+        length_modules: Modules along its length: to the right, or upwards if it is turned.
+        thickness_modules: Modules across its length.
+        height_m: Height above the ground.
+        cost: What a piece costs where no cost area says otherwise.
+        stock: How many pieces there are.
+        rotatable: Whether it may be turned by a right angle.
+        stops_vehicles: Whether no vehicle gets past it, over it or through it.
+    """
+
+    name: Name
+    description: Annotated[str, Field(max_length=200)] = ""
+    length_modules: Count
+    thickness_modules: Count = 1
+    height_m: Height
+    cost: Cost
+    stock: Annotated[StrictInt, Field(ge=0, le=10_000)]
+    rotatable: StrictBool = True
+    stops_vehicles: StrictBool = True
+
+    @property
+    def orientations(self) -> tuple[bool, ...]:
+        """In which orientations it can be set down: not turned, and turned."""
+        square = self.length_modules == self.thickness_modules
+        return (False, True) if self.rotatable and not square else (False,)
+
+    def footprint(self, turned: bool) -> tuple[int, int]:
+        """Return how many rows and columns of cells it covers."""
+        size = self.thickness_modules, self.length_modules
+        return size[::-1] if turned else size
+
+
+class Variant(NamedTuple):
+    """One way to set an item down.
+
+    Attributes:
+        item: Index of the item in the catalogue.
+        name: Its name; empty for the single module of a zone without a catalogue.
+        turned: Whether its length runs upwards.
+        rows: Rows of cells that it covers.
+        columns: Columns of cells that it covers.
+        height_m: Its height; `None` is as high as the air.
+        cost: What a piece costs where no cost area says otherwise.
+        stops_vehicles: Whether no vehicle gets past it.
+    """
+
+    item: int
+    name: str
+    turned: bool
+    rows: int
+    columns: int
+    height_m: float | None
+    cost: float
+    stops_vehicles: bool
+
+    def cells_at(self, row: int, column: int) -> Iterator[Cell]:
+        """Yield the cells that it covers with its lower left one there, row by row."""
+        for up in range(self.rows):
+            for right in range(self.columns):
+                yield row + up, column + right
+
+
+class PlacedModule(NamedTuple):
+    """One module of a layout.
+
+    Attributes:
+        cell: Where it stands.
+        height_m: Its height; `None` is as high as the air.
+        piece: Name of the piece that it is part of; empty for a single module.
+        stops_vehicles: Whether no vehicle gets past it.
+    """
+
+    cell: Cell
+    height_m: float | None
+    piece: str
+    stops_vehicles: bool
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """What can be placed on the cells of a zone, and the numbers of the actions that do it.
+
+    Without items the only thing to place is a single module, and the elements of a layout are
+    cells; with items they are pieces. Action `variant * rows * columns + row * columns + column`
+    sets a variant down with its lower left cell there; the action after the last one finishes.
+
+    Attributes:
+        variants: Every way to set an item down: item by item, not turned before turned.
+        names: Names of the items; empty without a catalogue.
+        stocks: How many pieces there are of each item (of single modules, if there are none).
+        shape: Rows and columns of the zone.
+    """
+
+    variants: tuple[Variant, ...]
+    names: tuple[str, ...]
+    stocks: tuple[int, ...]
+    shape: tuple[int, int]
+
+    @classmethod
+    def of_items(cls, items: Sequence[Item], shape: tuple[int, int]) -> "Catalogue":
+        """Return the catalogue of a zone with items."""
+        variants = tuple(
+            Variant(
+                number,
+                item.name,
+                turned,
+                *item.footprint(turned),
+                item.height_m,
+                item.cost,
+                item.stops_vehicles,
+            )
+            for number, item in enumerate(items)
+            for turned in item.orientations
+        )
+        names, stocks = (item.name for item in items), (item.stock for item in items)
+        return cls(variants, tuple(names), tuple(stocks), shape)
+
+    @classmethod
+    def of_modules(
+        cls, stock: int, height_m: float | None, cost: float, shape: tuple[int, int]
+    ) -> "Catalogue":
+        """Return what stands for the catalogue of a zone without one: the single module."""
+        return cls((Variant(0, "", False, 1, 1, height_m, cost, True),), (), (stock,), shape)
+
+    @property
+    def has_items(self) -> bool:
+        """Whether layouts consist of pieces; otherwise they consist of cells."""
+        return bool(self.names)
+
+    @property
+    def finish(self) -> int:
+        """The number of the action that finishes; the others are below it."""
+        return len(self.variants) * self.shape[0] * self.shape[1]
+
+    def element(self, action: int) -> Element:
+        """Return what an action below `finish` places."""
+        variant, row, column = np.unravel_index(action, (len(self.variants), *self.shape))
+        return self.element_at(int(variant), int(row), int(column))
+
+    def element_at(self, variant: int, row: int, column: int) -> Element:
+        """Return the element of a variant with its lower left cell there."""
+        if not self.has_items:
+            return row, column
+        chosen = self.variants[variant]
+        return Piece(row, column, chosen.name, chosen.turned)
+
+    def action(self, element: Element) -> int:
+        """Return the number of the action that places an element.
+
+        Raises:
+            LayoutError: If there is no such item or orientation, or the lower left cell is off
+                the grid.
+        """
+        rows, columns = self.shape
+        row, column = element[:2]
+        if not (0 <= row < rows and 0 <= column < columns):
+            raise LayoutError(
+                f"{element_text(element)} is outside the build zone of {rows} rows and"
+                f" {columns} columns"
+            )
+        return (self.variant_number(element) * rows + row) * columns + column
+
+    def variant_number(self, element: Element) -> int:
+        """Return the number of the variant that an element is of.
+
+        Raises:
+            LayoutError: If there is no such item, or it cannot be turned.
+        """
+        if not isinstance(element, Piece):
+            return 0
+        number = self._numbers.get((element.item, element.turned))
+        if number is None:
+            raise LayoutError(f"{element_text(element)} {self.reason_against(element)}")
+        return number
+
+    def variant(self, element: Element) -> Variant:
+        """Return the variant that an element is of.
+
+        Raises:
+            LayoutError: If there is no such item, or it cannot be turned.
+        """
+        return self.variants[self.variant_number(element)]
+
+    def reason_against(self, element: Element) -> str | None:
+        """Return why there is no such element, whatever the cell, or `None` if there is."""
+        if not isinstance(element, Piece) or (element.item, element.turned) in self._numbers:
+            return None
+        if element.item not in self.names:
+            nearest = suggestion(element.item, self.names) or f"; known: {', '.join(self.names)}"
+            return f"is not in the catalogue{nearest}"
+        item = self.variants[self._numbers[element.item, False]]
+        if item.rows == item.columns:
+            return "is as long as it is thick: it is not turned"
+        return "may not be turned: it is not rotatable"
+
+    def cells(self, element: Element) -> tuple[Cell, ...]:
+        """Return the cells that an element covers, its lower left one first, row by row.
+
+        Raises:
+            LayoutError: If there is no such item, or it cannot be turned.
+        """
+        return tuple(self.variant(element).cells_at(element[0], element[1]))
+
+    def element_from(self, given: Any, place: str) -> Element:
+        """Return an element of a layout as plain values.
+
+        Args:
+            given: (row, column), or with items (row, column, item, turned), of which `turned` may
+                be left out. NumPy's numbers and arrays are welcome.
+            place: Where it comes from, for the error.
+
+        Raises:
+            LayoutError: If it is anything else.
+        """
+        if not self.has_items:
+            return cell_from(given, place)
+        if type(given) is Piece and tuple(map(type, given)) == (int, int, str, bool):
+            return given  # the usual case
+        known = ", ".join(map(repr, self.names))
+        if not isinstance(given, list | tuple):
+            raise LayoutError(f"{place}: is {type_word(given)}, {_PIECE}; items: {known}")
+        if len(given) not in (3, 4):
+            raise LayoutError(f"{place}: has {len(given)} values, {_PIECE}; items: {known}")
+        row, column, item, turned = (*given, False)[:4]
+        numbers = _is_integer(row) and _is_integer(column)
+        if not (numbers and isinstance(item, str) and isinstance(turned, bool | np.bool_)):
+            words = ", ".join(map(type_word, given))
+            raise LayoutError(f"{place}: is ({words}), {_PIECE}; items: {known}")
+        return Piece(index(row), index(column), str(item), bool(turned))
+
+    def layout_from(self, layout: Any) -> tuple[Element, ...]:
+        """Return a layout as plain values, in its order; see `element_from`.
+
+        Raises:
+            LayoutError: If it is no layout: a set has no order, and floats and truth values are
+                no integers.
+        """
+        is_array = isinstance(layout, np.ndarray) and layout.ndim > 0
+        if is_array or (isinstance(layout, Sequence) and not isinstance(layout, str | bytes)):
+            return tuple(self.element_from(item, f"layout[{i}]") for i, item in enumerate(layout))
+        what = "(row, column, item, turned)" if self.has_items else "(row, column) pairs"
+        raise LayoutError(f"layout is {type_word(layout)}, must be a list of {what}")
+
+    @cached_property
+    def _numbers(self) -> dict[tuple[str, bool], int]:
+        """The number of each variant by name and orientation."""
+        return {(each.name, each.turned): i for i, each in enumerate(self.variants)}
+
+
+_PAIR: Final = "must be a pair of integers (row, column)"
+
+
+_PIECE: Final = "must be (row, column, item, turned), two integers, a name and a truth value"
+
+
+def cell_from(given: Any, place: str) -> Cell:
+    """Return a pair of integers as a cell.
+
+    Args:
+        given: (row, column). NumPy's numbers and arrays are welcome.
+        place: Where it comes from, for the error.
+
+    Raises:
+        LayoutError: If it is anything else.
+    """
+    if type(given) is tuple and tuple(map(type, given)) == (int, int):
+        return given  # the usual case
+    listed = given.tolist() if isinstance(given, np.ndarray | np.generic) else given
+    if not isinstance(listed, list | tuple):
+        raise LayoutError(f"{place}: is {type_word(listed)}, {_PAIR}")
+    if len(listed) != 2:
+        raise LayoutError(f"{place}: has {len(listed)} values, {_PAIR}")
+    if not all(_is_integer(number) for number in listed):
+        raise LayoutError(f"{place}: is ({', '.join(map(type_word, listed))}), {_PAIR}")
+    return index(listed[0]), index(listed[1])
+
+
+def _is_integer(value: Any) -> bool:
+    """Whether the value is an integer; `True` and 1.0 are not."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def cell_text(cell: Cell) -> str:
+    """Return a cell for a message: `cell (3, 4)`."""
+    return f"cell ({value_text(cell[0])}, {value_text(cell[1])})"
+
+
+def element_text(element: Element) -> str:
+    """Return an element for a message: `cell (3, 4)`, `'t_wall' at cell (3, 4), turned`."""
+    if not isinstance(element, Piece):
+        return cell_text(element)
+    turned = ", turned," if element.turned else ""
+    return f"{value_text(element.item)} at {cell_text((element.row, element.column))}{turned}"

@@ -1,0 +1,129 @@
+"""Checks of a build zone: its catalogue and its areas, and whether anything can be built in it."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from blast_env.arrays import BoolArray
+from blast_env.scenario.access_way import AccessWay, closing_places, is_open
+from blast_env.scenario.problems import Problem, extent
+from blast_env.scenario.zone import Area, BuildZone, EmptyZone, Surroundings, empty_zone
+from blast_env.units import MODULE_SIDE_M
+
+
+def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
+    """Yield what is wrong with a build zone, its areas and what stands around it."""
+    zone = surroundings.zone
+    yield from _area_problems(zone)
+    yield from _key_problems(zone)
+    cells = empty_zone(surroundings)
+    if zone.items:
+        yield from _item_problems(zone, cells)
+    elif zone.stock > (usable := int(cells.usable.sum())):
+        message = f"is {zone.stock}, must be at most {usable}, the number of usable cells"
+        yield Problem("build_zone.stock", message)
+    in_stock = [cells.catalogue.stocks[each.item] > 0 for each in cells.catalogue.variants]
+    available = cells.fits & np.array(in_stock)[:, np.newaxis, np.newaxis]
+    if zone.access_way is not None:
+        closing = _closing(zone, zone.access_way, cells)
+        problem = _access_way_problem(zone, zone.access_way, cells.passable, available, closing)
+        if problem is not None:
+            yield problem
+        else:
+            available = available & ~closing
+    if zone.budget is not None and available.any():
+        cheapest = float(cells.costs[available].min())
+        if cheapest > zone.cost_limit:
+            what = "a module on the cheapest usable cell"
+            if zone.items:
+                what = "the cheapest piece at its cheapest place"
+            message = f"is {zone.budget:.10g}, must be at least {cheapest:.10g}, the cost of {what}"
+            yield Problem("build_zone.budget", message)
+
+
+def _area_problems(zone: BuildZone) -> Iterator[Problem]:
+    """Check that keep-outs and cost areas have something to do with the zone."""
+    listed: dict[str, Sequence[Area]] = {"keep_outs": zone.keep_outs, "cost_areas": zone.cost_areas}
+    for key, areas in listed.items():
+        for index, area in enumerate(areas):
+            if not area.rectangle_m.overlaps(zone.rectangle_m):
+                where, bound = extent(area.rectangle_m), extent(zone.rectangle_m)
+                message = f"covers {where}, must overlap the build zone ({bound})"
+                yield Problem(f"build_zone.{key}[{index}]", message)
+
+
+def _key_problems(zone: BuildZone) -> Iterator[Problem]:
+    """Check that costs and heights are said where they count: of modules, or of items."""
+    for index, area in enumerate(zone.cost_areas):
+        here = f"build_zone.cost_areas[{index}]"
+        needed, other = ("module_cost", "cost_factor")[:: -1 if zone.items else 1]
+        if getattr(area, needed) is None:
+            yield Problem(f"{here}.{needed}", "missing")
+        if getattr(area, other) is not None:
+            instead = "with a catalogue" if zone.items else "without a catalogue"
+            yield Problem(f"{here}.{other}", f"must be left out: {instead} there is {needed}")
+    if not zone.items:
+        return
+    for key in ("module_cost", "height_m"):
+        if getattr(zone, key) != BuildZone.model_fields[key].default:
+            what = "cost" if key == "module_cost" else "height"
+            yield Problem(
+                f"build_zone.{key}",
+                f"is {getattr(zone, key):g}, must be left out: the items have each a {what} of"
+                " their own",
+            )
+
+
+def _item_problems(zone: BuildZone, cells: EmptyZone) -> Iterator[Problem]:
+    """Check the names of the items, that they are in stock, and that each fits somewhere."""
+    names = [item.name for item in zone.items]
+    for index, name in enumerate(names):
+        first = names.index(name)
+        if first != index:
+            message = f"is {name!r}, already the name of build_zone.items[{first}]"
+            yield Problem(f"build_zone.items[{index}].name", message)
+    pieces = sum(item.stock for item in zone.items)
+    if pieces == 0:
+        yield Problem("build_zone.items", "none is in stock, at least one must have stock above 0")
+    elif zone.stock > pieces:
+        message = f"is {zone.stock}, must be at most {pieces}, the number of pieces of all items"
+        yield Problem("build_zone.stock", message)
+    for index, item in enumerate(zone.items):
+        own = [each.item == index for each in cells.catalogue.variants]
+        if cells.fits[own].any():
+            continue
+        size = f"{item.length_modules} x {item.thickness_modules} modules"
+        turned = "in either orientation" if len(item.orientations) > 1 else "without turning it"
+        sizes = map(item.footprint, item.orientations)
+        if any(rows <= zone.rows and columns <= zone.columns for rows, columns in sizes):
+            message = f"{item.name!r} of {size} fits nowhere on usable cells {turned}"
+        else:
+            message = (
+                f"{item.name!r} of {size} does not fit into the zone of {zone.columns} columns and"
+                f" {zone.rows} rows {turned}"
+            )
+        yield Problem(f"build_zone.items[{index}]", message)
+
+
+def _closing(zone: BuildZone, way: AccessWay, cells: EmptyZone) -> BoolArray:
+    """Return from where each variant alone would close the way; nothing if it is too wide."""
+    if way.width_cells > min(zone.shape):
+        return np.zeros_like(cells.fits)
+    return np.stack([*closing_places(way, cells.passable, cells.catalogue.variants)])
+
+
+def _access_way_problem(
+    zone: BuildZone, way: AccessWay, passable: BoolArray, available: BoolArray, closing: BoolArray
+) -> Problem | None:
+    """Return why the access way and the zone do not fit each other, or `None` if they do."""
+    widest_m = min(zone.shape) * MODULE_SIDE_M
+    if way.width_m > widest_m:
+        message = f"is {way.width_m:g}, must be at most {widest_m:g}, the zone's shorter side"
+        return Problem("build_zone.access_way.width_m", message)
+    if not is_open(way, passable):
+        message = f"the structures leave no {way.description} through the empty zone"
+        return Problem("build_zone.access_way", message)
+    if available.any() and closing[available].all():
+        what = "a piece at any place" if zone.items else "a module on any usable cell"
+        return Problem("build_zone.access_way", f"{what} would close the {way.description}")
+    return None
