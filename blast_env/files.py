@@ -1,11 +1,13 @@
 """Files that are either complete or not there, and a folder that keeps results by their keys."""
 
+import errno
 import json
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -26,22 +28,25 @@ def make_folder(folder: str | Path) -> None:
 
 
 @contextmanager
-def write_atomically(target: str | Path) -> Iterator[Path]:
+def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]:
     """Give a temporary file to write to, which becomes `target` when the block ends well.
 
     The temporary file is empty, lies in the folder of `target` and has its suffix. If the block
     raises anything, `KeyboardInterrupt` included, it is deleted and `target` stays as it was. An
-    existing `target` keeps its permissions, and a link stays a link.
+    existing `target` keeps its permissions, and a link stays a link. A killed process may leave a
+    temporary file behind, see `is_temporary`, and `target` as it was or complete.
 
     Args:
         target: The file to write.
+        durable: Whether file and folder are on the device, not only on their way to it, when this
+            returns: no loss of power takes the file back or cuts it. Costs some milliseconds.
 
     Yields:
         The path to write to.
 
     Raises:
-        BlastEnvError: If the folder does not exist or cannot be written to, or if `target` is
-            itself a folder.
+        BlastEnvError: If the folder does not exist or cannot be written to, if `target` is
+            itself a folder, or if the block raises `OSError`: the device is full, for example.
     """
     path = Path(os.path.realpath(target))
     if os.path.isdir(path):
@@ -53,28 +58,55 @@ def write_atomically(target: str | Path) -> Iterator[Path]:
     try:
         # Not tempfile: its files are private to the user, whatever the umask says.
         temporary.open("xb").close()
-    except OSError as error:
-        raise _cannot_write(target, error) from error
-    try:
         yield temporary
-        _replace(temporary, path, target)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _replace(temporary: Path, path: Path, target: str | Path) -> None:
-    """Put the temporary file in the place of `path`."""
-    try:
         if os.path.exists(path):
             shutil.copymode(path, temporary)
+        if durable:
+            sync(temporary)
         os.replace(temporary, path)
+        if durable:
+            sync(path.parent)
     except OSError as error:
-        raise _cannot_write(target, error) from error
+        raise _cannot_write(target, error, temporary) from error
+    finally:
+        with suppress(OSError):  # of a device that fails altogether
+            temporary.unlink(missing_ok=True)
 
 
-def _cannot_write(target: str | Path, error: OSError) -> BlastEnvError:
+def is_temporary(name: str) -> bool:
+    """Return whether a file of this name is one that a killed `write_atomically` has left."""
+    return re.fullmatch(r"\.[0-9a-f]{16}(\..*)?", name) is not None
+
+
+_NO_SYNC: Final = (errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM)
+"""What systems say that sync no folders, or none that may not be read."""
+
+
+def sync(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the device.
+
+    Raises:
+        OSError: If they cannot be put there; folders that the system does not sync are excused.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        if error.errno not in _NO_SYNC or not path.is_dir():
+            raise
+
+
+def _cannot_write(
+    target: str | Path, error: OSError, temporary: Path | None = None
+) -> BlastEnvError:
     """Return the error that says why `target` cannot be written."""
-    return BlastEnvError(f"{target}: cannot be written: {error.strerror or error}")
+    reason = error.strerror or str(error) or type(error).__name__
+    if error.filename not in (None, str(target), str(temporary)):
+        reason += f": {str(error.filename)!r}"
+    return BlastEnvError(f"{target}: cannot be written: {reason}")
 
 
 _CHECKSUM_BYTES: Final = 32
@@ -108,23 +140,32 @@ class FolderStore:
         most_bytes: Most that the files take together; what was not asked for longest goes first.
             Each process looks after every 32nd part of it that it has written, so several may
             exceed it by as much for a moment. Without it, nothing ever goes.
+        durable: Whether a loss of power leaves what was kept before; see `write_atomically`.
 
     Attributes:
         folder: The folder, as an absolute path.
         suffix: As given.
         most_bytes: As given.
+        durable: As given.
         damaged: Number of damaged files that this object has found.
 
     Raises:
         BlastEnvError: If the folder cannot be made, or `most_bytes` is negative.
     """
 
-    def __init__(self, folder: str | Path, suffix: str, most_bytes: int | None = None) -> None:
+    def __init__(
+        self,
+        folder: str | Path,
+        suffix: str,
+        most_bytes: int | None = None,
+        durable: bool = True,
+    ) -> None:
         if most_bytes is not None and most_bytes < 0:
             raise BlastEnvError(f"most_bytes is {most_bytes}, must be at least 0")
         self.folder = Path(folder).absolute()
         self.suffix = suffix
         self.most_bytes = most_bytes
+        self.durable = durable
         self.damaged = 0
         self._unseen_bytes = most_bytes or 0  # nobody has looked yet
         make_folder(self.folder)
@@ -154,11 +195,8 @@ class FolderStore:
             BlastEnvError: If it cannot be written.
         """
         path, packed = self._path(key), _packed(content, key)
-        try:
-            with write_atomically(path) as temporary:
-                temporary.write_bytes(packed)
-        except OSError as error:
-            raise _cannot_write(path, error) from error
+        with write_atomically(path, self.durable) as temporary:
+            temporary.write_bytes(packed)
         if self.most_bytes is None:
             return
         self._unseen_bytes += len(packed)

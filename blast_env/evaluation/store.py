@@ -116,7 +116,9 @@ MOST_BYTES: Final = 256_000_000
 class DiskCache:
     """Keeps loads in files of a folder, for other processes and the next run; see `FolderStore`.
 
-    Where the folder cannot be written (any more), a warning says so and the work goes on.
+    Where the folder cannot be used (any more), a warning says so and the work goes on. A loss of
+    power may cost the last blasts, which would be simulated again: to wait for the device after
+    each would take as long as a blast of the particle model does.
 
     Args:
         folder: The folder; it is made if need be.
@@ -127,7 +129,7 @@ class DiskCache:
     """
 
     def __init__(self, folder: str | Path, most_bytes: int = MOST_BYTES) -> None:
-        self._store = FolderStore(folder, SUFFIX, most_bytes)
+        self._store = FolderStore(folder, SUFFIX, most_bytes, durable=False)
 
     @property
     def folder(self) -> Path:

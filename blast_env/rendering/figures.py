@@ -1,6 +1,7 @@
 """Figures of one blast: scheme of the site, initial velocities, impulse over time."""
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -359,8 +360,10 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
             f"{path}: cannot save a figure with the suffix {path.suffix!r}, "
             f"must be one of {', '.join(FIGURE_SUFFIXES)}"
         )
+    buffer = BytesIO()  # a file that cannot be written would be left open
+    figure.savefig(buffer, format=suffix[1:], dpi=_DOTS_PER_IN)
     with write_atomically(path) as temporary:
-        figure.savefig(temporary, format=suffix[1:], dpi=_DOTS_PER_IN)
+        temporary.write_bytes(buffer.getbuffer())
     return path
 
 

@@ -2,8 +2,11 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from math import floor, inf
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
+from tempfile import TemporaryFile
 from types import TracebackType
 from typing import Final, Protocol, Self
 
@@ -18,7 +21,7 @@ from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MS_PER_S
 
 with render_extra():
-    import imageio.v2 as imageio
+    import imageio_ffmpeg
     from PIL import Image
 
 
@@ -44,6 +47,9 @@ class FilmFile(Protocol):
 class Mp4File:
     """An MP4 film: H.264 in yuv420p, which every player knows.
 
+    Frames go to ffmpeg; its exit status and the frames in the finished file are looked at, so that
+    a film is whole when the block ends well. (imageio's writer looks at neither.)
+
     Args:
         path: The file.
         frames_per_s: Frames a second.
@@ -52,29 +58,28 @@ class Mp4File:
     """
 
     def __init__(self, path: Path, frames_per_s: float, title: str, comment: str) -> None:
-        metadata = ["-metadata", f"title={title}", "-metadata", f"comment={comment}"]
-        try:
-            self._writer = imageio.get_writer(
-                path,
-                format="FFMPEG",
-                mode="I",
-                fps=frames_per_s,
-                codec="libx264",
-                pixelformat="yuv420p",
-                quality=None,
-                macro_block_size=2,
-                ffmpeg_log_level="error",
-                output_params=["-crf", "20", "-movflags", "+faststart", *metadata],
-            )
-        except RuntimeError as error:
-            raise BlastEnvError(f"films need ffmpeg: {error}") from error
+        self._path = path
+        self._rate = str(Fraction(frames_per_s).limit_denominator())
+        self._metadata = ["-metadata", f"title={title}", "-metadata", f"comment={comment}"]
+        # Not a pipe, which would fill and stop ffmpeg; closed by `__exit__`.
+        self._messages = TemporaryFile()  # noqa: SIM115
+        self._encoder: Popen[bytes] | None = None
+        self._frames = 0
 
     def append(self, frame: Frame) -> None:
-        """Add a frame with even width and height."""
+        """Add a frame with even width and height.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        if self._encoder is None:
+            self._encoder = self._started(frame.shape[1], frame.shape[0])
+        assert self._encoder.stdin is not None
         try:
-            self._writer.append_data(frame)
-        except OSError as error:
-            raise BlastEnvError(f"the film cannot be written: {error}") from error
+            self._encoder.stdin.write(np.ascontiguousarray(frame).data)
+        except OSError as error:  # ffmpeg has gone, and has said why
+            raise self._failure() from error
+        self._frames += 1
 
     def __enter__(self) -> Self:
         return self
@@ -85,7 +90,63 @@ class Mp4File:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._writer.close()
+        with self._messages:
+            if kind is None:
+                self._finish()
+            elif self._encoder is not None:
+                self._encoder.kill()
+                self._encoder.communicate()
+
+    def _started(self, width: int, height: int) -> Popen[bytes]:
+        """Return an encoder that waits for frames of a size."""
+        try:
+            program = imageio_ffmpeg.get_ffmpeg_exe()
+        except RuntimeError as error:
+            raise BlastEnvError(f"films need ffmpeg: {error}") from error
+        raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", self._rate]
+        coded = ["-an", "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"]
+        return Popen(
+            [
+                *(program, "-y", "-v", "error", *raw, "-i", "-", *coded),
+                *("-movflags", "+faststart", *self._metadata, str(self._path)),
+            ],
+            stdin=PIPE,
+            stdout=DEVNULL,
+            stderr=self._messages,
+            start_new_session=True,  # Ctrl-C is for us
+        )
+
+    def _finish(self) -> None:
+        """Let the encoder end, and make sure that all is there."""
+        if self._encoder is None:
+            raise BlastEnvError("the film cannot be written: it has no frames")
+        try:
+            self._encoder.communicate()
+        except BrokenPipeError:
+            pass
+        except BaseException:
+            self._encoder.kill()
+            raise
+        if self._encoder.wait() != 0:
+            raise self._failure()
+        try:
+            found, _ = imageio_ffmpeg.count_frames_and_secs(str(self._path))
+        except RuntimeError as error:
+            raise BlastEnvError("the film cannot be written: it cannot be read again") from error
+        if found != self._frames:
+            raise BlastEnvError(
+                f"the film cannot be written: {found} of {self._frames} frames are in the file"
+            )
+
+    def _failure(self) -> BlastEnvError:
+        """Return the error with what ffmpeg has said last."""
+        assert self._encoder is not None
+        self._encoder.wait()
+        self._messages.seek(0)
+        said = self._messages.read().decode(errors="replace").split("\n")
+        last = [line.strip() for line in said if line.strip()][-1:]
+        reason = last[0] if last else f"ffmpeg ended with status {self._encoder.returncode}"
+        return BlastEnvError(f"the film cannot be written: {reason}")
 
 
 class GifFile:

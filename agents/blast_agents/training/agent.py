@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Final, Literal
 from zipfile import BadZipFile, ZipFile
@@ -99,8 +100,11 @@ class Checkpoint:
             "optimizer": self.optimizer,
             "counters": asdict(self.counters),
         }
+        # torch would say in an error of its own that the device is full.
+        buffer = BytesIO()
+        torch.save(content, buffer)
         with write_atomically(path) as temporary:
-            torch.save(content, temporary)
+            temporary.write_bytes(buffer.getbuffer())
 
     @classmethod
     def load(cls, path: Path) -> "Checkpoint":

@@ -28,6 +28,7 @@ from blast_env.calibration.model import (
 )
 from blast_env.calibration.references import kingery_bulmash, paper_ufc_column
 from blast_env.errors import BlastEnvError
+from blast_env.files import sync
 from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import parameters_digest
 from blast_env.provenance import package_version
@@ -220,12 +221,15 @@ def append_to_store(path: Path, run: FreeFieldRun) -> None:
         BlastEnvError: If the file cannot be written.
     """
     line = json.dumps(asdict(run)) + "\n"
+    is_new = not path.exists()
     try:
         with path.open("ab+") as file:
             _cut_unfinished_line(file)
             file.write(line.encode())
             file.flush()
             os.fsync(file.fileno())
+        if is_new:
+            sync(path.parent)
     except OSError as error:
         raise BlastEnvError(f"{path}: cannot be written: {error.strerror or error}") from error
 

@@ -1,0 +1,91 @@
+"""Every writer of the packages, with something small to write."""
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import torch
+from blast_agents.training.agent import Checkpoint, Counters
+
+from blast_env.calibration.model import load_calibration, save_calibration
+from blast_env.evaluation import evaluate_layout
+from blast_env.export import LayoutPlan, export_layout
+from blast_env.files import FolderStore
+from blast_env.rendering.figures import initial_velocities, save_figure
+from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
+from blast_env.scenario import save_scenario, write_layout
+from blast_env.simulation import Blast, BlastResult
+from blast_env.studies.calibration.study import FreeFieldRun, append_to_store
+from blast_env.tables import write_csv
+from tests.rendering.scenes import LAYOUT, small_blast
+
+Writer = Callable[[Path], Any]
+
+
+@cache
+def _blast() -> Blast:
+    return small_blast(with_barrier=True)
+
+
+@cache
+def _result() -> BlastResult:
+    return _blast().run()
+
+
+@cache
+def _plan() -> LayoutPlan:
+    return LayoutPlan(_blast().scenario, LAYOUT, provenance={"text": "x" * 3000})
+
+
+def _mp4(path: Path) -> None:
+    write_film(_blast(), path, frames_per_s=5.0, slow_motion=40.0, width_px=320)
+
+
+def _pair(path: Path) -> None:
+    panels = [FilmPanel(_blast(), "left"), FilmPanel(_blast(), "right")]
+    write_side_by_side(panels, path, frames_per_s=5.0, slow_motion=40.0, width_px=640)
+
+
+def _checkpoint(path: Path) -> None:
+    Checkpoint({"weight": torch.zeros(2000)}, {}, Counters()).save(path)
+
+
+def _blasts_of_a_study(path: Path) -> None:
+    for seed in range(40):
+        append_to_store(path, FreeFieldRun(f"key {seed}", 10.0, seed, 1.0, 1.0, None))
+
+
+def _stored_result(path: Path) -> None:
+    FolderStore(path.parent, path.suffix).put("key", bytes(10_000))
+
+
+WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
+    {
+        "scenario.toml": lambda path: save_scenario(_blast().scenario, path),
+        "layout.json": lambda path: write_layout(path, _plan().scenario, LAYOUT, {"a": "b" * 3000}),
+        "layout.csv": lambda path: export_layout(_plan(), path),
+        "layout.geojson": lambda path: export_layout(_plan(), path),
+        "layout.dxf": lambda path: export_layout(_plan(), path),
+        "table.csv": lambda path: write_csv(_result().collisions, path),
+        "table.xlsx": lambda path: _result().to_excel(path),
+        "table.parquet": lambda path: _result().to_parquet(path),
+        "figure.png": lambda path: save_figure(
+            initial_velocities(_blast().scenario.parameters), path
+        ),
+        "figure.svg": lambda path: save_figure(
+            initial_velocities(_blast().scenario.parameters), path
+        ),
+        "figure.pdf": lambda path: save_figure(
+            initial_velocities(_blast().scenario.parameters), path
+        ),
+        "film.mp4": _mp4,
+        "pair.mp4": _pair,
+        "film.gif": _mp4,
+        "evaluation.json": lambda path: evaluate_layout("courtyard", (), (0, 1)).to_json(path),
+        "calibration.json": lambda path: save_calibration(load_calibration("ballistic_ufc"), path),
+        "last.pt": _checkpoint,
+    }
+)
+"""By the name of a file that each of them writes."""
