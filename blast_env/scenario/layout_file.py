@@ -7,16 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from blast_env.documents import MAX_BYTES, DocumentError, parse_json, read_text
 from blast_env.errors import LayoutError, suggestion
 from blast_env.files import write_atomically
 from blast_env.geometry import Cell
-from blast_env.scenario.files import MAX_BYTES, read_text
 from blast_env.scenario.models import Scenario
 from blast_env.scenario.placement import cell_from, check_layout
-from blast_env.scenario.problems import key_path, shortened, type_word, value_text
-
-MAX_DIGITS: Final = 1000
-"""Digits of an integer in a layout file."""
+from blast_env.scenario.problems import key_path, type_word, value_text
 
 _KEYS: Final = ("cells", "scenario", "scenario_hash", "provenance")
 _HASH_DIGITS: Final = 12  # in messages
@@ -49,10 +46,10 @@ class LayoutFile:
             LayoutError: If the file cannot be read or is anything else.
         """
         try:
-            text = read_text(Path(path))
-        except ValueError as error:
+            content = parse_json(read_text(Path(path)))
+        except DocumentError as error:
             raise LayoutError(f"{path}: {error}") from error
-        return _parse(_content(text, str(path)), str(path))
+        return _parse(content, str(path))
 
     @classmethod
     def of(
@@ -98,7 +95,10 @@ class LayoutFile:
             BlastEnvError: If it cannot be written there.
         """
         text = f"{self._text(path)}\n"
-        _parse(_content(text, str(path)), str(path))
+        try:
+            _parse(parse_json(text), str(path))
+        except DocumentError as error:
+            raise LayoutError(f"{path}: {error}") from error
         content = text.encode()
         if len(content) > MAX_BYTES:
             raise LayoutError(
@@ -183,19 +183,6 @@ def write_layout(
     return LayoutFile.of(scenario, layout, provenance).save(path)
 
 
-def _content(text: str, path: str) -> Any:
-    """Return what the text of a JSON file holds; `path` is its name, for errors."""
-    try:
-        return json.loads(text, object_pairs_hook=_unique_keys, parse_int=_integer)
-    except json.JSONDecodeError as error:
-        where = f"line {error.lineno}, column {error.colno}"
-        raise LayoutError(f"{path}: {where}: {error.msg}") from error
-    except RecursionError as error:
-        raise LayoutError(f"{path}: is nested too deeply") from error
-    except ValueError as error:
-        raise LayoutError(f"{path}: {error}") from error
-
-
 def _parse(content: Any, source: str) -> LayoutFile:
     """Return what a file says; `source` is its name, for errors."""
     if not isinstance(content, dict):
@@ -238,18 +225,3 @@ def _cells(listed: Any, source: str, place: str) -> tuple[Cell, ...]:
 
 def _is_hash(value: Any) -> bool:
     return isinstance(value, str) and re.fullmatch("[0-9a-f]{64}", value) is not None
-
-
-def _integer(digits: str) -> int:
-    """Read an integer, refusing one so long that Python would refuse it without saying where."""
-    if len(digits) > MAX_DIGITS:
-        raise ValueError(f"{shortened(digits)} has {len(digits)} digits, which is too large")
-    return int(digits)
-
-
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object, refusing keys that occur twice: one of them would be lost."""
-    content = dict(pairs)
-    if len(content) < len(pairs):
-        raise ValueError("a key occurs twice")
-    return content

@@ -257,7 +257,7 @@ def test_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mon
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_text", fail)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(BlastEnvError, match="cannot be written: No space left"):
         save_scenario(load_scenario("free_field"), path)
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["f.toml"]
