@@ -41,6 +41,10 @@ MOST_AIR_BALLS: Final = 1_000_000
 """What fits into the memory of a common computer."""
 
 
+MOST_MODULES: Final = 250_000
+"""Of a scene: 250 m x 250 m of buildings, with which a blast takes 2 s more."""
+
+
 _SITE: Final = TypeAdapter(Site)
 
 
@@ -181,7 +185,13 @@ def _repeated_names(
 
 
 def _structure_problems(parts: Parts) -> Iterator[Problem]:
-    """Check that the structures lie inside the site and apart from each other."""
+    """Check that the structures lie inside the site and apart from each other, and their sum."""
+    stock = 0 if parts.build_zone is None else parts.build_zone.stock
+    modules = sum(each.rows * each.columns for each in parts.structures.values()) + stock
+    if modules > MOST_MODULES:
+        with_stock = f", the stock of {stock:,} among them" if stock else ""
+        message = f"have {modules:,} modules together{with_stock}, must have at most"
+        yield Problem("structures", f"{message} {MOST_MODULES:,}")
     for index, structure in parts.structures.items():
         yield from _outside_site(
             parts, f"structures[{index}]", _described(structure), structure.rectangle_m

@@ -1,48 +1,16 @@
-"""Reading small text files that people write."""
+"""Scenario files."""
 
 import os
-import re
-import tomllib
 from pathlib import Path
 from typing import Final, Self, overload
 
 import tomli_w
 
+from blast_env.documents import DocumentError, parse_toml, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.scenario.models import Scenario
-from blast_env.scenario.problems import Problem, ScenarioError, shortened, unknown_name
-
-MAX_BYTES: Final = 1_000_000
-"""Larger files are refused: they are something else that was named by mistake."""
-
-
-def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file; a byte order mark is dropped.
-
-    Raises:
-        ValueError: If it cannot be read; the message says why, without the name of the file.
-    """
-    try:
-        if path.is_dir():
-            raise ValueError("is a folder, must be a file")
-        if not path.exists():
-            raise ValueError("there is no such file")
-        if not path.is_file():
-            raise ValueError("is not a regular file")
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise ValueError(f"cannot be read: {error.strerror or error}") from error
-    if len(content) > MAX_BYTES:
-        raise ValueError(f"has {path.stat().st_size} bytes, must have at most {MAX_BYTES}")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        byte = content[error.start]
-        raise ValueError(f"line {line}: is not UTF-8 text: byte 0x{byte:02x}") from error
-
+from blast_env.scenario.problems import Problem, ScenarioError, unknown_name
 
 SUFFIX: Final = ".toml"
 
@@ -66,8 +34,8 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     path = _located(name_or_path)
     try:
         text = read_text(path)
-    except ValueError as error:
-        raise ScenarioError(str(path), [Problem("", str(error))]) from error
+    except DocumentError as error:
+        raise ScenarioError(str(path), [Problem(error.place, error.message)]) from error
     return parse_scenario(text, str(path))
 
 
@@ -131,12 +99,9 @@ def parse_scenario(text: str, source: str) -> Scenario:
         ScenarioError: If anything is wrong; all problems are in the error.
     """
     try:
-        document = tomllib.loads(text)
-    except RecursionError as error:
-        problem = Problem(f"line {_deepest_line(text)}", "is nested too deeply")
-        raise ScenarioError(source, [problem]) from error
-    except ValueError as error:
-        raise ScenarioError(source, [_syntax_problem(str(error), text)]) from error
+        document = parse_toml(text)
+    except DocumentError as error:
+        raise ScenarioError(source, [Problem(error.place, error.message)]) from error
     return Scenario.from_document(document, source)
 
 
@@ -206,31 +171,3 @@ def _located(name_or_path: str | Path) -> Path:
     if path.suffix != SUFFIX and not is_folder:
         raise ScenarioError(str(path), [Problem("", f"must be a {SUFFIX} file")])
     return path
-
-
-def _deepest_line(text: str) -> int:
-    """Return the number of the line with the most open brackets."""
-    depth = 0
-    depths = [0]
-    for line in text.split("\n"):
-        depth += sum(line.count(bracket) for bracket in "[{")
-        depths.append(depth)
-        depth -= sum(line.count(bracket) for bracket in "]}")
-    return depths.index(max(depths))
-
-
-def _syntax_problem(message: str, text: str) -> Problem:
-    """Return the problem for a message of the TOML parser, with its place as the key."""
-    match = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.S)
-    if match is None:
-        # The only error without a place: an integer that Python refuses to read.
-        digits = re.search(r"[0-9_]{1000,}", text)
-        number = text.count("\n", 0, digits.start() if digits else len(text)) + 1
-        what = shortened(message.split(";")[0], 200)
-        return Problem(f"line {number}", f"is not usable: {what}")
-    what, line, column = match.groups()
-    if line is None:
-        lines = text.split("\n")
-        line, column = str(len(lines)), str(len(lines[-1]) + 1)
-    place = f"line {line}, column {column}"
-    return Problem(place, f"is not TOML: {shortened(what, 200)}")

@@ -8,17 +8,15 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+from blast_env.documents import MAX_BYTES, DocumentError, parse_json, read_text
 from blast_env.errors import LayoutError, suggestion
 from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout, Piece
 from blast_env.scenario.catalogue import cell_from
-from blast_env.scenario.files import MAX_BYTES, AnyScenario, find_scenario, read_text
+from blast_env.scenario.files import AnyScenario, find_scenario
 from blast_env.scenario.models import Scenario
 from blast_env.scenario.placement import check_layout
-from blast_env.scenario.problems import key_path, shortened, type_word, value_text
-
-MAX_DIGITS: Final = 1000
-"""Digits of an integer in a layout file."""
+from blast_env.scenario.problems import key_path, type_word, value_text
 
 CELLS_VERSION: Final = 1
 """The version of a file whose layout consists of cells; it need not say so."""
@@ -68,10 +66,10 @@ class LayoutFile:
             LayoutError: If the file cannot be read or is anything else.
         """
         try:
-            text = read_text(Path(path))
-        except ValueError as error:
+            content = parse_json(read_text(Path(path)))
+        except DocumentError as error:
             raise LayoutError(f"{path}: {error}") from error
-        return _parse(_content(text, str(path)), str(path))
+        return _parse(content, str(path))
 
     @classmethod
     def of(
@@ -127,7 +125,10 @@ class LayoutFile:
             BlastEnvError: If it cannot be written there.
         """
         text = f"{self._text(path)}\n"
-        _parse(_content(text, str(path)), str(path))
+        try:
+            _parse(parse_json(text), str(path))
+        except DocumentError as error:
+            raise LayoutError(f"{path}: {error}") from error
         content = text.encode()
         if len(content) > MAX_BYTES:
             raise LayoutError(
@@ -217,19 +218,6 @@ def write_layout(
     return LayoutFile.of(scenario, layout, provenance).save(path)
 
 
-def _content(text: str, path: str) -> Any:
-    """Return what the text of a JSON file holds; `path` is its name, for errors."""
-    try:
-        return json.loads(text, object_pairs_hook=_unique_keys, parse_int=_integer)
-    except json.JSONDecodeError as error:
-        where = f"line {error.lineno}, column {error.colno}"
-        raise LayoutError(f"{path}: {where}: {error.msg}") from error
-    except RecursionError as error:
-        raise LayoutError(f"{path}: is nested too deeply") from error
-    except ValueError as error:
-        raise LayoutError(f"{path}: {error}") from error
-
-
 def _parse(content: Any, source: str) -> LayoutFile:
     """Return what a file says; `source` is its name, for errors."""
     if not isinstance(content, dict):
@@ -311,18 +299,3 @@ def _cells(listed: Any, source: str, place: str) -> Layout:
 
 def _is_hash(value: Any) -> bool:
     return isinstance(value, str) and re.fullmatch("[0-9a-f]{64}", value) is not None
-
-
-def _integer(digits: str) -> int:
-    """Read an integer, refusing one so long that Python would refuse it without saying where."""
-    if len(digits) > MAX_DIGITS:
-        raise ValueError(f"{shortened(digits)} has {len(digits)} digits, which is too large")
-    return int(digits)
-
-
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object, refusing keys that occur twice: one of them would be lost."""
-    content = dict(pairs)
-    if len(content) < len(pairs):
-        raise ValueError("a key occurs twice")
-    return content

@@ -217,3 +217,23 @@ def test_air_too_fine_for_the_memory_is_refused() -> None:
     (line,) = lines_for(changed(minimal_document(), OVERRIDES[:1], {"overrides": fine}))
     assert "simulation.overrides.air.spacing_units: is 0.02, which makes" in line
     assert "must make at most 1,000,000" in line
+
+
+def test_the_modules_of_all_structures_together_have_a_bound() -> None:
+    """Nine of 1000 x 1000 took a minute and 4.6 GB, each of them within its own bounds."""
+    square = {"kind": "ConcreteSquare", "protected": True, "side_modules": 1000}
+    document = minimal_document()
+    document["site"] = {"width_m": 2000.0, "height_m": 2000.0}
+    document["structures"] = [
+        {**square, "name": f"s{i}", "corner_m": [5.0 + 510.0 * (i % 3), 5.0 + 510.0 * (i // 3)]}
+        for i in range(9)
+    ]
+    message = "f.toml: structures: have 9,000,000 modules together, must have at most 250,000"
+    assert lines_for(document) == [message]
+    document["structures"] = [{**square, "name": "s", "corner_m": [5.0, 5.0], "side_modules": 500}]
+    zone = {"corner_m": [300.0, 5.0], "rows": 2, "columns": 2, "stock": 1}
+    assert lines_for(document) == []
+    assert lines_for({**document, "build_zone": zone}) == [
+        "f.toml: structures: have 250,001 modules together, the stock of 1 among them, must"
+        " have at most 250,000"
+    ]

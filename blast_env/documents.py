@@ -1,0 +1,186 @@
+"""Reading text files that people write or edit: small, not deep, and without surprises."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, Final
+
+from blast_env.errors import BlastEnvError
+
+MAX_BYTES: Final = 1_000_000
+"""Larger files are refused: they are something else that was named by mistake."""
+
+MAX_DEPTH: Final = 50
+"""Brackets within each other, and parts of a dotted key. Parsers take time that grows with the
+square of it, or fail in ways of their own."""
+
+MAX_DIGITS: Final = 1000
+"""Digits of an integer."""
+
+_SHOWN: Final = 60
+"""Characters of a text from a file in a message."""
+
+
+class DocumentError(BlastEnvError):
+    """A text that cannot be read.
+
+    Args:
+        place: Where, e.g. `line 3, column 5`; empty if the whole text is meant.
+        message: What is wrong.
+
+    Attributes:
+        place: As given.
+        message: As given.
+    """
+
+    def __init__(self, place: str, message: str) -> None:
+        self.place, self.message = place, message
+        super().__init__(f"{place}: {message}" if place else message)
+
+    def __reduce__(self) -> tuple[type["DocumentError"], tuple[str, str]]:
+        return type(self), (self.place, self.message)
+
+
+def read_text(path: Path, most_bytes: int = MAX_BYTES) -> str:
+    """Return the text of a UTF-8 file; a byte order mark is dropped.
+
+    Args:
+        path: The file.
+        most_bytes: Most that it may have.
+
+    Raises:
+        DocumentError: If it cannot be read; the message says why, without the name of the file.
+    """
+    try:
+        if path.is_dir():
+            raise DocumentError("", "is a folder, must be a file")
+        if not path.exists():
+            raise DocumentError("", "there is no such file")
+        if not path.is_file():
+            raise DocumentError("", "is not a regular file")
+        with path.open("rb") as file:
+            content = file.read(most_bytes + 1)
+            size = path.stat().st_size
+    except OSError as error:
+        raise DocumentError("", f"cannot be read: {error.strerror or error}") from error
+    if len(content) > most_bytes:
+        raise DocumentError("", f"has {size} bytes, must have at most {most_bytes}")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        byte = content[error.start]
+        raise DocumentError(f"line {line}", f"is not UTF-8 text: byte 0x{byte:02x}") from error
+
+
+_TOML_TOKEN: Final = re.compile(
+    r"""(?P<comment>\#[^\n]*+)
+      | (?P<text>\"{3}(?:[^"\\]|\\.|"(?!""))*+\"{3} | '{3}.*?'{3})
+      | (?P<key>"(?:[^"\\\n]|\\.)*+" | '[^'\n]*+' | [A-Za-z0-9_-]++)
+      | (?P<dot>\.) | (?P<space>[ \t]++) | (?P<open>[\[{]) | (?P<close>[\]}])
+      | (?P<other>[^\#"'A-Za-z0-9_.\[\]{}\ \t-]++ | .)""",
+    re.VERBOSE | re.DOTALL,
+)
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return what the text of a TOML file holds.
+
+    Raises:
+        DocumentError: If it is not TOML, or nested too deeply.
+    """
+    _check_toml_depth(text)
+    try:
+        return tomllib.loads(text)
+    except ValueError as error:
+        raise _toml_error(str(error), text) from error
+
+
+def _check_toml_depth(text: str) -> None:
+    """Refuse what takes the parser for ever: deep brackets, and keys of many parts."""
+    depth, parts, after_dot = 0, 0, False
+    for token in _TOML_TOKEN.finditer(text):
+        kind = token.lastgroup
+        if kind == "space":
+            continue
+        if kind == "open":
+            depth += 1
+        elif kind == "close":
+            depth = max(depth - 1, 0)
+        if kind == "key":
+            parts = parts + 1 if after_dot else 1
+        after_dot = kind == "dot" and parts > 0
+        if kind not in ("key", "dot"):
+            parts = 0
+        if max(depth, parts) > MAX_DEPTH:
+            line = text.count("\n", 0, token.start()) + 1
+            raise DocumentError(
+                f"line {line}", f"is nested too deeply: more than {MAX_DEPTH} levels"
+            )
+
+
+def _toml_error(message: str, text: str) -> DocumentError:
+    """Return the error for a message of the TOML parser."""
+    match = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.S)
+    if match is None:
+        # The only error without a place: an integer that Python refuses to read.
+        digits = re.search(r"[0-9_]{1000,}", text)
+        number = text.count("\n", 0, digits.start() if digits else len(text)) + 1
+        return DocumentError(f"line {number}", f"is not usable: {_cut(message.split(';')[0], 200)}")
+    what, line, column = match.groups()
+    if line is None:
+        lines = text.split("\n")
+        line, column = str(len(lines)), str(len(lines[-1]) + 1)
+    return DocumentError(f"line {line}, column {column}", f"is not TOML: {_cut(what, 200)}")
+
+
+_JSON_TOKEN: Final = re.compile(r'"(?:[^"\\]|\\.)*+"|([\[{])|([\]}])', re.DOTALL)
+
+
+def parse_json(text: str) -> Any:
+    """Return what the text of a JSON file holds.
+
+    Raises:
+        DocumentError: If it is not JSON, nested too deeply, has a key twice in one object (one of
+            them would be lost), an integer that is too long, or a number that is none.
+    """
+    depth = 0
+    for token in _JSON_TOKEN.finditer(text):
+        depth = max(depth + (token[1] is not None) - (token[2] is not None), 0)
+        if depth > MAX_DEPTH:
+            line = text.count("\n", 0, token.start()) + 1
+            message = f"is nested too deeply: more than {MAX_DEPTH} levels"
+            raise DocumentError(f"line {line}", message)
+    try:
+        return json.loads(
+            text, object_pairs_hook=_unique_keys, parse_int=_integer, parse_constant=_no_number
+        )
+    except json.JSONDecodeError as error:
+        place = f"line {error.lineno}, column {error.colno}"
+        raise DocumentError(place, f"is not JSON: {error.msg}") from error
+    except RecursionError as error:  # brackets that do not match
+        raise DocumentError("", "is nested too deeply") from error
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        raise DocumentError("", "a key occurs twice")
+    return content
+
+
+def _integer(digits: str) -> int:
+    """Read an integer, refusing one so long that Python would refuse it without saying where."""
+    if len(digits) > MAX_DIGITS:
+        shown = _cut(digits, _SHOWN)
+        raise DocumentError("", f"{shown} has {len(digits)} digits, which is too large")
+    return int(digits)
+
+
+def _no_number(name: str) -> float:
+    raise DocumentError("", f"{name} is not a number of JSON")
+
+
+def _cut(text: str, length: int) -> str:
+    return text if len(text) <= length else text[: length - 3] + "..."

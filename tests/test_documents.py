@@ -1,0 +1,82 @@
+"""Texts that would keep a parser busy for ever, or break it, are refused before it sees them."""
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+import tomli_w
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blast_env.documents import MAX_DEPTH, DocumentError, parse_json, parse_toml, read_text
+from tests.scenario.documents import all_documents
+
+DEEP = MAX_DEPTH + 1
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("a = 1\n" + ".".join(["a"] * 40_000) + " = 1", 2),  # 80 kB took all memory
+        ("[" + " . ".join(['"a.b"', "'c'"] * DEEP) + "]", 1),
+        ("x = { " + ".".join(["1"] * DEEP) + " = 2 }", 1),
+        ("x = 'y'\n\nx = " + "[" * 2000, 3),
+        ("x = " + "{ x = " * 400 + "1" + "}" * 400, 1),
+        ('"""' + ".".join(["a"] * DEEP) + " = 1", 1),  # a text without an end is no text
+    ],
+)
+def test_what_is_nested_too_deeply_is_refused_at_once(text: str, line: int) -> None:
+    began_s = time.perf_counter()
+    with pytest.raises(DocumentError, match="is nested too deeply") as caught:
+        parse_toml(text)
+    assert caught.value.place == f"line {line}"
+    assert time.perf_counter() - began_s < 2.0
+
+
+def test_dots_and_brackets_in_texts_and_comments_are_none() -> None:
+    many = ".".join(["a"] * 1000) + "[" * 1000
+    text = f"# {many}\na = \"{many}\"\nb = '{many}'\nc = '''\n{many}'''\nd = \"\"\"\\\n{many}\"\"\""
+    document = parse_toml(text)
+    assert list(document.values()) == [many] * 4
+    assert parse_json(json.dumps({"a": many})) == {"a": many}
+
+
+def test_real_files_are_read() -> None:
+    for document in all_documents():
+        assert parse_toml(tomli_w.dumps(document)) == document
+
+
+@given(st.text(alphabet="ab.=[]{}\"'\\#\n 1-", max_size=60))
+def test_any_text_is_toml_or_an_error_with_a_place(text: str) -> None:
+    try:
+        parse_toml(text)
+    except DocumentError as error:
+        place = error.place
+    else:
+        place = "line"
+    assert place.startswith("line")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[" * DEEP, "line 1: is nested too deeply"),
+        ('{"a": 1, "a": 2}', "a key occurs twice"),
+        ("9" * 6000, "has 6000 digits"),
+        ("[NaN]", "NaN is not a number"),
+        ("[1,", "line 1, column 4: is not JSON"),
+        ("]" * 99 + "[" * 99_999, "is nested too deeply"),
+    ],
+)
+def test_what_json_may_not_hold_is_named(text: str, words: str) -> None:
+    with pytest.raises(DocumentError, match=words):
+        parse_json(text)
+
+
+def test_a_file_may_have_a_bound_of_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_text("12345")
+    assert read_text(path, 5) == "12345"
+    with pytest.raises(DocumentError, match="has 5 bytes, must have at most 4"):
+        read_text(path, 4)
