@@ -35,6 +35,29 @@ class UnknownNameError(BlastEnvError):
         return type(self), self._arguments
 
 
+class UnknownArgumentError(BlastEnvError, TypeError):
+    """A keyword argument that does not exist.
+
+    A `TypeError` with Python's own words, which other libraries look for, and made from a message
+    alone, as Gymnasium makes it anew; `of` names the nearest argument in it.
+    """
+
+    @classmethod
+    def of(cls, function: str, name: str, known: Iterable[str]) -> "UnknownArgumentError":
+        """Return the error.
+
+        Args:
+            function: Name of what was called.
+            name: The argument given.
+            known: The arguments that exist.
+        """
+        names = sorted(known)
+        return cls(
+            f"{function}() got an unexpected keyword argument {name!r}"
+            f"{suggestion(name, names)}; known: {', '.join(names)}"
+        )
+
+
 @contextmanager
 def import_extra(extra: str, what: str) -> Iterator[None]:
     """Import packages of an optional extra in this block.

@@ -13,7 +13,7 @@ from blast_agents.proposal import propose
 from blast_agents.training import TrainedAgent, TrainingSettings, load_agent
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.environments import training_source
-from blast_agents.training.run_folder import SITES, RunFolder
+from blast_agents.training.run_folder import RunFolder
 
 from blast_env.cli.evaluation_report import (
     EvaluateOptions,
@@ -36,6 +36,7 @@ from blast_env.provenance import command, versions
 from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import save_scenario
+from blast_env.sites import SITES
 from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
 

@@ -9,7 +9,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError, UnknownArgumentError, UnknownNameError
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
 
@@ -28,13 +28,15 @@ def checked_keywords(
     """Return the function with an error that names the nearest keyword for a misspelt one.
 
     `gymnasium.make` hands keywords over that no type checker has seen, and Python's own error
-    does not say what was meant.
+    does not say what was meant. What is called raises `UnknownArgumentError` for one.
     """
     known = [name for name in signature(function).parameters if name != "self"]
 
     @wraps(function)
     def checked(*args: _Parameters.args, **kwargs: _Parameters.kwargs) -> _Returned:
-        check_names("argument", kwargs, known)
+        for name in kwargs:
+            if name not in known:
+                raise UnknownArgumentError.of(function.__qualname__, name, known)
         return function(*args, **kwargs)
 
     return checked

@@ -28,6 +28,7 @@ from blast_env.envs.episode import (
     total,
 )
 from blast_env.envs.observations import OBSERVATIONS, Array, Observable, Observation
+from blast_env.envs.spec import PlainSpec
 from blast_env.envs.strategies import (
     REWARDS,
     Reward,
@@ -45,7 +46,7 @@ from blast_env.scenario import AnyScenario, Placement
 from blast_env.statistics import Risk
 
 
-class BlastBarrierEnv(gym.Env[Array, np.int64]):
+class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     """Barriers are placed one by one to shield a structure; then a charge goes off.
 
     ## Description
@@ -122,8 +123,9 @@ class BlastBarrierEnv(gym.Env[Array, np.int64]):
     `cache_hit_rate`, their share, counted since the environment was made.
 
     ## Arguments
-    - `scenario`: bundled name, path of a scenario file, a `Scenario`, or a `ScenarioSource`
-      (`blast_env.envs.strategies`), which draws one at every `reset`.
+    - `scenario`: bundled name, path of a scenario file, a `Scenario` or its plain data; or
+      `"sites"`, which draws a generated site at every `reset`, or any other `ScenarioSource`
+      (`blast_env.envs.strategies`).
     - `reward`: `"terminal"`, `"incremental"`, or a `Reward` (`blast_env.envs.strategies`).
     - `observation`: see above, or an `Observation` (`blast_env.envs.observations`).
     - `threat`: `"visible"`, `"hidden"`, or a `ThreatModel` (`blast_env.envs.strategies`).

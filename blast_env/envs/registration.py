@@ -5,7 +5,7 @@ from typing import Final
 import gymnasium as gym
 
 from blast_env.scenario import bundled_scenarios
-from blast_env.sites import SiteSource
+from blast_env.sites import SITES
 
 BARRIER_ENTRY_POINT: Final = "blast_env.envs.barrier_env:BlastBarrierEnv"
 
@@ -24,27 +24,21 @@ def register_environments() -> None:
     gym.register(
         id="BlastSimulator-v0",
         entry_point="blast_env.envs.simulator_env:BlastSimulatorEnv",
+        vector_entry_point="blast_env.envs.vector:simulator_vector",
     )
-    gym.register(
-        id="BlastBarrier-v0", entry_point=BARRIER_ENTRY_POINT, kwargs={"scenario": "courtyard"}
-    )
-    gym.register(
-        id="BlastBarrierIncremental-v0",
-        entry_point=BARRIER_ENTRY_POINT,
-        kwargs={"scenario": "courtyard", "reward": "incremental"},
-    )
-    gym.register(
-        id="BlastBarrierGas-v0",
-        entry_point=BARRIER_ENTRY_POINT,
-        kwargs={"scenario": "courtyard", "engine": "gas"},
-    )
-    gym.register(
-        id="BlastBarrierSites-v0",
-        entry_point=BARRIER_ENTRY_POINT,
-        kwargs={"scenario": SiteSource.training()},
-    )
+    _register_barrier("BlastBarrier-v0", scenario="courtyard")
+    _register_barrier("BlastBarrierIncremental-v0", scenario="courtyard", reward="incremental")
+    _register_barrier("BlastBarrierGas-v0", scenario="courtyard", engine="gas")
+    _register_barrier("BlastBarrierSites-v0", scenario=SITES)
     for name in bundled_scenarios():
         if name not in WITHOUT_BUILD_ZONE:
-            gym.register(
-                id=barrier_id(name), entry_point=BARRIER_ENTRY_POINT, kwargs={"scenario": name}
-            )
+            _register_barrier(barrier_id(name), scenario=name)
+
+
+def _register_barrier(environment_id: str, **arguments: str) -> None:
+    gym.register(
+        id=environment_id,
+        entry_point=BARRIER_ENTRY_POINT,
+        vector_entry_point="blast_env.envs.vector:barrier_vector",
+        kwargs=arguments,
+    )

@@ -9,6 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from blast_env.envs.arguments import check_names, checked_keywords
+from blast_env.envs.spec import PlainSpec
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
 from blast_env.physics.engine import BlastRun, Engine
@@ -16,7 +17,7 @@ from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import BARRIER_NAME, ModularPart
 from blast_env.recording.tables import collision_table
-from blast_env.scenario import AnyScenario, find_scenario
+from blast_env.scenario import AnyScenario, check_layout, find_scenario
 from blast_env.simulation import Blast, BlastResult
 
 if TYPE_CHECKING:  # drawing is an optional extra
@@ -30,7 +31,7 @@ _OPTIONS: Final = ("layout", "charge_position_m")
 _BALL_KINDS: Final = (CollisionType.ExplosionBall, CollisionType.AirBall)
 
 
-class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
+class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     """A blast that unfolds step by step: nothing is decided, everything can be watched.
 
     ## Description
@@ -74,7 +75,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
     and at the end `end_reason` and `digest`.
 
     ## Arguments
-    - `scenario`: bundled name, path of a scenario file, or a `Scenario`.
+    - `scenario`: bundled name, path of a scenario file, a `Scenario` or its plain data.
     - `layout`: the default layout.
     - `engine`: name of an engine, or an engine.
     - `step_s`: simulated time per step, s.
@@ -153,7 +154,7 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
             "scenario_hash": self.scenario.content_hash,
             "charge_position_m": blast.scene.charge.position_m,
             "charge_tnt_kg": blast.scene.charge.tnt_kg,
-            "layout": tuple(blast.layout),
+            "layout": blast.layout,
             "module_ids": tuple(part.module_id for part in parts),
         }
         return self._observe(self._run), info
@@ -222,7 +223,8 @@ class BlastSimulatorEnv(gym.Env[Observation, np.int64]):
 
     def _lay_out(self, seed: int, options: Mapping[str, Any]) -> Blast:
         check_names("option of reset", options, _OPTIONS)
-        blast = Blast(self.scenario, options.get("layout", self.layout), seed, self.engine)
+        layout = check_layout(self.scenario, options.get("layout", self.layout))
+        blast = Blast(self.scenario, layout, seed, self.engine)
         position_m = options.get("charge_position_m")
         if position_m is None:
             return blast

@@ -13,6 +13,7 @@ from blast_env.evaluation.comparison import Objective
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyScenario, AnySource, PointSource, Scenario, ScenarioField
+from blast_env.sites import SITES, SiteSource
 
 
 class ThreatModel(Protocol):
@@ -105,14 +106,18 @@ def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
     """Return the source for what a user calls a scenario.
 
     Args:
-        scenario: Bundled name, path of a scenario file, a scenario, or a source.
+        scenario: Bundled name, `"sites"` for generated sites to train on, path of a scenario file,
+            a scenario or its plain data, or a source.
 
     Raises:
         ScenarioError: If there is no such scenario, or anything is wrong with it.
         BlastEnvError: If it has no build zone, or is anything else.
     """
-    if isinstance(scenario, str | Path | Scenario):
-        source: ScenarioSource = SingleScenario(scenario)
+    source: ScenarioSource
+    if isinstance(scenario, str) and scenario == SITES:
+        source = SiteSource.training()
+    elif isinstance(scenario, str | Path | Mapping | Scenario):
+        source = SingleScenario(scenario)
     else:
         source = scenario
     if not (hasattr(source, "sample") and hasattr(source, "representative")):

@@ -1,8 +1,9 @@
 """Scenario files."""
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, Self, overload
+from typing import Any, Final, Self, overload
 
 import tomli_w
 
@@ -39,15 +40,17 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     return parse_scenario(text, str(path))
 
 
-AnyScenario = Scenario | str | Path
-"""What a user may call a scenario: itself, its bundled name, or the path of its file."""
+AnyScenario = Scenario | str | Path | Mapping[str, Any]
+"""What a user may call a scenario: itself, its bundled name, the path of its file, or what such a
+file says as plain data."""
 
 
 def find_scenario(scenario: AnyScenario) -> Scenario:
     """Return the scenario that a user means.
 
     Args:
-        scenario: A scenario, which is returned as it is, or what `load_scenario` takes.
+        scenario: A scenario, which is returned as it is, what `load_scenario` takes, or plain data
+            as `Scenario.model_dump(mode="json", exclude_none=True)` gives it.
 
     Raises:
         ScenarioError: If there is no such scenario, or anything is wrong with it.
@@ -55,6 +58,8 @@ def find_scenario(scenario: AnyScenario) -> Scenario:
     """
     if isinstance(scenario, Scenario):
         return scenario
+    if isinstance(scenario, Mapping):
+        return Scenario.from_document(scenario, str(scenario.get("name", "scenario")))
     if not isinstance(scenario, str | Path):
         raise BlastEnvError(f"scenario is {scenario!r}, must be a name, a path or a Scenario")
     return load_scenario(scenario)

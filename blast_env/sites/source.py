@@ -13,6 +13,9 @@ from blast_env.sites.criterion import SiteCriterion
 from blast_env.sites.generate import CRITERION, MOST_SEED, RANGES, generate_site
 from blast_env.sites.ranges import SiteRanges
 
+SITES: Final = "sites"
+"""Name of the generated sites to train on, where an environment asks for a scenario."""
+
 HELD_OUT_SITES: Final = 10_000
 """Seeds 0 to 9,999 are held out; training has the seeds from 10,000 on."""
 

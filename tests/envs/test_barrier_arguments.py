@@ -1,5 +1,7 @@
 """Wrong arguments and options of the barrier environment are named."""
 
+import pickle
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -39,7 +41,6 @@ def test_bad_options_are_named(options: dict, error: type, words: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"scenaro": "courtyard"}, "no argument 'scenaro', did you mean 'scenario'"),
         ({"scenario": "cortyard"}, "did you mean 'courtyard'"),
         ({"scenario": "free_field"}, "'free_field' has no build zone"),
         ({"reward": "teminal"}, "no reward 'teminal', did you mean 'terminal'"),
@@ -66,6 +67,19 @@ def test_bad_arguments_are_named(arguments: dict, words: str) -> None:
     with pytest.raises(BlastEnvError) as caught:
         gym.make("BlastBarrier-v0", **arguments)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["BlastBarrier-v0", "BlastSimulator-v0"])
+def test_unknown_arguments_are_what_gymnasium_s_users_expect(name: str) -> None:
+    """Wrappers and libraries look for Python's words in a `TypeError`; people for the name."""
+    with pytest.raises(TypeError) as caught:
+        gym.make(name, scenaro="courtyard")
+    words = "got an unexpected keyword argument 'scenaro', did you mean 'scenario'?; known: "
+    assert words in str(caught.value)
+    assert isinstance(caught.value, BlastEnvError)
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'; known"):
+        gym.make_vec(name, num_envs=2, frameskip=4)
 
 
 def test_an_unknown_render_mode_is_named() -> None:

@@ -90,5 +90,5 @@ def test_environments_in_processes_share_a_folder(tmp_path: Path) -> None:
 def test_what_is_no_cache_is_named() -> None:
     with pytest.raises(BlastEnvError, match="cache is 3, must be a folder or have the methods"):
         make(cache=3)
-    with pytest.raises(BlastEnvError, match="no argument 'cahce', did you mean 'cache'"):
+    with pytest.raises(BlastEnvError, match="argument 'cahce', did you mean 'cache'"):
         make(cahce="folder")

@@ -116,7 +116,8 @@ def test_no_public_function_insists_on_a_loaded_scenario(module_name: str) -> No
 def test_name_path_and_scenario_mean_the_same(call: Callable[[Any], Any], tmp_path: Path) -> None:
     path = tmp_path / "courtyard.toml"
     blast_env.save_scenario(NAME, path)
-    assert call(NAME) == call(str(path)) == call(path) == call(COURTYARD)
+    plain = COURTYARD.model_dump(mode="json", exclude_none=True)
+    assert call(NAME) == call(str(path)) == call(path) == call(plain) == call(COURTYARD)
 
 
 class _Nowhere:

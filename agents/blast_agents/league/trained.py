@@ -9,8 +9,9 @@ from blast_agents.league.entries import Agent, Training
 from blast_agents.league.tracks import Track
 from blast_agents.training import load_agent
 from blast_agents.training.agent import Checkpoint
-from blast_agents.training.run_folder import SITES, EvaluationRow, RunFolder, read_rows
+from blast_agents.training.run_folder import EvaluationRow, RunFolder, read_rows
 from blast_env.errors import BlastEnvError
+from blast_env.sites import SITES
 
 _ALGORITHMS: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
 

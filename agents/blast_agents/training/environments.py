@@ -11,7 +11,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
 
 from blast_agents.training.hyperparameters import DEFAULT_SECTION
-from blast_agents.training.run_folder import SITES, RunConfiguration, TrainingSettings
+from blast_agents.training.run_folder import RunConfiguration, TrainingSettings
 from blast_env.envs.arguments import real_number, whole_number
 from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
@@ -19,7 +19,7 @@ from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.strategies import ScenarioSource, scenario_source
 from blast_env.evaluation.store import LoadsCache
 from blast_env.scenario import bundled_scenarios
-from blast_env.sites import SiteSource
+from blast_env.sites import SITES
 
 _Env = gym.Env[Array, np.int64]
 
@@ -127,7 +127,7 @@ def training_source(scenario: str) -> ScenarioSource:
         ScenarioError: If there is no such scenario, or anything is wrong with it.
         BlastEnvError: If it has no build zone.
     """
-    return SiteSource.training() if scenario == SITES else scenario_source(scenario)
+    return scenario_source(scenario)
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,6 @@ from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scen
 CONFIGURATION_FORMAT: Final = 1
 
 
-SITES: Final = "sites"
-"""Name of the generated sites, where a scenario is asked for."""
-
-
 THREATS: Final = ("visible", "hidden")
 
 

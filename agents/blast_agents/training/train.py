@@ -23,7 +23,6 @@ from blast_agents.training.hyperparameters import Hyperparameters
 from blast_agents.training.learning_curve import save_learning_curve
 from blast_agents.training.recorder import Progress, Recorder
 from blast_agents.training.run_folder import (
-    SITES,
     EvaluationRow,
     RolloutRow,
     RunConfiguration,
@@ -34,6 +33,7 @@ from blast_agents.training.run_folder import (
 )
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
+from blast_env.sites import SITES
 
 
 @dataclass(frozen=True, eq=False)
