@@ -16,6 +16,7 @@ _NO_INFLUENCE: Final = frozenset(
         "cli",
         "envs",
         "export",
+        "importing",
         "recording",
         "rendering",
         "sites",

@@ -7,6 +7,7 @@ import typer
 from blast_env.cli.bench import bench
 from blast_env.cli.calibrate import calibrate
 from blast_env.cli.evaluate import evaluate
+from blast_env.cli.import_map import import_map
 from blast_env.cli.league import league
 from blast_env.cli.output import print_line
 from blast_env.cli.search import search
@@ -22,6 +23,7 @@ app = typer.Typer(
 )
 for _command in (simulate, validate, calibrate, evaluate, search, bench, train, league):
     app.command()(_command)
+app.command("import")(import_map)  # a word that Python keeps for itself
 
 
 def _show_version(asked: bool) -> None:

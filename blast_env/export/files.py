@@ -1,19 +1,21 @@
 """Layouts as CSV, GeoJSON, DXF and JSON."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+import numpy as np
 import pandas as pd
 
 from blast_env import tables
 from blast_env.errors import BlastEnvError, suggestion
-from blast_env.export.plan import Feature, LayoutPlan
+from blast_env.export.plan import Feature, LayoutPlan, PlaceM
 from blast_env.files import make_folder, write_atomically
 from blast_env.scenario import write_layout
+from blast_env.scenario.georeference import AnyGeoreference
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
 COLUMNS: Final = (
@@ -52,22 +54,46 @@ def write_csv(plan: LayoutPlan, path: Path) -> None:
     tables.write_csv(module_table(plan), path)
 
 
-COORDINATES: Final = (
+SITE_METRES: Final = (
     "local site metres: x to the right and y upwards from the lower left corner of the site; "
     "not longitude and latitude (not WGS 84)"
 )
-"""Stands in the collection and in every feature, because many programs read features alone."""
+"""Coordinates of a site that lies on no map."""
+
+_LONGITUDE_LATITUDE: Final = "longitude and latitude (WGS 84)"
 
 
 def feature_collection(plan: LayoutPlan) -> dict[str, Any]:
-    """Return a FeatureCollection of everything on the site, as plain data."""
-    return {
+    """Return a FeatureCollection of everything on the site, as plain data.
+
+    With a georeference of the scenario it lies on its map: in longitude and latitude, as GeoJSON
+    has it, or in the reference system of the map, which then is the older form's member `crs`.
+    """
+    georeference = plan.scenario.georeference
+    # It stands in every feature too, because many programs read features alone.
+    words = _coordinate_words(georeference)
+    collection: dict[str, Any] = {
         "type": "FeatureCollection",
         "name": plan.scenario.name,
-        "coordinate_system": COORDINATES,
+        "coordinate_system": words,
         "scenario_hash": plan.scenario.content_hash,
-        "features": [_feature(feature) for feature in plan.features],
+        "features": [_feature(feature, words, georeference) for feature in plan.features],
     }
+    if georeference is not None and georeference.kind == "map" and words != _LONGITUDE_LATITUDE:
+        collection["crs"] = {"type": "name", "properties": {"name": georeference.crs}}
+    return collection
+
+
+def _coordinate_words(georeference: AnyGeoreference | None) -> str:
+    """Return what the coordinates are, in words."""
+    if georeference is None:
+        return SITE_METRES
+    if georeference.kind == "drawing":
+        unit = georeference.metres_per_unit
+        return f"those of the drawing that the site was imported from, in units of {unit:g} m"
+    from blast_env.importing.plane import is_longitude_latitude
+
+    return _LONGITUDE_LATITUDE if is_longitude_latitude(georeference.crs) else georeference.crs
 
 
 def write_geojson(plan: LayoutPlan, path: Path) -> None:
@@ -84,22 +110,36 @@ def write_geojson(plan: LayoutPlan, path: Path) -> None:
         temporary.write_text(f'{head},\n"features": [\n{features}\n]\n}}\n', encoding="utf-8")
 
 
-def _feature(feature: Feature) -> dict[str, Any]:
+def _feature(
+    feature: Feature, coordinate_words: str, georeference: AnyGeoreference | None
+) -> dict[str, Any]:
     return {
         "type": "Feature",
         "properties": {
             "kind": feature.kind.value,
             "name": feature.name,
             **feature.properties,
-            "coordinate_system": COORDINATES,
+            "coordinate_system": coordinate_words,
         },
-        "geometry": _geometry(feature),
+        "geometry": _geometry(_on_map(feature.places_m, georeference)),
     }
 
 
-def _geometry(feature: Feature) -> dict[str, Any]:
+def _on_map(places_m: Sequence[PlaceM], georeference: AnyGeoreference | None) -> list[list[float]]:
+    """Return places of the site in the coordinates of its map, if it has one."""
+    if georeference is None:
+        return [list(place) for place in places_m]
+    # Here, because sites without a map do not need the extra `maps`.
+    from blast_env.importing.plane import to_map
+
+    return [
+        [round(value, _DIGITS) for value in place]
+        for place in to_map(georeference, np.array(places_m)).tolist()
+    ]
+
+
+def _geometry(places: list[list[float]]) -> dict[str, Any]:
     """Return a point, a line or a polygon, its ring closed and counterclockwise."""
-    places = [list(place) for place in feature.places_m]
     if len(places) == 1:
         return {"type": "Point", "coordinates": places[0]}
     if len(places) == 2:

@@ -14,6 +14,7 @@ from blast_env.physics.scene import Charge
 from blast_env.physics.structure import ModularPart
 from blast_env.scenario import (
     AnySource,
+    AnyStructure,
     BuildZone,
     RectangleSource,
     ScenarioField,
@@ -106,7 +107,7 @@ class LayoutPlan:
             kind = FeatureKind.STRUCTURE
             if structure.protected:
                 kind = FeatureKind.PROTECTED_STRUCTURE
-            yield _area(kind, structure.rectangle_m, structure.name, weight=structure.weight)
+            yield _area(kind, structure.rectangle_m, structure.name, **_said_of(structure))
         for source in scenario.charge:
             yield _charge_place(source)
         if self.charge is not None:
@@ -118,6 +119,16 @@ class LayoutPlan:
             yield _area(
                 FeatureKind.BARRIER, rectangle, part.module_id, row=part.row, column=part.column
             )
+
+
+def _said_of(structure: AnyStructure) -> dict[str, str | float]:
+    """Return what there is to say of a structure beside its name."""
+    said: dict[str, str | float] = {"weight": structure.weight}
+    if structure.height_m is not None:
+        said["height_m"] = structure.height_m
+    if structure.building is not None:
+        said["building"] = structure.building
+    return said
 
 
 def _zone_features(zone: BuildZone) -> Iterator[Feature]:

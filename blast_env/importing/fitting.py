@@ -1,0 +1,380 @@
+"""Buildings of a map as rectangles of modules on the grid of a site."""
+
+import re
+import unicodedata
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.importing.cells import (
+    COARSER,
+    CellRectangle,
+    Deviation,
+    in_blocks,
+    outline_of,
+    owners,
+    rectangles_of,
+)
+from blast_env.importing.options import ImportOptions
+from blast_env.importing.placing import PlacedSite
+from blast_env.importing.roles import Role, Thing
+from blast_env.units import MODULE_SIDE_M
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+    from shapely.geometry.base import BaseGeometry
+
+MOST_STRUCTURES: Final = 100
+"""As many as a scenario may have."""
+
+_MOST_NAME: Final = 34  # letters, which leaves room for the letters of parts
+_BARRIER: Final = "barrier"
+
+
+@dataclass(frozen=True)
+class FittedBuilding:
+    """A building as modules.
+
+    Attributes:
+        name: Its name in the scenario.
+        title: What the map calls it, or an empty string.
+        place: Where in the file it is.
+        outline: Its outline in site metres, cut at the site's border.
+        rectangles: The modules.
+        wall_shares: Which part of the building's walls that look at air each rectangle has.
+        height_m: Its height; `None` for as high as the air.
+        protected: Whether its load counts.
+        deviation: How far the modules are from the outline.
+        block_m: Side of the blocks it was cut into; a module's side, unless that takes too many
+            rectangles.
+        is_cut: Whether the site's border cuts it.
+    """
+
+    name: str
+    title: str
+    place: str
+    outline: BaseGeometry
+    rectangles: tuple[CellRectangle, ...]
+    wall_shares: tuple[float, ...]
+    height_m: float | None
+    protected: bool
+    deviation: Deviation
+    block_m: float
+    is_cut: bool
+
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        """Names of the rectangles: the building's, with letters where there are several."""
+        if len(self.rectangles) == 1:
+            return (self.name,)
+        joint = "" if self.name[-1].isdigit() else "_"
+        return tuple(
+            f"{self.name}{joint}{_letters(number)}" for number in range(len(self.rectangles))
+        )
+
+    @property
+    def modules(self) -> BaseGeometry:
+        """The outline of the modules in site metres."""
+        return outline_of(self.rectangles)
+
+    @property
+    def area_m2(self) -> float:
+        """Area of the modules."""
+        return float(self.modules.area)
+
+
+def fit_buildings(
+    site: PlacedSite, options: ImportOptions
+) -> tuple[tuple[FittedBuilding, ...], tuple[str, ...]]:
+    """Return the buildings of a site as modules, and notes on what was left out.
+
+    Raises:
+        BlastEnvError: If there is no building, one deviates too far from its outline, or they
+            take too many rectangles.
+    """
+    kept, notes = _kept(site, options)
+    if not kept:
+        raise BlastEnvError(f"{site.path}: there is no building on the site{_hint(site)}")
+    kept = sorted(kept, key=lambda each: -each.geometry.area)
+    outlines = [each.geometry for each in kept]
+    owner = owners(outlines, site.shape)
+    cut = [_cut(site, index, thing, owner, options) for index, thing in enumerate(kept)]
+    count = sum(len(rectangles) for rectangles, _ in cut)
+    if count > MOST_STRUCTURES:
+        raise BlastEnvError(
+            f"{site.path}: the buildings take {count} rectangles, must take at most "
+            f"{MOST_STRUCTURES}, as many structures as a scenario has: make the site smaller "
+            "(--size), leave out small buildings (--least-area), or take fewer rectangles for each "
+            "(--most-rectangles)"
+        )
+    heights = _heights(kept, options)
+    titles = [each.name for each in kept]
+    walls = _wall_areas([rectangles for rectangles, _ in cut], heights, site.shape)
+    buildings = [
+        FittedBuilding(
+            name=name,
+            title=thing.name,
+            place=thing.place,
+            outline=thing.geometry,
+            rectangles=rectangles,
+            wall_shares=shares,
+            height_m=height_m,
+            protected=thing.protected,
+            deviation=Deviation.between(thing.geometry, outline_of(rectangles)),
+            block_m=block * MODULE_SIDE_M,
+            is_cut=_touches_border(thing.geometry, site),
+        )
+        for name, thing, (rectangles, block), shares, height_m in zip(
+            _names(titles), kept, cut, walls, heights, strict=True
+        )
+    ]
+    for building in buildings:
+        _check_deviation(site, building, options)
+    without = sum(height_m is None for height_m in heights)
+    if without:
+        notes.append(
+            "buildings without a height in the file, which are as high as the air "
+            f"(--default-height): {without} of {len(heights)}"
+        )
+    return tuple(buildings), tuple(notes)
+
+
+def protected_as_asked(
+    buildings: Sequence[FittedBuilding], site: PlacedSite, options: ImportOptions
+) -> tuple[FittedBuilding, ...]:
+    """Return the buildings, protected those that the user named, or that the file marks.
+
+    Raises:
+        BlastEnvError: If a name is none, or no building is protected.
+    """
+    chosen = {_found(buildings, name) for name in options.protect}
+    if options.protect_near is not None:
+        place = shapely.Point(site.to_site(np.array([options.protect_near]))[0])
+        chosen.add(int(np.argmin([each.outline.distance(place) for each in buildings])))
+    if not chosen:
+        chosen = {index for index, each in enumerate(buildings) if each.protected}
+    if not chosen:
+        raise BlastEnvError(
+            "no building is protected: say --protect NAME or --protect-near X Y; there are "
+            f"{_listed(buildings)}"
+        )
+    return tuple(replace(each, protected=index in chosen) for index, each in enumerate(buildings))
+
+
+def _kept(site: PlacedSite, options: ImportOptions) -> tuple[list[Thing], list[str]]:
+    """Return the buildings on the site, cut at its border and large enough, and notes."""
+    kept, small, invalid = [], 0, 0
+    for thing in site.of_role(Role.BUILDING):
+        outline, mended = _sound(site, thing, options)
+        invalid += mended
+        inside = shapely.intersection(outline, site.box)
+        parts = [part for part in shapely.get_parts(inside) if part.geom_type == "Polygon"]
+        if sum(part.area for part in parts) < options.least_area_m2:
+            small += not inside.is_empty
+            continue
+        geometry = parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
+        kept.append(
+            replace(thing, geometry=geometry, name=thing.name or _written_in(site, outline))
+        )
+    notes = []
+    if small:
+        notes.append(
+            f"buildings of less than {options.least_area_m2:g} m2 on the site, which were left "
+            f"out (--least-area): {small}"
+        )
+    if invalid:
+        notes.append(f"outlines that cross themselves, which were put right: {invalid}")
+    return kept, notes
+
+
+def _sound(site: PlacedSite, thing: Thing, options: ImportOptions) -> tuple[BaseGeometry, bool]:
+    """Return an outline that does not cross itself, and whether it was put right.
+
+    Raises:
+        BlastEnvError: If it does, and is not to be put right.
+    """
+    outline = thing.geometry
+    if shapely.is_valid(outline):
+        return outline, False
+    if not options.repair:
+        reason = str(shapely.is_valid_reason(outline)).split("[")[0].strip().lower()
+        words = f" ({thing.name})" if thing.name else ""
+        raise BlastEnvError(
+            f"{site.path}: {thing.place}{words}: the outline is not sound: {reason}; --repair puts "
+            "such outlines right"
+        )
+    return shapely.buffer(shapely.make_valid(outline), 0.0), True
+
+
+def _written_in(site: PlacedSite, outline: BaseGeometry) -> str:
+    """Return the only text that stands in an outline of a drawing, or an empty string."""
+    words = {
+        each.name for each in site.of_role(Role.NAME) if shapely.covers(outline, each.geometry)
+    }
+    return words.pop() if len(words) == 1 else ""
+
+
+def _cut(
+    site: PlacedSite,
+    index: int,
+    thing: Thing,
+    owner: NDArray[np.int32],
+    options: ImportOptions,
+) -> tuple[tuple[CellRectangle, ...], int]:
+    """Return a building as rectangles, and the side of its blocks in modules.
+
+    The blocks are as fine as `most_rectangles` allows. What coarser ones leave of a building's
+    own cells is air; cells of other buildings they never take.
+
+    Raises:
+        BlastEnvError: If the outline covers no module, or takes too many rectangles.
+    """
+    own = owner == index
+    if not own.any():
+        raise BlastEnvError(
+            f"{site.path}: {thing.place}: covers half of no module, or lies under another "
+            "building: leave it out with --least-area"
+        )
+    least = 0
+    for side in COARSER:
+        cells = in_blocks(own, side) & (own | (owner == -1))
+        rectangles = rectangles_of(cells)
+        if 0 < len(rectangles) <= options.most_rectangles:
+            owner[own & ~cells] = -1
+            owner[cells] = index
+            return rectangles, side
+        least = min(least, len(rectangles)) or len(rectangles)
+    words = f" ({thing.name})" if thing.name else ""
+    raise BlastEnvError(
+        f"{site.path}: {thing.place}{words}: takes {least} rectangles even in blocks of "
+        f"{COARSER[-1] * MODULE_SIDE_M:g} m, must take at most {options.most_rectangles} "
+        "(--most-rectangles)"
+    )
+
+
+def _check_deviation(site: PlacedSite, building: FittedBuilding, options: ImportOptions) -> None:
+    """Refuse a building that its modules do not stand for.
+
+    Raises:
+        BlastEnvError: If area or outline are too far off.
+    """
+    deviation = building.deviation
+    words = f"{site.path}: {building.place}: {building.title or building.name}"
+    if deviation.area_share > options.most_area_deviation:
+        raise BlastEnvError(
+            f"{words}: modules miss {deviation.area_share:.1%} of its area, must miss at most "
+            f"{options.most_area_deviation:.1%} (--most-area-deviation, --most-rectangles)"
+        )
+    if deviation.outline_m > options.most_outline_deviation_m:
+        raise BlastEnvError(
+            f"{words}: the outline of its modules is {deviation.outline_m:.2f} m off, must be at "
+            f"most {options.most_outline_deviation_m:g} m off (--most-outline-deviation, "
+            "--most-rectangles)"
+        )
+
+
+def _heights(things: Sequence[Thing], options: ImportOptions) -> list[float | None]:
+    """Return the heights in whole modules; `None` where nobody knows one."""
+    heights = (each.height_m or options.default_height_m for each in things)
+    return [
+        None if height_m is None else max(round(height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
+        for height_m in heights
+    ]
+
+
+def _wall_areas(
+    parts: Sequence[Sequence[CellRectangle]],
+    heights: Sequence[float | None],
+    shape: tuple[int, int],
+) -> list[tuple[float, ...]]:
+    """Return which share of its building's walls that look at air each rectangle has.
+
+    A wall beside a lower building looks at air above that one's roof.
+    """
+    # Nothing is higher than what is as high as the air.
+    known = [height_m for height_m in heights if height_m is not None]
+    highest_m = max(known, default=0.0) + 1.0
+    height = np.zeros((shape[0] + 2, shape[1] + 2))
+    for rectangles, height_m in zip(parts, heights, strict=True):
+        for each in rectangles:
+            height[1:-1, 1:-1][each.cells] = highest_m if height_m is None else height_m
+    middle = height[1:-1, 1:-1]
+    sides = (height[1:-1, :-2], height[1:-1, 2:], height[:-2, 1:-1], height[2:, 1:-1])
+    open_m: FloatArray = np.sum([np.maximum(middle - side, 0.0) for side in sides], axis=0)
+    shares = []
+    for rectangles in parts:
+        areas = np.array([open_m[each.cells].sum() for each in rectangles])
+        shares.append(tuple(float(area) for area in areas / (areas.sum() or 1.0)))
+    return shares
+
+
+def _touches_border(outline: BaseGeometry, site: PlacedSite) -> bool:
+    return bool(shapely.intersects(outline, site.box.boundary))
+
+
+def _names(titles: Sequence[str]) -> list[str]:
+    """Return a name for each building that a scenario takes, and each only once."""
+    names: list[str] = []
+    number = 0
+    for title in titles:
+        name = plain_name(title)
+        if name in ("", _BARRIER):
+            number += 1
+            name = f"building_{number}"
+        while name in names:
+            number += 1
+            name = f"{plain_name(title) or 'building'}_{number}"
+        names.append(name)
+    return names
+
+
+def plain_name(title: str) -> str:
+    """Return a title as a scenario takes names, as far as that goes; empty if nothing is left."""
+    plain = unicodedata.normalize("NFKD", title.replace("ß", "ss"))
+    letters = plain.encode("ascii", "ignore").decode()
+    return re.sub(r"[^A-Za-z0-9-]+", "_", letters).lstrip("_-0123456789").rstrip("_")[:_MOST_NAME]
+
+
+def _letters(number: int) -> str:
+    """Return a, b, ... z, aa, ab, ..."""
+    text = ""
+    number += 1
+    while number:
+        number, letter = divmod(number - 1, 26)
+        text = chr(ord("a") + letter) + text
+    return text
+
+
+def _found(buildings: Sequence[FittedBuilding], name: str) -> int:
+    """Return the index of the building of a name, the scenario's or the map's."""
+    for index, each in enumerate(buildings):
+        if name.casefold() in (each.name.casefold(), each.title.casefold()):
+            return index
+    raise BlastEnvError(f"--protect is {name!r}, but there are {_listed(buildings)}")
+
+
+def _listed(buildings: Sequence[FittedBuilding]) -> str:
+    """Return names of buildings, not too many."""
+    shown = [each.name for each in buildings[:20]]
+    more = len(buildings) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more else "")
+
+
+def _hint(site: PlacedSite) -> str:
+    """Return what may help where there are no buildings."""
+    return "".join(_hints(site))
+
+
+def _hints(site: PlacedSite) -> Iterator[str]:
+    if site.layers:
+        layers = ", ".join(site.layers[:20])
+        yield f": say with --buildings-from which layer has them; the file has {layers}"
+    elif site.of_role(Role.BUILDING):
+        yield ": buildings of the file lie elsewhere, or are smaller than --least-area"
+    else:
+        yield ": the file has none; say with --buildings-from what is one"

@@ -1,0 +1,150 @@
+"""Reading GeoJSON, RFC 7946 or the older form with a `crs` member."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.importing.site_map import (
+    MOST_FEATURES,
+    DrawingCoordinates,
+    MapCoordinates,
+    MapFeature,
+    SiteMap,
+    SourceCoordinates,
+    Tags,
+    checked_file,
+    too_many,
+)
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+    from shapely.errors import ShapelyError
+    from shapely.geometry import shape
+    from shapely.geometry.base import BaseGeometry
+
+LOCAL: Final = "local"
+"""Instead of a reference system: the coordinates are metres of a plane of their own."""
+
+_DEFAULT_CRS: Final = "EPSG:4326"
+_LOCAL_WORDS: Final = "local site metres"  # in what blast-env writes of a site without a place
+_KINDS: Final = (
+    *("Point", "MultiPoint", "LineString", "MultiLineString"),
+    *("Polygon", "MultiPolygon", "GeometryCollection"),
+)
+
+
+def read_geojson(path: Path, crs: str | None = None) -> SiteMap:
+    """Return what a GeoJSON file shows.
+
+    Args:
+        path: The file.
+        crs: Reference system of the coordinates, `local` for metres of a plane of their own;
+            without it, what the file says, and longitude and latitude where it says nothing.
+
+    Raises:
+        BlastEnvError: If it cannot be read, or is no GeoJSON.
+    """
+    document = _parsed(checked_file(path))
+    listed = _listed_features(path, document)
+    if len(listed) > MOST_FEATURES:
+        raise too_many(path)
+    features, empty = [], 0
+    for index, item in enumerate(listed):
+        feature = _feature(path, f"features[{index}]", item)
+        if feature is None:
+            empty += 1
+        else:
+            features.append(feature)
+    notes = (f"features without a geometry, which were left out: {empty}",) if empty else ()
+    return SiteMap(path, _coordinates(path, document, crs), tuple(features), notes)
+
+
+def _parsed(path: Path) -> Mapping[str, Any]:
+    try:
+        document = json.loads(path.read_bytes())
+    except RecursionError as error:
+        raise BlastEnvError(f"{path}: is nested too deeply") from error
+    except (ValueError, OSError) as error:
+        raise BlastEnvError(f"{path}: is not JSON: {error}") from error
+    if not isinstance(document, dict):
+        raise BlastEnvError(f"{path}: is {type(document).__name__}, must be a GeoJSON object")
+    return document
+
+
+def _listed_features(path: Path, document: Mapping[str, Any]) -> list[Any]:
+    """Return the features of a collection, a single feature, or a bare geometry."""
+    kind = document.get("type")
+    if kind == "FeatureCollection":
+        features = document.get("features")
+        if not isinstance(features, list):
+            raise BlastEnvError(f"{path}: features is missing or no array")
+        return features
+    if kind == "Feature":
+        return [document]
+    if kind in _KINDS:
+        return [{"type": "Feature", "geometry": document, "properties": {}}]
+    raise BlastEnvError(
+        f"{path}: type is {kind!r}, must be 'FeatureCollection', 'Feature' or that of a geometry: "
+        "is it GeoJSON?"
+    )
+
+
+def _feature(path: Path, place: str, item: Any) -> MapFeature | None:
+    """Return a feature, or `None` for one without a geometry, which GeoJSON allows."""
+    if not isinstance(item, dict) or item.get("type") != "Feature":
+        raise BlastEnvError(f"{path}: {place}: is not a Feature")
+    if item.get("geometry") is None:
+        return None
+    geometry = _geometry(path, place, item["geometry"])
+    return None if geometry.is_empty else MapFeature(geometry, _tags(item), place)
+
+
+def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:
+    if not isinstance(document, dict) or document.get("type") not in _KINDS:
+        kind = document.get("type") if isinstance(document, dict) else document
+        raise BlastEnvError(
+            f"{path}: {place}.geometry: type is {kind!r}, must be one of {', '.join(_KINDS)}"
+        )
+    try:
+        geometry = shapely.force_2d(shape(document))
+        finite = np.isfinite(shapely.get_coordinates(geometry)).all()
+    except (ShapelyError, TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
+        raise BlastEnvError(f"{path}: {place}.geometry: is not usable: {error}") from error
+    except RecursionError as error:
+        raise BlastEnvError(f"{path}: {place}.geometry: is nested too deeply") from error
+    if not finite:
+        raise BlastEnvError(f"{path}: {place}.geometry: has a coordinate that is no finite number")
+    return geometry
+
+
+def _tags(item: Mapping[str, Any]) -> Tags:
+    """Return the properties that are plain values, and the identifier."""
+    properties = item.get("properties")
+    tags = dict(properties) if isinstance(properties, dict) else {}
+    if "id" in item:
+        tags.setdefault("id", item["id"])
+    return {str(key): value for key, value in tags.items() if isinstance(value, str | int | float)}
+
+
+def _coordinates(path: Path, document: Mapping[str, Any], crs: str | None) -> SourceCoordinates:
+    """Return what the coordinates mean: as asked, or as the file says."""
+    if crs is None:
+        if _LOCAL_WORDS in str(document.get("coordinate_system", "")):
+            return DrawingCoordinates(1.0)
+        crs = _named_crs(path, document.get("crs"))
+    return DrawingCoordinates(1.0) if crs == LOCAL else MapCoordinates(crs)
+
+
+def _named_crs(path: Path, member: Any) -> str:
+    """Return the reference system of the older form of GeoJSON."""
+    if member is None:
+        return _DEFAULT_CRS
+    properties = member.get("properties") if isinstance(member, dict) else None
+    name = properties.get("name") if isinstance(properties, dict) else None
+    if not isinstance(name, str):
+        raise BlastEnvError(f"{path}: crs: has no properties.name; say --crs instead")
+    return name

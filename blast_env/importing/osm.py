@@ -1,0 +1,107 @@
+"""Reading extracts of OpenStreetMap: XML (`.osm`) and PBF (`.osm.pbf`), offline."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.importing.site_map import (
+    MOST_FEATURES,
+    MapCoordinates,
+    MapFeature,
+    SiteMap,
+    Tags,
+    checked_file,
+    too_many,
+)
+
+with import_extra("maps", "maps and drawings"):
+    import osmium
+    import shapely
+    from osmium import osm
+    from shapely.geometry import LineString, MultiPolygon, Point, Polygon
+
+SUFFIXES: Final = (".osm", ".pbf", ".osm.bz2", ".osm.gz")
+
+_WGS84: Final = "EPSG:4326"
+_CUT: Final = "ways of which the extract does not have all nodes, which were left out"
+_LEAST_RING: Final = 4  # points, the first one again at the end
+
+
+def read_osm(path: Path) -> SiteMap:
+    """Return what an extract of OpenStreetMap shows: tagged ways, areas and nodes.
+
+    Closed ways with no `highway` are outlines. Relations are outlines where they are complete
+    multipolygons; ways that the extract cuts through are left out, and the notes say so.
+
+    Raises:
+        BlastEnvError: If it cannot be read.
+    """
+    features, skipped = [], _Skipped()
+    try:
+        for feature in _features(checked_file(path), skipped):
+            features.append(feature)
+            if len(features) > MOST_FEATURES:
+                raise too_many(path)
+    except RuntimeError as error:
+        raise BlastEnvError(f"{path}: cannot be read as OpenStreetMap data: {error}") from error
+    return SiteMap(path, MapCoordinates(_WGS84), tuple(features), skipped.notes)
+
+
+@dataclass
+class _Skipped:
+    """How many things of which kind were left out, and why."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return tuple(f"{what}: {count}" for what, count in self.counts.items())
+
+
+def _features(path: Path, skipped: _Skipped) -> Iterator[MapFeature]:
+    """Yield everything with tags; ways of multipolygons without tags are only in those."""
+    processor = osmium.FileProcessor(str(path)).with_areas()
+    processor.with_filter(osmium.filter.EmptyTagFilter())
+    for item in processor:
+        tags = {tag.k: tag.v for tag in item.tags}
+        if isinstance(item, osm.Node):
+            if item.location.valid():
+                yield MapFeature(Point(item.lon, item.lat), tags, f"node {item.id}")
+        elif isinstance(item, osm.Way):
+            feature = _way(item, tags, skipped)
+            if feature is not None:
+                yield feature
+        elif isinstance(item, osm.Area) and not item.from_way():
+            rings = list(item.outer_rings())
+            if not rings:
+                skipped.counts["relations with rings that do not close, which were left out"] += 1
+                continue
+            polygons = [
+                Polygon(_places(ring), [_places(hole) for hole in item.inner_rings(ring)])
+                for ring in rings
+            ]
+            geometry = polygons[0] if len(polygons) == 1 else MultiPolygon(polygons)
+            yield MapFeature(geometry, tags, f"relation {item.orig_id()}")
+
+
+def _way(way: Any, tags: Tags, skipped: _Skipped) -> MapFeature | None:
+    """Return a way as an outline if it is closed and no street, otherwise as a line."""
+    try:
+        places = _places(way.nodes)
+    except osmium.InvalidLocationError:
+        skipped.counts[_CUT] += 1
+        return None
+    if len(places) < 2:
+        skipped.counts["ways of fewer than two nodes, which were left out"] += 1
+        return None
+    is_area = way.is_closed() and len(places) >= _LEAST_RING and "highway" not in tags
+    geometry = Polygon(places) if is_area else LineString(places)
+    return MapFeature(shapely.force_2d(geometry), tags, f"way {way.id}")
+
+
+def _places(nodes: Iterable[Any]) -> list[tuple[float, float]]:
+    """Return longitude and latitude of nodes."""
+    return [(node.lon, node.lat) for node in nodes]

@@ -1,0 +1,244 @@
+"""Where on a map the site lies: its rectangle, its direction, and what is on it."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.importing.direction import dominant_direction_deg, grid_offset_m
+from blast_env.importing.options import MOST_SITE_M, ImportOptions
+from blast_env.importing.plane import Plane, plane_around, rotated
+from blast_env.importing.roles import Role, Thing
+from blast_env.importing.site_map import SiteMap
+from blast_env.scenario.georeference import AnyGeoreference
+from blast_env.units import MODULE_SIDE_M
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+    from shapely.geometry.base import BaseGeometry
+
+_HAIR_M: Final = 0.01
+_ROUNDING: Final = 0.1  # of a module: no row of modules for a map's rounding
+
+
+@dataclass(frozen=True)
+class PlacedSite:
+    """A site on a map; what is on it is in metres from the site's lower left corner.
+
+    Attributes:
+        path: The file.
+        plane: The plane in which the map is measured.
+        rotation_deg: From the plane's x axis to the site's, counterclockwise.
+        corner_m: The site's lower left corner in the turned plane.
+        shape: Rows and columns of modules.
+        things: What is on the site or near it.
+        layers: Layers of a drawing.
+    """
+
+    path: Path
+    plane: Plane
+    rotation_deg: float
+    corner_m: tuple[float, float]
+    shape: tuple[int, int]
+    things: tuple[Thing, ...]
+    layers: tuple[str, ...] = ()
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Its extents along x and y."""
+        return self.shape[1] * MODULE_SIDE_M, self.shape[0] * MODULE_SIDE_M
+
+    @cached_property
+    def box(self) -> BaseGeometry:
+        """The whole site."""
+        return shapely.box(0.0, 0.0, *self.size_m)
+
+    @property
+    def georeference(self) -> AnyGeoreference:
+        """Where on the map it lies."""
+        corner = rotated(np.array([self.corner_m]), self.rotation_deg)[0]
+        return self.plane.georeference((float(corner[0]), float(corner[1])), self.rotation_deg)
+
+    def of_role(self, role: Role) -> tuple[Thing, ...]:
+        """Return the things of a role."""
+        return tuple(each for each in self.things if each.role is role)
+
+    def to_site(self, places: FloatArray) -> FloatArray:
+        """Return places of the map (n, 2) in metres of the site (n, 2)."""
+        turned = rotated(self.plane.to_metres(places), -self.rotation_deg)
+        return np.asarray(turned - np.array(self.corner_m))
+
+
+def place_site(site_map: SiteMap, things: Sequence[Thing], options: ImportOptions) -> PlacedSite:
+    """Return the site that the user asked for, or around everything that is on the map.
+
+    Raises:
+        BlastEnvError: If the map has nothing to put it around, the place is not on the Earth, or
+            the site would be too large.
+    """
+    if not things:
+        raise BlastEnvError(
+            f"{site_map.path}: has no building and no place of a charge that is marked as such; "
+            "say what is one with --buildings-from and --charges-from"
+        )
+    plane = plane_around(site_map.coordinates, _reference(things, options))
+    near = _near(site_map, things, plane, options)
+    rotation_deg = _rotation_deg(near, options)
+    turned = [_moved(each, lambda places: rotated(places, -rotation_deg)) for each in near]
+    left, bottom, right, top = _bounds_m(site_map, turned, plane, rotation_deg, options)
+    size_m = np.array([right - left, top - bottom])
+    if size_m.max() > MOST_SITE_M:
+        raise BlastEnvError(
+            f"{site_map.path}: the site would be {size_m[0]:,.0f} x {size_m[1]:,.0f} m, must be at "
+            f"most {MOST_SITE_M:g} m long and wide: say --centre or --origin, and --size"
+        )
+    offsets = grid_offset_m(
+        [each.geometry for each in _outlines(turned, (left, bottom, right, top))]
+    )
+    asked = options.size_m is not None
+    corner = [
+        _on_grid(low, offset, asked) for low, offset in zip((left, bottom), offsets, strict=True)
+    ]
+    far = (corner[0] + size_m[0], corner[1] + size_m[1]) if asked else (right, top)
+    counts = [
+        int(np.ceil((high - low) / MODULE_SIDE_M - _ROUNDING))
+        for low, high in zip(corner, far, strict=True)
+    ]
+    moved = [_moved(each, lambda places: places - np.array(corner)) for each in turned]
+    layers = sorted({str(each.tags["layer"]) for each in site_map.features if "layer" in each.tags})
+    return PlacedSite(
+        path=site_map.path,
+        plane=plane,
+        rotation_deg=rotation_deg,
+        corner_m=(corner[0], corner[1]),
+        shape=(counts[1], counts[0]),
+        things=tuple(moved),
+        layers=tuple(layers),
+    )
+
+
+def _reference(things: Sequence[Thing], options: ImportOptions) -> tuple[float, float]:
+    """Return a place of the map near the site: as asked, or in the middle of everything."""
+    asked = options.origin or options.centre
+    if asked is not None:
+        return asked
+    shown = _chief(things)
+    left, bottom, right, top = shapely.total_bounds([each.geometry for each in shown])
+    return float(left + right) / 2.0, float(bottom + top) / 2.0
+
+
+def _chief(things: Sequence[Thing]) -> Sequence[Thing]:
+    """Return what a site is put around: its own outline, or everything but streets and texts."""
+    own = [each for each in things if each.role is Role.SITE]
+    if own:
+        return own
+    fixed = [
+        each
+        for each in things
+        if each.role is not Role.NAME and not (each.role is Role.CHARGE and _is_line(each.geometry))
+    ]
+    return fixed or things
+
+
+def _is_line(geometry: BaseGeometry) -> bool:
+    return geometry.geom_type in ("LineString", "MultiLineString")
+
+
+def _near(
+    site_map: SiteMap, things: Sequence[Thing], plane: Plane, options: ImportOptions
+) -> list[Thing]:
+    """Return what may be on the site, in metres of the plane."""
+    measured = [_moved(each, plane.to_metres) for each in things]
+    if options.size_m is None:
+        bounds = [shapely.bounds(each.geometry) for each in measured]
+        if not np.isfinite(bounds).all():
+            raise BlastEnvError(
+                f"{site_map.path}: reaches too far for one site: say --centre or --origin, and "
+                "--size"
+            )
+        return list(_joined(measured))
+    # The corner or the middle is the plane's reference; the site turns around it.
+    reference = options.origin or options.centre
+    middle = plane.to_metres(np.array([reference]))[0]
+    around = shapely.Point(middle).buffer(2.0 * float(np.hypot(*options.size_m)))
+    near = [each for each in measured if shapely.intersects(each.geometry, around)]
+    return list(_joined(near))
+
+
+def _joined(things: Iterable[Thing]) -> Iterator[Thing]:
+    """Yield things, with the rectangles of a building that blast-env wrote as one again."""
+    buildings: dict[str, list[Thing]] = {}
+    for thing in things:
+        if thing.part_of:
+            buildings.setdefault(thing.part_of, []).append(thing)
+        else:
+            yield thing
+    for name, parts in buildings.items():
+        # Coordinates of a file are rounded: rectangles that touched may be a hair apart.
+        outline = shapely.union_all([each.geometry for each in parts], grid_size=_HAIR_M)
+        protected = any(each.protected for each in parts)
+        yield replace(parts[0], geometry=outline, name=name, protected=protected)
+
+
+def _moved(thing: Thing, move: Callable[[FloatArray], FloatArray]) -> Thing:
+    return replace(thing, geometry=shapely.transform(thing.geometry, move))
+
+
+def _rotation_deg(things: Sequence[Thing], options: ImportOptions) -> float:
+    """Return the direction of the site: as asked, or that of most walls."""
+    if options.rotation_deg is not None:
+        return options.rotation_deg
+    own = [each.geometry for each in things if each.role is Role.SITE]
+    walls = own or [each.geometry for each in things if each.role is Role.BUILDING]
+    return dominant_direction_deg(walls)
+
+
+def _bounds_m(
+    site_map: SiteMap,
+    things: Sequence[Thing],
+    plane: Plane,
+    rotation_deg: float,
+    options: ImportOptions,
+) -> tuple[float, float, float, float]:
+    """Return the site's rectangle in the turned plane."""
+    if options.size_m is not None:
+        asked = options.origin or options.centre
+        place = rotated(plane.to_metres(np.array([asked])), -rotation_deg)[0]
+        size = np.array(options.size_m)
+        low = place - (0.0 if options.origin is not None else 0.5 * size)
+        far = low + size
+        return float(low[0]), float(low[1]), float(far[0]), float(far[1])
+    chief = _chief(things)
+    if not any(each.role is Role.BUILDING for each in things):
+        raise BlastEnvError(
+            f"{site_map.path}: has no building that is marked as such; say what is one with "
+            "--buildings-from"
+        )
+    left, bottom, right, top = (
+        float(each) for each in shapely.total_bounds([each.geometry for each in chief])
+    )
+    margin_m = 0.0 if chief[0].role is Role.SITE else options.margin_m
+    return left - margin_m, bottom - margin_m, right + margin_m, top + margin_m
+
+
+def _outlines(things: Sequence[Thing], bounds_m: tuple[float, float, float, float]) -> list[Thing]:
+    """Return the buildings that the grid's lines are to suit."""
+    box = shapely.box(*bounds_m)
+    own = [each for each in things if each.role is Role.SITE]
+    return own or [
+        each
+        for each in things
+        if each.role is Role.BUILDING and shapely.intersects(each.geometry, box)
+    ]
+
+
+def _on_grid(low_m: float, offset_m: float, nearest: bool) -> float:
+    """Return the grid line nearest to a place, or the last one before it."""
+    steps = (low_m - offset_m) / MODULE_SIDE_M
+    count = np.round(steps) if nearest else np.floor(steps + _ROUNDING)
+    return float(offset_m + count * MODULE_SIDE_M)

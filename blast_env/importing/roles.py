@@ -1,0 +1,247 @@
+"""What the things on a map are to a site: buildings, places of charges, zone, keep-outs."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from fnmatch import fnmatchcase
+from math import isfinite
+from types import MappingProxyType
+from typing import Final
+
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.importing.site_map import DrawingCoordinates, MapFeature, SiteMap, Tags
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+    from shapely.geometry.base import BaseGeometry
+
+
+class Role(StrEnum):
+    """What a thing on a map is to a site."""
+
+    SITE = "site"
+    BUILDING = "building"
+    CHARGE = "place of a charge"
+    ZONE = "build zone"
+    KEEP_OUT = "keep-out"
+    NAME = "name"
+
+
+@dataclass(frozen=True)
+class Thing:
+    """Something of a map that matters to the site.
+
+    Attributes:
+        role: What it is.
+        geometry: Its outline, line or point, in the coordinates of the source.
+        name: What the source calls it, or an empty string.
+        place: Where in the file it is.
+        height_m: Its height, where the source has it.
+        protected: Whether the source says that its load counts.
+        tnt_kg: Mass of a charge there, where the source has it.
+        part_of: The building that it is a rectangle of, in what blast-env itself wrote.
+    """
+
+    role: Role
+    geometry: BaseGeometry
+    name: str
+    place: str
+    height_m: float | None = None
+    protected: bool = False
+    tnt_kg: float | None = None
+    part_of: str = ""
+
+
+@dataclass(frozen=True)
+class Selector:
+    """Chooses things by a tag: `building`, `usage=school`, `Layer=A-WALL*`; of drawings, a layer.
+
+    Attributes:
+        key: Key of the tag.
+        pattern: What its value must be, with `*` and `?`, whatever the case; `None` for anything
+            but `no`.
+    """
+
+    key: str
+    pattern: str | None
+
+    @classmethod
+    def parsed(cls, text: str, is_drawing: bool) -> "Selector":
+        """Return the selector that a text stands for.
+
+        Raises:
+            BlastEnvError: If a part of it is empty.
+        """
+        key, sign, value = text.partition("=")
+        if not key or (sign and not value):
+            example = "a layer" if is_drawing else "KEY or KEY=VALUE"
+            raise BlastEnvError(f"{text!r} chooses nothing, must be {example}")
+        if sign:
+            return cls(key, value)
+        return cls("layer", text) if is_drawing else cls(key, None)
+
+    def chooses(self, tags: Tags) -> bool:
+        """Whether something with these tags is meant."""
+        value = tags.get(self.key)
+        if value is None or value is False:
+            return False
+        if self.pattern is None:
+            return str(value).lower() != "no"
+        return fnmatchcase(str(value).lower(), self.pattern.lower())
+
+
+Selectors = Mapping[Role, tuple[Selector, ...]]
+"""What the user chose, by role; what is not in it is found by the usual tags."""
+
+_OWN_STRUCTURES: Final = ("structure", "protected_structure")
+
+_KINDS: Final[Mapping[str, Role]] = MappingProxyType(
+    {
+        "site": Role.SITE,
+        "structure": Role.BUILDING,
+        "protected_structure": Role.BUILDING,
+        "build_zone": Role.ZONE,
+        "keep_out": Role.KEEP_OUT,
+        "charge_place": Role.CHARGE,
+    }
+)
+"""Kinds, and in small letters layers, of what blast-env itself writes."""
+
+_ROADS: Final = frozenset(
+    f"{road}{link}"
+    for road in ("motorway", "trunk", "primary", "secondary", "tertiary")
+    for link in ("", "_link")
+) | {"unclassified", "residential", "living_street", "service", "road", "track"}
+"""Values of OpenStreetMap's `highway` on which motor vehicles go."""
+
+_HEIGHT_KEYS: Final = ("height", "height_m", "building:height", "building_height")
+_LEVEL_KEYS: Final = ("building:levels", "levels", "storeys", "num_floors")
+_NAME_KEYS: Final = ("name", "addr:housename", "text")
+_LENGTH: Final = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?)\s*(m|ft|')?\s*")
+_FOOT_M: Final = 0.3048
+
+
+def things_of(
+    site_map: SiteMap, selectors: Selectors, level_height_m: float, height_key: str | None = None
+) -> tuple[tuple[Thing, ...], tuple[str, ...]]:
+    """Return what on a map matters to a site, and notes on what was not clear.
+
+    Args:
+        site_map: The map.
+        selectors: What the user chose.
+        level_height_m: Height of a storey, where only their number is known.
+        height_key: The tag with the height; without it, the usual ones.
+    """
+    is_drawing = isinstance(site_map.coordinates, DrawingCoordinates)
+    found: list[Thing] = []
+    notes: list[str] = []
+    for feature in site_map.features:
+        role = _role(feature, selectors)
+        if role is None:
+            continue
+        if is_drawing and role is not Role.NAME and feature.tags.get("text"):
+            role = Role.NAME  # a text on the layer of what it names
+        height_m, note = _height_m(feature, level_height_m, height_key)
+        notes += [note] if note else []
+        found.append(_thing(feature, role, height_m))
+    if not any(each.role is Role.BUILDING for each in found) and Role.BUILDING not in selectors:
+        found += _untagged_outlines(site_map)
+    return tuple(_closed(found)), tuple(dict.fromkeys(notes))
+
+
+def _role(feature: MapFeature, selectors: Selectors) -> Role | None:
+    """Return what something is: as the user chose, or by its tags."""
+    for role, chosen in selectors.items():
+        if any(selector.chooses(feature.tags) for selector in chosen):
+            return role
+    usual = _usual_role(feature)
+    return None if usual in selectors else usual
+
+
+def _usual_role(feature: MapFeature) -> Role | None:
+    tags = feature.tags
+    own = str(tags.get("kind", tags.get("layer", ""))).lower()
+    if own in _KINDS:
+        return _KINDS[own]
+    if str(tags.get("building", "no")).lower() not in ("no", "false"):
+        return Role.BUILDING
+    is_tunnel = str(tags.get("tunnel", "no")).lower() not in ("no", "false")
+    if str(tags.get("highway", "")).lower() in _ROADS and not is_tunnel:
+        return Role.CHARGE
+    if str(tags.get("amenity", "")).lower() == "parking" and feature.geometry.area > 0.0:
+        return Role.CHARGE
+    return Role.NAME if tags.get("text") else None
+
+
+def _thing(feature: MapFeature, role: Role, height_m: float | None) -> Thing:
+    tags = feature.tags
+    own = str(tags.get("kind", tags.get("layer", ""))).lower()
+    tnt_kg = tags.get("tnt_kg")
+    return Thing(
+        role=role,
+        geometry=feature.geometry,
+        name=next((str(tags[key]) for key in _NAME_KEYS if tags.get(key)), ""),
+        place=feature.place,
+        height_m=height_m,
+        protected=own == "protected_structure" or tags.get("protected") in (True, "yes", "true"),
+        part_of=str(tags.get("building", "")) if own in _OWN_STRUCTURES else "",
+        tnt_kg=float(tnt_kg) if isinstance(tnt_kg, int | float) and tnt_kg > 0.0 else None,
+    )
+
+
+def _height_m(
+    feature: MapFeature, level_height_m: float, key: str | None
+) -> tuple[float | None, str | None]:
+    """Return the height of something, and a note if it has one that cannot be read."""
+    lower = {str(name).lower(): value for name, value in feature.tags.items()}
+    keys = _HEIGHT_KEYS if key is None else (key.lower(),)
+    given = next((lower[name] for name in keys if name in lower), None)
+    if given is not None:
+        height_m = _length_m(given)
+        if height_m is not None:
+            return height_m, None
+        return None, f"{feature.place}: the height {given!r} is no length in m or ft"
+    levels = next((lower[name] for name in _LEVEL_KEYS if name in lower), None)
+    number = None if levels is None or key is not None else _length_m(levels)
+    return (None if number is None else number * level_height_m), None
+
+
+def _length_m(value: str | float | bool) -> float | None:
+    """Return a length above 0 in metres, or `None` if the value is none."""
+    if isinstance(value, str):
+        match = _LENGTH.fullmatch(value.replace(",", "."))
+        if match is None:
+            return None
+        value = float(match[1]) * (1.0 if match[2] in (None, "m") else _FOOT_M)
+    return float(value) if isfinite(value) and value > 0.0 else None
+
+
+def _untagged_outlines(site_map: SiteMap) -> list[Thing]:
+    """Return all outlines as buildings, for a map of which nothing says what is what."""
+    known = ("kind", "building", "highway", "layer")
+    if any(key in feature.tags for feature in site_map.features for key in known):
+        return []
+    return [
+        _thing(feature, Role.BUILDING, _height_m(feature, 1.0, None)[0])
+        for feature in site_map.features
+        if feature.geometry.geom_type in ("Polygon", "MultiPolygon")
+    ]
+
+
+def _closed(things: Iterable[Thing]) -> Iterator[Thing]:
+    """Yield things, with the open lines of an outline that was drawn side by side as one.
+
+    Places of charges may be lines, and stay them.
+    """
+    loose: dict[Role, list[Thing]] = {}
+    for thing in things:
+        is_line = thing.geometry.geom_type in ("LineString", "MultiLineString")
+        if is_line and thing.role not in (Role.CHARGE, Role.NAME):
+            loose.setdefault(thing.role, []).append(thing)
+        else:
+            yield thing
+    for role, lines in loose.items():
+        for outline in shapely.get_parts(shapely.polygonize([each.geometry for each in lines])):
+            near = next(each for each in lines if each.geometry.intersects(outline))
+            yield Thing(role, outline, near.name, near.place, near.height_m, near.protected)

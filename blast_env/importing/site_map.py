@@ -1,0 +1,119 @@
+"""What the readers of maps and drawings give: outlines and lines with their tags."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from blast_env.errors import BlastEnvError, import_extra
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+    from shapely.geometry.base import BaseGeometry
+
+MOST_BYTES: Final = 50_000_000
+"""Larger files are refused before they are read: an extract of a town has a few megabytes."""
+
+MOST_FEATURES: Final = 100_000
+"""Outlines and lines that are taken from a file."""
+
+MOST_POINTS: Final = 2_000_000
+"""Points of all of them."""
+
+Tags = Mapping[str, str | float | bool]
+
+
+@dataclass(frozen=True)
+class MapCoordinates:
+    """Coordinates on the Earth.
+
+    Attributes:
+        crs: Their reference system as pyproj reads it; x is easting or longitude.
+    """
+
+    crs: str
+
+
+@dataclass(frozen=True)
+class DrawingCoordinates:
+    """Coordinates in a plane whose place on the Earth is unknown.
+
+    Attributes:
+        metres_per_unit: Length of a unit.
+    """
+
+    metres_per_unit: float
+
+
+SourceCoordinates = MapCoordinates | DrawingCoordinates
+
+
+@dataclass(frozen=True)
+class MapFeature:
+    """One thing on a map.
+
+    Attributes:
+        geometry: Its outline, line or point, in the coordinates of the source.
+        tags: What the source says of it: properties, tags, or its layer.
+        place: Where in the file it is, for messages: `features[12]`, `way 4711`.
+    """
+
+    geometry: BaseGeometry
+    tags: Tags
+    place: str
+
+
+@dataclass(frozen=True)
+class SiteMap:
+    """A map or drawing as it was read.
+
+    Attributes:
+        path: The file.
+        coordinates: What the numbers mean.
+        features: Everything that has an outline or a line, and texts as points.
+        notes: What was left out, a sentence each.
+    """
+
+    path: Path
+    coordinates: SourceCoordinates
+    features: tuple[MapFeature, ...]
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a map with more than can be worked on.
+
+        Raises:
+            BlastEnvError: If it has too many points.
+        """
+        points = shapely.get_num_coordinates([each.geometry for each in self.features])
+        if points.sum() > MOST_POINTS:
+            raise BlastEnvError(
+                f"{self.path}: has {points.sum():,} points, must have at most {MOST_POINTS:,}: "
+                "cut a smaller extract"
+            )
+
+
+def checked_file(path: Path) -> Path:
+    """Return the path of a file that can be read.
+
+    Raises:
+        BlastEnvError: If there is none, or it is too large.
+    """
+    if not path.exists():
+        raise BlastEnvError(f"{path}: there is no such file")
+    if not path.is_file():
+        raise BlastEnvError(f"{path}: is not a file")
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise BlastEnvError(
+            f"{path}: has {size:,} bytes, must have at most {MOST_BYTES:,}: cut a smaller extract"
+        )
+    return path
+
+
+def too_many(path: Path) -> BlastEnvError:
+    """Return the error of a file with more things than are taken."""
+    return BlastEnvError(
+        f"{path}: has more than {MOST_FEATURES:,} outlines and lines, must have at most that many: "
+        "cut a smaller extract"
+    )

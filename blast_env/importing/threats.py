@@ -1,0 +1,169 @@
+"""Where charges may be on an imported site."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.importing.cells import covered_shares, in_blocks, rectangles_of
+from blast_env.importing.fitting import FittedBuilding
+from blast_env.importing.options import ImportOptions
+from blast_env.importing.placing import PlacedSite
+from blast_env.importing.roles import Role, Thing
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+    from shapely.geometry.base import BaseGeometry
+
+MOST_SOURCES: Final = 100
+"""As many as a scenario may have."""
+
+_SIMPLER_M: Final = (0.1, 0.25, 0.5, 1.0, 2.0)  # by how much curves of streets are made straight
+_LEAST_LENGTH_M: Final = 1.0
+_CLEAR_M: Final = 0.01  # more than the charge's radius, for rounding
+_DIGITS: Final = 3
+_AREA_BLOCK: Final = 4  # modules: places of charges in an area are cut no finer
+_POINT_SHARE_M: Final = 5.0
+
+
+def charge_sources(
+    site: PlacedSite,
+    buildings: Sequence[FittedBuilding],
+    radius_m: float,
+    options: ImportOptions,
+) -> list[dict[str, Any]]:
+    """Return where charges may be, as the charges of a scenario.
+
+    Streets become segments, their weights their lengths, so that every metre is as likely; areas
+    become rectangles; points stay points and weigh as much as 5 m of street. All keep clear of
+    the buildings and the border by the charge's radius.
+
+    Args:
+        site: The site.
+        buildings: What stands on it.
+        radius_m: Radius of the charge.
+        options: Masses, and places that the user adds.
+
+    Raises:
+        BlastEnvError: If there is no place for a charge, or there are too many.
+    """
+    free = _free(site, buildings, radius_m)
+    things = site.of_role(Role.CHARGE)
+    for tolerance_m in _SIMPLER_M:
+        sources = [
+            *_asked(site, free, options),
+            *(source for each in things for source in _sources(each, free, tolerance_m, options)),
+        ]
+        if len(sources) <= MOST_SOURCES:
+            break
+    if len(sources) > MOST_SOURCES:
+        raise BlastEnvError(
+            f"{site.path}: charges may be at {len(sources)} places, must be at most "
+            f"{MOST_SOURCES}: make the site smaller (--size), or choose fewer places "
+            "(--charges-from)"
+        )
+    if not sources:
+        raise BlastEnvError(
+            f"{site.path}: there is no place for a charge on the site clear of buildings: say "
+            "--charge-at X Y, or with --charges-from where one may be"
+        )
+    return sources
+
+
+def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float) -> BaseGeometry:
+    """Return where the middle of a charge may be."""
+    width_m, height_m = site.size_m
+    gap_m = radius_m + _CLEAR_M
+    inside = shapely.box(gap_m, gap_m, width_m - gap_m, height_m - gap_m)
+    built = shapely.union_all(
+        [
+            shapely.box(*each.rectangle_m.grown(gap_m))
+            for building in buildings
+            for each in building.rectangles
+        ]
+    )
+    return shapely.difference(inside, built)
+
+
+def _asked(
+    site: PlacedSite, free: BaseGeometry, options: ImportOptions
+) -> Iterator[dict[str, Any]]:
+    """Yield the points that the user named."""
+    for place in options.charge_at:
+        x_m, y_m = site.to_site(np.array([place]))[0]
+        if not shapely.intersects(free, shapely.Point(x_m, y_m)):
+            raise BlastEnvError(
+                f"--charge-at is {place[0]:.10g} {place[1]:.10g}, which is at ({x_m:.2f}, "
+                f"{y_m:.2f}) m of the site: outside, in a building, or too near to one"
+            )
+        yield _point(float(x_m), float(y_m), options.tnt_kg)
+
+
+def _sources(
+    thing: Thing, free: BaseGeometry, tolerance_m: float, options: ImportOptions
+) -> Iterator[dict[str, Any]]:
+    tnt_kg = thing.tnt_kg or options.tnt_kg
+    for part in shapely.get_parts(thing.geometry):
+        if part.geom_type == "Polygon":
+            yield from _areas(shapely.make_valid(part), free, tolerance_m, tnt_kg)
+        elif part.geom_type == "Point":
+            if shapely.intersects(free, part):
+                yield _point(part.x, part.y, tnt_kg)
+        else:
+            yield from _segments(part, free, tolerance_m, tnt_kg)
+
+
+def _segments(
+    line: BaseGeometry, free: BaseGeometry, tolerance_m: float, tnt_kg: float
+) -> Iterator[dict[str, Any]]:
+    straight = shapely.simplify(line, tolerance_m)
+    for start, end in pairwise(shapely.get_coordinates(straight)):
+        inside = shapely.intersection(shapely.LineString([start, end]), free)
+        for part in shapely.get_parts(inside):
+            if part.length < _LEAST_LENGTH_M:
+                continue
+            ends = shapely.get_coordinates(part)[[0, -1]].round(_DIGITS).tolist()
+            yield {
+                "kind": "segment",
+                "start_m": ends[0],
+                "end_m": ends[1],
+                "tnt_kg": tnt_kg,
+                "weight": round(float(part.length), _DIGITS),
+            }
+
+
+def _areas(
+    area: BaseGeometry, free: BaseGeometry, tolerance_m: float, tnt_kg: float
+) -> Iterator[dict[str, Any]]:
+    """Yield the blocks of an area; they are coarser where curves are made straighter."""
+    inside = shapely.intersection(area, free)
+    if inside.is_empty or inside.area == 0.0:
+        return
+    _, _, right, top = inside.bounds
+    shape = (int(np.ceil(2.0 * top)) + 1, int(np.ceil(2.0 * right)) + 1)
+    (rows, columns), shares = covered_shares(inside, shape)
+    cells = np.zeros(shape, dtype=bool)
+    # Whole cells only: their edges keep as clear as the area does.
+    cells[rows, columns] = shares > 1.0 - 1e-6
+    blocks = in_blocks(cells, 1 + int(_AREA_BLOCK * tolerance_m)) & cells
+    for each in rectangles_of(blocks):
+        left, bottom, far, high = each.rectangle_m
+        size = [far - left, high - bottom]
+        yield {
+            "kind": "rectangle",
+            "corner_m": [left, bottom],
+            "size_m": size,
+            "tnt_kg": tnt_kg,
+            "weight": size[0] * size[1],
+        }
+
+
+def _point(x_m: float, y_m: float, tnt_kg: float) -> dict[str, Any]:
+    return {
+        "kind": "point",
+        "position_m": [round(float(x_m), _DIGITS), round(float(y_m), _DIGITS)],
+        "tnt_kg": tnt_kg,
+        "weight": _POINT_SHARE_M,
+    }

@@ -1,0 +1,141 @@
+"""The plan of an imported site: what the map shows, and the modules that stand for it."""
+
+import numpy as np
+
+from blast_env.importing import FittedBuilding, ImportedSite
+from blast_env.importing.plane import rotated
+from blast_env.rendering.site_plan import draw_site, draw_zone, rectangle_patch, write_heading
+from blast_env.rendering.style import (
+    EXPLOSIVE,
+    INK,
+    PROTECTED,
+    QUIET_INK,
+    STRUCTURE,
+    render_extra,
+    unit_interval,
+)
+from blast_env.scenario import PointSource, RectangleSource
+
+with render_extra():
+    import shapely
+    from matplotlib import patheffects
+    from matplotlib.axes import Axes
+    from matplotlib.collections import LineCollection, PatchCollection
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+_WIDTH_IN = 10.0
+_LEAST_IN, _MOST_IN = 5.0, 11.0
+_HEADING_IN = 1.7
+_ARROW_PT = 34.0
+_FAINT = 0.35
+
+
+def imported_plan(imported: ImportedSite) -> Figure:
+    """Return the plan of an imported site: modules filled, the map's outlines as lines over them.
+
+    North is marked, and each building has its name and how far its modules are off.
+    """
+    scenario = imported.scenario
+    width_m, height_m = scenario.site.width_m, scenario.site.height_m
+    height_in = np.clip(_WIDTH_IN * height_m / width_m + _HEADING_IN, _LEAST_IN, _MOST_IN)
+    figure = Figure(figsize=(_WIDTH_IN, float(height_in)), layout="constrained")
+    axes = figure.subplots()
+    draw_site(axes, scenario.site.rectangle_m)
+    for building in imported.buildings:
+        _draw_building(axes, building)
+    if scenario.build_zone is not None:
+        draw_zone(axes, scenario.build_zone)
+    _draw_charges(axes, imported)
+    _draw_north(axes, imported)
+    figure.legend(
+        handles=_legend(imported), loc="outside lower center", ncols=3, fontsize=9, frameon=False
+    )
+    worst = max(imported.buildings, key=lambda each: each.deviation.outline_m)
+    write_heading(
+        figure,
+        scenario.name,
+        f"{imported.site.path.name}, turned by {imported.site.rotation_deg:.1f}°; modules at most "
+        f"{worst.deviation.outline_m:.2f} m from an outline ({worst.name})",
+    )
+    return figure
+
+
+def _draw_building(axes: Axes, building: FittedBuilding) -> None:
+    colour = unit_interval(PROTECTED if building.protected else STRUCTURE)
+    patches = [rectangle_patch(each.rectangle_m) for each in building.rectangles]
+    modules = PatchCollection(patches, facecolor=(*colour, _FAINT), edgecolor=colour)
+    modules.set(linewidth=0.8, zorder=2)
+    axes.add_collection(modules)
+    rings = [
+        shapely.get_coordinates(ring)
+        for ring in shapely.get_rings(shapely.get_parts(building.outline))
+    ]
+    lines = LineCollection(rings, colors=[unit_interval(INK)], linewidths=1.3, zorder=3)
+    axes.add_collection(lines)
+    middle = building.outline.representative_point()
+    text = axes.text(
+        middle.x,
+        middle.y,
+        f"{building.name}\n{building.deviation.area_share:.1%}, "
+        f"{building.deviation.outline_m:.2f} m",
+        ha="center",
+        va="center",
+        fontsize=7.5,
+        fontweight="bold" if building.protected else "normal",
+        zorder=6,
+    )
+    text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
+
+
+def _draw_charges(axes: Axes, imported: ImportedSite) -> None:
+    colour = unit_interval(EXPLOSIVE)
+    for source in imported.scenario.charge:
+        if isinstance(source, RectangleSource):
+            patch = rectangle_patch(source.rectangle_m)
+            patch.set(facecolor=(*colour, _FAINT), edgecolor=colour, linewidth=1.0, zorder=4)
+            axes.add_patch(patch)
+        else:
+            marker = "*" if isinstance(source, PointSource) else ""
+            x, y = np.transpose(source.segment_m)
+            axes.plot(x, y, color=colour, linewidth=2.2, marker=marker, markersize=11.0, zorder=4)
+
+
+def _draw_north(axes: Axes, imported: ImportedSite) -> None:
+    """Draw an arrow to the north, or along a drawing's y axis, in the upper right corner."""
+    georeference = imported.scenario.georeference
+    assert georeference is not None
+    east, north = rotated(np.array([[0.0, 1.0]]), -georeference.rotation_deg)[0]
+    label = "N" if georeference.kind == "map" else "y"
+    axes.annotate(
+        label,
+        xy=(0.93, 0.87),
+        xycoords="axes fraction",
+        xytext=(_ARROW_PT * east, _ARROW_PT * north),
+        textcoords="offset points",
+        arrowprops={"arrowstyle": "<|-", "color": unit_interval(INK)},
+        ha="center",
+        va="center",
+        fontweight="bold",
+    )
+
+
+def _legend(imported: ImportedSite) -> list[Patch | Line2D]:
+    handles: list[Patch | Line2D] = [
+        Line2D([], [], color=unit_interval(INK), linewidth=1.3, label="outline on the map"),
+        _box("modules, protected", unit_interval(PROTECTED)),
+        _box("modules, not protected", unit_interval(STRUCTURE)),
+        Line2D([], [], color=unit_interval(EXPLOSIVE), linewidth=2.2, label="where charges may be"),
+    ]
+    zone = imported.scenario.build_zone
+    if zone is not None:
+        quiet = unit_interval(QUIET_INK)
+        handles.append(Patch(fill=False, edgecolor=quiet, linestyle="--", label="build zone"))
+        if zone.keep_outs:
+            handles.append(Patch(fill=False, edgecolor=quiet, hatch="////", label="keep-out"))
+    return handles
+
+
+def _box(label: str, colour: tuple[float, float, float]) -> Patch:
+    return Patch(facecolor=(*colour, _FAINT), edgecolor=colour, label=label)

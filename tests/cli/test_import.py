@@ -1,0 +1,64 @@
+"""`blast-env import`."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from blast_env.cli import app
+from blast_env.scenario import load_scenario
+from tests.importing.maps import BLOCK
+
+
+def run(*arguments: str | Path) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, ["import", *map(str, arguments)], env={"COLUMNS": "150"})
+    return done.exit_code, done.stdout, done.stderr
+
+
+def test_table_says_how_far_each_building_is_off(tmp_path: Path) -> None:
+    out, picture = tmp_path / "block.toml", tmp_path / "block.png"
+    code, text, _ = run(BLOCK, "--protect", "Town Hall", "--out", out, "--picture", picture)
+    assert code == 0
+    rows = {line.split("│")[1].strip(): line for line in text.splitlines() if "│" in line}
+    assert [cell.strip() for cell in rows["Town_Hall"].split("│")[2:10]] == [
+        *("yes", "3", "10.5", "339.2", "336.2", "0.9", "0.30", "0.5"),
+    ]
+    assert "places of charges: 2" in text
+    assert f"wrote {out}" in text
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    scenario = load_scenario(out)
+    assert scenario.description.startswith("Imported from market_street.geojson (SHA-256 ")
+    assert "0.37 m of its outline (Chapel)" in scenario.description
+
+
+def test_report_as_json_has_the_same(tmp_path: Path) -> None:
+    out = tmp_path / "block.toml"
+    place = ("--centre", "7.5006", "54.80045", "--size", "40", "30", "--tnt", "20")
+    options = ("--protect-near", "7.5006", "54.80045", "--zone-around", "5", "--zone-from", "none")
+    code, _, error = run(BLOCK, *place, *options, "--out", out)
+    assert code == 2
+    assert "--zone-from and --zone-around exclude each other" in error
+    assert not out.exists()
+    code, text, _ = run(
+        BLOCK, *place, *options[:-2], "--out", out, "--json", "--charge-at", "7.5,5"
+    )
+    assert code == 2
+    code, text, _ = run(BLOCK, *place, *options[:-2], "--out", out, "--json")
+    report = json.loads(text)
+    assert code == 0
+    (hall,) = (each for each in report["buildings"] if each["protected"])
+    assert hall["title"] == "Town Hall"
+    assert hall["is_cut"]
+    scenario = load_scenario(out)
+    assert report["scenario_hash"] == scenario.content_hash
+    assert (scenario.site.width_m, scenario.site.height_m) == (40.0, 30.0)
+    assert {source.tnt_kg for source in scenario.charge} == {20.0}
+    assert report["georeference"]["kind"] == "map"
+
+
+@pytest.mark.parametrize("text", ["7.5", "a,b", "1,2,3"])
+def test_place_of_a_charge_that_is_none(text: str, tmp_path: Path) -> None:
+    code, _, error = run(BLOCK, "--charge-at", text, "--out", tmp_path / "a.toml")
+    assert code == 2
+    assert f"--charge-at is '{text}', must be two numbers as X,Y" in error

@@ -1,0 +1,393 @@
+"""From maps and drawings to scenarios and back."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import osmium
+import pytest
+import shapely
+from pyproj import Transformer
+
+from blast_env.export import LayoutPlan, export_layout
+from blast_env.importing import ImportedSite, ImportOptions, import_site
+from blast_env.importing.roles import Role
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.scenario import (
+    AnySource,
+    RectangleSource,
+    Scenario,
+    load_scenario,
+    save_scenario,
+    usable_cells,
+)
+from blast_env.scenario.georeference import DrawingGeoreference, MapGeoreference
+from blast_env.scenario.models import PointM
+from blast_env.simulation.gas import GasBlast
+from tests.importing.maps import BLOCK, LAYERS, charge, outline, rectangle, written
+
+HALL = ImportOptions(protect=("Town Hall",))
+MODULE_M = 0.5
+TO_UTM = Transformer.from_crs("EPSG:4326", "EPSG:25832", always_xy=True)
+"""Metres to measure with, which the import does not use."""
+
+
+@pytest.fixture(scope="module")
+def block() -> ImportedSite:
+    return import_site(BLOCK, HALL)
+
+
+def imported(path: Path, **options: Any) -> ImportedSite:
+    return import_site(path, ImportOptions(**options))
+
+
+def comparable(scenario: Scenario) -> dict[str, Any]:
+    return scenario.model_dump(exclude={"name", "description", "georeference", "charge"})
+
+
+def ends_m(source: AnySource) -> tuple[PointM, PointM]:
+    assert not isinstance(source, RectangleSource)
+    return source.segment_m
+
+
+def in_utm(feature: dict[str, Any]) -> Any:
+    """Return the geometry of a GeoJSON feature in metres."""
+    geometry = shapely.geometry.shape(feature["geometry"])
+    return shapely.transform(geometry, lambda lon_lat: np.stack(TO_UTM.transform(*lon_lat.T), 1))
+
+
+# The block.
+
+
+def test_block_is_turned_to_its_streets_and_fits_to_half_a_module(block: ImportedSite) -> None:
+    assert block.site.rotation_deg == pytest.approx(23.0, abs=0.01)
+    assert [each.title for each in block.buildings if each.protected] == ["Town Hall"]
+    for each in block.buildings:
+        assert each.deviation.outline_m < 0.75 * MODULE_M
+        assert each.area_m2 == pytest.approx(each.outline.area, rel=0.06)
+    georeference = block.scenario.georeference
+    assert isinstance(georeference, MapGeoreference)
+    assert georeference.rotation_deg == pytest.approx(23.0, abs=0.01)
+    assert georeference.crs == "EPSG:4326"
+
+
+def test_heights_are_those_of_the_map_in_whole_modules(block: ImportedSite) -> None:
+    heights = {each.title: each.height_m for each in block.buildings}
+    assert heights == {
+        "Town Hall": 10.5,
+        "Baker": 9.0,
+        "Bookshop": 6.0,  # two storeys
+        "Pharmacy": 9.0,
+        "Library": 7.5,  # 7.4 m
+        "Water Tower": 18.0,
+        "Chapel": None,
+    }
+    assert any("which are as high as the air" in note and "1 of 7" in note for note in block.notes)
+
+
+def test_streets_are_places_of_charges_as_likely_on_every_metre(block: ImportedSite) -> None:
+    (west, east) = block.scenario.charge
+    for source in (west, east):
+        (x0, y0), (x1, y1) = ends_m(source)
+        assert source.weight == pytest.approx(np.hypot(x1 - x0, y1 - y0), abs=0.01)
+    assert sum(each.weight for each in (west, east)) == pytest.approx(84.0, abs=1.0)
+
+
+def test_zone_and_what_must_stay_empty_are_those_of_the_map(block: ImportedSite) -> None:
+    zone = block.scenario.zone
+    assert (zone.rows, zone.columns) == (8, 64)  # 4 m x 32 m
+    assert [each.reason for each in zone.keep_outs] == ["monument"]
+    covered = zone.keep_outs[0].rectangle_m
+    (monument,) = block.site.of_role(Role.KEEP_OUT)
+    assert shapely.covers(shapely.box(*covered).buffer(0.03), monument.geometry)
+
+
+@pytest.mark.parametrize("suffix", [".osm", ".osm.pbf", ".dxf"])
+def test_every_format_gives_the_same_buildings(
+    suffix: str, block: ImportedSite, tmp_path: Path
+) -> None:
+    path = BLOCK.with_suffix(suffix)
+    if suffix == ".osm.pbf":
+        path = tmp_path / "block.osm.pbf"
+        with osmium.SimpleWriter(str(path)) as writer:
+            for item in osmium.FileProcessor(str(BLOCK.with_suffix(".osm"))):
+                writer.add(item)
+    other = import_site(path, replace(HALL, **LAYERS) if suffix == ".dxf" else HALL)
+    for mine, its in zip(block.buildings, other.buildings, strict=True):
+        assert (mine.name, mine.height_m, mine.protected) == (its.name, its.height_m, its.protected)
+        assert mine.area_m2 == pytest.approx(its.area_m2, rel=0.03)
+        assert mine.modules.distance(its.modules.centroid) == pytest.approx(0.0, abs=MODULE_M)
+    if suffix == ".dxf":
+        assert isinstance(other.scenario.georeference, DrawingGeoreference)
+        assert comparable(other.scenario)["build_zone"]["rows"] == 8
+    else:
+        assert any("no build zone" in note for note in other.notes)
+
+
+# The way back.
+
+
+def test_layout_lands_on_the_map_where_it_belongs(block: ImportedSite, tmp_path: Path) -> None:
+    """Buildings lie over those of the extract, a module on the piece of ground that it is for."""
+    save_scenario(block.scenario, tmp_path / "block.toml")
+    scenario = load_scenario(tmp_path / "block.toml")
+    cell = tuple(np.argwhere(usable_cells(scenario))[7])
+    layout = ((int(cell[0]), int(cell[1])),)
+    content = json.loads(
+        export_layout(LayoutPlan(scenario, layout), tmp_path / "layout.geojson").read_text()
+    )
+    assert "crs" not in content
+    originals = {
+        feature["properties"].get("name"): in_utm(feature)
+        for feature in json.loads(BLOCK.read_text())["features"]
+        if "building" in feature["properties"]
+    }
+    parts: dict[str, list[Any]] = {}
+    for feature in content["features"]:
+        if "structure" in feature["properties"]["kind"]:
+            name = feature["properties"].get("building", feature["properties"]["name"])
+            parts.setdefault(name.replace("_", " "), []).append(in_utm(feature))
+    assert parts.keys() == originals.keys() - {None}
+    for name, pieces in parts.items():
+        modules = shapely.union_all(pieces, grid_size=0.01)
+        assert shapely.hausdorff_distance(modules, originals[name]) < MODULE_M
+    (module,) = (each for each in content["features"] if each["properties"]["kind"] == "barrier")
+    square = in_utm(module)
+    assert square.area == pytest.approx(0.25, rel=0.002)
+    zone = in_utm(json.loads(BLOCK.read_text())["features"][-2])
+    assert shapely.covers(zone.buffer(0.3), square)
+
+
+def test_what_is_exported_can_be_imported_again(block: ImportedSite, tmp_path: Path) -> None:
+    path = export_layout(LayoutPlan(block.scenario, ()), tmp_path / "block.geojson")
+    again = import_site(path)
+    assert comparable(again.scenario) == comparable(block.scenario)
+    mine, its = block.scenario.georeference, again.scenario.georeference
+    assert isinstance(mine, MapGeoreference)
+    assert isinstance(its, MapGeoreference)
+    for key in ("longitude_deg", "latitude_deg"):
+        assert getattr(its, key) == pytest.approx(getattr(mine, key), abs=1e-8)  # a millimetre
+
+
+def test_map_in_another_reference_system_goes_back_to_it(tmp_path: Path) -> None:
+    """The older form of GeoJSON says which in its member crs; so does what is written."""
+    collection = json.loads(BLOCK.read_text())
+    for feature in collection["features"]:
+        places = feature["geometry"]["coordinates"]
+        ring = places[0] if feature["geometry"]["type"] == "Polygon" else places
+        ring[:] = np.stack(TO_UTM.transform(*np.array(ring).T), axis=1).tolist()
+    name = "urn:ogc:def:crs:EPSG::25832"
+    collection["crs"] = {"type": "name", "properties": {"name": name}}
+    path = tmp_path / "utm.geojson"
+    path.write_text(json.dumps(collection))
+    site = import_site(path, HALL)
+    assert isinstance(site.scenario.georeference, MapGeoreference)
+    assert site.scenario.georeference.rotation_deg == pytest.approx(23.0, abs=0.02)  # true north
+    content = json.loads(
+        export_layout(LayoutPlan(site.scenario, ()), tmp_path / "layout.geojson").read_text()
+    )
+    assert content["crs"]["properties"]["name"] == name
+    zone = next(each for each in content["features"] if each["properties"]["kind"] == "build_zone")
+    original = shapely.geometry.shape(collection["features"][-2]["geometry"])
+    assert shapely.hausdorff_distance(
+        shapely.geometry.shape(zone["geometry"]), original
+    ) == pytest.approx(0.0, abs=MODULE_M)
+
+
+def test_drawing_goes_back_to_its_own_millimetres(tmp_path: Path) -> None:
+    site = import_site(BLOCK.with_suffix(".dxf"), replace(HALL, **LAYERS))
+    content = json.loads(
+        export_layout(LayoutPlan(site.scenario, ()), tmp_path / "layout.geojson").read_text()
+    )
+    assert "units of 0.001 m" in content["coordinate_system"]
+    zone = next(each for each in content["features"] if each["properties"]["kind"] == "build_zone")
+    ring = np.array(zone["geometry"]["coordinates"][0]) / 1000.0 - [5000.0, 3000.0]
+    turned = shapely.affinity.rotate(shapely.Polygon(ring), -23.0, origin=(0, 0))
+    assert shapely.hausdorff_distance(turned, shapely.box(36, 27, 68, 31)) < MODULE_M
+
+
+# Places, sizes, choices.
+
+
+def test_origin_and_size_say_what_is_on_the_site(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        outline(rectangle(10, 10, 8, 6), name="A"),
+        outline(rectangle(30, 10, 8, 6), name="B"),
+        charge(12.0, 25.0),
+    )
+    site = imported(path, protect=("a",), origin=(5.1, 4.0), size_m=(29.0, 30.0))
+    assert site.site.size_m == (29.0, 30.0)
+    assert site.site.corner_m == (5.0, 4.0)  # moved onto the grid of the walls
+    first, second = site.buildings
+    assert (first.name, first.is_cut, first.rectangles[0].rectangle_m) == (
+        *("A", False),
+        (5.0, 6.0, 13.0, 12.0),
+    )
+    assert (second.name, second.is_cut) == ("B", True)
+    assert second.rectangles[0].rectangle_m == (25.0, 6.0, 29.0, 12.0)
+    centred = imported(path, protect=("a",), centre=(19.5, 19.0), size_m=(29.0, 30.0))
+    assert comparable(centred.scenario) == comparable(site.scenario)
+
+
+def test_site_is_put_around_everything_with_a_margin(tmp_path: Path) -> None:
+    path = written(tmp_path, outline(rectangle(0, 0, 6, 4)), charge(12.0, 2.0))
+    site = imported(path, protect_near=(1.0, 1.0), margin_m=3.0, rotation_deg=0.0)
+    assert site.site.size_m == (18.0, 10.0)
+    assert site.buildings[0].name == "building_1"
+    assert ends_m(site.scenario.charge[0])[0] == (15.0, 5.0)
+
+
+def test_protected_is_what_is_named_near_or_marked(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        outline(rectangle(0, 0, 6, 4), name="Nord Schule"),
+        outline(rectangle(10, 0, 5, 4), name="Straße 5", protected="yes"),
+        charge(8.0, 12.0),
+    )
+
+    def protected(**options: Any) -> list[str]:
+        return [each.name for each in imported(path, **options).buildings if each.protected]
+
+    assert protected() == ["Strasse_5"]
+    assert protected(protect=("nord schule",)) == ["Nord_Schule"]
+    assert protected(protect_near=(0.0, 9.0)) == ["Nord_Schule"]
+    assert protected(protect=("Strasse_5",), protect_near=(0, 0)) == ["Nord_Schule", "Strasse_5"]
+
+
+def test_properties_say_what_is_what_where_the_user_says_which(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        outline(rectangle(0, 0, 6, 4), kind="house", z_top=7.1),
+        outline(rectangle(10, 0, 6, 4), kind="shed"),
+        outline(rectangle(0, 8, 6, 3), kind="lawn"),
+        outline(rectangle(0, 8, 2, 1), kind="pond", name="pond"),
+        outline(rectangle(20, 0, 4, 8), kind="parking lot", tnt_kg=20.0),
+    )
+    site = imported(
+        path,
+        buildings_from=("kind=HOUSE",),
+        zone_from=("kind=lawn",),
+        keep_outs_from=("kind=p?nd",),
+        charges_from=("kind=parking*",),
+        height_from="Z_top",
+        protect_near=(0.0, 0.0),
+        stock=4,
+    )
+    (house,) = site.buildings
+    assert house.height_m == 7.0
+    assert (site.scenario.zone.rows, site.scenario.zone.columns) == (6, 12)
+    assert [each.rectangle_m for each in site.scenario.zone.keep_outs] == [(10, 18, 12, 19)]
+    (area,) = site.scenario.charge
+    assert (area.kind, area.tnt_kg, area.weight) == ("rectangle", 20.0, 32.0)
+
+
+def test_zone_in_site_metres_or_around_what_is_protected(tmp_path: Path) -> None:
+    path = written(tmp_path, outline(rectangle(0, 0, 6, 4), protected=True), charge(14.0, 2.0))
+    given = imported(path, zone_m=(17.0, 8.0, 2.0, 9.0)).scenario.zone
+    assert given.rectangle_m == (17.0, 8.0, 19.0, 17.0)
+    around = imported(path, zone_around_m=4.0, wall_height_m=2.5, clearance_m=0.5).scenario.zone
+    assert around.rectangle_m == (6.0, 6.0, 20.0, 18.0)
+    assert (around.height_m, around.clearance_m) == (2.5, 0.5)
+
+
+def test_zone_that_is_no_rectangle_is_closed_outside_its_outline(tmp_path: Path) -> None:
+    zone = [(10, 0), (14, 0), (14, 2), (12, 2), (12, 4), (10, 4)]
+    path = written(
+        tmp_path,
+        outline(rectangle(0, 0, 6, 4), protected=True),
+        outline(zone, kind="build_zone"),
+        charge(20.0, 2.0),
+    )
+    scenario = imported(path).scenario
+    assert scenario.zone.rectangle_m == (20.0, 10.0, 24.0, 14.0)
+    assert [each.rectangle_m for each in scenario.zone.keep_outs] == [(22.0, 12.0, 24.0, 14.0)]
+    assert int(usable_cells(scenario).sum()) == 48
+
+
+# One building of several rectangles.
+
+ELL = [(6.0, 3.0), (9.0, 3.0), (9.0, 5.0), (7.5, 5.0), (7.5, 7.0), (6.0, 7.0)]
+
+
+@pytest.fixture(scope="module")
+def ell(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
+    """A house of 3 m height with two wings, beside one of 1.5 m."""
+    path = written(
+        tmp_path_factory.mktemp("maps"),
+        outline(rectangle(0, 0, 12, 10), kind="site"),
+        outline(ELL, name="House 7", height=3.0, protected=True),
+        outline(rectangle(9.0, 3.0, 2.0, 2.0), name="annexe", height="1.5 m"),
+        charge(2.0, 5.0),
+    )
+    return imported(path, tnt_kg=5.0).scenario
+
+
+def test_rectangles_of_a_building_touch_and_have_its_name(ell: Scenario) -> None:
+    one, other, annexe = ell.structures
+    assert (one.name, other.name, annexe.name) == ("House_7a", "House_7b", "annexe")
+    assert one.building == other.building == "House_7"
+    assert annexe.building is None
+    assert one.rectangle_m == (6.0, 3.0, 9.0, 5.0)
+    assert other.rectangle_m == (6.0, 5.0, 7.5, 7.0)
+    # 12 m of walls and half of 2 m, of which the annexe hides the lower half.
+    assert one.weight == pytest.approx((2.0 + 3.0 + 1.5 + 1.0) / 13.0, abs=1e-5)
+    assert one.weight + other.weight == pytest.approx(1.0, abs=1e-5)
+
+
+def test_two_rectangles_take_the_load_of_one_building(ell: Scenario) -> None:
+    """No load on walls between them, and together the mean over the walls of the house."""
+    result = GasBlast(ell, engine=GasEngine(time_limit_s=0.03)).run()
+    faces = result.faces[result.faces["structure"].str.startswith("House")]
+    walls = faces[faces["face"] != "roof"]
+    inner = walls[(walls["y_m"] == 5.0) & (walls["x_m"] < 7.5)]
+    assert len(inner) == 0
+    hidden = walls[(walls["x_m"] == 9.0) & (walls["z_m"] < 1.5)]
+    assert len(hidden) == 0
+    table = result.structures[result.structures["protected"]]
+    together = (table["weight"] * table["positive_impulse_pa_s"]).sum()
+    assert together == pytest.approx(walls["positive_impulse_pa_s"].mean(), rel=1e-4)
+    assert together > 0.0
+
+
+def test_rectangle_that_others_hide_does_not_count(tmp_path: Path) -> None:
+    """A part of a house between higher neighbours and its own wings has no walls in the air."""
+    # The wings are along y; the neighbours close the middle in the west and the east.
+    wings = [(4, 0), (10, 0), (10, 2), (8, 2), (8, 4), (10, 4), (10, 6), (4, 6), (4, 4), (6, 4)]
+    ring = [(float(x), float(y)) for x, y in (*wings, (6, 2), (4, 2))]
+    path = written(
+        tmp_path,
+        outline(ring, name="House", height=6.0, protected=True),
+        outline(rectangle(4, 2, 2, 2), height=9.0),
+        outline(rectangle(8, 2, 2, 2), height=9.0),
+        charge(20.0, 3.0),
+    )
+    scenario = imported(path).scenario
+    house = [each for each in scenario.structures if each.building == "House"]
+    assert [each.protected for each in house] == [True, False, True]
+    assert sum(each.weight for each in house if each.protected) == pytest.approx(1.0)
+    result = GasBlast(scenario, engine=GasEngine(time_limit_s=0.002)).run()
+    middle = result.structures.set_index("structure").loc["House_b"]
+    assert middle["area_m2"] == 0.0
+
+
+def test_streets_keep_clear_of_buildings_and_border(tmp_path: Path) -> None:
+    """A street under a house is cut there: no charge may be inside it."""
+    path = written(
+        tmp_path,
+        outline(rectangle(10, 0, 6, 10), protected=True),
+        {
+            "type": "Feature",
+            "properties": {"highway": "service"},
+            "geometry": {"type": "LineString", "coordinates": [[-40, 5], [60, 5]]},
+        },
+    )
+    scenario = imported(path).scenario
+    gap_m = scenario.charge_radius_m
+    west, east = scenario.charge
+    assert ends_m(west)[0][0] == pytest.approx(gap_m, abs=0.02)
+    assert ends_m(west)[1][0] == pytest.approx(10.0 - gap_m, abs=0.02)
+    assert ends_m(east)[0][0] == pytest.approx(16.0 + gap_m, abs=0.02)
+    assert ends_m(east)[1][0] == pytest.approx(26.0 - gap_m, abs=0.02)
