@@ -1,6 +1,7 @@
 """Axis-parallel rectangles, the only plane figure that sites are made of; cells of a grid."""
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Collection, Iterable
 from typing import NamedTuple
 
 Cell = tuple[int, int]
@@ -95,6 +96,22 @@ Layout = tuple[Element, ...]
 def layout_text(layout: Iterable[Element]) -> str:
     """Return a layout for one field of a table: `3,4 3,5`, `3,4,t_wall 7,4,t_wall,turned`."""
     return " ".join(map(_element_text, layout))
+
+
+def layout_counts(layout: Collection[Element], kind: str = "", of: int | None = None) -> str:
+    """Return what a layout consists of: `1 module`, `3 of 9 pieces (2 wall, 1 post)`.
+
+    Args:
+        layout: Modules or pieces.
+        kind: What kind of them, before the word: `barrier`.
+        of: How many there are in stock.
+    """
+    items = Counter(str(element[2]) for element in layout if len(element) > 2)
+    word = f"{kind} {'piece' if items else 'module'}".strip()
+    plural = "" if len(layout) == 1 and of is None else "s"
+    number = f"{len(layout)}" if of is None else f"{len(layout)} of {of}"
+    named = ", ".join(f"{count} {item}" for item, count in items.items())
+    return f"{number} {word}{plural}" + (f" ({named})" if named else "")
 
 
 def _element_text(element: Element) -> str:

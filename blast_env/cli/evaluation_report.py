@@ -24,6 +24,7 @@ from blast_env.evaluation import (
 )
 from blast_env.export import LayoutPlan, check_target, export_layouts
 from blast_env.files import make_folder
+from blast_env.geometry import layout_counts
 from blast_env.statistics import Estimate
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
@@ -170,7 +171,7 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
     """Print the structures' mean loads, and what the layout does over all threats."""
     count = len(evaluation.threats)
     table = make_table(
-        f"{evaluation.scenario.name}: {len(evaluation.layout)} barrier modules against none, "
+        f"{evaluation.scenario.name}: {layout_counts(evaluation.layout, 'barrier')} against none, "
         f"{seeds_text(seeds)}",
         _HEADERS,
         text_columns=2,

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
-from blast_env.geometry import Element
+from blast_env.geometry import Element, layout_counts
 from blast_env.physics.gas.engine import GasEngine
 from blast_env.scenario import Scenario
 from blast_env.scenario.build_scene import draw_charge
@@ -73,7 +73,7 @@ def _print(result: GasResult, written: Sequence[Path]) -> None:
     x_m, y_m = charge.position_m
     table = make_table(
         f"{result.blast.scenario.name}: {charge.tnt_kg:g} kg TNT at ({x_m:.2f}, {y_m:.2f}) m, "
-        f"{charge.height_m:g} m high, {len(result.blast.layout)} barrier modules",
+        f"{charge.height_m:g} m high, {layout_counts(result.blast.layout, 'barrier')}",
         _HEADERS,
         text_columns=2,
     )

@@ -40,6 +40,7 @@ from blast_env.evaluation import (
 from blast_env.evaluation.cases import practice_hidden, practice_visible
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.files import make_folder
+from blast_env.geometry import layout_counts
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
@@ -114,7 +115,7 @@ def print_search(run: SearchRun, options: SearchOptions, checked: LayoutEvaluati
     )
     result_console().print(table)
     print_line(
-        f"{len(result.layout)} of {problem.stock} modules; {result.blasts} of {result.budget} "
+        f"{layout_counts(result.layout, of=problem.stock)}; {result.blasts} of {result.budget} "
         f"blasts spent, {run.cache_hits} of the loads asked for known already; "
         f"{run.seconds:.1f} s"
     )

@@ -11,7 +11,7 @@ import typer
 
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element
+from blast_env.geometry import Element, layout_counts
 from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Scenario, load_layout, load_scenario
@@ -158,7 +158,7 @@ def print_summary(result: BlastResult, written: Sequence[Path]) -> None:
     x_m, y_m = scene.charge.position_m
     table = make_table(
         f"{blast.scenario.name}: {scene.charge.tnt_kg:g} kg TNT at ({x_m:.2f}, {y_m:.2f}) m, "
-        f"seed {blast.seed}, {len(blast.layout)} barrier modules",
+        f"seed {blast.seed}, {layout_counts(blast.layout, 'barrier')}",
         _HEADERS,
         text_columns=2,
     )

@@ -85,7 +85,7 @@ CASE_COLUMNS: Final = (
     Column("charge_x_m", "m", "centre of its charge, from the left border"),
     Column("charge_y_m", "m", "centre of its charge, from the lower border"),
     Column("tnt_kg", "kg", "TNT-equivalent mass of its charge"),
-    Column("modules", "", "modules of the layout"),
+    Column("modules", "", "modules, or pieces, of the layout"),
     Column("impulse_pa_s", "Pa s", "protected structures, with the layout, mean over the threats"),
     Column("unprotected_impulse_pa_s", "Pa s", "the same without a barrier"),
     Column("reduction", "", "of that impulse"),

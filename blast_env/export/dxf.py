@@ -1,5 +1,6 @@
 """What a drawing has to say beside its lines: conditions of the site, and how far they reach."""
 
+from collections import Counter
 from math import ceil, pi, tan
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -7,7 +8,7 @@ from typing import Final, NamedTuple
 from blast_env.errors import import_extra
 from blast_env.export.plan import Feature, FeatureKind, LayoutPlan
 from blast_env.files import write_atomically
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Piece, Rectangle
 from blast_env.scenario import BuildZone, Placement
 from blast_env.units import MODULE_SIDE_M
 
@@ -32,15 +33,32 @@ def note_lines(plan: LayoutPlan) -> tuple[str, ...]:
     zone = plan.scenario.build_zone
     if zone is None:
         return tuple(lines)
-    side = f"{MODULE_SIDE_M:g}"
-    lines.append(
-        f"Modules: {len(plan.layout)} of a stock of {zone.stock}, {side} m x {side} m each"
-    )
+    lines += _items(plan, zone) if zone.items else [_modules(plan, zone)]
     lines += _conditions(zone)
     if zone.budget is not None:
         cost = Placement.of(plan.scenario, plan.layout).cost
-        lines.append(f"Budget: {_number(zone.budget)}, of which the modules take {_number(cost)}")
+        what = "pieces" if zone.items else "modules"
+        lines.append(f"Budget: {_number(zone.budget)}, of which the {what} take {_number(cost)}")
     return tuple(lines)
+
+
+def _modules(plan: LayoutPlan, zone: BuildZone) -> str:
+    """Return how many modules there are, and how large they are."""
+    side = f"{MODULE_SIDE_M:g}"
+    high = "" if zone.height_m is None else f", {_number(zone.height_m)} m high"
+    return f"Modules: {len(plan.layout)} of a stock of {zone.stock}, {side} m x {side} m each{high}"
+
+
+def _items(plan: LayoutPlan, zone: BuildZone) -> list[str]:
+    """Return a line for each item: how many there are, and how large they are."""
+    counts = Counter(each.item for each in plan.layout if isinstance(each, Piece))
+    sides = [(each.length_modules, each.thickness_modules) for each in zone.items]
+    sizes_m = [[_number(MODULE_SIDE_M * modules) for modules in pair] for pair in sides]
+    return [
+        f"{item.name}: {counts[item.name]} of a stock of {item.stock}, {length} m x {thickness} m,"
+        f" {_number(item.height_m)} m high"
+        for item, (length, thickness) in zip(zone.items, sizes_m, strict=True)
+    ]
 
 
 def _conditions(zone: BuildZone) -> tuple[str, str]:
@@ -122,6 +140,10 @@ CLEARANCE_LAYER: Final = "CLEARANCE"
 NOTES_LAYER: Final = "NOTES"
 
 
+ITEMS_LAYER: Final = "ITEMS"
+"""What the pieces of a catalogue are, in words; they can be hidden."""
+
+
 _STRING: Final = 1000  # group code of a text in extended data
 
 
@@ -157,7 +179,11 @@ _STYLES: Final = {
 }
 
 
-_OTHER_STYLES: Final = {CLEARANCE_LAYER: _Style(52, "DASHED"), NOTES_LAYER: _Style(7)}
+_OTHER_STYLES: Final = {
+    CLEARANCE_LAYER: _Style(52, "DASHED"),
+    NOTES_LAYER: _Style(7),
+    ITEMS_LAYER: _Style(140),
+}
 
 
 def layer_name(kind: FeatureKind) -> str:
@@ -210,10 +236,40 @@ def _draw(space: Modelspace, feature: Feature) -> None:
         space.add_line(*places, attributes)
     else:
         outline = space.add_lwpolyline(places, close=True, dxfattribs=attributes)
+        height_m = feature.properties.get("height_m")
+        if isinstance(height_m, float):
+            outline.dxf.thickness = height_m  # what stands is drawn as high as it is
         if feature.kind is FeatureKind.BARRIER:
-            outline.set_xdata(APPLICATION, [(_STRING, feature.name)])
+            outline.set_xdata(APPLICATION, [(_STRING, text) for text in _barrier_texts(feature)])
+            if "item" in feature.properties:
+                _write_item(space, feature)
             return
     _write_name(space, feature)
+
+
+def _barrier_texts(feature: Feature) -> list[str]:
+    """Return what is said of a module or piece: its name, and for a piece its item and height."""
+    if "item" not in feature.properties:
+        return [feature.name]
+    return [feature.name, f"item={feature.properties['item']}", f"height_m={_height(feature)}"]
+
+
+def _height(feature: Feature) -> str:
+    return f"{feature.properties['height_m']:g}"
+
+
+def _write_item(space: Modelspace, feature: Feature) -> None:
+    """Write item and height of a piece along its middle."""
+    (left_m, bottom_m), (right_m, top_m) = feature.places_m[0], feature.places_m[2]
+    upright = top_m - bottom_m > right_m - left_m
+    text = space.add_text(
+        f"{feature.properties['item']} {_height(feature)} m",
+        height=0.5 * MODULE_SIDE_M,
+        rotation=90.0 if upright else 0.0,
+        dxfattribs={"layer": ITEMS_LAYER},
+    )
+    middle = ((left_m + right_m) / 2.0, (bottom_m + top_m) / 2.0)
+    text.set_placement(middle, align=TextEntityAlignment.MIDDLE_CENTER)
 
 
 def _write_name(space: Modelspace, feature: Feature) -> None:

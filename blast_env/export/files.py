@@ -1,4 +1,4 @@
-"""Layouts as CSV, GeoJSON, DXF and JSON."""
+"""Layouts as CSV, Excel, GeoJSON, DXF and JSON."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -8,50 +8,34 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
-import pandas as pd
 
 from blast_env import tables
 from blast_env.errors import BlastEnvError, suggestion
+from blast_env.export.bill import bill_of_quantities, element_table, write_excel
 from blast_env.export.plan import Feature, LayoutPlan, PlaceM
 from blast_env.files import make_folder, write_atomically
 from blast_env.scenario import write_layout
 from blast_env.scenario.georeference import AnyGeoreference
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
-COLUMNS: Final = (
-    "module_id",
-    "row",
-    "column",
-    "corner_x_m",
-    "corner_y_m",
-    "centre_x_m",
-    "centre_y_m",
-    "side_m",
-)
-"""`corner` is a module's lower left corner; rows count upwards, columns to the right, from 0."""
-
-
-_DIGITS: Final = 9
-
-
-def module_table(plan: LayoutPlan) -> pd.DataFrame:
-    """Return one row a module in the order of the layout; see `COLUMNS`."""
-    rows = []
-    for part in plan.modules:
-        corner_m = (part.rectangle.left / UNITS_PER_M, part.rectangle.bottom / UNITS_PER_M)
-        centre_m = (part.x / UNITS_PER_M, part.y / UNITS_PER_M)
-        places_m = (round(value, _DIGITS) for value in (*corner_m, *centre_m))
-        rows.append((part.module_id, part.row, part.column, *places_m, MODULE_SIDE_M))
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+_DIGITS: Final = 9  # of a coordinate on a map: a tenth of a millimetre in degrees
 
 
 def write_csv(plan: LayoutPlan, path: Path) -> None:
-    """Write the modules.
+    """Write the modules or pieces.
 
     Raises:
         BlastEnvError: If the file cannot be written.
     """
-    tables.write_csv(module_table(plan), path)
+    tables.write_csv(element_table(plan), path)
+
+
+def write_bill(plan: LayoutPlan, path: Path) -> None:
+    """Write the bill of quantities.
+
+    Raises:
+        BlastEnvError: If the file cannot be written.
+    """
+    tables.write_csv(bill_of_quantities(plan), path)
 
 
 SITE_METRES: Final = (
@@ -164,7 +148,14 @@ def _write_dxf(plan: LayoutPlan, path: Path) -> None:
 
 
 _WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], None]]] = MappingProxyType(
-    {".json": _write_json, ".csv": write_csv, ".geojson": write_geojson, ".dxf": _write_dxf}
+    {
+        ".json": _write_json,
+        ".csv": write_csv,
+        ".bill.csv": write_bill,
+        ".xlsx": write_excel,
+        ".geojson": write_geojson,
+        ".dxf": _write_dxf,
+    }
 )
 
 
@@ -177,8 +168,9 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
 
     Args:
         plan: The layout on its site.
-        path: `.json` (a layout file), `.csv` (the modules), `.geojson` or `.dxf` (everything on
-            the site); an existing file is replaced as a whole.
+        path: `.json` (a layout file), `.csv` (the modules or pieces), `.bill.csv` (the bill of
+            quantities), `.xlsx` (both), `.geojson` or `.dxf` (everything on the site); an existing
+            file is replaced as a whole.
 
     Returns:
         The path.
@@ -189,7 +181,7 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
     """
     path = Path(path)
     check_target(path, 1)
-    suffix = path.suffix.lower()
+    suffix = _suffix(path)
     if suffix not in _WRITERS:
         raise BlastEnvError(f"{path}: has no suffix, must be {_named_suffixes()}")
     _WRITERS[suffix](plan, path)
@@ -234,7 +226,7 @@ def check_target(target: str | Path, count: int) -> None:
             package that is needed is not installed.
     """
     target = Path(target)
-    suffix = target.suffix.lower()
+    suffix = _suffix(target)
     if suffix and suffix not in SUFFIXES and not target.is_dir():
         raise BlastEnvError(
             f"{target}: suffix is {suffix!r}{suggestion(suffix, SUFFIXES)}, must be "
@@ -249,7 +241,13 @@ def check_target(target: str | Path, count: int) -> None:
 
 
 def _is_file(target: Path) -> bool:
-    return target.suffix.lower() in SUFFIXES and not target.is_dir()
+    return _suffix(target) in SUFFIXES and not target.is_dir()
+
+
+def _suffix(path: Path) -> str:
+    """Return the suffix that names a form; the last one, unless the last two are known."""
+    both = "".join(path.suffixes[-2:]).lower()
+    return both if both in SUFFIXES else path.suffix.lower()
 
 
 def _named_suffixes() -> str:

@@ -9,7 +9,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
-from blast_env.geometry import Layout, Rectangle
+from blast_env.geometry import Layout, Piece, Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import ModularPart
 from blast_env.scenario import (
@@ -67,7 +67,7 @@ class LayoutPlan:
 
     Attributes:
         scenario: The scenario; its bundled name or path will do.
-        layout: (row, column) of each module; their order is kept.
+        layout: (row, column) of each module, or the pieces; their order is kept.
         charge: The charge that the layout was made for; `None` where it is for all the places
             where the scenario may have one, or nobody knows.
         provenance: How the layout was made: anything that JSON can hold.
@@ -87,7 +87,7 @@ class LayoutPlan:
 
     @property
     def modules(self) -> tuple[ModularPart, ...]:
-        """The modules in the order of the layout, with the identifiers of the blast's tables."""
+        """The modules, in the order of the layout, with the names that the blast's tables have."""
         zone = self.scenario.build_zone
         if zone is None:
             return ()
@@ -112,12 +112,41 @@ class LayoutPlan:
             yield _charge_place(source)
         if self.charge is not None:
             name = f"charge of {self.charge.tnt_kg:g} kg TNT"
-            places_m = (_rounded(*self.charge.position_m),)
+            places_m = (rounded_m(*self.charge.position_m),)
             yield Feature(FeatureKind.CHARGE, places_m, name, {"tnt_kg": self.charge.tnt_kg})
+        zone = scenario.build_zone
+        if zone is not None:
+            yield from _piece_features(zone, self.layout) if zone.items else self._module_features()
+
+    def _module_features(self) -> Iterator[Feature]:
+        zone = self.scenario.zone
+        height = {} if zone.height_m is None else {"height_m": zone.height_m}
         for part in self.modules:
             rectangle = part.rectangle.scaled(1.0 / UNITS_PER_M)
             yield _area(
-                FeatureKind.BARRIER, rectangle, part.module_id, row=part.row, column=part.column
+                FeatureKind.BARRIER,
+                rectangle,
+                part.module_id,
+                row=part.row,
+                column=part.column,
+                **height,
+            )
+
+
+def _piece_features(zone: BuildZone, layout: Layout) -> Iterator[Feature]:
+    """Yield the pieces as wholes."""
+    items = {item.name: item for item in zone.items}
+    for piece in layout:
+        if isinstance(piece, Piece):
+            item = items[piece.item]
+            yield _area(
+                FeatureKind.BARRIER,
+                zone.element_rectangle_m(piece),
+                zone.piece_name(piece),
+                **piece._asdict(),
+                height_m=item.height_m,
+                unit_cost=item.cost,
+                stops_vehicles=item.stops_vehicles,
             )
 
 
@@ -136,8 +165,11 @@ def _zone_features(zone: BuildZone) -> Iterator[Feature]:
     conditions: dict[str, str | float] = {
         "stock": zone.stock,
         "clearance_m": zone.clearance_m,
-        "module_cost": zone.module_cost,
     }
+    if zone.items:
+        conditions["items"] = ", ".join(f"{item.stock} {item.name}" for item in zone.items)
+    else:
+        conditions["module_cost"] = zone.module_cost
     if zone.budget is not None:
         conditions["budget"] = zone.budget
     if zone.access_way is not None:
@@ -157,15 +189,16 @@ def _charge_place(source: AnySource) -> Feature:
     if isinstance(source, RectangleSource):
         return _area(FeatureKind.CHARGE_PLACE, source.rectangle_m, name, **properties)
     ends_m = source.segment_m if isinstance(source, SegmentSource) else (source.position_m,)
-    places_m = tuple(_rounded(*place) for place in ends_m)
+    places_m = tuple(rounded_m(*place) for place in ends_m)
     return Feature(FeatureKind.CHARGE_PLACE, places_m, name, properties)
 
 
 def _area(kind: FeatureKind, rectangle: Rectangle, name: str, **properties: str | float) -> Feature:
     left, bottom, right, top = rectangle
     corners = ((left, bottom), (right, bottom), (right, top), (left, top))
-    return Feature(kind, tuple(_rounded(x, y) for x, y in corners), name, properties)
+    return Feature(kind, tuple(rounded_m(x, y) for x, y in corners), name, properties)
 
 
-def _rounded(x_m: float, y_m: float) -> PlaceM:
+def rounded_m(x_m: float, y_m: float) -> PlaceM:
+    """Return a place without what is but rounding."""
     return round(x_m, _DIGITS), round(y_m, _DIGITS)

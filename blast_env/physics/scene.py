@@ -1,5 +1,6 @@
 """A scene: everything that an engine needs to run one blast, as plain arrays."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal, NamedTuple
@@ -97,6 +98,20 @@ class Scene(BlastSite):
         return round(impulse / self.impulse_quantum) * self.impulse_quantum
 
 
+class Block(NamedTuple):
+    """What stands as one: a structure, a piece of a barrier, or a single module.
+
+    Attributes:
+        name: Its name; empty for a single module.
+        rectangle: Its plan, units.
+        height_m: Its height; `None` is as high as the air.
+    """
+
+    name: str
+    rectangle: Rectangle
+    height_m: float | None
+
+
 @dataclass(frozen=True)
 class StructureOutline:
     """What a structure is before any blast; attributes as in `ModularObstacle`.
@@ -125,6 +140,37 @@ class StructureOutline:
         """The rectangle of the whole grid, units."""
         size = (self.columns * MODULE_SIDE_UNITS, self.rows * MODULE_SIDE_UNITS)
         return Rectangle.from_corner(self.corner, size)
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The whole structure; of a barrier its pieces, or its modules where it has none."""
+        if self.cells is None:
+            return (Block(self.name, self.rectangle, self.height_m),)
+        count = len(self.cells)
+        heights_m = self.heights_m or (self.height_m,) * count
+        pieces = self.pieces or ("",) * count
+        groups: dict[str | Cell, list[tuple[Cell, float | None]]] = {}
+        for cell, piece, height_m in zip(self.cells, pieces, heights_m, strict=True):
+            groups.setdefault(piece or cell, []).append((cell, height_m))
+        return tuple(
+            Block(
+                key if isinstance(key, str) else "",
+                self._around([cell for cell, _ in group]),
+                group[0][1],
+            )
+            for key, group in groups.items()
+        )
+
+    def _around(self, cells: Sequence[Cell]) -> Rectangle:
+        """Return the rectangle that cells fill, units."""
+        rows, columns = zip(*cells, strict=True)
+        side, (left, bottom) = MODULE_SIDE_UNITS, self.corner
+        return Rectangle(
+            left + min(columns) * side,
+            bottom + min(rows) * side,
+            left + (max(columns) + 1) * side,
+            bottom + (max(rows) + 1) * side,
+        )
 
     def build(self) -> ModularObstacle:
         """Return the obstacle with all its parts unloaded."""

@@ -400,10 +400,18 @@ class SheetTable(NamedTuple):
     columns: Sequence[Column]
 
 
-def write_tables(record: RunRecord, tables: Sequence[SheetTable], path: str | Path) -> Path:
+def write_tables(
+    record: RunRecord, tables: Sequence[SheetTable], path: str | Path, title: str | None = None
+) -> Path:
     """Write a workbook with a run record and tables, and a sheet that explains their columns.
 
     As `write_workbook`: whole or not at all, and the same to the last byte for the same content.
+
+    Args:
+        record: What was run, with the version of the package.
+        tables: The tables.
+        path: The file.
+        title: Of the file; of a blast unless given.
 
     Returns:
         The path.
@@ -411,8 +419,9 @@ def write_tables(record: RunRecord, tables: Sequence[SheetTable], path: str | Pa
     Raises:
         BlastEnvError: If the suffix is another one or the file cannot be written there.
     """
+    title = title or f"Blast {record['scenario']}, engine {record['engine']}"
     with _workbook(path) as workbook:
-        _WorkbookWriter(workbook, EXCEL_ROWS).write_tables(record, tables)
+        _WorkbookWriter(workbook, EXCEL_ROWS).write_tables(record, tables, title)
     return Path(path)
 
 
@@ -472,19 +481,20 @@ class _WorkbookWriter:
         add_charts(self._workbook, run, _CHART_COLUMN, _CHART_SHEET, data)
         self._write_columns(tables, _UNITS)
 
-    def write_tables(self, record: RunRecord, tables: Sequence[SheetTable]) -> None:
+    def write_tables(self, record: RunRecord, tables: Sequence[SheetTable], title: str) -> None:
         """Write a run record and tables, and the properties."""
-        self._set_properties(record, f"Blast {record['scenario']}, engine {record['engine']}")
+        self._set_properties(record, title)
         self._write_run(record)
         for each in tables:
             self._write_table(*each)
         self._write_columns(tables, ())
 
     def _set_properties(self, record: RunRecord, title: str) -> None:
+        digest = f", digest {record['digest']}" if "digest" in record else ""
         self._workbook.set_properties(
             {
                 "title": title,
-                "comments": f"blast-env {record['blast-env version']}, digest {record['digest']}",
+                "comments": f"blast-env {record['blast-env version']}{digest}",
                 "created": _CREATED,
             }
         )

@@ -298,13 +298,29 @@ def draw_obstacle(
     for part in obstacle.parts:
         _draw_module(surface, view, part, full_impulse, grid)
     if is_barrier:
-        for part in obstacle.parts:
-            place = view.rectangle(part.rectangle)
-            pygame.draw.rect(surface, BARRIER, place, 2 if place.width >= 7 else 1)
+        for rectangle in _wholes(obstacle):
+            place = view.rectangle(rectangle)
+            pygame.draw.rect(surface, BARRIER, place, 2 if min(place.size) >= 7 else 1)
         return
     width = 3 if obstacle.protected else 2
     around = view.rectangle(obstacle.rectangle).inflate(2 * width - 2, 2 * width - 2)
     pygame.draw.rect(surface, PROTECTED if obstacle.protected else STRUCTURE, around, width)
+
+
+def _wholes(barrier: ModularObstacle) -> list[Rectangle]:
+    """Return the rectangles of the pieces of a barrier, or of its modules if it has none."""
+    wholes: dict[str, Rectangle] = {}
+    for part in barrier.parts:
+        name = part.piece or part.module_id
+        left, bottom, right, top = part.rectangle
+        known = wholes.get(name, part.rectangle)
+        wholes[name] = Rectangle(
+            min(left, known.left),
+            min(bottom, known.bottom),
+            max(right, known.right),
+            max(top, known.top),
+        )
+    return list(wholes.values())
 
 
 def _draw_module(

@@ -10,7 +10,7 @@ import numpy as np
 from blast_env.evaluation.cases import Case
 from blast_env.evaluation.comparison import Comparison
 from blast_env.evaluation.report import LayoutEvaluation
-from blast_env.geometry import Layout
+from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import BlastSite
 from blast_env.physics.structure import ModularObstacle
 from blast_env.rendering.site_plan import (
@@ -188,8 +188,8 @@ def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
 
 
 def _title(evaluation: LayoutEvaluation) -> str:
-    modules = len(evaluation.layout)
-    barrier = count_of("barrier module", modules) if modules else "no barrier"
+    layout = evaluation.layout
+    barrier = layout_counts(layout, "barrier") if layout else "no barrier"
     reduction = f"reduction of the impulse {_percent(evaluation.mean_reduction)}"
     return f"{evaluation.scenario.name}, {barrier}: {reduction}{_interval(evaluation.reduction)}"
 
@@ -444,7 +444,7 @@ def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
     (x_m, y_m), tnt_kg = charge_here.position_m, charge_here.tnt_kg
     charge = f"{tnt_kg:g} kg TNT at ({x_m:.1f}, {y_m:.1f}) m"
     axes.annotate(
-        f"{site}{count_of('module', len(panel.layout))}\n{charge}",
+        f"{site}{layout_counts(panel.layout)}\n{charge}",
         (0.5, 1.0),
         xycoords="axes fraction",
         xytext=(0.0, 2.0),

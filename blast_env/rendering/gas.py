@@ -14,6 +14,7 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.calibration.references import Burst, Friedlander, kingery_bulmash
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.geometry import layout_counts
 from blast_env.physics.scene import WALLS, StructureOutline, WallName
 from blast_env.rendering.site_plan import (
     in_metres,
@@ -23,7 +24,6 @@ from blast_env.rendering.site_plan import (
 from blast_env.rendering.style import (
     FAINT,
     QUIET_INK,
-    count_of,
     nice_ceiling,
     number_on_axis,
     render_extra,
@@ -108,7 +108,7 @@ def kind_of(quantity: str) -> Kind:
 
 def layout_words(blast: GasBlast) -> str:
     """Return what barrier a blast has, in words."""
-    return f"barrier of {count_of('module', len(blast.layout))}" if blast.layout else "no barrier"
+    return f"barrier of {layout_counts(blast.layout)}" if blast.layout else "no barrier"
 
 
 def gas_subtitle(blast: GasBlast) -> str:

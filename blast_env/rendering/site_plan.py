@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -107,12 +108,32 @@ def draw_outline(axes: Axes, obstacle: Obstacle, linewidth: float = 1.6) -> None
 
 
 def draw_what_stands(axes: Axes, structures: Sequence[StructureOutline]) -> None:
-    """Draw the outlines of the structures, and the modules of the barrier as filled squares."""
+    """Draw the outlines of the structures, and what the barrier consists of as filled.
+
+    Pieces of a catalogue have light edges, and are the lighter the lower they are.
+    """
     for outline in structures:
         draw_outline(axes, outline)
-        if outline.cells is not None:
-            parts = [rectangle_patch(in_metres(part.rectangle)) for part in outline.build().parts]
+        if outline.cells is None:
+            continue
+        blocks = outline.blocks
+        parts = [rectangle_patch(in_metres(block.rectangle)) for block in blocks]
+        if outline.pieces is None:
             axes.add_collection(PatchCollection(parts, color=unit_interval(BARRIER), zorder=4))
+            continue
+        shades = [_shade(block.height_m, outline.height_m) for block in blocks]
+        edge = unit_interval(PAGE)
+        axes.add_collection(
+            PatchCollection(parts, facecolor=shades, edgecolor=edge, linewidth=0.5, zorder=4)
+        )
+
+
+def _shade(height_m: float | None, highest_m: float | None) -> tuple[float, float, float]:
+    """Return the colour of a piece: that of barriers for the highest item, lighter below."""
+    share = 1.0 if height_m is None or highest_m is None else height_m / highest_m
+    dark, light = np.array(unit_interval(BARRIER)), np.array(unit_interval(SITE))
+    red, green, blue = dark + 0.6 * (1.0 - share) * (light - dark)
+    return float(red), float(green), float(blue)
 
 
 def draw_loads(
@@ -154,13 +175,18 @@ def draw_charge(axes: Axes, position_m: tuple[float, float]) -> None:
     axes.add_line(_star(*position_m))
 
 
+BARRIER_MODULE: Final = "barrier module"
+
+
 def legend_handles(obstacles: Sequence[Obstacle], zone: BuildZone | None) -> list[Artist]:
     """Return the legend entries for what a site has."""
     handles: list[Artist] = [_star()]
+    in_pieces = any(obstacle.pieces is not None for obstacle in obstacles)
+    barrier = "barrier piece, darker is higher" if in_pieces else BARRIER_MODULE
     roles = (
         ("protected structure", PROTECTED, 2.4, lambda o: o.protected),
         ("other structure", STRUCTURE, 1.6, lambda o: not o.protected and o.cells is None),
-        ("barrier module", BARRIER, 1.2, lambda o: o.cells is not None),
+        (barrier, BARRIER, 1.2, lambda o: o.cells is not None),
     )
     for label, colour, linewidth, matches in roles:
         if any(matches(obstacle) for obstacle in obstacles):
@@ -180,7 +206,7 @@ def layout_legend(structures: Sequence[Obstacle], zone: BuildZone | None) -> lis
     """Return the legend entries for a charge and for what `draw_what_stands` shows."""
     handles = legend_handles(structures, zone)
     for handle in handles:
-        if handle.get_label() == "barrier module":
+        if str(handle.get_label()).startswith("barrier "):
             handle.set(fill=True, facecolor=unit_interval(BARRIER))
     return handles
 
@@ -257,7 +283,9 @@ def what_stands(structures: Sequence[StructureOutline]) -> list[StructureOutline
     for outline in structures:
         if outline.cells is not None:
             corners = [part.rectangle[:2] for part in outline.build().parts]
-            single = replace(outline, rows=1, columns=1, cells=((0, 0),))
+            single = replace(
+                outline, rows=1, columns=1, cells=((0, 0),), heights_m=None, pieces=None
+            )
             obstacles += [replace(single, corner=corner) for corner in corners]
     return obstacles
 

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.errors import import_extra
+from blast_env.geometry import layout_counts
 from blast_env.physics.particles import CollisionType, distance_to_rectangle
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import Colour
@@ -133,7 +134,7 @@ def blast_title(blast: Blast) -> tuple[str, str]:
     x, y = charge.position_m
     parts = [
         f"charge {charge.tnt_kg:g} kg TNT at ({x:.1f} m, {y:.1f} m)",
-        f"barrier of {count_of('module', len(blast.layout))}" if blast.layout else "no barrier",
+        f"barrier of {layout_counts(blast.layout)}" if blast.layout else "no barrier",
         f"seed {blast.seed}",
     ]
     return blast.scenario.name, ", ".join(parts)

@@ -16,7 +16,7 @@ from ezdxf.layouts.layout import Modelspace
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.export import SUFFIXES, FeatureKind, LayoutPlan, export_layout, export_layouts
-from blast_env.export.files import COLUMNS
+from blast_env.export.bill import MODULE_COLUMNS
 from blast_env.physics.scene import Charge
 from blast_env.scenario import LayoutFile, Scenario, load_layout
 from blast_env.scenario.build_scene import build_scene
@@ -61,7 +61,7 @@ def test_json_is_a_layout_file_with_the_charge(tmp_path: Path) -> None:
 
 def test_csv_has_every_module_in_metres(tmp_path: Path) -> None:
     table = pd.read_csv(export_layout(plan(), tmp_path / "layout.csv"))
-    assert tuple(table.columns) == COLUMNS
+    assert list(table.columns) == [column.name for column in MODULE_COLUMNS]
     assert list(zip(table["row"], table["column"], strict=True)) == list(LAYOUT)
     for row, (left, bottom, right, top) in zip(
         table.to_dict("records"), squares_m(LAYOUT), strict=True
@@ -181,7 +181,10 @@ def test_a_layout_that_does_not_fit_is_refused() -> None:
     ("name", "words"),
     [
         ("layout.geojsn", "did you mean '.geojson'"),
-        ("layout.dwg", "must be .json, .csv, .geojson or .dxf, or nothing for a folder"),
+        (
+            "layout.dwg",
+            "must be .json, .csv, .bill.csv, .xlsx, .geojson or .dxf, or nothing for a folder",
+        ),
         ("two.dxf", "is one file, but there are 2 layouts"),
         ("file", "cannot be a folder"),
     ],
@@ -201,5 +204,5 @@ def test_without_ezdxf_the_message_says_how_to_get_it(
     monkeypatch.delitem(sys.modules, "blast_env.export.dxf", raising=False)
     with pytest.raises(BlastEnvError, match=r"'ezdxf': pip install blast-env\[export\]"):
         export_layout(plan(), tmp_path / "layout.dxf")
-    for suffix in (".json", ".csv", ".geojson"):
+    for suffix in SUFFIXES[:-1]:
         assert export_layout(plan(), tmp_path / f"layout{suffix}").exists()

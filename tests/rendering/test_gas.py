@@ -30,7 +30,11 @@ from blast_env.rendering.pressure_frames import (
     Smooth,
     default_section,
 )
+from blast_env.rendering.site_plan import draw_what_stands, layout_legend
+from blast_env.scenario.build_scene import build_site
 from blast_env.simulation.gas import GasBlast, GasResult
+from tests.catalogue_sites import WALL as PIECES
+from tests.catalogue_sites import yard
 from tests.gas_sites import WALL, hut
 
 HEIGHT_M, CUT = 0.75, Section("y", 4.25)
@@ -371,3 +375,17 @@ def test_what_is_no_film_is_refused(
     with pytest.raises(BlastEnvError, match=words):
         write_pressure_film(blast, path, **options)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_pieces_are_drawn_as_wholes_lighter_where_they_are_lower() -> None:
+    figure = Figure()
+    axes = figure.add_subplot()
+    structures = build_site(yard(), PIECES).structures
+    draw_what_stands(axes, structures)
+    (pieces,) = axes.collections
+    boxes = [path.get_extents() for path in pieces.get_paths()]
+    assert [(box.width, box.height) for box in boxes] == [(0.5, 1.5), (0.5, 1.5), (0.5, 0.5)]
+    lightness = np.asarray(pieces.get_facecolor())[:, :3].mean(axis=1)
+    assert lightness[0] == lightness[1] < lightness[2]
+    labels = [str(handle.get_label()) for handle in layout_legend(structures, yard().zone)]
+    assert "barrier piece, darker is higher" in labels

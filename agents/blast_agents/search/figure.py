@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from blast_agents.search.problem import Candidate, LayoutProblem, SearchResult
+from blast_env.geometry import layout_counts
 from blast_env.rendering.site_plan import write_heading
 from blast_env.rendering.style import (
     QUIET_INK,
@@ -49,7 +50,7 @@ def search_figure(result: SearchResult, problem: LayoutProblem) -> Figure:
         figure,
         f"{scenario.name}, {result.method} search: reduction "
         f"{100.0 * problem.reduction(best):.0f} % with "
-        f"{count_of('module', len(best.layout))}",
+        f"{layout_counts(best.layout)}",
         f"{result.blasts:,} of {count_of('blast', result.budget)} spent"
         f"{', interrupted' if result.interrupted else ''}; engine "
         f"{problem.evaluator.engine.name}, seed {result.seed}; reductions are "

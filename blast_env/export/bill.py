@@ -1,0 +1,213 @@
+"""What a layout consists of, as tables: its modules or pieces, and the bill of quantities."""
+
+from collections.abc import Iterator, Sequence
+from math import fsum
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import pandas as pd
+
+from blast_env.export.plan import LayoutPlan, rounded_m
+from blast_env.geometry import Element, Piece
+from blast_env.provenance import package_version
+from blast_env.recording.excel import SheetTable, write_tables
+from blast_env.scenario import Placement
+from blast_env.tables import Column, table_of
+from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+
+MODULE_COLUMNS: Final = (
+    Column("module_id", "", "name of the module, made from its centre in metres"),
+    Column("row", "", "row of the build zone, upwards from 0"),
+    Column("column", "", "column of the build zone, to the right from 0"),
+    Column("corner_x_m", "m", "lower left corner, from the left border"),
+    Column("corner_y_m", "m", "lower left corner, from the lower border"),
+    Column("centre_x_m", "m", "centre, from the left border"),
+    Column("centre_y_m", "m", "centre, from the lower border"),
+    Column("side_m", "m", "side of the module"),
+)
+"""Of the modules of a zone without a catalogue."""
+
+PIECE_COLUMNS: Final = (
+    Column("piece", "", "name of the piece, made from its item and its centre in metres"),
+    Column("item", "", "item of the catalogue"),
+    Column("row", "", "row of its lower left cell, upwards from 0"),
+    Column("column", "", "column of its lower left cell, to the right from 0"),
+    Column("turned", "", "whether its length runs upwards rather than to the right"),
+    Column("corner_x_m", "m", "lower left corner, from the left border"),
+    Column("corner_y_m", "m", "lower left corner, from the lower border"),
+    Column("centre_x_m", "m", "centre, from the left border"),
+    Column("centre_y_m", "m", "centre, from the lower border"),
+    Column("length_m", "m", "length"),
+    Column("thickness_m", "m", "thickness"),
+    Column("height_m", "m", "height"),
+    Column("cost", "", "cost at that place, in the unit of the budget"),
+    Column("stops_vehicles", "", "whether no vehicle gets past it"),
+)
+"""Of the pieces of a zone with a catalogue."""
+
+BILL_COLUMNS: Final = (
+    Column("item", "", "item of the catalogue, or `module`; `total` is all of them"),
+    Column("description", "", "what it is"),
+    Column("count", "", "pieces that the layout takes"),
+    Column("in_stock", "", "pieces that there are"),
+    Column("length_m", "m", "length"),
+    Column("thickness_m", "m", "thickness"),
+    Column("height_m", "m", "height; nothing where it is as high as the air"),
+    Column("unit_cost", "", "cost of a piece where no cost area says otherwise"),
+    Column("cost", "", "cost of these pieces at their places, in the unit of the budget"),
+)
+"""Of the bill of quantities."""
+
+MODULE: Final = "module"
+"""What the bill calls the single module of a zone without a catalogue."""
+
+TOTAL: Final = "total"
+"""The last line of the bill."""
+
+
+def element_columns(plan: LayoutPlan) -> tuple[Column, ...]:
+    """Return the columns of `element_table`: those of pieces, or of modules."""
+    zone = plan.scenario.build_zone
+    return PIECE_COLUMNS if zone is not None and zone.items else MODULE_COLUMNS
+
+
+def element_table(plan: LayoutPlan) -> pd.DataFrame:
+    """Return one row a module or a piece in the order of the layout; see `element_columns`."""
+    columns = element_columns(plan)
+    rows = _piece_rows(plan) if columns is PIECE_COLUMNS else _module_rows(plan)
+    return table_of(list(rows), columns)
+
+
+def _module_rows(plan: LayoutPlan) -> Iterator[dict[str, object]]:
+    for part in plan.modules:
+        corner_x_m, corner_y_m = rounded_m(
+            part.rectangle.left / UNITS_PER_M, part.rectangle.bottom / UNITS_PER_M
+        )
+        centre_x_m, centre_y_m = rounded_m(part.x / UNITS_PER_M, part.y / UNITS_PER_M)
+        yield {
+            "module_id": part.module_id,
+            "row": part.row,
+            "column": part.column,
+            "corner_x_m": corner_x_m,
+            "corner_y_m": corner_y_m,
+            "centre_x_m": centre_x_m,
+            "centre_y_m": centre_y_m,
+            "side_m": MODULE_SIDE_M,
+        }
+
+
+def _piece_rows(plan: LayoutPlan) -> Iterator[dict[str, object]]:
+    zone = plan.scenario.zone
+    items = {item.name: item for item in zone.items}
+    for piece, cost in _with_costs(plan):
+        if not isinstance(piece, Piece):
+            raise AssertionError("a zone with a catalogue has pieces")
+        item, rectangle = items[piece.item], zone.element_rectangle_m(piece)
+        corner_x_m, corner_y_m = rounded_m(rectangle.left, rectangle.bottom)
+        centre_x_m, centre_y_m = rounded_m(*rectangle.centre)
+        yield {
+            "piece": zone.piece_name(piece),
+            **piece._asdict(),
+            "corner_x_m": corner_x_m,
+            "corner_y_m": corner_y_m,
+            "centre_x_m": centre_x_m,
+            "centre_y_m": centre_y_m,
+            "length_m": item.length_modules * MODULE_SIDE_M,
+            "thickness_m": item.thickness_modules * MODULE_SIDE_M,
+            "height_m": item.height_m,
+            "cost": cost,
+            "stops_vehicles": item.stops_vehicles,
+        }
+
+
+def _with_costs(plan: LayoutPlan) -> list[tuple[Element, float]]:
+    """Return the elements of a layout, each with what it costs where it stands."""
+    placement = Placement.of(plan.scenario, plan.layout)
+    number, costs = placement.catalogue.variant_number, placement.costs
+    return [(each, float(costs[number(each), each[0], each[1]])) for each in placement.layout]
+
+
+class _Line(NamedTuple):
+    """One line of the bill but for its counts and its cost."""
+
+    item: str
+    description: str
+    in_stock: int
+    length_m: float
+    thickness_m: float
+    height_m: float | None
+    unit_cost: float
+
+
+def bill_of_quantities(plan: LayoutPlan) -> pd.DataFrame:
+    """Return what a layout takes, one row an item that it has, and the total; `BILL_COLUMNS`."""
+    lines = _lines(plan)
+    of_items: dict[str, list[float]] = {line.item: [] for line in lines}
+    for element, cost in _with_costs(plan):
+        of_items[element.item if isinstance(element, Piece) else MODULE].append(cost)
+    rows: list[dict[str, object]] = [
+        {
+            **line._asdict(),
+            "count": len(of_items[line.item]),
+            "cost": fsum(of_items[line.item]),
+        }
+        for line in lines
+        if of_items[line.item]
+    ]
+    everything = [cost for costs in of_items.values() for cost in costs]
+    nothing = dict.fromkeys(("length_m", "thickness_m", "height_m", "unit_cost", "in_stock"))
+    total = {"item": TOTAL, "description": "", "count": len(everything), "cost": fsum(everything)}
+    return table_of([*rows, {**nothing, **total}], BILL_COLUMNS).astype({"in_stock": "Int64"})
+
+
+def _lines(plan: LayoutPlan) -> Sequence[_Line]:
+    """Return a line for every item that there is."""
+    zone, side_m = plan.scenario.build_zone, MODULE_SIDE_M
+    if zone is None:
+        return ()
+    if not zone.items:
+        words = "single module"
+        return [_Line(MODULE, words, zone.stock, side_m, side_m, zone.height_m, zone.module_cost)]
+    return [
+        _Line(
+            item.name,
+            item.description,
+            item.stock,
+            item.length_modules * side_m,
+            item.thickness_modules * side_m,
+            item.height_m,
+            item.cost,
+        )
+        for item in zone.items
+    ]
+
+
+def write_excel(plan: LayoutPlan, path: Path) -> None:
+    """Write a workbook: the bill of quantities, the modules or pieces, and what they are for.
+
+    Raises:
+        BlastEnvError: If the file cannot be written.
+    """
+    zone, columns = plan.scenario.build_zone, element_columns(plan)
+    name = "Pieces" if columns is PIECE_COLUMNS else "Modules"
+    record: dict[str, str | int | float] = {
+        "scenario": plan.scenario.name,
+        "scenario hash": plan.scenario.content_hash,
+        "blast-env version": package_version(),
+        "coordinates": "local site metres, from the lower left corner of the site",
+    }
+    if zone is not None and zone.budget is not None:
+        record["budget"] = zone.budget
+    if plan.charge is not None:
+        record |= {
+            "charge x (m)": plan.charge.position_m[0],
+            "charge y (m)": plan.charge.position_m[1],
+            "charge height (m)": plan.charge.height_m,
+            "charge TNT equivalent (kg)": plan.charge.tnt_kg,
+        }
+    record |= {f"made by: {key}": str(value) for key, value in plan.provenance.items()}
+    tables = (
+        SheetTable("Bill", bill_of_quantities(plan), BILL_COLUMNS),
+        SheetTable(name, element_table(plan), columns),
+    )
+    write_tables(record, tables, path, f"Layout for {plan.scenario.name}")
