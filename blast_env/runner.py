@@ -1,7 +1,7 @@
-"""Many independent pieces of work, several at a time."""
+"""Many independent pieces of work, several at a time: here, or on a cluster (`on_cluster`)."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from typing import Any, Literal, TypeVar
 
 import joblib
@@ -26,23 +26,27 @@ def in_order(
 
     The number of workers changes nothing but the time. When the consumer stops or an item raises,
     what has not begun is left out. Where joblib has been told of another backend
-    (`joblib.parallel_config`), that one does the work.
+    (`joblib.parallel_config`, `on_cluster`), that one does what is for processes, with as many
+    workers as it was told.
 
     Args:
         function: Does one item; for processes, it and the items must pickle.
-        items: The work.
+        items: The work; a single item is done here.
         workers: How many items are under way at the same time; a single one does them here.
         kind: Processes or threads.
 
     Raises:
-        BlastEnvError: If `workers` is not a whole number of at least 1.
+        BlastEnvError: If `workers` is not a whole number of at least 1, or a worker process was
+            killed.
     """
     check_workers("workers", workers)
-    if min(workers, len(items)) <= 1:
-        return map(function, items)
     if kind == "threads":
-        return _in_threads(function, items, workers)
-    return _parallel(function, items, workers, kind, "generator")
+        alone = min(workers, len(items)) <= 1
+        return map(function, items) if alone else _in_threads(function, items, workers)
+    count = _processes(workers, len(items))
+    if count == 1:
+        return map(function, items)
+    return _parallel(function, items, count, "generator")
 
 
 def run_all(
@@ -69,17 +73,17 @@ def as_completed(
     function: Callable[[Item], Result],
     items: Sequence[Item],
     workers: int = 1,
-    kind: Workers = "processes",
 ) -> Iterator[tuple[int, Result]]:
     """Yield (index, result) of each item as soon as it is there, so that it can be kept at once.
 
-    Arguments and errors are those of `in_order`.
+    Processes do it; arguments and errors are those of `in_order`.
     """
     check_workers("workers", workers)
-    if min(workers, len(items)) <= 1:
+    count = _processes(workers, len(items))
+    if count == 1:
         return enumerate(map(function, items))
     numbered = _Numbered(function)
-    return _parallel(numbered, list(enumerate(items)), workers, kind, "generator_unordered")
+    return _parallel(numbered, list(enumerate(items)), count, "generator_unordered")
 
 
 def share_of(
@@ -127,13 +131,23 @@ class _Numbered:
         return index, self._function(item)
 
 
+def _processes(workers: int, items: int) -> int:
+    """Return how many processes do the work; 1 if it is done here."""
+    told = int(joblib.effective_n_jobs(None))  # 1, unless joblib was told something else
+    return max(min(max(workers, told), items), 1)
+
+
 def _parallel(
     function: Callable[[Any], Any],
     items: Sequence[Any],
     workers: int,
-    kind: Workers,
     return_as: Literal["generator", "generator_unordered"],
 ) -> Iterator[Any]:
-    parallel = joblib.Parallel(min(workers, len(items)), prefer=kind, return_as=return_as)
-    results: Iterator[Any] = parallel(joblib.delayed(function)(item) for item in items)
-    return results
+    parallel = joblib.Parallel(workers, prefer="processes", return_as=return_as)
+    try:
+        yield from parallel(joblib.delayed(function)(item) for item in items)
+    except BrokenExecutor as error:
+        raise BlastEnvError(
+            "a worker process has ended, for want of memory or because it was killed; what is "
+            "done is kept where the command has a folder for it, and the same command goes on"
+        ) from error

@@ -16,7 +16,8 @@ import typer
 from blast_agents.rules import random_layout
 
 from blast_env.arrays import FloatArray
-from blast_env.cli.output import print_line, progress_bar
+from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.rendering.figures import save_figure
 from blast_env.runner import run_all
@@ -121,26 +122,28 @@ def main(
     random_layouts: Annotated[int, typer.Option(min=2)] = 50,
     threats: Annotated[int, typer.Option(min=1, help="Charges and seeds a layout.")] = 4,
     processes: int = 2,
+    cluster: ClusterAddress = None,
     engine: str = "event",
     preset: str = SiteRanges.preset,
     calibration: str = SiteRanges.calibration,
     picture: Annotated[Path | None, typer.Option(help="Where to draw the first twelve.")] = None,
 ) -> None:
     """Print tables about generated sites, and draw some."""
-    ranges = SiteRanges(preset=preset, calibration=calibration)
-    seconds = [cpu_time_s(seed, ranges) for seed in range(sites)]
-    generated = [generate_site(seed, ranges) for seed in range(sites)]
-    of_seeds = [list(drawn_sites(seed, ranges)) for seed in range(sites)]
-    print_properties(generated)
-    print_time(seconds, sum(map(len, of_seeds)))
-    if picture is not None:
-        print_line(f"wrote {save_figure(contact_sheet(generated[:12]), picture)}")
-    drawn = [site for of_seed in of_seeds[:blasted] for site in of_seed]
-    measure = partial(measured, random_layouts=random_layouts, threats=threats, engine=engine)
-    with progress_bar("blasts") as progress:
-        results = run_all(measure, drawn, processes, progress=progress)
-    print_measured([each for each in results if each.accepted])
-    print_agreement(results)
+    with user_errors(), running_on(cluster):
+        ranges = SiteRanges(preset=preset, calibration=calibration)
+        seconds = [cpu_time_s(seed, ranges) for seed in range(sites)]
+        generated = [generate_site(seed, ranges) for seed in range(sites)]
+        of_seeds = [list(drawn_sites(seed, ranges)) for seed in range(sites)]
+        print_properties(generated)
+        print_time(seconds, sum(map(len, of_seeds)))
+        if picture is not None:
+            print_line(f"wrote {save_figure(contact_sheet(generated[:12]), picture)}")
+        drawn = [site for of_seed in of_seeds[:blasted] for site in of_seed]
+        measure = partial(measured, random_layouts=random_layouts, threats=threats, engine=engine)
+        with progress_bar("blasts") as progress:
+            results = run_all(measure, drawn, processes, progress=progress)
+        print_measured([each for each in results if each.accepted])
+        print_agreement(results)
 
 
 def cpu_time_s(seed: int, ranges: SiteRanges) -> float:

@@ -8,6 +8,7 @@ import pandas as pd
 import typer
 
 from blast_env.arrays import FloatArray
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder
@@ -35,6 +36,7 @@ def compare(
     event_seeds: Annotated[int, typer.Option(help="Blasts on the event engine.")] = 1000,
     scene: Annotated[str | None, typer.Option(help="Only this scene.")] = None,
     processes: int = 2,
+    cluster: ClusterAddress = None,
     out: Annotated[Path, typer.Option(help="Folder of the finished blasts.")] = COMPARED,
     figure: Annotated[Path, typer.Option()] = COMPARED / "engine_convergence.png",
 ) -> None:
@@ -44,7 +46,7 @@ def compare(
         with progress_bar(blasts.label) as progress:
             return loads.collisions_of(blasts, processes, out, progress)
 
-    with user_errors():
+    with user_errors(), running_on(cluster):
         make_folder(out)
         make_folder(figure.parent)
         scenes = [each for each in loads.engine_scenes() if scene in (None, each.name)]
@@ -65,6 +67,7 @@ def compare_modules(
     seeds: Annotated[int, typer.Option(min=20, help="Blasts on pymunk.")] = 60,
     event_seeds: Annotated[int, typer.Option(help="Blasts on the event engine.")] = 400,
     processes: int = 2,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Hold single modules against those of the event engine, at two steps of pymunk."""
 
@@ -73,7 +76,7 @@ def compare_modules(
             return modules.module_impulses(scenario, engine, count, processes, progress)
 
     rows = []
-    with user_errors():
+    with user_errors(), running_on(cluster):
         for scene in benchmark_scenes():
             event = impulses(scene.scenario, "event", event_seeds)
             for step_radii, scenario in modules.stepped(scene):
@@ -90,25 +93,28 @@ def compare_modules(
 
 
 @app.command()
-def steps(processes: int = 2) -> None:
+def steps(processes: int = 2, cluster: ClusterAddress = None) -> None:
     """Print how the load on a building depends on pymunk's step: m |v| (transferred impulse)."""
-    free_field = load_scenario("free_field")
-    scenarios = {
-        "courtyard": load_scenario("courtyard").with_simulation("ballistic"),
-        "free_field, 15 m": free_field.at_stand_off(15.0),
-        "free_field, 60 m": free_field.at_stand_off(60.0),
-    }
-    rows = []
-    for name, scenario in scenarios.items():
-        row = [name]
-        for step_radii in STEPS_RADII:
-            stepped = scenario.with_simulation(overrides={"stepping": {"step_radii": step_radii}})
-            with progress_bar(f"{name}, {step_radii:g} radii") as progress:
-                found = run_all(partial(_load, stepped), range(STEP_SEEDS), processes, progress)
-            impulse, transferred = (sum(each) / STEP_SEEDS for each in zip(*found, strict=True))
-            row.append(f"{impulse:,.0f} ({transferred:,.0f})")
-        rows.append(row)
-    print_line(markdown_table(("scenario", *(f"{step:g} radii" for step in STEPS_RADII)), rows))
+    with user_errors(), running_on(cluster):
+        free_field = load_scenario("free_field")
+        scenarios = {
+            "courtyard": load_scenario("courtyard").with_simulation("ballistic"),
+            "free_field, 15 m": free_field.at_stand_off(15.0),
+            "free_field, 60 m": free_field.at_stand_off(60.0),
+        }
+        rows = []
+        for name, scenario in scenarios.items():
+            row = [name]
+            for step_radii in STEPS_RADII:
+                stepped = scenario.with_simulation(
+                    overrides={"stepping": {"step_radii": step_radii}}
+                )
+                with progress_bar(f"{name}, {step_radii:g} radii") as progress:
+                    found = run_all(partial(_load, stepped), range(STEP_SEEDS), processes, progress)
+                impulse, transferred = (sum(each) / STEP_SEEDS for each in zip(*found, strict=True))
+                row.append(f"{impulse:,.0f} ({transferred:,.0f})")
+            rows.append(row)
+        print_line(markdown_table(("scenario", *(f"{step:g} radii" for step in STEPS_RADII)), rows))
 
 
 def _load(scenario: Scenario, seed: int) -> tuple[float, float]:

@@ -12,6 +12,7 @@ import typer
 from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
 
 from blast_env.arrays import FloatArray
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
@@ -227,9 +228,10 @@ def endings(
     random_layouts: Annotated[int, typer.Option(min=0)] = 2,
     cell: Cell = 0.5,
     processes: Processes = 1,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Print what the end of a run cuts off: the impulse then and later, with several layouts."""
-    with user_errors():
+    with user_errors(), running_on(cluster):
         loaded, engine = load_scenario(scenario), GasEngine(cell_m=cell)
         layouts = _rule_layouts(loaded) | _random_layouts(loaded, random_layouts)
         jobs = {
@@ -271,9 +273,10 @@ def cells(
         float | None, typer.Option(help="When loads are looked at, s; at the end of the runs.")
     ] = None,
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Print whether smaller cells change loads, reductions and the order of layouts."""
-    with user_errors():
+    with user_errors(), running_on(cluster):
         site = _cells_site(scenario, endless)
         for seed in range(charges):
             charge = draw_charge(site, seed)
@@ -386,12 +389,13 @@ def judge(
     charges: int = 3,
     seeds: int = 4,
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Judge the particle model by gas dynamics: order, overstatement, regret.
 
     Random layouts and the two walls by rule, each under charges that the scenario draws.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         chosen = load_scenario(scenario)
         rng = np.random.default_rng(0)
         drawn = [draw_charge(chosen, seed) for seed in range(charges)]

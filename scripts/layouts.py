@@ -10,6 +10,7 @@ import typer
 from blast_agents.rules import random_layout
 
 from blast_env.arrays import FloatArray
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.evaluator import BlastEvaluator
@@ -32,6 +33,7 @@ def noise(
     charges: Annotated[int, typer.Option(min=2, help="Charges drawn from the scenario.")] = 16,
     seeds: Annotated[int, typer.Option(min=2, help="Seeds of fan and air a charge.")] = 4,
     processes: int = 2,
+    cluster: ClusterAddress = None,
     engine: str = "event",
 ) -> None:
     """Print how much of what an episode of `BlastBarrier-v0` pays is the layout, and how much luck.
@@ -40,21 +42,22 @@ def noise(
     charges (the noise), and their ratio by how many blasts are averaged (in brackets for
     comparisons). The defaults of `realisations` and `threats` rest on it.
     """
-    rows = []
-    for name in SCENARIOS:
-        scenario = load_scenario(name)
-        for kind, draw in LAYOUTS.items():
-            rng = np.random.default_rng(0)
-            drawn = [draw(scenario, rng) for _ in range(layouts)]
-            evaluator = BlastEvaluator(scenario, engine)
-            impulses = _impulses(evaluator, [(), *drawn], (charges, seeds), processes)
-            unprotected, impulses = impulses[0], impulses[1:]
-            visible = [Noise.of(impulses[:, c], unprotected[c]) for c in range(charges)]
-            hidden = Noise.of(impulses.reshape(layouts, -1), unprotected.ravel())
-            rows.append((f"{name}, {kind}, seeds", *Noise.mean_of(visible).cells()))
-            rows.append((f"{name}, {kind}, charges and seeds", *hidden.cells()))
-    columns = ("scenario, layouts, draws", "signal", "noise", "of reduction", "in comparisons")
-    print_line(markdown_table((*columns, *(f"{n} averaged" for n in AVERAGED)), rows))
+    with user_errors(), running_on(cluster):
+        rows = []
+        for name in SCENARIOS:
+            scenario = load_scenario(name)
+            for kind, draw in LAYOUTS.items():
+                rng = np.random.default_rng(0)
+                drawn = [draw(scenario, rng) for _ in range(layouts)]
+                evaluator = BlastEvaluator(scenario, engine)
+                impulses = _impulses(evaluator, [(), *drawn], (charges, seeds), processes)
+                unprotected, impulses = impulses[0], impulses[1:]
+                visible = [Noise.of(impulses[:, c], unprotected[c]) for c in range(charges)]
+                hidden = Noise.of(impulses.reshape(layouts, -1), unprotected.ravel())
+                rows.append((f"{name}, {kind}, seeds", *Noise.mean_of(visible).cells()))
+                rows.append((f"{name}, {kind}, charges and seeds", *hidden.cells()))
+        columns = ("scenario, layouts, draws", "signal", "noise", "of reduction", "in comparisons")
+        print_line(markdown_table((*columns, *(f"{n} averaged" for n in AVERAGED)), rows))
 
 
 def _impulses(
@@ -79,6 +82,7 @@ def engines(
     layouts: Annotated[int, typer.Option(min=10)] = 200,
     charges: Annotated[int, typer.Option(min=1, help="Charges drawn from the scenario.")] = 8,
     processes: int = 2,
+    cluster: ClusterAddress = None,
     out: Annotated[Path, typer.Option(help="File for the mean loads.")] = Path(
         "out/rank_layouts.csv"
     ),
@@ -88,7 +92,7 @@ def engines(
     Each layout gets the same charges on both. Two lots of seeds of fan and air on each engine say
     how well an engine agrees with itself, which bounds how well it can agree with the other one.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         make_folder(out.parent)
         scenario = load_scenario("courtyard").with_simulation("ballistic")
         rng = np.random.default_rng(0)
@@ -114,6 +118,7 @@ def resolutions(
     seeds: Annotated[int, typer.Option(min=2)] = 4,
     first_seed: int = 2000,
     processes: Annotated[int, typer.Option(min=1)] = 2,
+    cluster: ClusterAddress = None,
     out: Path = Path("out/resolution_convergence"),
 ) -> None:
     """Print whether finer balls would rank layouts differently, on the same seeds.
@@ -121,7 +126,7 @@ def resolutions(
     With `collisional`, `collisional_fine` and still finer balls: what each layout leaves of the
     impulse, the rank correlations, the mean differences, and the time of a blast.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         make_folder(out)
         loaded = load_scenario(scenario)
         rng = np.random.default_rng(0)

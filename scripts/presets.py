@@ -20,6 +20,7 @@ from pymoo.optimize import minimize
 from scipy.stats import qmc
 
 from blast_env.calibration import fit_metrics, fit_power_law, paper_table, shape_rms_percent
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
@@ -135,6 +136,7 @@ def ballistic(
     finalists: Annotated[int, typer.Option(help="How many are measured again.")] = 6,
     finalist_seeds: Annotated[int, typer.Option(help="Blasts per distance then.")] = 16,
     processes: int = 2,
+    cluster: ClusterAddress = None,
     out: Path = Path("out/search_ballistic.json"),
 ) -> None:
     """Search `ballistic`, print every candidate, and write the finalists to a file.
@@ -145,7 +147,7 @@ def ballistic(
     """
     start, rng = perf_counter(), np.random.default_rng(0)
     tried: list[tuple[np.ndarray, Candidate, Score]] = []
-    with user_errors():
+    with user_errors(), running_on(cluster):
         make_folder(out.parent)
         points = list(qmc.Sobol(4, seed=1).random(candidates))
         for number in range(candidates + refinements):
@@ -187,6 +189,7 @@ def collisional(
     generations: Annotated[int, typer.Option(min=1)] = 9,
     seeds: Annotated[int, typer.Option(min=2)] = 3,
     processes: Annotated[int, typer.Option(min=1)] = 2,
+    cluster: ClusterAddress = None,
     out: Path = SEARCH,
 ) -> None:
     """Search `collisional` with NSGA-II; write all candidates and the front.
@@ -194,7 +197,7 @@ def collisional(
     Searches packing fraction, ball radius, elasticity, masses, number of balls, shrinking, C_e,
     thermal share and facade width. An interrupted search goes on where it was.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         make_folder(out)
         store = dense_air.Store(out / "candidates.jsonl", tuple(range(seeds)), processes)
         with progress_bar(f"{generations} generations of {population}") as progress:

@@ -14,6 +14,7 @@ from typing import Annotated, Final
 import typer
 
 from blast_env import load_scenario
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import evaluate_against
@@ -50,12 +51,13 @@ def main(
     realisations: Annotated[int, typer.Option(min=1, help="Held-out blasts of each.")] = 5,
     engine: str = "event",
     processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 2,
+    cluster: ClusterAddress = None,
     page: Annotated[Path, typer.Option(help="The page with the markers.")] = PAGE,
     pictures: Annotated[Path, typer.Option(help="Folder for the pictures.")] = PICTURES,
 ) -> None:
     """Run the study and bring page and pictures up to date."""
     effort = Effort(layouts=layouts, seeds=seeds, charges=charges, realisations=realisations)
-    with user_errors():
+    with user_errors(), running_on(cluster):
         scenarios = [load_scenario(name) for name in names or studied_scenarios()]
         for scenario in scenarios:  # before the blasts, so that no result is lost
             with_section(read_page(page), scenario.name, "")

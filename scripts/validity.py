@@ -11,6 +11,7 @@ import pandas as pd
 import typer
 
 from blast_env.calibration import fit_metrics, fit_power_law
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder
@@ -50,11 +51,12 @@ def scaling(
     seeds: Seeds = 16,
     first_seed: int = 1000,
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
     out: Path = Path("out/hopkinson_cranz"),
     figure: Path = Path("docs/pictures/hopkinson_cranz.png"),
 ) -> None:
     """Print, write and draw whether charges obey Hopkinson-Cranz scaling."""
-    with user_errors():
+    with user_errors(), running_on(cluster):
         make_folder(out)
         numbers = range(first_seed, first_seed + seeds)
         with progress_bar("blasts") as progress:
@@ -76,13 +78,19 @@ def scaling(
 
 
 @app.command()
-def facade_width(distance_m: float = 40.0, seeds: Seeds = 16, processes: Processes = 2) -> None:
+def facade_width(
+    distance_m: float = 40.0,
+    seeds: Seeds = 16,
+    processes: Processes = 2,
+    cluster: ClusterAddress = None,
+) -> None:
     """Print the scaled impulse on the reference facade, on twice and on four times it."""
-    for side_modules in FACADES_MODULES:
-        scenario = free_field(side_modules=side_modules).at_stand_off(distance_m)
-        scaled = run_all(partial(_psi_s, scenario), range(seeds), processes)
-        width_m, error = side_modules * MODULE_SIDE_M, stdev(scaled) / seeds**0.5
-        print_line(f"{width_m:3g} m: {fmean(scaled):.4f} +- {error:.4f} psi s")
+    with user_errors(), running_on(cluster):
+        for side_modules in FACADES_MODULES:
+            scenario = free_field(side_modules=side_modules).at_stand_off(distance_m)
+            scaled = run_all(partial(_psi_s, scenario), range(seeds), processes)
+            width_m, error = side_modules * MODULE_SIDE_M, stdev(scaled) / seeds**0.5
+            print_line(f"{width_m:3g} m: {fmean(scaled):.4f} +- {error:.4f} psi s")
 
 
 def _psi_s(scenario: Scenario, seed: int) -> float:
@@ -95,6 +103,7 @@ def pressure(
     seeds: int = 16,
     first_seed: int = 2000,
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
     out: Path = Path("out/pressure_history.png"),
 ) -> None:
     """Print and draw how far the pressure on a facade is from Kingery and Bulmash's.
@@ -102,7 +111,7 @@ def pressure(
     The impulse is calibrated, so the pressures are scaled to it; arrival, peak and duration are
     then what the model says by itself.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         make_folder(out.parent)
         wanted = range(first_seed, first_seed + seeds)
         cases = [pressure_case(float(d), wanted, processes) for d in distances.split(",")]
@@ -143,10 +152,11 @@ def mach_stem(
     times: Annotated[int, typer.Option(min=4)] = 17,
     seeds: Seeds = 40,
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
     out: Path = Path("out/mach_stem.png"),
 ) -> None:
     """Print and draw whether reflection at a long wall turns into a Mach stem, and where."""
-    with user_errors():
+    with user_errors(), running_on(cluster):
         parameters = stem.dense_elastic_air() if preset is None else find_preset(preset)
         if parameters.air.spacing_units == 0.0:
             raise BlastEnvError(f"preset {preset!r} has no air: there is no density to look at")
@@ -188,6 +198,7 @@ def thermal_share(
     seeds: Seeds = 16,
     first_seed: int = 1000,
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
     out: Path = Path("out/thermal_share.csv"),
 ) -> None:
     """Print and write what the random part of the charge's initial velocity does.
@@ -195,7 +206,7 @@ def thermal_share(
     The preset with several thermal shares, and finer balls beside it: reflected impulse over
     distance, side-on load over path length, their ratio; last Kingery and Bulmash's.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         make_folder(out.parent)
         base = find_preset(preset)
         shares = [{"explosive": {"thermal_share": share}} for share in THERMAL_SHARES]

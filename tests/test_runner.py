@@ -1,10 +1,13 @@
 """Many blasts in threads: the same results as one by one, in order, and errors that say which."""
 
+import joblib
 import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
+from blast_env.runner import run_all
 from blast_env.simulation import Blast, simulate_many
+from tests.pieces_of_work import kill, square, workers_within
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 
 WALL = tuple((row, 0) for row in range(2, 12))
@@ -80,3 +83,18 @@ def test_threads_out_of_bounds(threads: int) -> None:
     message = f"threads is {threads!r}, must be a whole number of at least 1"
     with pytest.raises(BlastEnvError, match=message):
         simulate_many(blasts(1), threads)
+
+
+def test_a_worker_process_that_is_killed_is_an_error() -> None:
+    """As the system does when the memory is full; no traceback of a pool."""
+    with pytest.raises(BlastEnvError, match="a worker process has ended"):
+        run_all(kill, range(2), workers=2)
+    assert run_all(square, range(4), workers=2) == [0, 1, 4, 9]
+
+
+def test_joblib_may_be_told_how_many_work() -> None:
+    """By whoever calls, for all that runs within; without it one item comes after the other."""
+    with joblib.parallel_config("threading", n_jobs=2):
+        assert run_all(square, range(4)) == [0, 1, 4, 9]
+        assert run_all(workers_within, range(1)) == [2]
+    assert run_all(workers_within, range(2)) == [1, 1]

@@ -17,6 +17,7 @@ from blast_env.calibration.model import (
     save_calibration,
 )
 from blast_env.calibration.references import paper_table
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import (
     make_table,
     print_line,
@@ -456,6 +457,7 @@ def calibrate(
         typer.Option(help="LOW,HIGH: masses, kg, for which the law shall hold by scaling."),
     ] = None,
     processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
+    cluster: ClusterAddress = None,
     out: Annotated[Path, typer.Option(help="Folder for all files.")] = Path("out/calibration"),
     shielding: Annotated[
         bool,
@@ -486,10 +488,11 @@ def calibrate(
     interruption, the same command goes on from there.
 
     With --shielding: study how much of the impulse gets round the corners of a block. That takes
-    --preset, --engine, --seeds, --first-seed, --processes and --out of the options above.
+    --preset, --engine, --seeds, --first-seed, --processes, --cluster and --out of the options
+    above.
     """
     numbers = tuple(range(first_seed, first_seed + seeds))
-    with user_errors():
+    with user_errors(), running_on(cluster):
         if shielding:
             _refuse(context, _FREE_FIELD_OPTIONS, "does not go with --shielding")
             used, engine = preset or DEFAULT_PRESET, engine or "event"

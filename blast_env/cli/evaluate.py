@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.evaluation_report import EvaluateOptions, report_layout
 from blast_env.cli.output import (
     user_errors,
@@ -98,6 +99,7 @@ def evaluate(
     seeds: SeedCount = 32,
     first_seed: FirstSeed = None,
     processes: Processes = 1,
+    cluster: ClusterAddress = None,
     engine: EngineName = None,
     cell: CellSide = None,
     cvar_level: CvarLevel = CVAR_LEVEL,
@@ -114,7 +116,7 @@ def evaluate(
     options = EvaluateOptions(
         seeds, first_seed, processes, engine, cell, cvar_level, cache, export, out, as_json
     )
-    with user_errors():
+    with user_errors(), running_on(cluster):
         check_cvar_level(cvar_level)
         if run is not None:
             _refuse_beside_run(layout, scenario)

@@ -15,6 +15,7 @@ from blast_agents.league import (
     standard_entries,
 )
 
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import (
     make_table,
     print_line,
@@ -63,12 +64,13 @@ def league(
     seed: Annotated[int, typer.Option(help="Decides cases, threats and searches.")] = 0,
     engine: Annotated[str, typer.Option(help="Engine that runs the blasts.")] = "event",
     processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Compare searches, rules and trained agents on the same held-out cases and seeds.
 
     An interrupted league goes on when it is called again with the same folder.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         # Here, because its figures need the extra `render`.
         from blast_agents.league.report import write_league
 

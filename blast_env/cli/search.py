@@ -16,6 +16,7 @@ from blast_agents.search import (
 from blast_agents.search import Progress as SearchProgress
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import (
     make_table,
     message_console,
@@ -223,6 +224,7 @@ def search(
         float | None, typer.Option(help="Side of the cells of gas dynamics, m; 0.5 unless given.")
     ] = None,
     processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
+    cluster: ClusterAddress = None,
     start_from: Annotated[
         list[Path] | None, typer.Option(help="Layout file to begin with; more than one will do.")
     ] = None,
@@ -241,7 +243,7 @@ def search(
     Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats that
     the search has not met; those blasts do not count.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         options = SearchOptions(
             method=method,
             scenario=scenario,
