@@ -86,6 +86,11 @@ def as_completed(
     return _parallel(numbered, list(enumerate(items)), count, "generator_unordered")
 
 
+def workers_told() -> int:
+    """Return with how many workers joblib was told to work (`on_cluster`); 1 if it was not."""
+    return int(joblib.effective_n_jobs(None))
+
+
 def share_of(
     progress: Callable[[float], None] | None, done: int, whole: int, part: int = 1
 ) -> Callable[[float], None] | None:
@@ -133,8 +138,7 @@ class _Numbered:
 
 def _processes(workers: int, items: int) -> int:
     """Return how many processes do the work; 1 if it is done here."""
-    told = int(joblib.effective_n_jobs(None))  # 1, unless joblib was told something else
-    return max(min(max(workers, told), items), 1)
+    return max(min(max(workers, workers_told()), items), 1)
 
 
 def _parallel(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.errors import BlastEnvError, import_extra
 
@@ -58,8 +59,10 @@ def train(
         typer.Option("--set", help="key=value, e.g. ent_coef=0.01; may be given again."),
     ] = None,
     resume: Annotated[
-        Path | None, typer.Option(help="Go on with the run of this folder; no other option.")
+        Path | None,
+        typer.Option(help="Go on with the run of this folder; no other option but --cluster."),
     ] = None,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Train an agent that proposes layouts, or go on with a training that was interrupted."""
     fresh = {
@@ -74,7 +77,7 @@ def train(
         "set": set_ or None,
     }
     given = {name: value for name, value in fresh.items() if value is not None}
-    with user_errors():
+    with user_errors(), running_on(cluster):
         if resume is not None:
             result = _resume(resume, scenario, given)
         elif run is None:

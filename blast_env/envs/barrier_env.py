@@ -37,7 +37,7 @@ from blast_env.envs.strategies import (
     scenario_source,
 )
 from blast_env.evaluation.comparison import CVAR_LEVEL
-from blast_env.evaluation.evaluator import Evaluators
+from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.evaluation.store import BlastCache
 from blast_env.geometry import Element
 from blast_env.physics.engine import Engine
@@ -273,6 +273,21 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         if self.render_mode == "human":
             self._display.show(episode)
         return episode.observe(), total(terms), episode.ended, False, info
+
+    def blasts_due(self, action: np.int64 | int) -> tuple[BlastAsked, ...]:
+        """Return the blasts that `step` asks for if this action ends the episode; else none.
+
+        So whoever steps many environments can run the blasts of all of them together, and leave
+        the loads in the `cache` that they share (`Evaluators.run_ahead`). What an observation asks
+        for, or a reward before the end, is not among them.
+
+        Args:
+            action: As for `step`, which is still to be called.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If `reset` has not been called.
+        """
+        return self._episode.blasts_due(int(action), self.illegal)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions are legal now, (actions,).

@@ -33,7 +33,7 @@ from blast_env.envs.strategies import (
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, SeedRange, Threat
 from blast_env.evaluation.comparison import Assessment, Objective
-from blast_env.evaluation.evaluator import Evaluators
+from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.geometry import Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import is_gas
@@ -99,19 +99,40 @@ class Episode:
         Raises:
             BlastEnvError: If the reward names a term that is taken.
         """
-        before, legal = self.placement, self.placement.legal
-        finishes = action == legal.size
-        is_illegal = not finishes and not legal.flat[action]
-        if is_illegal:
-            self.illegal_actions += 1
-        elif not finishes:
-            self.placement = before.place(before.catalogue.element(action))
-        exhausted = self.illegal_actions >= illegal.limit
-        self.ended = finishes or exhausted or self.placement.is_full
+        before = self.placement
+        self.placement, is_illegal, self.ended = self._after(action, illegal)
+        self.illegal_actions += is_illegal
         transition = Transition(
             self.initial, before.layout, self.placement.layout, self.ended, self.objective
         )
         return _with_illegal_term(reward(transition), -illegal.cost if is_illegal else 0.0)
+
+    def blasts_due(self, action: int, illegal: IllegalActions) -> tuple[BlastAsked, ...]:
+        """Return the blasts that `final_information` asks for if the action ends the episode.
+
+        Args:
+            action: As for `act`, which is still to be called.
+            illegal: Likewise.
+        """
+        placement, _, ended = self._after(action, illegal)
+        case = self.objective.case
+        layouts = (placement.layout, ()) if ended else ()
+        return tuple(
+            BlastAsked(case.scenario, layout, threat)
+            for layout in layouts
+            for threat in case.threats
+        )
+
+    def _after(self, action: int, illegal: IllegalActions) -> tuple[Placement, bool, bool]:
+        """Return the placement after an action, whether that is illegal, and whether it ends."""
+        before, legal = self.placement, self.placement.legal
+        finishes = action == legal.size
+        is_illegal = not finishes and not legal.flat[action]
+        placement = before
+        if not finishes and not is_illegal:
+            placement = before.place(before.catalogue.element(action))
+        exhausted = self.illegal_actions + is_illegal >= illegal.limit
+        return placement, is_illegal, finishes or exhausted or placement.is_full
 
     def assess(self) -> tuple[Assessment, Assessment]:
         """Return what the layout is worth, and what no barrier is."""

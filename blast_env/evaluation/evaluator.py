@@ -3,9 +3,8 @@
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from blast_env.calibration.model import Calibration, scenario_calibration
 from blast_env.evaluation.cases import Threat
@@ -18,7 +17,7 @@ from blast_env.evaluation.store import (
     engine_text,
     find_cache,
 )
-from blast_env.geometry import Element
+from blast_env.geometry import Element, Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.scene import Charge
@@ -135,15 +134,10 @@ class BlastEvaluator:
         keys = [self._key(layout, threat) for layout, threat in pairs]
         asked = dict.fromkeys(keys)
         found = {key: loads for key in asked if (loads := self._known(key)) is not None}
-        missing = [key for key in asked if key not in found]
-        run = partial(_run_one, calibration=self.calibration)
-        blasts = [_Work(self.scenario, self.engine, key) for key in missing]
-        for done, (index, loads) in enumerate(as_completed(run, blasts, processes), start=1):
-            found[missing[index]] = loads
-            self._remember(missing[index], loads)
-            if self._cache is not None:
-                self._cache.add(missing[index], loads)
-            self.blasts += 1
+        missing = [self._work(key) for key in asked if key not in found]
+        for done, (index, loads) in enumerate(as_completed(_run_one, missing, processes), start=1):
+            found[missing[index].key] = loads
+            self._keep(missing[index].key, loads)
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(keys))
         self.cache_hits += len(keys) - len(missing)
@@ -155,6 +149,9 @@ class BlastEvaluator:
         seed = 0 if is_gas(self.engine) else threat.seed
         return self._key_of_nothing._replace(layout=cells, charge=threat.charge, seed=seed)
 
+    def _work(self, key: BlastKey) -> "_Work":
+        return _Work(self.scenario, self.engine, self.calibration, key)
+
     def _known(self, key: BlastKey) -> BlastLoads | None:
         """Return loads that are remembered here or there."""
         loads = self._remembered.get(key)
@@ -163,6 +160,13 @@ class BlastEvaluator:
             if loads is not None:
                 self._remember(key, loads)
         return loads
+
+    def _keep(self, key: BlastKey, loads: BlastLoads) -> None:
+        """Count and remember a blast that was run."""
+        self.blasts += 1
+        self._remember(key, loads)
+        if self._cache is not None:
+            self._cache.add(key, loads)
 
     def _remember(self, key: BlastKey, loads: BlastLoads) -> None:
         loads.module_impulse_sim.flags.writeable = False  # it is given out more than once
@@ -175,18 +179,34 @@ class _Work:
 
     scenario: Scenario
     engine: Engine
+    calibration: Calibration | None
     key: BlastKey
 
 
-def _run_one(work: _Work, calibration: Calibration | None) -> BlastLoads:
+def _run_one(work: _Work) -> BlastLoads:
     scenario, engine, key = work.scenario, work.engine, work.key
     if is_gas(engine):
         from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
 
         return gas_loads(GasBlast(scenario, key.layout, key.seed, engine, key.charge).run())
-    if calibration is None:
+    if work.calibration is None:
         raise AssertionError("an evaluator of particles has a calibration")
-    return blast_loads(Blast(scenario, key.layout, key.seed, engine, key.charge).run(), calibration)
+    result = Blast(scenario, key.layout, key.seed, engine, key.charge).run()
+    return blast_loads(result, work.calibration)
+
+
+class BlastAsked(NamedTuple):
+    """A blast that somebody will ask for.
+
+    Attributes:
+        scenario: The scenario.
+        layout: What stands on the site.
+        threat: The charge and the seed.
+    """
+
+    scenario: Scenario
+    layout: Layout
+    threat: Threat
 
 
 _MOST_EVALUATORS: Final = 4
@@ -240,6 +260,33 @@ class Evaluators:
         """Share of the loads asked for so far that needed no blast; 0 if none were."""
         asked = self.blasts + self.cache_hits
         return self.cache_hits / asked if asked else 0.0
+
+    def run_ahead(self, asked: Sequence[BlastAsked], processes: int = 1) -> list[bool]:
+        """Run blasts of any scenarios together, for others that have the same cache.
+
+        Args:
+            asked: Blasts that will be asked for; those that are known already are not run.
+            processes: Worker processes; they change nothing but the time.
+
+        Returns:
+            For which of them a blast was run; of equal ones, for the first.
+
+        Raises:
+            BlastEnvError: As `BlastEvaluator.loads_of_many`.
+        """
+        missing: dict[BlastKey, tuple[int, BlastEvaluator]] = {}
+        for number, (scenario, layout, threat) in enumerate(asked):
+            evaluator = self.of(scenario)
+            key = evaluator._key(layout, threat)
+            if key not in missing and evaluator._known(key) is None:
+                missing[key] = (number, evaluator)
+        blasts = [evaluator._work(key) for key, (_, evaluator) in missing.items()]
+        was_run = [False] * len(asked)
+        for index, loads in as_completed(_run_one, blasts, processes):
+            number, evaluator = missing[blasts[index].key]
+            evaluator._keep(blasts[index].key, loads)
+            was_run[number] = True
+        return was_run
 
     def of(self, scenario: AnyScenario) -> BlastEvaluator:
         """Return the evaluator of a scenario.

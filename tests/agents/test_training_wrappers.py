@@ -1,6 +1,7 @@
 """What training changes about the environment: the reward, and which episodes there are."""
 
 import gymnasium as gym
+import joblib
 import numpy as np
 import pytest
 from blast_agents.training import TrainingSettings, load_hyperparameters
@@ -8,11 +9,15 @@ from blast_agents.training.environments import (
     SITES_ID,
     EnvironmentMaker,
     RelativeReward,
+    SharedBlastsVecEnv,
     ThreatPool,
+    make_environments,
 )
 from blast_agents.training.run_folder import RunConfiguration
+from stable_baselines3.common.vec_env import DummyVecEnv
 
 import blast_env  # noqa: F401
+from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.sites import SiteSource
 from tests.agents.training_runs import small_scenario
@@ -92,3 +97,38 @@ def test_bounds_are_named() -> None:
         ThreatPool(environment(), size=0)
     with pytest.raises(BlastEnvError, match="illegal_action_cost is -1"):
         RelativeReward(environment(), illegal_action_cost=-1)
+
+
+def test_environments_whose_blasts_run_together_are_those_that_run_their_own() -> None:
+    """Over several episodes: observations, rewards, who ran how many blasts, to the last bit."""
+    pool = [{"blast_agents.training.environments.ThreatPool": {"size": 2}}]
+    hyperparameters = load_hyperparameters("maskable_ppo", "default", {"n_envs": 3})
+    configuration = RunConfiguration(
+        settings=TrainingSettings(algorithm="maskable_ppo", scenario="small", steps=1),
+        hyperparameters=hyperparameters.model_copy(update={"env_wrapper": pool}),
+        scenario_hash="0" * 64,
+    )
+    source = scenario_source(small_scenario())
+    alone = DummyVecEnv([EnvironmentMaker(configuration, source, index) for index in range(3)])
+    with joblib.parallel_config("threading", n_jobs=2):
+        together = make_environments(configuration, source)
+        assert isinstance(together, SharedBlastsVecEnv)
+        for env in (alone, together):
+            env.seed(7)
+        np.testing.assert_array_equal(alone.reset(), together.reset())
+        rng, ended = np.random.default_rng(0), 0
+        for _ in range(14):
+            masks = together.env_method("action_masks")
+            actions = np.array([rng.choice(np.flatnonzero(mask)) for mask in masks])
+            actions[0] = 0  # illegal after the first step
+            for one, other in zip(alone.step(actions), together.step(actions), strict=True):
+                np.testing.assert_equal(_without_clock(one), _without_clock(other))
+            ended += int(alone.buf_dones.sum())
+    assert ended >= 6
+
+
+def _without_clock(part: object) -> object:
+    """Return one part of what a step gives; of an episode's monitor, without the seconds."""
+    if not isinstance(part, list | tuple):
+        return part
+    return [{key: value for key, value in info.items() if key != "episode"} for info in part]

@@ -1,5 +1,6 @@
 """The environments of a training, with their wrappers."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
 from typing import Any, Final, SupportsFloat
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from blast_agents.training.hyperparameters import DEFAULT_SECTION
 from blast_agents.training.run_folder import RunConfiguration, TrainingSettings
@@ -17,7 +19,9 @@ from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
 from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.strategies import ScenarioSource, scenario_source
-from blast_env.evaluation.store import LoadsCache
+from blast_env.evaluation import Evaluators
+from blast_env.evaluation.store import BlastCache, LoadsCache
+from blast_env.runner import workers_told
 from blast_env.scenario import bundled_scenarios
 from blast_env.sites import SITES
 
@@ -130,6 +134,46 @@ def training_source(scenario: str) -> ScenarioSource:
     return scenario_source(scenario)
 
 
+class SharedBlastsVecEnv(DummyVecEnv):
+    """Environments in this process whose blasts run elsewhere, those of a step all together.
+
+    For blasts that take far longer than all else in a step, and more workers than one machine has:
+    the runner gives them to the workers that joblib was told of (`on_cluster`). As many blasts run
+    at a time as episodes end in a step, so there should be several environments a worker; they
+    begin together, and those that use up the stock end together.
+
+    Observations, rewards and masks are those of any other vector of the same environments.
+
+    Args:
+        makers: Make the environments, `BlastBarrier` ones that share `cache`.
+        engine: The engine of all of them.
+        cache: Where they find the loads.
+    """
+
+    def __init__(
+        self, makers: Sequence[Callable[[], gym.Env[Any, Any]]], engine: str, cache: BlastCache
+    ) -> None:
+        super().__init__([*makers])
+        self._evaluators = Evaluators(engine, cache)
+        self._blasts = np.zeros(len(makers), dtype=np.int64)
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Run the blasts that the actions lead to, then act."""
+        due = [env.get_wrapper_attr("blasts_due") for env in self.envs]
+        blasts_due = [of(action) for of, action in zip(due, self.actions, strict=True)]
+        owners = [index for index, blasts in enumerate(blasts_due) for _ in blasts]
+        was_run = self._evaluators.run_ahead([blast for blasts in blasts_due for blast in blasts])
+        np.add.at(self._blasts, owners, was_run)
+        observations, rewards, ended, infos = super().step_wait()
+        for blasts, info in zip(self._blasts.tolist(), infos, strict=True):
+            if "blasts" in info:  # who asked for a blast counts it, wherever it ran
+                info["blasts"] += blasts
+                info["cache_hits"] -= blasts
+                asked = info["blasts"] + info["cache_hits"]
+                info["cache_hit_rate"] = info["cache_hits"] / asked
+        return observations, rewards, ended, infos
+
+
 @dataclass(frozen=True)
 class EnvironmentMaker:
     """Makes one of the parallel environments; can be sent to another process.
@@ -138,11 +182,13 @@ class EnvironmentMaker:
         configuration: Of the run.
         source: Gives the episodes their scenario.
         index: Which one it is.
+        cache: Where it looks for loads; a memory of its own unless given.
     """
 
     configuration: RunConfiguration
     source: ScenarioSource
     index: int
+    cache: BlastCache | None = None
 
     def __call__(self) -> gym.Env[Any, Any]:
         """Return the environment with its wrappers."""
@@ -154,7 +200,7 @@ class EnvironmentMaker:
             realisations=1,
             engine=settings.engine,
             observation=settings.observation,
-            cache=LoadsCache(_LOADS),
+            cache=LoadsCache(_LOADS) if self.cache is None else self.cache,
             **_threat_arguments(settings),
         )
         for name, arguments in self.configuration.hyperparameters.wrappers():
@@ -171,8 +217,15 @@ class EnvironmentMaker:
 
 
 def make_environments(configuration: RunConfiguration, source: ScenarioSource) -> VecEnv:
-    """Return the parallel environments, each in a process of its own unless there is but one."""
+    """Return the parallel environments, each in a process of its own unless there is but one.
+
+    Within `on_cluster`, in this process, and their blasts on the cluster.
+    """
     count = configuration.hyperparameters.n_envs
+    if workers_told() > 1:
+        shared = LoadsCache(_LOADS * count)
+        actors = [EnvironmentMaker(configuration, source, index, shared) for index in range(count)]
+        return SharedBlastsVecEnv(actors, configuration.settings.engine, shared)
     makers = [EnvironmentMaker(configuration, source, index) for index in range(count)]
     if count == 1:
         return DummyVecEnv([*makers])
