@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 export SDL_VIDEODRIVER ?= dummy
 export PYGAME_HIDE_SUPPORT_PROMPT := 1
 
-.PHONY: demo test quick lint types compiled check setup clean
+.PHONY: demo test test-browser quick lint types compiled check setup clean
 
 demo: $(STAMP)
 	$(BIN)/python scripts/demo.py
@@ -22,6 +22,10 @@ QUICK := envs evaluation export physics recording scenario test_golden.py test_s
 quick: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/pytest --numprocesses auto --dist worksteal -m "not slow" $(QUICK:%=tests/%)
+
+# The page in a real browser, headless; needs chromium and chromium-driver. Screenshots: out/app/.
+test-browser: $(STAMP)
+	$(BIN)/pytest tests/app/browser
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

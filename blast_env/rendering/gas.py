@@ -4,7 +4,7 @@ Two results can be drawn beside each other, say without and with a barrier; both
 scale.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import dist
 from typing import Any, Final, Literal
@@ -179,6 +179,7 @@ def facades(
     structure: str | None = None,
     quantity: Quantity = "impulse",
     beside: GasResult | None = None,
+    full: float | None = None,
 ) -> Figure:
     """Return the walls of a structure unfolded, with the load on every cell's face.
 
@@ -191,6 +192,8 @@ def facades(
         quantity: `"impulse"`, of all positive phases in Pa s, or `"peak"`, overpressure in kPa.
         beside: Another result with the same site and charge, drawn above on the same scale:
             without the barrier, or with another layout.
+        full: End of the scale, for walls that are to be compared; see `full_load`. Without it the
+            largest load that is drawn, rounded up.
 
     Raises:
         BlastEnvError: If site or charge of the results differ, or there is no structure.
@@ -201,8 +204,7 @@ def facades(
     walls = [
         {wall: _wall(each, outline, wall, kind) for wall in _LEFT_TO_RIGHT} for each in results
     ]
-    largest = max(float(np.nanmax(v, initial=0.0)) for row in walls for v in row.values())
-    scale = Normalize(0.0, nice_ceiling(largest) if largest > 0.0 else 1.0)
+    scale = Normalize(0.0, _full(walls) if full is None else full)
     lengths = np.array([_length_m(outline, wall) for wall in _LEFT_TO_RIGHT])
     widths = np.maximum(lengths, _LEAST_WALL_SHARE * lengths.sum())
     height_m = outline.height_m or result.run.site.air_height_m
@@ -232,6 +234,22 @@ def facades(
     title, subtitle = gas_heading(results, f"{kind.name} on the walls of {outline.name}")
     write_heading(figure, title, f"{subtitle}; walls seen from outside")
     return figure
+
+
+def full_load(result: GasResult, structure: str, quantity: Quantity) -> float:
+    """Return the end of the scale on which `facades` draws a structure, in Pa s or kPa.
+
+    Raises:
+        UnknownNameError: If there is no such structure or quantity.
+    """
+    kind, outline = kind_of(quantity), _outline(result, structure)
+    return _full([{wall: _wall(result, outline, wall, kind) for wall in _LEFT_TO_RIGHT}])
+
+
+def _full(walls: Sequence[Mapping[WallName, FloatArray]]) -> float:
+    """Return the largest load on walls, rounded up."""
+    largest = max(float(np.nanmax(v, initial=0.0)) for row in walls for v in row.values())
+    return nice_ceiling(largest) if largest > 0.0 else 1.0
 
 
 def _outline(result: GasResult, structure: str | None) -> StructureOutline:

@@ -98,8 +98,22 @@ def _distances_m(grid: GasGrid, opening: Opening) -> FloatArray:
     return np.asarray(np.sqrt(across**2 + along**2 + (grid.centres_m(2)[0] - z_m) ** 2))
 
 
+def map_levels(result: GasResult, quantity: Quantity) -> tuple[float, ...]:
+    """Return the contours that `ground_map` draws, in Pa s or kPa, to draw other maps with them.
+
+    Raises:
+        BlastEnvError: If it was run without the recorders.
+        UnknownNameError: If there is no such quantity.
+    """
+    values = kind_of(quantity).factor * ground_values(result, quantity)
+    return tuple(_contour_levels([_on_site(result, values)[2]]))
+
+
 def ground_map(
-    result: GasResult, quantity: Quantity = "peak", beside: GasResult | None = None
+    result: GasResult,
+    quantity: Quantity = "peak",
+    beside: GasResult | None = None,
+    levels: Sequence[float] | None = None,
 ) -> Figure:
     """Return a map of the load over the ground, with contours and what stands on it.
 
@@ -108,6 +122,8 @@ def ground_map(
         quantity: `"peak"`, overpressure in kPa, or `"impulse"`, of all positive phases in Pa s.
         beside: Another result with the same site and charge, drawn to the left on the same scale:
             without the barrier, or with another layout.
+        levels: Contours, and with them the scale, for maps that are to be compared; see
+            `map_levels`. Without them they are chosen by what is drawn.
 
     Raises:
         BlastEnvError: If a blast was run without the recorders, or site or charge differ.
@@ -115,9 +131,10 @@ def ground_map(
     """
     kind, results = kind_of(quantity), both_results(result, beside)
     values = [kind.factor * ground_values(each, quantity) for each in results]
-    levels = _contour_levels(
-        [_on_site(each, value)[2] for each, value in zip(results, values, strict=True)]
-    )
+    if levels is None:
+        levels = _contour_levels(
+            [_on_site(each, value)[2] for each, value in zip(results, values, strict=True)]
+        )
     scale = LogNorm(levels[0], levels[-1])
     figure = Figure(figsize=_map_size_in(result.run.site, len(results)), layout="constrained")
     plans = figure.subplots(1, len(results), squeeze=False, sharex=True, sharey=True)[0]

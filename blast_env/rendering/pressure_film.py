@@ -9,9 +9,11 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
+from blast_env.physics.gas.engine import Recorders
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import Snapshots
+from blast_env.physics.gas.solver import Recorder
 from blast_env.rendering.film import FilmPlan, for_gif, known_suffix, open_film, plan_until
 from blast_env.rendering.gas import (
     PA_PER_KPA,
@@ -91,7 +93,7 @@ def write_pressure_film(
         plan = plan_until(end_s, frames_per_s, slow_motion)
         if suffix == ".gif":
             plan, width_px = for_gif(plan, width_px)
-        full_kpa = _full_kpa([shot.result for shot in shots]) if full_kpa is None else full_kpa
+        full_kpa = largest_kpa([shot.result for shot in shots]) if full_kpa is None else full_kpa
         painter = PressurePainter(shots, full_kpa, width_px - width_px % 2)
         with open_film(suffix, temporary, plan, blast.scenario.name, _comment(shots, plan)) as film:
             for number in range(plan.frame_count):
@@ -115,8 +117,8 @@ def _comment(shots: Sequence["PressureShot"], plan: FilmPlan) -> str:
     )
 
 
-def _full_kpa(results: Sequence[GasResult]) -> float:
-    """Return the end of the scale: the largest peak on the walls that count, rounded up."""
+def largest_kpa(results: Sequence[GasResult]) -> float:
+    """Return the end of a film's scale: the largest peak on the walls that count, rounded up."""
     peaks = []
     for result in results:
         table = result.structures
@@ -130,6 +132,7 @@ def record_planes(
     height_m: float,
     section: Section,
     progress: Callable[[float], None] = lambda _: None,
+    further: Recorders = lambda _: (),
 ) -> PressureShot:
     """Run a blast and take pictures of two planes all the while.
 
@@ -138,6 +141,7 @@ def record_planes(
         height_m: Height of the plan.
         section: The section.
         progress: Called from time to time with the share of the time limit that has passed.
+        further: Further recorders, as for `GasBlast.run`.
 
     Raises:
         BlastEnvError: If a plane is outside the grid.
@@ -147,12 +151,12 @@ def record_planes(
     scale = cbrt(blast.site.charge.tnt_kg / 100.0)
     times_s = (scale * np.arange(0.0, _LONGEST_S, _EVERY_S)).tolist()
 
-    def recorders(grid: GasGrid) -> Sequence[Snapshots]:
+    def recorders(grid: GasGrid) -> Sequence[Recorder]:
         place = [*site_m.centre]
         place[section.normal] = section.at_m
         cell = grid.cell_at((place[0], place[1], height_m))
         made.extend(Snapshots(grid, axis, cell[axis], times_s) for axis in (2, section.normal))
-        return made
+        return (*made, *further(grid))
 
     result = blast.run(progress, recorders)
     opening = opening_of(result.run.charge, result.run.handover_radius_m)

@@ -20,8 +20,13 @@ from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.gas.probes import GroundMap
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.film import plan_until
-from blast_env.rendering.gas import facades, gauge_history
-from blast_env.rendering.ground_map import ground_map, ground_recorders, ground_values
+from blast_env.rendering.gas import facades, full_load, gauge_history
+from blast_env.rendering.ground_map import (
+    ground_map,
+    ground_recorders,
+    ground_values,
+    map_levels,
+)
 from blast_env.rendering.pressure_film import record_planes, write_pressure_film
 from blast_env.rendering.pressure_frames import (
     PressurePainter,
@@ -126,6 +131,27 @@ def test_maps_show_the_ground_of_the_site_on_one_scale(
     assert figure.axes[0].get_xlabel() == "x (m)"
     assert figure.axes[0].get_ylabel() == "y (m)"
     assert_all_is_on_the_page(figure)
+
+
+@pytest.mark.parametrize("quantity", ["peak", "impulse"])
+def test_maps_of_their_own_can_have_the_scale_of_another(
+    bare: GasResult, walled: GasResult, quantity: Any
+) -> None:
+    levels = map_levels(bare, quantity)
+    for result in (bare, walled):
+        (image,) = images_of(ground_map(result, quantity, levels=levels))
+        assert image.get_clim() == (levels[0], levels[-1])
+
+
+def test_walls_of_their_own_can_have_the_scale_of_another(
+    bare: GasResult, walled: GasResult
+) -> None:
+    full = full_load(bare, "hut", "impulse")
+    for result in (bare, walled):
+        images = images_of(facades(result, "hut", "impulse", full=full))
+        assert {image.get_clim() for image in images} == {(0.0, full)}
+    largest = max(float(np.nanmax(values_of(image))) for image in images_of(facades(bare, "hut")))
+    assert largest <= full <= 1.3 * largest
 
 
 def test_solids_are_no_ground(walled: GasResult) -> None:

@@ -1,0 +1,334 @@
+"""Blasts for the page: a film that begins at once, loads, pictures, all on one colour scale.
+
+The scale of everything on a site is that of the blast without a barrier under the same threat: it
+does not change when a layout is added, and what was drawn before stays comparable.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Final
+
+import numpy as np
+from pydantic import ValidationError
+
+from blast_env.app.records import (
+    FILM,
+    FRAME,
+    RECORD,
+    BlastRecord,
+    Film,
+    Kept,
+    Load,
+    Picture,
+    Wave,
+    blast_key,
+    read_film,
+    read_record,
+    write_kept,
+)
+from blast_env.app.work import BlastTask, ThreatOf, plain_layout, scenario_of
+from blast_env.calibration.model import CalibrationError
+from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
+from blast_env.files import make_folder, write_atomically
+from blast_env.geometry import Layout
+from blast_env.physics.engines import find_engine
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
+from blast_env.provenance import versions
+from blast_env.rendering.figures import save_figure
+from blast_env.rendering.film import largest_load, paint_at, plan_film
+from blast_env.rendering.frames import Frame, FramePainter
+from blast_env.rendering.gas import Quantity, facades, full_load
+from blast_env.rendering.ground_map import ground_map, ground_recorders, map_levels
+from blast_env.rendering.pressure_film import largest_kpa, record_planes
+from blast_env.rendering.pressure_frames import PressurePainter, default_section
+from blast_env.rendering.style import render_extra
+from blast_env.runner import share_of
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.simulation import Blast
+from blast_env.simulation.gas import GasBlast, GasResult
+from blast_env.statistics import mean_estimate
+from blast_env.units import MS_PER_S, PA_PER_KPA
+
+with render_extra():
+    from PIL import Image
+
+SEEDS: Final = range(8)
+"""Seeds of the particle blasts whose mean a load is."""
+
+FRAMES: Final = 48
+_FIRST_FRAMES: Final = 8  # after so many a film can begin
+_FILM_PX: Final = 640
+_PLAN_HEIGHT_M: Final = 1.5
+_MOST_POINTS: Final = 600  # of a gauge's history
+_QUALITY: Final = 82
+
+Tell = Callable[[float], None]
+
+
+class Scale(Kept):
+    """The colour scales of all blasts of one threat by gas dynamics.
+
+    Attributes:
+        film_kpa: End of the films' scale.
+        levels: Contours of the maps, by quantity.
+        walls: Ends of the walls' scales, by structure and quantity.
+    """
+
+    film_kpa: float
+    levels: dict[str, tuple[float, ...]]
+    walls: dict[str, dict[str, float]]
+
+
+_SCALE: Final = "scale.json"
+_QUANTITIES: Final[tuple[Quantity, ...]] = ("peak", "impulse")
+
+
+def warm_engines() -> None:
+    """Load compiled code by small blasts, so that the next ones begin at once."""
+    scenario = load_scenario("courtyard")
+    Blast(scenario, (), 0, "event").run()
+    GasEngine()
+
+
+def run_blasts(task: BlastTask, tell: Tell) -> None:
+    """Run the blasts of a layout, one a threat, and what they are held against.
+
+    Blasts that are there already are not run again. First comes the film of the first threat.
+
+    Args:
+        task: What to run.
+        tell: Called with the share that is done.
+
+    Raises:
+        BlastEnvError: If they cannot be run.
+    """
+    scenario = scenario_of(task.scenario)
+    layout: Layout = tuple(tuple(each) for each in task.layout)
+    work: list[tuple[ThreatOf, Layout]] = []
+    for threat in task.threats:
+        # Gas has its scale from the blast without a barrier; particles are looked at first.
+        both = [(threat, ()), (threat, layout)]
+        work += both if task.engine.is_gas else both[::-1]
+    work = list(dict.fromkeys(work))
+    for number, (threat, cells) in enumerate(work):
+        part = share_of(tell, number, len(work)) or tell
+        _run_one(task, scenario, threat, cells, part)
+
+
+def _run_one(
+    task: BlastTask, scenario: Scenario, threat: ThreatOf, layout: Layout, tell: Tell
+) -> None:
+    charge = Charge(threat.position_m, threat.tnt_kg, threat.height_m)
+    key = blast_key(scenario.content_hash, layout, charge, task.engine)
+    folder = Path(task.blasts) / key
+    if read_record(folder) is not None:
+        return
+    make_folder(folder)
+    began_s = perf_counter()
+    run = _gas if task.engine.is_gas else _particles
+    found = run(task, scenario, layout, charge, folder, tell)
+    record = BlastRecord(
+        key=key,
+        threat=threat.name,
+        engine=task.engine,
+        layout=plain_layout(layout),
+        seconds=perf_counter() - began_s,
+        repeat={
+            "scenario hash": scenario.content_hash,
+            "charge": [list(charge.position_m), charge.tnt_kg, charge.height_m],
+            "versions": versions(),
+        },
+        **found,
+    )
+    write_kept(record, folder / RECORD)
+
+
+# Particles.
+
+
+def _particles(
+    task: BlastTask, scenario: Scenario, layout: Layout, charge: Charge, folder: Path, tell: Tell
+) -> dict[str, Any]:
+    blast = Blast(scenario, layout, 0, "event", charge)
+    bare = Blast(scenario, (), 0, "event", charge).run()
+    painter = FramePainter.for_blast(blast, width_px=_FILM_PX, full_impulse=largest_load(bare))
+    plan = plan_film(bare)
+    times_s = np.linspace(0.0, plan.end_s, FRAMES).tolist()
+    run = blast.start()
+    frames = (paint_at(run, painter, time_s, plan.real_time_factor) for time_s in times_s)
+    _write_film(frames, times_s, folder, share_of(tell, 0, 10, 5) or tell)
+    notes = [*scenario.height_notes]
+    try:
+        loads = _particle_loads(task, scenario, layout, charge, share_of(tell, 5, 10, 5) or tell)
+    except CalibrationError as error:
+        return {"loads": (), "notes": (*notes, f"no loads: {error}")}
+    notes += dict.fromkeys(note for each in loads for own in each.structures for note in own.notes)
+    notes.append(f"particles overrate walls; mean over {len(SEEDS)} seeds, judge by gas")
+    return {"loads": _mean_loads(loads), "notes": tuple(notes)}
+
+
+def _particle_loads(
+    task: BlastTask, scenario: Scenario, layout: Layout, charge: Charge, tell: Tell
+) -> list[BlastLoads]:
+    evaluator = BlastEvaluator(scenario, "event", cache=task.cache)
+    pairs = [(layout, Threat(charge, seed)) for seed in SEEDS]
+    return evaluator.loads_of_many(pairs, progress=tell)
+
+
+def _mean_loads(loads: Sequence[BlastLoads]) -> tuple[Load, ...]:
+    def load(name: str, protected: bool, values: Sequence[float]) -> Load:
+        mean, low, high = mean_estimate(np.array(values))
+        return Load(
+            structure=name, protected=protected, impulse_pa_s=mean, low_pa_s=low, high_pa_s=high
+        )
+
+    together = load("", True, [each.protected_impulse_pa_s for each in loads])
+    return (
+        together,
+        *(
+            load(first.name, first.protected, [each.structures[k].impulse_pa_s for each in loads])
+            for k, first in enumerate(loads[0].structures)
+        ),
+    )
+
+
+# Gas.
+
+
+def _gas(
+    task: BlastTask, scenario: Scenario, layout: Layout, charge: Charge, folder: Path, tell: Tell
+) -> dict[str, Any]:
+    engine = find_engine("gas", task.engine.cell_m)
+    if not isinstance(engine, GasEngine):
+        raise AssertionError("the engine gas is gas dynamics")
+    blast = GasBlast(scenario, layout, 0, engine, charge)
+    section = default_section(blast.site)
+    height_m = min(_PLAN_HEIGHT_M, 0.5 * blast.site.air_height_m)
+    told = share_of(tell, 0, 100, 60) or tell
+    shot = record_planes(blast, height_m, section, told, ground_recorders)
+    result = shot.result
+    bare_key = blast_key(scenario.content_hash, (), charge, task.engine)
+    scale = _scale(result, Path(task.blasts) / bare_key / _SCALE)
+    if not layout:
+        write_kept(scale, folder / _SCALE)
+    painter = PressurePainter([shot], scale.film_kpa, _FILM_PX)
+    times_s = np.linspace(0.0, result.time_s, FRAMES).tolist()
+    frames = (painter.paint(time_s, "") for time_s in times_s)
+    _write_film(frames, times_s, folder, share_of(tell, 60, 100, 25) or tell)
+    pictures = tuple(_pictures(result, scale, folder))
+    notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]
+    return {
+        "loads": _gas_loads(result),
+        "notes": tuple(dict.fromkeys(notes)),
+        "pictures": pictures,
+        "waves": tuple(_waves(result)),
+    }
+
+
+def _scale(result: GasResult, kept: Path) -> Scale:
+    """Return the scale that was kept with the blast without a barrier; this one's without it."""
+    try:
+        return Scale.model_validate_json(kept.read_text(encoding="utf-8"))
+    except (OSError, ValidationError):
+        names = _facades_of(result)
+        return Scale(
+            film_kpa=largest_kpa([result]),
+            levels={each: map_levels(result, each) for each in _QUANTITIES},
+            walls={
+                name: {each: full_load(result, name, each) for each in _QUANTITIES}
+                for name in names
+            },
+        )
+
+
+def _facades_of(result: GasResult) -> list[str]:
+    """Return the structures whose walls are drawn: the protected ones."""
+    table = result.structures
+    return [str(name) for name in table[table["protected"]]["structure"]]
+
+
+def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture]:
+    for quantity in _QUANTITIES:
+        name = f"map_{quantity}.png"
+        levels = scale.levels[quantity]
+        save_figure(ground_map(result, quantity, levels=levels), folder / name)
+        yield Picture(file=name, label=f"{quantity} over the ground")
+    for structure in _facades_of(result):
+        for quantity in _QUANTITIES[::-1]:
+            name = f"walls_{structure}_{quantity}.png"
+            full = scale.walls.get(structure, {}).get(quantity)
+            save_figure(facades(result, structure, quantity, full=full), folder / name)
+            yield Picture(file=name, label=f"{quantity} on the walls of {structure}")
+
+
+def _gas_loads(result: GasResult) -> tuple[Load, ...]:
+    rows = result.structures.to_dict("records")
+    loads = [
+        Load(
+            structure=str(row["structure"]),
+            protected=bool(row["protected"]),
+            impulse_pa_s=float(row["positive_impulse_pa_s"]),
+            peak_kpa=float(row["peak_pa"]) / PA_PER_KPA,
+        )
+        for row in rows
+    ]
+    weights = [float(row["weight"]) for row in rows]
+    counted = [
+        (each, weight) for each, weight in zip(loads, weights, strict=True) if each.protected
+    ]
+    together = Load(
+        structure="",
+        protected=True,
+        impulse_pa_s=sum(weight * each.impulse_pa_s for each, weight in counted),
+        peak_kpa=max(each.peak_kpa for each, _ in counted),
+    )
+    return (together, *loads)
+
+
+def _waves(result: GasResult) -> Iterator[Wave]:
+    for row in result.gauges.to_dict("records"):
+        history = result.history(row["name"])
+        time_ms = MS_PER_S * history["time_s"].to_numpy()
+        kpa = history["overpressure_pa"].to_numpy() / PA_PER_KPA
+        chosen = _telling_points(kpa)
+        yield Wave(
+            gauge=str(row["name"]),
+            peak_kpa=float(row["peak_pa"]) / PA_PER_KPA,
+            impulse_pa_s=float(row["positive_impulse_pa_s"]),
+            time_ms=tuple(np.round(time_ms[chosen], 4).tolist()),
+            overpressure_kpa=tuple(np.round(kpa[chosen], 4).tolist()),
+        )
+
+
+def _telling_points(values: Any) -> list[int]:
+    """Return which points of a history to keep: the extremes of its parts, so that no peak goes."""
+    if len(values) <= _MOST_POINTS:
+        return list(range(len(values)))
+    chosen = set()
+    for part in np.array_split(np.arange(len(values)), _MOST_POINTS // 2):
+        chosen |= {int(part[values[part].argmax()]), int(part[values[part].argmin()])}
+    return sorted(chosen)
+
+
+# Films.
+
+
+def _write_film(
+    frames: Iterator[Frame], times_s: Sequence[float], folder: Path, tell: Tell
+) -> None:
+    """Write frames one by one; the film can be watched from the first few on."""
+    film = read_film(folder)
+    if film is not None and film.count == len(film.time_ms):
+        return
+    times_ms = tuple(round(MS_PER_S * time_s, 3) for time_s in times_s)
+    keep = partial(Film, time_ms=times_ms)
+    for number, frame in enumerate(frames):
+        with write_atomically(folder / FRAME.format(number)) as temporary:
+            Image.fromarray(frame).save(temporary, quality=_QUALITY)
+        done = number + 1
+        if done == _FIRST_FRAMES or done == len(times_s) or done % (2 * _FIRST_FRAMES) == 0:
+            write_kept(keep(count=done), folder / FILM)
+        tell(done / len(times_s))

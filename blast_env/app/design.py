@@ -1,0 +1,189 @@
+"""A design: a site, and up to four layouts for it side by side; with undo and redo."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from blast_env.app import placing
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout
+from blast_env.scenario import Placement, Scenario
+
+SLOTS: Final = ("A", "B", "C", "D")
+"""Names of the layouts of a design."""
+
+MOST_STEPS: Final = 100
+"""Steps that can be undone."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """A site and its layouts, all of them legal.
+
+    Attributes:
+        scenario: The site.
+        layouts: One for each of `SLOTS`.
+        active: Number of the layout that is edited.
+    """
+
+    scenario: Scenario
+    layouts: tuple[Layout, ...] = ((),) * len(SLOTS)
+    active: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no design.
+
+        Raises:
+            LayoutError: If a layout is not legal.
+            BlastEnvError: If there are not as many as slots, or the active one is none of them.
+        """
+        if len(self.layouts) != len(SLOTS):
+            raise BlastEnvError(f"layouts: there are {len(self.layouts)}, must be {len(SLOTS)}")
+        if not 0 <= self.active < len(SLOTS):
+            raise BlastEnvError(f"active is {self.active}, must be 0 to {len(SLOTS) - 1}")
+        for layout in self.layouts:
+            Placement.of(self.scenario, layout)
+
+    @property
+    def layout(self) -> Layout:
+        """The layout that is edited."""
+        return self.layouts[self.active]
+
+    def with_layout(self, layout: Layout, slot: int | None = None) -> "Design":
+        """Return the design with another layout in a slot, the active one unless named.
+
+        Raises:
+            LayoutError: If it is not legal.
+        """
+        number = self.active if slot is None else slot
+        layouts = [*self.layouts]
+        layouts[number] = Placement.of(self.scenario, layout).cells
+        return replace(self, layouts=tuple(layouts))
+
+    def with_scenario(self, scenario: Scenario) -> tuple["Design", tuple[str, ...]]:
+        """Return the design on a changed site, and what of its layouts fell away and why."""
+        layouts, notes = [], []
+        for name, layout in zip(SLOTS, self.layouts, strict=True):
+            kept, reasons = placing.what_still_stands(scenario, layout)
+            layouts.append(kept)
+            if reasons:
+                notes.append(f"layout {name}: {len(reasons)} taken away, since {reasons[0]}")
+        return replace(self, scenario=scenario, layouts=tuple(layouts)), tuple(notes)
+
+    def record(self) -> dict[str, Any]:
+        """Return the design as plain data."""
+        return {
+            "scenario": self.scenario.model_dump(mode="json", exclude_none=True),
+            "layouts": [[list(each) for each in layout] for layout in self.layouts],
+            "active": self.active,
+        }
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any], source: str) -> "Design":
+        """Return the design of a record.
+
+        Args:
+            record: Plain data, as `record` gives it.
+            source: Where it comes from, for the error.
+
+        Raises:
+            BlastEnvError: If it is none; the message says why.
+        """
+        try:
+            scenario, listed = record["scenario"], record["layouts"]
+            layouts = tuple(tuple(tuple(each) for each in layout) for layout in listed)
+            active = int(record["active"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise BlastEnvError(f"{source}: is no design: {error!r}") from error
+        return cls(Scenario.from_document(scenario, source), layouts, active)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A design and what made it."""
+
+    label: str
+    design: Design
+
+
+@dataclass(frozen=True)
+class History:
+    """A design with what came before it and what was undone; immutable.
+
+    Attributes:
+        past: Earlier steps, the oldest first.
+        present: The design as it is.
+        future: What was undone, what comes next first.
+    """
+
+    present: Step
+    past: tuple[Step, ...] = ()
+    future: tuple[Step, ...] = ()
+
+    @property
+    def design(self) -> Design:
+        """The design as it is."""
+        return self.present.design
+
+    def then(self, label: str, design: Design) -> "History":
+        """Return the history with one more step; one that changes nothing is none."""
+        if design == self.design:
+            return self
+        past = (*self.past, self.present)[-MOST_STEPS:]
+        return History(Step(label, design), past)
+
+    def showing(self, active: int) -> "History":
+        """Return the history with another layout before the user: no step, nothing to undo."""
+        shown = replace(self.present, design=replace(self.design, active=active))
+        return replace(self, present=shown)
+
+    def undone(self) -> "History":
+        """Return the history one step back; at its beginning, as it is."""
+        if not self.past:
+            return self
+        return History(self.past[-1], self.past[:-1], (self.present, *self.future))
+
+    def redone(self) -> "History":
+        """Return the history with the last undone step; where there is none, as it is."""
+        if not self.future:
+            return self
+        return History(self.future[0], (*self.past, self.present), self.future[1:])
+
+    def record(self) -> dict[str, Any]:
+        """Return the history as plain data, each site in it once."""
+        sites: list[dict[str, Any]] = []
+
+        def of_step(step: Step) -> dict[str, Any]:
+            record = step.design.record()
+            site = record["scenario"]
+            if site not in sites:
+                sites.append(site)
+            return {**record, "label": step.label, "scenario": sites.index(site)}
+
+        return {
+            "present": of_step(self.present),
+            "past": [of_step(each) for each in self.past],
+            "future": [of_step(each) for each in self.future],
+            "sites": sites,
+        }
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any], source: str) -> "History":
+        """Return the history of a record.
+
+        Raises:
+            BlastEnvError: If it is none; the message says why.
+        """
+
+        def step_of(part: Mapping[str, Any]) -> Step:
+            whole = {**part, "scenario": record["sites"][part["scenario"]]}
+            return Step(str(part["label"]), Design.from_record(whole, source))
+
+        try:
+            return cls(
+                step_of(record["present"]),
+                tuple(step_of(each) for each in record["past"]),
+                tuple(step_of(each) for each in record["future"]),
+            )
+        except (KeyError, TypeError, IndexError) as error:
+            raise BlastEnvError(f"{source}: is no design: {error!r}") from error

@@ -1,0 +1,390 @@
+"""The hand on the plan: tools, what is selected, what is dragged, and why it cannot stand there.
+
+Takes places in metres, and knows nothing of the page. Each stroke is one step of the design.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final
+
+from blast_env.app import edits, placing
+from blast_env.app.edits import Kind, Thing
+from blast_env.app.session import Session
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Cell, Layout, Rectangle
+from blast_env.scenario import Scenario, ScenarioError
+from blast_env.scenario.sections import PointM
+from blast_env.units import MODULE_SIDE_M
+
+
+class Tool(StrEnum):
+    """What the mouse does."""
+
+    SELECT = "select and move"
+    PLACE = "place"
+    ERASE = "erase"
+    STRUCTURE = "structure"
+    ZONE = "build zone"
+    KEEP_OUT = "keep-out"
+    CHARGE = "charge"
+    CHARGE_AREA = "charge area"
+    GAUGE = "gauge"
+
+
+_DRAWN: Final = {
+    Tool.STRUCTURE: Kind.STRUCTURE,
+    Tool.ZONE: Kind.ZONE,
+    Tool.KEEP_OUT: Kind.KEEP_OUT,
+    Tool.CHARGE: Kind.CHARGE,
+    Tool.GAUGE: Kind.GAUGE,
+}
+
+_HANDLE_M: Final = 0.6  # how near to the upper right corner one takes hold of the size
+
+
+@dataclass(frozen=True)
+class Ghost:
+    """What would stand where the mouse is.
+
+    Attributes:
+        rectangle_m: Where.
+        reason: Why it cannot; empty if it can.
+        is_line: Whether it is the diagonal of the rectangle, from `line_m[0]` to `line_m[1]`.
+        line_m: The ends of a line.
+    """
+
+    rectangle_m: Rectangle
+    reason: str = ""
+    line_m: tuple[PointM, PointM] | None = None
+
+
+@dataclass
+class _Stroke:
+    """What goes on while the button is down."""
+
+    start_m: PointM
+    layout: Layout
+    moves: bool = False
+    sizes: bool = False
+    lifted: placing.Element | None = None
+    made: Scenario | None = None
+    thing: Thing | None = None
+    changed: int = 0
+
+
+@dataclass
+class Editor:
+    """The hand of one page on a design.
+
+    Attributes:
+        session: The design.
+        tool: What the mouse does.
+        item: Name of what is placed.
+        turned: Whether it is turned.
+        selected: What is selected.
+        cursor: The cell that the keyboard is at; `None` before it was used.
+        ghost: What would stand where the mouse is.
+        pending: The layout as it is under a stroke that is not over; `None` without one.
+        message: What there is to say, and has not been said yet.
+    """
+
+    session: Session
+    tool: Tool = Tool.SELECT
+    item: str = ""
+    turned: bool = False
+    selected: Thing | None = None
+    cursor: Cell | None = None
+    ghost: Ghost | None = None
+    pending: Layout | None = None
+    message: str = ""
+    _stroke: _Stroke | None = field(default=None, init=False)
+    _last: Cell | PointM | None = field(default=None, init=False)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The site, with what is being dragged where it is dragged to, if it can be there."""
+        stroke = self._stroke
+        return self.session.scenario if stroke is None or stroke.made is None else stroke.made
+
+    @property
+    def layout(self) -> Layout:
+        """The layout, with what the stroke has done so far."""
+        return self.session.design.layout if self.pending is None else self.pending
+
+    @property
+    def holds_something(self) -> bool:
+        """Whether the stroke that is under way moves or draws anything."""
+        stroke = self._stroke
+        return stroke is not None and (stroke.thing is not None or stroke.lifted is not None)
+
+    def choose(self, tool: Tool) -> None:
+        """Take another tool."""
+        self.tool, self.ghost, self._stroke, self.pending = tool, None, None, None
+
+    # The mouse.
+
+    def press(self, x_m: float, y_m: float, erase: bool = False) -> None:
+        """Begin a stroke at a place."""
+        self.message = ""
+        self._stroke = stroke = _Stroke((x_m, y_m), self.session.design.layout)
+        self._last = None
+        if self.tool in (Tool.PLACE, Tool.ERASE) or erase:
+            self._paint(x_m, y_m, erase or self.tool is Tool.ERASE)
+        elif self.tool is Tool.SELECT:
+            self._take_hold(x_m, y_m, stroke)
+        else:
+            self._draw(x_m, y_m)
+
+    def move(self, x_m: float, y_m: float, erase: bool = False) -> bool:
+        """Follow the mouse; return whether anything looks different now."""
+        if self.tool is Tool.SELECT or self.tool in _DRAWN or self.tool is Tool.CHARGE_AREA:
+            place: Cell | PointM | None = (edits.snapped(x_m), edits.snapped(y_m))
+        else:
+            place = placing.cell_at(self.session.scenario, x_m, y_m)
+        if place == self._last:
+            return False
+        self._last = place
+        if self._stroke is None:
+            return self._hover(x_m, y_m)
+        if self.tool in (Tool.PLACE, Tool.ERASE) or erase:
+            self._paint(x_m, y_m, erase or self.tool is Tool.ERASE)
+        elif self.tool is Tool.SELECT:
+            self._drag(x_m, y_m)
+        else:
+            self._draw(x_m, y_m)
+        return True
+
+    def release(self) -> None:
+        """End the stroke: one step, or the reason why it is none."""
+        stroke, self._stroke = self._stroke, None
+        pending, self.pending = self.pending, None
+        ghost, self.ghost, self._last = self.ghost, None, None
+        if stroke is None:
+            return
+        if ghost is not None and ghost.reason:
+            self.message = ghost.reason
+        if stroke.made is not None:
+            verb = "size" if stroke.sizes else "move" if stroke.moves else "draw"
+            kind = stroke.thing.kind if stroke.thing is not None else "site"
+            self._keep(f"{verb} {kind}", stroke.made)
+            self.selected = stroke.thing
+        elif pending is not None and pending != self.session.design.layout:
+            count = abs(len(pending) - len(self.session.design.layout))
+            verb = (
+                "move" if not count else "place" if len(pending) > len(stroke.layout) else "erase"
+            )
+            self._keep_layout(f"{verb} {max(count, 1)}", pending)
+
+    def leave(self) -> None:
+        """The mouse has left the plan: what it holds is put back."""
+        self.ghost, self._stroke, self.pending, self._last = None, None, None, None
+
+    # The keyboard.
+
+    def step_cursor(self, rows: int, columns: int) -> None:
+        """Move the cell that the keyboard is at; it stays in the zone."""
+        zone = self.session.scenario.build_zone
+        if zone is None:
+            self.message = "there is no build zone: draw one first"
+            return
+        row, column = self.cursor or (zone.rows // 2, zone.columns // 2)
+        if self.cursor is not None:
+            row, column = row + rows, column + columns
+        self.cursor = min(max(row, 0), zone.rows - 1), min(max(column, 0), zone.columns - 1)
+        self._show_at(self.cursor)
+
+    def toggle_at_cursor(self) -> None:
+        """Place at the cell that the keyboard is at, or take away what stands there."""
+        if self.cursor is None:
+            self.step_cursor(0, 0)
+            return
+        design = self.session.design
+        there = placing.element_at(design.scenario, design.layout, self.cursor)
+        if there is not None:
+            self._keep_layout("erase 1", tuple(each for each in design.layout if each != there))
+        else:
+            self._show_at(self.cursor)
+            if self.ghost is not None and self.ghost.reason:
+                self.message = self.ghost.reason
+                return
+            new = placing.element(design.scenario, self.item, self.cursor, self.turned)
+            self._keep_layout("place 1", (*design.layout, new))
+        self._show_at(self.cursor)
+
+    def nudge(self, x_m: float, y_m: float) -> None:
+        """Move what is selected by so much, if it can be there."""
+        if self.selected is None:
+            return
+        selected = self.selected
+        label = f"move {selected.kind}"
+        self.attempt(label, lambda scenario: edits.moved(scenario, selected, (x_m, y_m)))
+
+    def delete(self) -> None:
+        """Take away what is selected, if the site can be without it."""
+        if self.selected is None:
+            self.message = "nothing is selected"
+            return
+        selected = self.selected
+        if self.attempt(f"delete {selected.kind}", lambda s: edits.removed(s, selected)):
+            self.selected = None
+
+    def attempt(self, label: str, edit: Callable[[Scenario], Scenario]) -> bool:
+        """Make an edit of the site a step, or say why it cannot be; return whether it was made."""
+        try:
+            scenario = edit(self.session.scenario)
+        except BlastEnvError as error:
+            self.message = reason_of(error)
+            return False
+        self._keep(label, scenario)
+        return True
+
+    # What the strokes do.
+
+    def _take_hold(self, x_m: float, y_m: float, stroke: _Stroke) -> None:
+        scenario, layout = self.session.scenario, self.session.design.layout
+        cell = placing.cell_at(scenario, x_m, y_m)
+        there = None if cell is None else placing.element_at(scenario, layout, cell)
+        if there is not None:
+            stroke.lifted, stroke.moves = there, True
+            self.selected = None
+            return
+        own = self.selected
+        if own is not None and edits.has(scenario, own) and own.kind is not Kind.GAUGE:
+            box = edits.rectangle_of(scenario, own)
+            near = max(abs(x_m - box.right), abs(y_m - box.top)) <= _HANDLE_M
+            if near and (box.left, box.bottom) != (box.right, box.top):
+                stroke.sizes, stroke.thing = True, own
+                return
+        self.selected = edits.thing_at(scenario, x_m, y_m, _HANDLE_M)
+        stroke.thing, stroke.moves = self.selected, self.selected is not None
+
+    def _drag(self, x_m: float, y_m: float) -> None:
+        stroke = self._stroke
+        if stroke is None:
+            return
+        if stroke.lifted is not None:
+            self._drag_element(x_m, y_m, stroke, stroke.lifted)
+            return
+        if stroke.thing is None:
+            return
+        scenario, thing = self.session.scenario, stroke.thing
+        by_m = (x_m - stroke.start_m[0], y_m - stroke.start_m[1])
+        box = edits.rectangle_of(scenario, thing)
+        if stroke.sizes:
+            end = edits.snapped(x_m), edits.snapped(y_m)
+            right = max(end[0], box.left + MODULE_SIDE_M)
+            target = Rectangle(box.left, box.bottom, right, max(end[1], box.bottom + MODULE_SIDE_M))
+        else:
+            shift = edits.snapped(by_m[0]), edits.snapped(by_m[1])
+            target = Rectangle(
+                box.left + shift[0], box.bottom + shift[1], box.right + shift[0], box.top + shift[1]
+            )
+        self.ghost = Ghost(target)
+        try:
+            if stroke.sizes:
+                stroke.made = edits.resized(scenario, thing, (x_m, y_m))
+            else:
+                stroke.made = edits.moved(scenario, thing, by_m)
+        except BlastEnvError as error:
+            stroke.made = None
+            self.ghost = Ghost(target, reason_of(error))
+
+    def _drag_element(
+        self, x_m: float, y_m: float, stroke: _Stroke, lifted: placing.Element
+    ) -> None:
+        scenario = self.session.scenario
+        cell = placing.cell_at(scenario, x_m, y_m)
+        if cell is None:
+            return
+        others = tuple(each for each in stroke.layout if each != lifted)
+        moved = placing.moved_to(lifted, cell)
+        reason = placing.reason_against(scenario, others, moved)
+        self.ghost = Ghost(placing.rectangle_of(scenario, moved), reason or "")
+        self.pending = stroke.layout if reason else (*others, moved)
+
+    def _paint(self, x_m: float, y_m: float, erase: bool) -> None:
+        scenario, layout = self.session.scenario, self.layout
+        cell = placing.cell_at(scenario, x_m, y_m)
+        if cell is None:
+            self.message = "there is no build zone: draw one first"
+            return
+        there = placing.element_at(scenario, layout, cell)
+        if erase:
+            if there is not None:
+                self.pending = tuple(each for each in layout if each != there)
+            return
+        self._show_at(cell)
+        if self.ghost is None or not self.ghost.reason:
+            new = placing.element(scenario, self.item, cell, self.turned)
+            self.pending = (*layout, new)
+        elif there is not None:
+            self.ghost = None  # a stroke over what stands already is no mistake
+
+    def _draw(self, x_m: float, y_m: float) -> None:
+        stroke = self._stroke
+        if stroke is None:
+            return
+        (x0, y0), (x1, y1) = stroke.start_m, (x_m, y_m)
+        xs = sorted((edits.snapped(x0), edits.snapped(x1)))
+        ys = sorted((edits.snapped(y0), edits.snapped(y1)))
+        box = Rectangle(xs[0], ys[0], xs[1], ys[1])
+        line = None
+        if self.tool is Tool.CHARGE:
+            line = (
+                (edits.snapped(x0), edits.snapped(y0)),
+                (edits.snapped(x1), edits.snapped(y1)),
+            )
+        self.ghost = Ghost(box, "", line)
+        if line is None and self.tool is not Tool.GAUGE and 0.0 in (xs[1] - xs[0], ys[1] - ys[0]):
+            stroke.made = None
+            return  # no area yet
+        scenario = self.session.scenario
+        try:
+            if self.tool is Tool.CHARGE_AREA:
+                stroke.made, stroke.thing = edits.with_charge_area(scenario, (x0, y0), (x1, y1))
+            else:
+                kind = _DRAWN[self.tool]
+                stroke.made, stroke.thing = edits.added(scenario, kind, (x0, y0), (x1, y1))
+        except BlastEnvError as error:
+            stroke.made = None
+            self.ghost = Ghost(box, reason_of(error), line)
+
+    def _hover(self, x_m: float, y_m: float) -> bool:
+        before = self.ghost
+        self.ghost = None
+        if self.tool is Tool.PLACE:
+            cell = placing.cell_at(self.session.scenario, x_m, y_m)
+            if cell is not None:
+                self._show_at(cell)
+        return self.ghost != before
+
+    def _show_at(self, cell: Cell) -> None:
+        """Show what would stand on a cell."""
+        scenario = self.session.scenario
+        new = placing.element(scenario, self.item, cell, self.turned)
+        reason = placing.reason_against(scenario, self.layout, new)
+        self.ghost = Ghost(placing.rectangle_of(scenario, new), reason or "")
+
+    def _keep(self, label: str, scenario: Scenario) -> None:
+        try:
+            notes = self.session.put_site(label, scenario)
+        except BlastEnvError as error:
+            notes = (str(error),)
+        if notes:
+            self.message = "; ".join(notes)
+
+    def _keep_layout(self, label: str, layout: Layout) -> None:
+        try:
+            self.session.put(label, self.session.design.with_layout(layout))
+        except BlastEnvError as error:
+            self.message = str(error)
+
+
+def reason_of(error: BlastEnvError) -> str:
+    """Return what is wrong in one sentence: the first problem of a scenario, how many more."""
+    if not isinstance(error, ScenarioError):
+        return str(error)
+    first, more = error.problems[0], len(error.problems) - 1
+    text = str(first).replace("\n", " ")
+    return text if not more else f"{text} (and {more} more)"

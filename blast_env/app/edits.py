@@ -1,0 +1,390 @@
+"""Edits of a scenario: each gives another sound scenario, or the library's reasons why not.
+
+Everything is put on the grid of the modules. No rule about what may stand where is here: a changed
+scenario goes through `Scenario.from_document`, which says all that is wrong with it.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from enum import StrEnum
+from math import hypot
+from typing import Any, Final, NamedTuple
+
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Rectangle
+from blast_env.scenario import (
+    SCHEMA_VERSION,
+    AnySource,
+    RectangleSource,
+    Scenario,
+)
+from blast_env.scenario.sections import PointM
+from blast_env.scenario.zone import source_bounds_m
+from blast_env.units import MODULE_SIDE_M
+
+Document = dict[str, Any]
+
+_HALF: Final = MODULE_SIDE_M / 2.0
+
+
+class Kind(StrEnum):
+    """What can be selected on a site."""
+
+    SITE = "site"
+    ZONE = "build zone"
+    STRUCTURE = "structure"
+    CHARGE = "charge"
+    KEEP_OUT = "keep-out"
+    COST_AREA = "cost area"
+    GAUGE = "gauge"
+
+
+class Thing(NamedTuple):
+    """One thing on a site: what it is, and its number among its kind."""
+
+    kind: Kind
+    number: int = 0
+
+
+_PATHS: Final[Mapping[Kind, tuple[str, ...]]] = {
+    Kind.SITE: ("site",),
+    Kind.ZONE: ("build_zone",),
+    Kind.STRUCTURE: ("structures",),
+    Kind.CHARGE: ("charge",),
+    Kind.KEEP_OUT: ("build_zone", "keep_outs"),
+    Kind.COST_AREA: ("build_zone", "cost_areas"),
+    Kind.GAUGE: ("gauges",),
+}
+"""Where each kind is in a scenario file."""
+
+_SINGLE: Final = (Kind.SITE, Kind.ZONE)
+
+
+def snapped(value_m: float) -> float:
+    """Return the nearest multiple of the side of a module."""
+    return round(value_m / MODULE_SIDE_M) * MODULE_SIDE_M
+
+
+def document_of(scenario: Scenario) -> Document:
+    """Return a scenario as plain data that may have every key."""
+    document: Document = scenario.model_dump(mode="json", exclude_none=True)
+    return {**document, "schema_version": SCHEMA_VERSION}
+
+
+def changed(scenario: Scenario, edit: Callable[[Document], None]) -> Scenario:
+    """Return a scenario with an edit of its document.
+
+    Raises:
+        ScenarioError: If it would not be sound; all that is wrong is in the error.
+    """
+    document = document_of(scenario)
+    edit(document)
+    return Scenario.from_document(document, scenario.name)
+
+
+def things(scenario: Scenario) -> Iterator[tuple[Thing, str]]:
+    """Yield everything on the site with what people call it."""
+    yield Thing(Kind.SITE), f"site, {scenario.site.width_m:g} x {scenario.site.height_m:g} m"
+    for index, structure in enumerate(scenario.structures):
+        protected = ", protected" if structure.protected else ""
+        yield Thing(Kind.STRUCTURE, index), f"{structure.name}{protected}"
+    for index, source in enumerate(scenario.charge):
+        yield Thing(Kind.CHARGE, index), f"charge {index + 1}, {source.tnt_kg:g} kg"
+    zone = scenario.build_zone
+    if zone is not None:
+        yield Thing(Kind.ZONE), "build zone"
+        for index, area in enumerate(zone.keep_outs):
+            yield Thing(Kind.KEEP_OUT, index), f"keep-out: {area.reason}"
+        for index, cost_area in enumerate(zone.cost_areas):
+            yield Thing(Kind.COST_AREA, index), f"cost area: {cost_area.reason}"
+    for index, gauge in enumerate(scenario.gauges):
+        yield Thing(Kind.GAUGE, index), f"gauge {gauge.name}"
+
+
+def has(scenario: Scenario, thing: Thing) -> bool:
+    """Return whether a thing is (still) there."""
+    return any(each == thing for each, _ in things(scenario))
+
+
+def rectangle_of(scenario: Scenario, thing: Thing) -> Rectangle:
+    """Return the smallest rectangle around a thing; of a point, one without extent.
+
+    Raises:
+        BlastEnvError: If there is no such thing.
+    """
+    if not has(scenario, thing):
+        raise BlastEnvError(f"{scenario.name} has no {thing.kind} {thing.number}")
+    kind, number = thing
+    if kind is Kind.SITE:
+        return scenario.site.rectangle_m
+    if kind is Kind.STRUCTURE:
+        return scenario.structures[number].rectangle_m
+    if kind is Kind.CHARGE:
+        return source_bounds_m(scenario.charge[number])
+    if kind is Kind.GAUGE:
+        x_m, y_m, _ = scenario.gauges[number].position_m
+        return Rectangle(x_m, y_m, x_m, y_m)
+    if kind is Kind.KEEP_OUT:
+        return scenario.zone.keep_outs[number].rectangle_m
+    if kind is Kind.COST_AREA:
+        return scenario.zone.cost_areas[number].rectangle_m
+    return scenario.zone.rectangle_m
+
+
+def thing_at(scenario: Scenario, x_m: float, y_m: float, reach_m: float) -> Thing | None:
+    """Return what is at a place, what is drawn on top first; the site itself is nothing.
+
+    Args:
+        scenario: The scenario.
+        x_m: The place.
+        y_m: The place.
+        reach_m: How far beside a point or a line one may point.
+    """
+    for kind, grown_m in (
+        (Kind.GAUGE, reach_m),
+        (Kind.CHARGE, reach_m),
+        (Kind.STRUCTURE, 0.0),
+        (Kind.KEEP_OUT, 0.0),
+        (Kind.COST_AREA, 0.0),
+        (Kind.ZONE, 0.0),
+    ):
+        own = [each for each, _ in things(scenario) if each.kind is kind]
+        for thing in reversed(own):
+            left, bottom, right, top = rectangle_of(scenario, thing).grown(grown_m)
+            if not (left <= x_m <= right and bottom <= y_m <= top):
+                continue
+            if kind is Kind.CHARGE and _beside(scenario.charge[thing.number], x_m, y_m) > reach_m:
+                continue
+            return thing
+    return None
+
+
+def _beside(source: AnySource, x_m: float, y_m: float) -> float:
+    """Return how far a place is from where a charge may be."""
+    if isinstance(source, RectangleSource):
+        return 0.0
+    (x0, y0), (x1, y1) = source.segment_m
+    square = (x1 - x0) ** 2 + (y1 - y0) ** 2
+    along = ((x_m - x0) * (x1 - x0) + (y_m - y0) * (y1 - y0)) / square if square else 0.0
+    share = min(max(along, 0.0), 1.0)
+    return hypot(x_m - x0 - share * (x1 - x0), y_m - y0 - share * (y1 - y0))
+
+
+def moved(scenario: Scenario, thing: Thing, by_m: PointM) -> Scenario:
+    """Return the scenario with a thing moved by about so much, onto the grid.
+
+    Raises:
+        ScenarioError: If it cannot be there.
+    """
+    if thing.kind is Kind.SITE:
+        return scenario
+    corner = rectangle_of(scenario, thing)
+    shift = _HALF if thing.kind is Kind.GAUGE else 0.0  # gauges are in the middle of cells
+    step = [
+        snapped(start + by - shift) + shift - start
+        for start, by in zip((corner.left, corner.bottom), by_m, strict=True)
+    ]
+
+    def edit(document: Document) -> None:
+        own = _own(document, thing)
+        for key in ("corner_m", "position_m", "start_m", "end_m"):
+            if key in own:
+                x_m, y_m, *rest = own[key]
+                own[key] = [_plain(x_m + step[0]), _plain(y_m + step[1]), *rest]
+
+    return changed(scenario, edit)
+
+
+def resized(scenario: Scenario, thing: Thing, corner_m: PointM) -> Scenario:
+    """Return the scenario with the upper right corner of a thing at another place of the grid.
+
+    Of a line it is the end that goes there; what has no extent stays as it is.
+
+    Raises:
+        ScenarioError: If it cannot be so large.
+    """
+    old = rectangle_of(scenario, thing)
+    width_m = max(snapped(corner_m[0] - old.left), MODULE_SIDE_M)
+    height_m = max(snapped(corner_m[1] - old.bottom), MODULE_SIDE_M)
+    columns, rows = round(width_m / MODULE_SIDE_M), round(height_m / MODULE_SIDE_M)
+
+    def edit(document: Document) -> None:
+        own = _own(document, thing)
+        if thing.kind is Kind.SITE:
+            own.update(width_m=_plain(width_m), height_m=_plain(height_m))
+        elif "side_modules" in own:
+            own["side_modules"] = max(rows, columns)
+        elif "rows" in own:
+            own.update(rows=rows, columns=columns)
+        elif "size_m" in own:
+            own["size_m"] = [_plain(width_m), _plain(height_m)]
+        elif "end_m" in own:
+            own["end_m"] = [_plain(snapped(value)) for value in corner_m]
+
+    return changed(scenario, edit)
+
+
+def with_values(scenario: Scenario, thing: Thing | None, values: Mapping[str, Any]) -> Scenario:
+    """Return the scenario with other values of a thing.
+
+    Args:
+        scenario: The scenario.
+        thing: The thing; `None` is the scenario itself.
+        values: By the keys of the scenario file; `None` takes a key away.
+
+    Raises:
+        ScenarioError: If it would not be sound.
+    """
+
+    def edit(document: Document) -> None:
+        own = document if thing is None else _own(document, thing)
+        for key, value in values.items():
+            if value is None:
+                own.pop(key, None)
+            else:
+                own[key] = value
+
+    return changed(scenario, edit)
+
+
+def removed(scenario: Scenario, thing: Thing) -> Scenario:
+    """Return the scenario without a thing.
+
+    Raises:
+        ScenarioError: If there must be one: the last charge, the last protected structure.
+        BlastEnvError: If it is the site.
+    """
+    if thing.kind is Kind.SITE:
+        raise BlastEnvError("the site itself cannot be taken away: open another one")
+
+    def edit(document: Document) -> None:
+        *above, key = _PATHS[thing.kind]
+        table = document
+        for part in above:
+            table = table[part]
+        if thing.kind in _SINGLE:
+            del table[key]
+        else:
+            del table[key][thing.number]
+
+    return changed(scenario, edit)
+
+
+def added(scenario: Scenario, kind: Kind, start_m: PointM, end_m: PointM) -> tuple[Scenario, Thing]:
+    """Return the scenario with one thing more, drawn from one place to another, on the grid.
+
+    A charge is a point where both places are the same, else a line; see `with_charge_area` for an
+    area. A build zone takes the place of the one there is, and keeps what holds in it.
+
+    Raises:
+        ScenarioError: If it cannot be there.
+    """
+    start = (snapped(start_m[0]), snapped(start_m[1]))
+    end = (snapped(end_m[0]), snapped(end_m[1]))
+    area = Rectangle(
+        _plain(min(start[0], end[0])),
+        _plain(min(start[1], end[1])),
+        _plain(max(start[0], end[0])),
+        _plain(max(start[1], end[1])),
+    )
+    section = {
+        Kind.STRUCTURE: lambda: _structure(scenario, area),
+        Kind.CHARGE: lambda: _charge(scenario, start, end),
+        Kind.KEEP_OUT: lambda: {**_sized(area), "reason": "must stay free"},
+        Kind.COST_AREA: lambda: {
+            **_sized(area),
+            "reason": "costly ground",
+            "module_cost": 2.0 * scenario.zone.module_cost,
+        },
+        Kind.GAUGE: lambda: _gauge(scenario, start_m),
+        Kind.ZONE: lambda: _zone(scenario, area),
+    }[kind]()
+
+    def edit(document: Document) -> None:
+        *above, key = _PATHS[kind]
+        table = document
+        for part in above:
+            table = table[part]
+        if kind is Kind.ZONE:
+            table[key] = {**table.get(key, {}), **section}
+        else:
+            table[key] = [*table.get(key, []), section]
+
+    if kind in (Kind.KEEP_OUT, Kind.COST_AREA):
+        _ = scenario.zone  # refuses a site without one
+    after = changed(scenario, edit)
+    last = max(each.number for each, _ in things(after) if each.kind is kind)
+    return after, Thing(kind, last)
+
+
+def with_charge_area(scenario: Scenario, start_m: PointM, end_m: PointM) -> tuple[Scenario, Thing]:
+    """Return the scenario with one more charge, anywhere in a rectangle.
+
+    Raises:
+        ScenarioError: If it cannot be there.
+    """
+    left, right = sorted((snapped(start_m[0]), snapped(end_m[0])))
+    bottom, top = sorted((snapped(start_m[1]), snapped(end_m[1])))
+    area = Rectangle(_plain(left), _plain(bottom), _plain(right), _plain(top))
+    section = {"kind": "rectangle", "tnt_kg": _usual_tnt_kg(scenario), **_sized(area)}
+    after = changed(scenario, lambda document: document["charge"].append(section))
+    return after, Thing(Kind.CHARGE, len(after.charge) - 1)
+
+
+def _own(document: Document, thing: Thing) -> Document:
+    """Return the part of a document that is a thing's."""
+    table: Any = document
+    for part in _PATHS[thing.kind]:
+        table = table[part]
+    own: Document = table if thing.kind in _SINGLE else table[thing.number]
+    return own
+
+
+def _structure(scenario: Scenario, area: Rectangle) -> Document:
+    names = {each.name for each in scenario.structures}
+    number = next(n for n in range(1, 200) if f"structure{n}" not in names)
+    return {
+        "kind": "ModularObstacle",
+        "name": f"structure{number}",
+        "corner_m": [area.left, area.bottom],
+        "rows": max(round((area.top - area.bottom) / MODULE_SIDE_M), 1),
+        "columns": max(round((area.right - area.left) / MODULE_SIDE_M), 1),
+        "protected": not any(each.protected for each in scenario.structures),
+    }
+
+
+def _charge(scenario: Scenario, start: PointM, end: PointM) -> Document:
+    tnt_kg = _usual_tnt_kg(scenario)
+    if start == end:
+        return {"kind": "point", "position_m": [*start], "tnt_kg": tnt_kg}
+    return {"kind": "segment", "start_m": [*start], "end_m": [*end], "tnt_kg": tnt_kg}
+
+
+def _usual_tnt_kg(scenario: Scenario) -> float:
+    return scenario.charge[0].tnt_kg
+
+
+def _gauge(scenario: Scenario, at_m: PointM) -> Document:
+    names = {each.name for each in scenario.gauges}
+    number = next(n for n in range(1, 200) if f"gauge{n}" not in names)
+    place = [_plain(snapped(value - _HALF) + _HALF) for value in at_m]
+    return {"name": f"gauge{number}", "position_m": [*place, 1.25]}
+
+
+def _zone(scenario: Scenario, area: Rectangle) -> Document:
+    rows = max(round((area.top - area.bottom) / MODULE_SIDE_M), 1)
+    columns = max(round((area.right - area.left) / MODULE_SIDE_M), 1)
+    section: Document = {"corner_m": [area.left, area.bottom], "rows": rows, "columns": columns}
+    if scenario.build_zone is None:
+        section["stock"] = max(min(rows * columns // 4, 16), 1)
+    return section
+
+
+def _sized(area: Rectangle) -> Document:
+    width_m = max(area.right - area.left, MODULE_SIDE_M)
+    height_m = max(area.top - area.bottom, MODULE_SIDE_M)
+    return {"corner_m": [area.left, area.bottom], "size_m": [width_m, height_m]}
+
+
+def _plain(value: float) -> float:
+    """Return a length without rounding errors and negative zero."""
+    return round(value, 9) + 0.0

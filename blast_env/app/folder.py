@@ -1,0 +1,219 @@
+"""The work folder: designs, the blasts that were run for them, and who has it open.
+
+Every file is written as a whole, so that nothing is lost when a page is reloaded, a browser closed
+or the server stopped.
+"""
+
+import json
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import time
+from typing import Any, Final
+
+from blast_env.app.design import Design, History, Step
+from blast_env.app.records import BlastRecord, check_key, read_record
+from blast_env.errors import BlastEnvError
+from blast_env.files import make_folder, write_atomically
+from blast_env.scenario import Scenario
+
+_DESIGN: Final = "design.json"
+_OPEN: Final = "open.json"
+
+
+@dataclass(frozen=True)
+class DesignEntry:
+    """A design in the list of those that can be opened again.
+
+    Attributes:
+        design_id: Its name in the folder.
+        title: Name of its site.
+        changed_s: When it was changed last, seconds since 1970.
+        problem: Why it cannot be opened; empty if it can.
+    """
+
+    design_id: str
+    title: str
+    changed_s: float
+    problem: str = ""
+
+
+class DesignFolder:
+    """The folder of one design.
+
+    Args:
+        path: The folder; it is there.
+
+    Attributes:
+        path: As given.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @property
+    def design_id(self) -> str:
+        """Name of the design: that of its folder."""
+        return self.path.name
+
+    @property
+    def jobs(self) -> Path:
+        """Where work that was asked for is."""
+        return self.path / "jobs"
+
+    @property
+    def blasts(self) -> Path:
+        """Where blasts are."""
+        return self.path / "blasts"
+
+    def save(self, history: History) -> None:
+        """Keep a design with its steps.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        content = json.dumps(history.record(), allow_nan=False)
+        try:
+            with write_atomically(self.path / _DESIGN) as temporary:
+                temporary.write_text(content, encoding="utf-8")
+        except OSError as error:  # a full disk
+            raise BlastEnvError(f"{self.path}: cannot be written: {error.strerror}") from error
+
+    def load(self) -> History:
+        """Return the design with its steps.
+
+        Raises:
+            BlastEnvError: If it cannot be read.
+        """
+        return History.from_record(self._content(), str(self.path / _DESIGN))
+
+    def entry(self) -> DesignEntry:
+        """Return the design for a list, without reading all of it anew."""
+        try:
+            changed_s = (self.path / _DESIGN).stat().st_mtime
+            content = self._content()
+            site = content["sites"][content["present"]["scenario"]]
+            return DesignEntry(self.design_id, str(site["name"]), changed_s)
+        except (BlastEnvError, OSError, LookupError, TypeError) as error:
+            return DesignEntry(self.design_id, "damaged", 0.0, str(error))
+
+    def blast_of(self, key: str) -> Path:
+        """Return the folder of a blast, which need not be there."""
+        return self.blasts / check_key(key)
+
+    def record_of(self, key: str) -> BlastRecord | None:
+        """Return what is kept of a blast, or `None` if it was not run to its end."""
+        return read_record(self.blast_of(key))
+
+    def _content(self) -> Any:
+        path = self.path / _DESIGN
+        try:
+            return json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise BlastEnvError(f"{path}: cannot be read: {error}") from error
+
+
+class WorkFolder:
+    """The folder of all designs.
+
+    Args:
+        path: The folder; it is made if need be.
+
+    Attributes:
+        path: As given, absolute.
+
+    Raises:
+        BlastEnvError: If it cannot be made.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path).expanduser().absolute()
+        make_folder(self._designs)
+
+    @property
+    def cache(self) -> Path:
+        """Where loads of blasts are kept for every design."""
+        return self.path / "cache"
+
+    def designs(self) -> list[DesignEntry]:
+        """Return the designs, the one changed last first."""
+        folders = [each for each in self._designs.iterdir() if each.is_dir()]
+        entries = [DesignFolder(each).entry() for each in folders]
+        return sorted(entries, key=lambda each: -each.changed_s)
+
+    def create(self, scenario: Scenario, label: str) -> DesignFolder:
+        """Return the folder of a new design.
+
+        Args:
+            scenario: Its site.
+            label: Where that comes from.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        folder = DesignFolder(self._designs / secrets.token_hex(6))
+        for path in (folder.path, folder.jobs, folder.blasts):
+            make_folder(path)
+        folder.save(History(Step(label, Design(scenario))))
+        return folder
+
+    def open(self, design_id: str) -> DesignFolder:
+        """Return the folder of a design.
+
+        Raises:
+            BlastEnvError: If there is none of that name.
+        """
+        folder = DesignFolder(self._designs / check_key(design_id))
+        if not (folder.path / _DESIGN).is_file():
+            raise BlastEnvError(f"there is no design {design_id!r} in {self.path}")
+        return folder
+
+    @contextmanager
+    def held(self, url: str) -> Iterator[None]:
+        """Hold the folder in this block: two servers would overwrite each other's designs.
+
+        Args:
+            url: Where this server is, for the message to others.
+
+        Raises:
+            BlastEnvError: If another process holds it.
+        """
+        mark = self.path / _OPEN
+        other = _holder(mark)
+        if other is not None:
+            raise BlastEnvError(
+                f"{self.path} is open already at {other}: go there, or name another folder"
+                " (--folder)"
+            )
+        with write_atomically(mark) as temporary:
+            content = {"process": os.getpid(), "url": url, "since_s": time()}
+            temporary.write_text(json.dumps(content), encoding="utf-8")
+        try:
+            yield
+        finally:
+            mark.unlink(missing_ok=True)
+
+    @property
+    def _designs(self) -> Path:
+        return self.path / "designs"
+
+
+def _holder(mark: Path) -> str | None:
+    """Return where the server is that holds a folder, or `None` if none does any more."""
+    try:
+        content = json.loads(mark.read_text(encoding="utf-8"))
+        process, url = int(content["process"]), str(content["url"])
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+    if process == os.getpid():
+        return url
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return None
+    except OSError:  # it is there, but another user's
+        return url
+    return url

@@ -1,0 +1,194 @@
+"""Processes that do the work of all designs: started beforehand, given work, stopped."""
+
+import os
+import secrets
+import subprocess
+import sys
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import monotonic
+from typing import Final
+
+from blast_env.app.work import Status, Task, read_status, write_status, write_task
+from blast_env.files import make_folder
+
+_GRACE_S: Final = 5.0
+"""How long work may take to stop before its process is ended."""
+
+_COMMAND: Final = (sys.executable, "-m", "blast_env.app.worker")
+
+
+@dataclass
+class _Process:
+    """A worker, and what it does."""
+
+    popen: "subprocess.Popen[str]"
+    folder: Path | None = None
+    stop_by_s: float | None = None
+
+    @classmethod
+    def started(cls) -> "_Process":
+        log = None if os.environ.get("BLAST_ENV_WORKER_LOG") else subprocess.DEVNULL
+        return cls(
+            subprocess.Popen(
+                _COMMAND,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=log,
+                text=True,
+                start_new_session=True,  # Ctrl-C is for the server, which then tells the workers
+            )
+        )
+
+    @property
+    def is_alive(self) -> bool:
+        return self.popen.poll() is None
+
+    def send(self, line: str) -> bool:
+        """Send a line; return whether the process could still take it."""
+        assert self.popen.stdin is not None
+        try:
+            self.popen.stdin.write(f"{line}\n")
+            self.popen.stdin.flush()
+        except OSError:
+            return False
+        return True
+
+    def end(self) -> None:
+        """End the process at once."""
+        self.popen.kill()
+        self.popen.wait()
+        self.hang_up()
+
+    def hang_up(self) -> None:
+        """Close the process's standard input, which is what it ends by."""
+        if self.popen.stdin is not None:
+            with suppress(OSError):
+                self.popen.stdin.close()
+
+
+@dataclass
+class Workers:
+    """Some processes, and the work that waits for them.
+
+    `tick` does what is due; call it from time to time. Work is known by its folder.
+
+    Attributes:
+        most: Most processes that work at the same time.
+    """
+
+    most: int = field(default_factory=lambda: min(max(os.cpu_count() or 1, 1), 4))
+    _processes: list[_Process] = field(default_factory=list, init=False)
+    _waiting: deque[Path] = field(default_factory=deque, init=False)
+
+    def prepare(self) -> None:
+        """Start one process that waits for work, so that the first blast need not wait for it."""
+        if not self._processes:
+            self._processes.append(_Process.started())
+
+    def begin(self, task: Task, jobs: Path, title: str) -> Path:
+        """Put work in line.
+
+        Args:
+            task: The work.
+            jobs: Where its folder is made.
+            title: What it is, for people.
+
+        Returns:
+            The folder of the work.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        folder = jobs / f"{len(list(jobs.iterdir())):04}-{secrets.token_hex(4)}"
+        make_folder(folder)
+        write_task(task, folder, title)
+        self._waiting.append(folder)
+        self.tick()
+        return folder
+
+    def stop(self, folder: Path) -> None:
+        """Stop work; a search keeps the best layout so far."""
+        if folder in self._waiting:
+            self._waiting.remove(folder)
+            _put(folder, "stopped", "stopped before it began")
+            return
+        for process in self._processes:
+            if process.folder == folder and process.stop_by_s is None:
+                process.stop_by_s = monotonic() + _GRACE_S
+                process.send("stop")
+
+    def is_known(self, folder: Path) -> bool:
+        """Return whether work is waiting or under way here."""
+        return folder in self._waiting or any(each.folder == folder for each in self._processes)
+
+    def tick(self) -> None:
+        """Look after the processes: who is done, who has died, who can take more."""
+        for process in [*self._processes]:
+            self._look_at(process)
+        while self._waiting:
+            idle = next((each for each in self._processes if each.folder is None), None)
+            if idle is None:
+                if len(self._processes) >= self.most:
+                    return
+                idle = _Process.started()
+                self._processes.append(idle)
+            folder = self._waiting.popleft()
+            idle.folder = folder
+            if not idle.send(f"run {folder}"):
+                self._waiting.appendleft(folder)
+                idle.end()
+                self._processes.remove(idle)
+
+    def close(self) -> None:
+        """Stop all work, let searches keep what they have, and end the processes."""
+        for folder in [*self._waiting]:
+            self.stop(folder)
+        for process in self._processes:
+            process.hang_up()
+        until_s = monotonic() + _GRACE_S
+        for process in self._processes:
+            try:
+                process.popen.wait(max(until_s - monotonic(), 0.0))
+            except subprocess.TimeoutExpired:
+                process.end()
+            if process.folder is not None and not read_status(process.folder).is_over:
+                _put(process.folder, "stopped", "stopped with the server")
+        self._processes.clear()
+
+    def _look_at(self, process: _Process) -> None:
+        if not process.is_alive:
+            process.hang_up()
+            self._processes.remove(process)
+            if process.folder is not None and not read_status(process.folder).is_over:
+                code = process.popen.returncode
+                _put(process.folder, "failed", f"its process ended unexpectedly (code {code})")
+            return
+        if process.folder is None:
+            return
+        if read_status(process.folder).is_over:
+            process.folder, process.stop_by_s = None, None
+        elif process.stop_by_s is not None and monotonic() > process.stop_by_s:
+            process.end()
+            self._processes.remove(process)
+            _put(process.folder, "stopped", "stopped")
+
+
+def jobs_of(folder: Path) -> list[tuple[Path, Status]]:
+    """Return all work that was asked for, the last first."""
+    folders = sorted((each for each in folder.iterdir() if each.is_dir()), reverse=True)
+    return [(each, read_status(each)) for each in folders]
+
+
+def _put(folder: Path, state: str, text: str) -> None:
+    status = read_status(folder)
+    write_status(status.model_copy(update={"state": state, "text": text}), folder)
+
+
+def settle(jobs: Path, workers: Workers) -> None:
+    """Say of work that no process does any more, after a server was killed, that it stopped."""
+    for folder, status in jobs_of(jobs):
+        if not status.is_over and not workers.is_known(folder):
+            _put(folder, "stopped", "the server stopped meanwhile")

@@ -1,0 +1,1 @@
+"""The page itself, with NiceGUI: panels, plan, results; all decisions are below."""

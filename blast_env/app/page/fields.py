@@ -1,0 +1,167 @@
+"""What can be changed about a thing on a site, as fields of a form."""
+
+from collections.abc import Mapping
+from typing import Any, Final, Literal, NamedTuple
+
+from blast_env.app.edits import Document, Kind, Thing, document_of
+from blast_env.physics.scene import WALLS
+from blast_env.scenario import Scenario
+
+Form = Literal["number", "integer", "text", "switch", "walls", "side"]
+
+
+class FormField(NamedTuple):
+    """A field.
+
+    Attributes:
+        label: What it is, with its unit.
+        key: Its key in the scenario file.
+        form: What is typed into it.
+        part: Number of the coordinate, where the key holds several.
+        optional: Whether it may be empty: then the rule of the file format holds.
+        inside: Key of the table in which the key is, if it is a further one.
+    """
+
+    label: str
+    key: str
+    form: Form = "number"
+    part: int | None = None
+    optional: bool = False
+    inside: str = ""
+
+
+_CORNER: Final = (
+    FormField("left (m)", "corner_m", part=0),
+    FormField("bottom (m)", "corner_m", part=1),
+)
+_SIZE: Final = (FormField("width (m)", "size_m", part=0), FormField("depth (m)", "size_m", part=1))
+
+_FIELDS: Final[Mapping[Kind, tuple[FormField, ...]]] = {
+    Kind.SITE: (
+        FormField("width (m)", "width_m"),
+        FormField("depth (m)", "height_m"),
+        FormField("height of the air (m)", "air_height_m", optional=True),
+    ),
+    Kind.ZONE: (
+        *_CORNER,
+        FormField("rows", "rows", "integer"),
+        FormField("columns", "columns", "integer"),
+        FormField("stock", "stock", "integer"),
+        FormField("height of modules (m)", "height_m", optional=True),
+        FormField("cost of a module", "module_cost"),
+        FormField("budget", "budget", optional=True),
+        FormField("clearance (m)", "clearance_m"),
+        FormField("access way (m)", "width_m", optional=True, inside="access_way"),
+        FormField("way between", "between", "side", optional=True, inside="access_way"),
+    ),
+    Kind.KEEP_OUT: (FormField("reason", "reason", "text"), *_CORNER, *_SIZE),
+    Kind.COST_AREA: (
+        FormField("reason", "reason", "text"),
+        FormField("cost of a module", "module_cost", optional=True),
+        *_CORNER,
+        *_SIZE,
+    ),
+    Kind.GAUGE: (
+        FormField("name", "name", "text"),
+        FormField("x (m)", "position_m", part=0),
+        FormField("y (m)", "position_m", part=1),
+        FormField("height (m)", "position_m", part=2),
+    ),
+}
+
+_OF_CHARGES: Final = (
+    FormField("mass (kg TNT)", "tnt_kg"),
+    FormField("height (m)", "height_m"),
+    FormField("weight", "weight"),
+)
+_OF_CHARGE: Final[Mapping[str, tuple[FormField, ...]]] = {
+    "point": (FormField("x (m)", "position_m", part=0), FormField("y (m)", "position_m", part=1)),
+    "segment": (
+        FormField("from x (m)", "start_m", part=0),
+        FormField("from y (m)", "start_m", part=1),
+        FormField("to x (m)", "end_m", part=0),
+        FormField("to y (m)", "end_m", part=1),
+    ),
+    "rectangle": (*_CORNER, *_SIZE),
+}
+
+_OF_STRUCTURE: Final = (
+    FormField("protected", "protected", "switch"),
+    FormField("height (m)", "height_m", optional=True),
+    *_CORNER,
+)
+_OF_STRUCTURES: Final[Mapping[str, tuple[FormField, ...]]] = {
+    "ModularObstacle": (
+        FormField("columns", "columns", "integer"),
+        FormField("rows", "rows", "integer"),
+    ),
+    "ConcreteSquare": (FormField("modules a side", "side_modules", "integer"),),
+}
+_LAST_OF_STRUCTURE: Final = (
+    FormField("weight", "weight"),
+    FormField("walls that count", "faces", "walls"),
+)
+
+
+def section_of(scenario: Scenario, thing: Thing) -> Document:
+    """Return what the scenario's file says of a thing."""
+    document = document_of(scenario)
+    tables: Mapping[Kind, Any] = {
+        Kind.SITE: [document["site"]],
+        Kind.ZONE: [document.get("build_zone", {})],
+        Kind.STRUCTURE: document["structures"],
+        Kind.CHARGE: document["charge"],
+        Kind.KEEP_OUT: document.get("build_zone", {}).get("keep_outs", []),
+        Kind.COST_AREA: document.get("build_zone", {}).get("cost_areas", []),
+        Kind.GAUGE: document.get("gauges", []),
+    }
+    section: Document = tables[thing.kind][thing.number]
+    return section
+
+
+def fields_of(scenario: Scenario, thing: Thing) -> tuple[FormField, ...]:
+    """Return what can be changed about a thing."""
+    kind = section_of(scenario, thing).get("kind", "")
+    if thing.kind is Kind.CHARGE:
+        return (*_OF_CHARGES, *_OF_CHARGE[kind])
+    if thing.kind is Kind.STRUCTURE:
+        name = FormField("name", "name", "text")
+        return (name, *_OF_STRUCTURE, *_OF_STRUCTURES[kind], *_LAST_OF_STRUCTURE)
+    return _FIELDS[thing.kind]
+
+
+def value_of(section: Document, field: FormField) -> Any:
+    """Return the value of a field, `None` where the file says nothing."""
+    if field.inside:
+        section = section.get(field.inside) or {}
+    value = section.get(field.key)
+    if field.form == "walls":
+        return list(value or WALLS)
+    return value if field.part is None or value is None else value[field.part]
+
+
+def change_of(section: Document, field: FormField, typed: Any) -> dict[str, Any]:
+    """Return what `edits.with_values` is to be given, for what was typed into a field."""
+    value = _of_form(field, typed)
+    if field.part is not None:
+        coordinates = [*section[field.key]]
+        coordinates[field.part] = value
+        value = coordinates
+    if not field.inside:
+        return {field.key: value}
+    table = {**(section.get(field.inside) or {}), field.key: value}
+    if value is None:
+        return {field.inside: None}
+    if field.inside == "access_way":
+        table = {"width_m": 3.0, "between": "left_right"} | table
+    return {field.inside: table}
+
+
+def _of_form(field: FormField, typed: Any) -> Any:
+    if typed is None or typed == "":
+        return None
+    if field.form == "number":
+        return float(typed)
+    if field.form == "integer":
+        return int(typed) if float(typed).is_integer() else float(typed)
+    return typed

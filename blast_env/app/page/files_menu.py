@@ -1,0 +1,150 @@
+"""Opening and saving: sites and layouts as files, all forms of export, films."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import tomli_w
+from nicegui import events, ui
+
+from blast_env.app.design import SLOTS
+from blast_env.app.session import Session
+from blast_env.app.sources import IMPORTERS, MOST_BYTES, layout_of_file, site_of_file
+from blast_env.errors import BlastEnvError
+from blast_env.export import SUFFIXES, LayoutPlan, export_layout
+from blast_env.provenance import versions
+from blast_env.scenario import Scenario
+
+
+def complain(error: BlastEnvError) -> None:
+    """Show what is wrong, with all its lines, until it has been read."""
+    with ui.dialog(value=True) as dialog, ui.card().classes("w-[560px] max-w-full"):
+        ui.label("That does not work").style("font-weight: 600; font-size: 16px")
+        ui.label(str(error)).style("white-space: pre-wrap; overflow-wrap: anywhere")
+        ui.label("Nothing was changed; the design is as it was.").classes("be-quiet")
+        ui.button("close", on_click=dialog.close).props("autofocus no-caps")
+
+
+async def read_site(event: events.UploadEventArguments) -> Scenario | None:
+    """Return the site of a file that was handed over, or say what is wrong with it."""
+    try:
+        return site_of_file(event.file.name, await event.file.read())
+    except BlastEnvError as error:
+        complain(error)
+        return None
+
+
+def site_upload(label: str, use: Callable[[Scenario, str], None]) -> ui.upload:
+    """Return a place to hand over the file of a site."""
+
+    async def take(event: events.UploadEventArguments) -> None:
+        upload.reset()
+        scenario = await read_site(event)
+        if scenario is not None:
+            use(scenario, event.file.name)
+
+    upload = ui.upload(
+        label=label,
+        auto_upload=True,
+        max_file_size=MOST_BYTES,
+        on_upload=take,
+        on_rejected=lambda: ui.notify(
+            f"the file is too large: at most {MOST_BYTES // 1_000_000} MB", type="negative"
+        ),
+    )
+    upload.props(f'accept="{",".join(IMPORTERS)}" flat bordered').classes("w-full")
+    return upload
+
+
+def _menu(words: str, icon: str) -> ui.menu:
+    """Return the menu of a button in the header."""
+    with ui.button(words, icon=icon).props("flat dense no-caps color=white"):
+        return ui.menu()
+
+
+class FilesMenu:
+    """The menus of the header.
+
+    Args:
+        session: The design.
+        after: Called after a file has changed the design.
+    """
+
+    def __init__(self, session: Session, after: Callable[[], None]) -> None:
+        self._session = session
+        self._after = after
+        with _menu("Open", "folder_open"):
+            ui.menu_item("all designs, new design", lambda: ui.navigate.to("/"))
+            ui.menu_item("site from a file, into this design", self._open_site)
+            ui.menu_item("layout from a file", self._open_layout)
+        with _menu("Save as", "save_alt"):
+            ui.menu_item("site: scenario file (.toml)", self._save_site)
+            for suffix in SUFFIXES:
+                ui.menu_item(f"layout: {suffix}", partial(self._save_layout, suffix))
+            ui.menu_item("film of this layout (.mp4)", self._save_film)
+
+    def _open_site(self) -> None:
+        with ui.dialog(value=True) as dialog, ui.card().classes("w-[480px]"):
+            ui.label("A site in the place of this one").style("font-weight: 600")
+            ui.label("Layouts stay as far as they may stand there; undo brings all back.")
+
+            def use(scenario: Scenario, name: str) -> None:
+                dialog.close()
+                notes = self._session.put_site(f"site of {name}", scenario)
+                for note in notes:
+                    ui.notify(note, type="warning", multi_line=True)
+                self._after()
+
+            site_upload("drop a file here, or press +", use)
+            ui.button("cancel", on_click=dialog.close).props("flat no-caps")
+
+    def _open_layout(self) -> None:
+        with ui.dialog(value=True) as dialog, ui.card().classes("w-[480px]"):
+            active = self._session.design.active
+            ui.label(f"A layout file (.json) into layout {SLOTS[active]}")
+
+            async def take(event: events.UploadEventArguments) -> None:
+                dialog.close()
+                try:
+                    file = layout_of_file(event.file.name, await event.file.read())
+                    cells = file.cells_for(self._session.scenario)
+                    design = self._session.design.with_layout(cells)
+                    self._session.put(f"layout of {event.file.name}", design)
+                except BlastEnvError as error:
+                    complain(error)
+                self._after()
+
+            upload = ui.upload(
+                label="drop a file here, or press +", auto_upload=True, on_upload=take
+            )
+            upload.props('accept=".json" flat bordered').classes("w-full")
+            ui.button("cancel", on_click=dialog.close).props("flat no-caps")
+
+    def _save_site(self) -> None:
+        scenario = self._session.scenario
+        text = tomli_w.dumps(scenario.model_dump(mode="json", exclude_none=True))
+        ui.download.content(text, f"{scenario.name}.toml")
+
+    def _save_layout(self, suffix: str) -> None:
+        session = self._session
+        name = f"{session.scenario.name}_{SLOTS[session.design.active]}{suffix}"
+        provenance = {"made by": "blast-env app", "versions": versions()}
+        try:
+            plan = LayoutPlan(session.scenario, session.design.layout, provenance=provenance)
+            with TemporaryDirectory() as folder:
+                content = export_layout(plan, Path(folder) / name).read_bytes()
+        except BlastEnvError as error:
+            complain(error)
+            return
+        ui.download.content(content, name)
+
+    def _save_film(self) -> None:
+        session = self._session
+        name = f"{session.scenario.name}_{SLOTS[session.design.active]}.mp4"
+        try:
+            session.film(session.folder.path / name)
+        except BlastEnvError as error:
+            complain(error)
+            return
+        ui.notify("the film is on its way: it can be downloaded on the right when it is there")

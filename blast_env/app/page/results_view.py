@@ -1,0 +1,230 @@
+"""Results beside each other: films, maps, walls, gauges, and the table."""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from nicegui import ui
+
+from blast_env.app.records import BlastRecord, Row, read_film
+from blast_env.app.session import Session
+from blast_env.app.threats import NamedThreat
+
+_FILM: Final = "film"
+_GAUGES: Final = "gauges"
+_COLUMNS: Final = (
+    ("layout", "layout", "left"),
+    ("threat", "threat", "left"),
+    ("structure", "structure", "left"),
+    ("impulse", "impulse (Pa s)", "right"),
+    ("peak", "peak (kPa)", "right"),
+    ("reduction", "reduction", "right"),
+    ("cost", "cost", "right"),
+    ("engine", "engine", "left"),
+)
+# Okabe and Ito, with a dash each: no colour alone says which line is which.
+_LINES: Final = (
+    ("#000000", "solid"),
+    ("#0072B2", "solid"),
+    ("#D55E00", "dashed"),
+    ("#009E73", "dotted"),
+    ("#CC79A7", "dashed"),
+)
+
+
+class ResultsView:
+    """Shows the blasts of the layouts as they are now.
+
+    Args:
+        session: The design.
+        url: Where the files of a blast are, by its key.
+    """
+
+    def __init__(self, session: Session, url: Callable[[str], str]) -> None:
+        self._session = session
+        self._url = url
+        self._what = _FILM
+        self._threat = ""
+        self._with_bare = True
+        self._state: object = None
+        self._build()
+
+    def _build(self) -> None:
+        with ui.row().classes("w-full items-center gap-2 no-wrap"):
+            self._pictures = ui.select([_FILM], value=_FILM, label="picture")
+            self._pictures.on_value_change(lambda e: self._choose(e.value))
+            self._threats = ui.select([], label="threat")
+            self._threats.on_value_change(lambda e: self._against(e.value))
+            for element in (self._pictures, self._threats):
+                element.props("dense outlined options-dense").classes("w-56")
+            bare = ui.switch("no barrier beside", value=True)
+            bare.on_value_change(lambda e: self._beside(e.value))
+            ui.space()
+            self._engine = ui.label().classes("be-quiet")
+        with ui.scroll_area().classes("w-full grow").style("height: calc(100vh - 160px)"):
+            self._empty = ui.label(
+                "No blast yet for the layouts as they are now: press Blast on the right."
+            ).classes("be-quiet")
+            self._bar = ui.html(_BAR, sanitize=False).classes("w-full")
+            self._cards = ui.element("div").classes("be-cards")
+            self._chart = ui.column().classes("w-full")
+            columns = [
+                {"name": name, "field": name, "label": label, "align": align, "sortable": True}
+                for name, label, align in _COLUMNS
+            ]
+            self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full mt-2")
+            self._table.props("dense flat bordered")
+            self._notes = ui.column().classes("gap-0 mt-1")
+
+    def _choose(self, what: str) -> None:
+        if what and what != self._what:
+            self._what = what
+            self.refresh()
+
+    def _against(self, threat: str) -> None:
+        if threat and threat != self._threat:
+            self._threat = threat
+            self.refresh()
+
+    def _beside(self, beside: bool) -> None:
+        self._with_bare = beside
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show what there is, if it is not shown already."""
+        session = self._session
+        threats = {each.name: each for each in session.chosen_threats()}
+        if self._threat not in threats:
+            self._threat = next(iter(threats))
+        self._threats.set_options([*threats], value=self._threat)
+        found = self._found(threats[self._threat])
+        state = (self._what, self._threat, self._with_bare, session.engine, found, *threats)
+        if state == self._state:
+            return
+        self._state = state
+        self._engine.text = f"engine: {session.engine.label}"
+        records = [record for _, _, record, _ in found if record is not None]
+        self._offer(records)
+        shown = [each for each in found if self._with_bare or each[0] != "no barrier"]
+        self._show_cards(shown)
+        self._show_chart(threats[self._threat])
+        rows = session.comparison()
+        self._table.rows = [_row(each, k) for k, each in enumerate(rows)]
+        self._table.visible = bool(rows)
+        self._empty.visible = not found
+        self._show_notes(records)
+
+    def _found(self, threat: NamedThreat) -> list[tuple[str, str, BlastRecord | None, int]]:
+        """Return name, key, record and number of frames of every blast of which anything is."""
+        found = []
+        for each in self._session.shown(threat):
+            folder = self._session.folder.blast_of(each.key)
+            record, film = self._session.folder.record_of(each.key), read_film(folder)
+            if record is not None or film is not None:
+                found.append((each.name, each.key, record, 0 if film is None else film.count))
+        return found
+
+    def _offer(self, records: list[BlastRecord]) -> None:
+        """Offer what pictures there are."""
+        labels = dict.fromkeys(each.label for record in records for each in record.pictures)
+        gauges = [_GAUGES] if any(record.waves for record in records) else []
+        options = [_FILM, *labels, *gauges]
+        if self._what not in options:
+            self._what = _FILM
+        self._pictures.set_options(options, value=self._what)
+
+    def _show_cards(self, found: list[tuple[str, str, BlastRecord | None, int]]) -> None:
+        self._cards.clear()
+        self._bar.visible = self._what == _FILM and bool(found)
+        self._cards.visible = self._what != _GAUGES
+        wide = self._what.endswith("walls") or " on the walls of " in self._what
+        columns = 1 if wide or len(found) == 1 else 2
+        self._cards.style(f"grid-template-columns: repeat({columns}, minmax(0, 1fr))")
+        with self._cards:
+            for name, key, record, frames in found:
+                self._card(name, key, record, frames)
+
+    def _card(self, name: str, key: str, record: BlastRecord | None, frames: int) -> None:
+        url = self._url(key)
+        with ui.element("figure").classes("be-card m-0"):
+            with ui.row().classes("w-full items-center no-wrap"):
+                title = name if name == "no barrier" else f"layout {name}"
+                ui.label(title).style("font-weight: 600")
+                ui.space()
+                ui.label(self._summary(record)).classes("be-quiet")
+            if self._what == _FILM:
+                if frames:
+                    image = ui.element("img")
+                    image.props(f'data-film="{url}/" data-count={frames} alt="film, {title}"')
+                else:
+                    ui.label("the film begins in a moment").classes("be-quiet")
+                return
+            pictures = () if record is None else record.pictures
+            file = next((each.file for each in pictures if each.label == self._what), None)
+            if file is None:
+                ui.label("not drawn yet").classes("be-quiet")
+            else:
+                ui.element("img").props(f'src="{url}/{file}" alt="{self._what}, {title}"')
+
+    def _summary(self, record: BlastRecord | None) -> str:
+        if record is None or not record.loads:
+            return "" if record is not None else "loads to come"
+        return f"{record.loads[0].impulse_pa_s:,.0f} Pa s on what is protected"
+
+    def _show_chart(self, threat: NamedThreat) -> None:
+        self._chart.clear()
+        self._chart.visible = self._what == _GAUGES
+        if self._what != _GAUGES:
+            return
+        waves = self._session.waves(threat)
+        names = dict.fromkeys(wave.gauge for _, record in waves for wave in record.waves)
+        with self._chart:
+            for gauge in names:
+                ui.echart(_chart(gauge, waves)).classes("w-full").style("height: 300px")
+
+    def _show_notes(self, records: list[BlastRecord]) -> None:
+        self._notes.clear()
+        with self._notes:
+            for note in dict.fromkeys(note for each in records for note in each.notes):
+                ui.label(f"note: {note}").classes("be-quiet")
+
+
+def _row(row: Row, number: int) -> dict[str, Any]:
+    return {"id": number, **row.model_dump()}
+
+
+def _chart(gauge: str, waves: Any) -> dict[str, Any]:
+    """Return the histories of all layouts at a gauge, in one diagram."""
+    series = []
+    for (name, record), (colour, dash) in zip(waves, _LINES, strict=False):
+        for wave in record.waves:
+            if wave.gauge == gauge:
+                points = [
+                    list(each) for each in zip(wave.time_ms, wave.overpressure_kpa, strict=True)
+                ]
+                series.append(
+                    {
+                        "name": f"{name}: {wave.peak_kpa:.3g} kPa, {wave.impulse_pa_s:.3g} Pa s",
+                        "type": "line",
+                        "showSymbol": False,
+                        "data": points,
+                        "lineStyle": {"color": colour, "type": dash, "width": 2},
+                        "itemStyle": {"color": colour},
+                    }
+                )
+    return {
+        "animation": False,
+        "title": {"text": f"gauge {gauge}", "textStyle": {"fontSize": 14}},
+        "legend": {"top": 24},
+        "grid": {"left": 60, "right": 20, "top": 64, "bottom": 46},
+        "tooltip": {"trigger": "axis"},
+        "xAxis": {"type": "value", "name": "time (ms)", "nameLocation": "middle", "nameGap": 28},
+        "yAxis": {"type": "value", "name": "overpressure (kPa)"},
+        "series": series,
+    }
+
+
+_BAR: Final = (
+    '<div class="be-film-bar"><button type="button" data-film-play>play</button>'
+    '<input type="range" min="0" max="47" value="0" step="1" data-film-slider'
+    ' aria-label="moment of all films"></div>'
+)

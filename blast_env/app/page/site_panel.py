@@ -1,0 +1,139 @@
+"""The panel on the left: what stands on the site, and what can be changed about it."""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from nicegui import ui
+
+from blast_env.app import edits
+from blast_env.app.editor import Editor
+from blast_env.app.edits import Kind, Thing
+from blast_env.app.page.fields import FormField, change_of, fields_of, section_of, value_of
+from blast_env.physics.scene import WALLS
+
+_SIDES: Final = {"left_right": "left and right", "bottom_top": "bottom and top"}
+_SITE: Final = Thing(Kind.SITE)
+
+
+class SitePanel:
+    """Shows and changes what is selected.
+
+    Args:
+        editor: The hand on the design.
+        after: Called after the panel has changed something.
+    """
+
+    def __init__(self, editor: Editor, after: Callable[[], None]) -> None:
+        self._editor = editor
+        self._after = after
+        self._fields: tuple[FormField, ...] = ()
+        self._inputs: list[Any] = []
+        self._filling = False
+        self._build()
+
+    def _build(self) -> None:
+        with ui.column().classes("be-side be-left").props('role="region" aria-label="site"'):
+            with ui.row().classes("w-full items-center no-wrap"):
+                self._name = ui.input("site").props("dense outlined").classes("grow")
+                self._name.on("blur", self._rename).on("keydown.enter", self._rename)
+            self._chooser = ui.select({}, label="selected", on_change=self._choose)
+            self._chooser.props("dense outlined options-dense").classes("w-full")
+            self._form = ui.column().classes("w-full gap-1")
+            with ui.row().classes("gap-1"):
+                self._delete = ui.button("delete", icon="delete", on_click=self._remove)
+                self._delete.props("dense outline no-caps size=sm")
+                ui.label("arrow keys move it by 0.5 m").classes("be-quiet self-center")
+            self._facts = ui.label().classes("be-quiet")
+
+    def refresh(self) -> None:
+        """Show the design as it is."""
+        scenario, editor = self._editor.session.scenario, self._editor
+        if editor.selected is not None and not edits.has(scenario, editor.selected):
+            editor.selected = None
+        thing = editor.selected or _SITE
+        self._filling = True
+        self._name.value = scenario.name
+        options = {_id(each): words for each, words in edits.things(scenario)}
+        self._chooser.set_options(options, value=_id(thing))
+        fields = fields_of(scenario, thing)
+        if fields != self._fields:
+            self._fields = fields
+            self._form.clear()
+            with self._form:
+                self._inputs = [self._input(each) for each in fields]
+        section = section_of(scenario, thing)
+        for field, element in zip(self._fields, self._inputs, strict=True):
+            element.value = value_of(section, field)
+        self._delete.set_enabled(thing != _SITE)
+        self._facts.text = " ".join(
+            (
+                f"Air {scenario.air_height_m:g} m high.",
+                "Without heights walls go up to it."
+                if any(each.height_m is None for each in scenario.structures)
+                else "",
+            )
+        )
+        self._filling = False
+
+    def _input(self, field: FormField) -> Any:
+        if field.form == "switch":
+            return ui.switch(field.label, on_change=lambda e: self._put(field, e.value))
+        element: Any
+        if field.form == "walls":
+            element = ui.select([*WALLS], label=field.label, multiple=True)
+            element.on_value_change(lambda e: self._put(field, e.value))
+        elif field.form == "side":
+            element = ui.select(_SIDES, label=field.label, clearable=True)
+            element.on_value_change(lambda e: self._put(field, e.value))
+        elif field.form == "text":
+            element = ui.input(field.label)
+        else:
+            step = 1 if field.form == "integer" else 0.5
+            element = ui.number(field.label, step=step)
+        if field.form in ("text", "number", "integer"):
+            element.on("blur", lambda: self._put(field, element.value))
+            element.on("keydown.enter", lambda: self._put(field, element.value))
+            element.on("change", lambda: self._put(field, element.value))
+        if field.optional:
+            element.props('placeholder="by rule" clearable stack-label')
+        element.props("dense outlined").classes("w-full")
+        return element
+
+    def _put(self, field: FormField, typed: Any) -> None:
+        if self._filling:
+            return
+        scenario = self._editor.session.scenario
+        thing = self._editor.selected or _SITE
+        section = section_of(scenario, thing)
+        if value_of(section, field) == typed:
+            return
+        try:
+            values = change_of(section, field, typed)
+        except ValueError:
+            self._editor.message = f"{field.label}: {typed!r} is no number"
+        else:
+            label = f"{thing.kind}: {field.label}"
+            self._editor.attempt(label, lambda site: edits.with_values(site, thing, values))
+        self._after()
+
+    def _rename(self) -> None:
+        typed = self._name.value
+        if self._filling or typed == self._editor.session.scenario.name:
+            return
+        self._editor.attempt("rename", lambda site: edits.with_values(site, None, {"name": typed}))
+        self._after()
+
+    def _choose(self, event: Any) -> None:
+        if self._filling or not event.value:
+            return
+        kind, _, number = str(event.value).rpartition(" ")
+        self._editor.selected = Thing(Kind(kind), int(number))
+        self._after()
+
+    def _remove(self) -> None:
+        self._editor.delete()
+        self._after()
+
+
+def _id(thing: Thing) -> str:
+    return f"{thing.kind} {thing.number}"

@@ -1,0 +1,90 @@
+"""The first page: designs to go on with, and sites to begin with."""
+
+from datetime import datetime
+
+from nicegui import ui
+
+from blast_env.app.page.files_menu import complain, site_upload
+from blast_env.app.session import Sessions
+from blast_env.app.sources import generated_site
+from blast_env.errors import BlastEnvError
+from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
+
+_MOST_SHOWN = 30
+
+
+class StartPage:
+    """The first page.
+
+    Args:
+        sessions: The designs.
+        message: What there is to say first.
+    """
+
+    def __init__(self, sessions: Sessions, message: str = "") -> None:
+        self._sessions = sessions
+        with (
+            ui.header()
+            .classes("items-center q-py-none q-px-md")
+            .style("height: 48px; background: #1e3a4c")
+        ):
+            ui.label("blast-env").style("font-weight: 600; font-size: 16px")
+            ui.label("where should barriers stand?").classes("q-ml-md")
+        with ui.row().classes("w-full no-wrap gap-4 q-pa-md items-start"):
+            with ui.column().classes("be-side").style("flex: 1; min-height: 400px"):
+                self._begin(message)
+            with ui.column().classes("be-side").style("flex: 1; min-height: 400px"):
+                self._designs()
+
+    def _begin(self, message: str) -> None:
+        if message:
+            ui.label(message).classes("be-refused")
+        ui.label("Begin with a site").classes("be-head")
+        for name in bundled_scenarios():
+            with ui.row().classes("w-full items-center no-wrap"):
+                button = ui.button(name, icon="add", on_click=lambda _, n=name: self._bundled(n))
+                button.props("no-caps dense outline").classes("w-44")
+                ui.label(load_scenario(name).description).classes("be-quiet")
+        ui.separator()
+        with ui.row().classes("items-center gap-2"):
+            self._seed = ui.number("seed", value=0, min=0, step=1, format="%d")
+            self._seed.props("dense outlined").classes("w-28")
+            ui.button("generated site", icon="casino", on_click=self._generated).props(
+                "no-caps dense outline"
+            )
+        ui.separator()
+        ui.label("or from a file").classes("be-quiet")
+        site_upload("drop a file here, or press +", self._create)
+
+    def _designs(self) -> None:
+        ui.label("Go on with a design").classes("be-head")
+        entries = self._sessions.work.designs()
+        if not entries:
+            ui.label("There are none yet.").classes("be-quiet")
+        for entry in entries[:_MOST_SHOWN]:
+            when = datetime.fromtimestamp(entry.changed_s).strftime("%Y-%m-%d %H:%M")
+            if entry.problem:
+                ui.label(f"{entry.design_id}: {entry.problem}").classes("be-refused")
+                continue
+            with ui.row().classes("w-full items-center no-wrap"):
+                ui.link(entry.title, f"/design/{entry.design_id}").style("font-weight: 600")
+                ui.space()
+                ui.label(f"{when}, {entry.design_id}").classes("be-quiet")
+        ui.label(f"kept in {self._sessions.work.path}").classes("be-quiet q-mt-md")
+
+    def _bundled(self, name: str) -> None:
+        self._create(load_scenario(name), name)
+
+    def _generated(self) -> None:
+        try:
+            self._create(generated_site(int(self._seed.value or 0)), "generated")
+        except BlastEnvError as error:
+            complain(error)
+
+    def _create(self, scenario: Scenario, source: str) -> None:
+        try:
+            session = self._sessions.new(scenario, f"site of {source}")
+        except BlastEnvError as error:
+            complain(error)
+            return
+        ui.navigate.to(f"/design/{session.folder.design_id}")

@@ -1,0 +1,287 @@
+"""The panel on the right: layouts, blasts, proposals, and the work that is under way."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from nicegui import ui
+
+from blast_env.app import placing
+from blast_env.app.design import SLOTS
+from blast_env.app.editor import Editor, Tool
+from blast_env.app.offers import METHODS, PROPOSERS
+from blast_env.app.records import Engine
+from blast_env.app.session import Session
+from blast_env.app.threats import threats_of
+from blast_env.app.work import Status
+from blast_env.errors import BlastEnvError
+
+_ENGINES: Final = {
+    "particles": "particles: a first look",
+    "gas 0.5": "gas, cells of 0.5 m",
+    "gas 0.25": "gas, cells of 0.25 m (slow)",
+}
+_SHOWN_JOBS: Final = 8
+_STATES: Final = {
+    "waiting": ("hourglass_empty", "waiting"),
+    "running": ("autorenew", "running"),
+    "done": ("check_circle", "done"),
+    "failed": ("error", "failed"),
+    "stopped": ("stop_circle", "stopped"),
+}
+
+
+class WorkPanel:
+    """Asks for blasts and proposals, and follows them.
+
+    Args:
+        editor: The hand on the design.
+        after: Called after the panel has changed something.
+        results: Called when somebody wants to see results.
+        runs: Run folders of trained agents, by name.
+    """
+
+    def __init__(
+        self,
+        editor: Editor,
+        after: Callable[[], None],
+        results: Callable[[], None],
+        runs: Sequence[Path],
+    ) -> None:
+        self._editor = editor
+        self._after = after
+        self._results = results
+        self._runs = {each.name: each for each in runs}
+        self._filling = False
+        self._told: list[tuple[Path, Status]] = []
+        self._build()
+
+    @property
+    def _session(self) -> Session:
+        return self._editor.session
+
+    def _build(self) -> None:
+        with ui.column().classes("be-side be-right").props('role="region" aria-label="work"'):
+            self._build_layouts()
+            self._build_blast()
+            self._build_proposal()
+            ui.label("Work").classes("be-head")
+            self._jobs = ui.column().classes("w-full gap-1").props('aria-live="polite"')
+
+    def _build_layouts(self) -> None:
+        ui.label("Layouts").classes("be-head")
+        with ui.row().classes("w-full items-center no-wrap gap-2"):
+            self._slots = ui.toggle(dict(enumerate(SLOTS)), on_change=lambda e: self._show(e.value))
+            self._slots.props('dense no-caps aria-label="layout that is edited"').classes(
+                "be-slots"
+            )
+            copy = ui.button(icon="content_copy", on_click=self._copy).props("dense flat size=sm")
+            copy.props('aria-label="copy into the next empty layout"')
+            copy.tooltip("copy into the next empty layout")
+            clear = ui.button(icon="layers_clear", on_click=self._clear).props("dense flat size=sm")
+            clear.props('aria-label="clear this layout"').tooltip("clear this layout")
+        self._counted = ui.label().classes("be-quiet")
+        self._palette = ui.select(
+            {}, label="what is placed", on_change=lambda e: self._item(e.value)
+        )
+        self._palette.props("dense outlined options-dense").classes("w-full")
+        self._turned = ui.switch("turned (key R)", on_change=lambda e: self.turn(e.value))
+
+    def _build_blast(self) -> None:
+        ui.separator()
+        with ui.row().classes("w-full items-center no-wrap gap-2"):
+            ui.label("Blast").classes("be-head")
+            ui.space()
+            one = ui.button("Blast", icon="flare", on_click=self.blast)
+            one.props("dense no-caps color=red-9").mark("blast")
+            every = ui.button("all", on_click=self.blast_all).props("dense outline no-caps")
+            every.tooltip("blast every layout that is not empty")
+        self._engine = ui.select(
+            _ENGINES, value="particles", label="engine", on_change=lambda e: self._use(e.value)
+        )
+        self._threats = ui.select(
+            [], label="threats", multiple=True, on_change=lambda e: self._against(e.value)
+        )
+        for element in (self._engine, self._threats):
+            element.props("dense outlined options-dense").classes("w-full")
+
+    def _build_proposal(self) -> None:
+        ui.separator()
+        with ui.row().classes("w-full items-center no-wrap gap-2"):
+            ui.label("Proposal").classes("be-head")
+            ui.space()
+            propose = ui.button("Propose", icon="lightbulb", on_click=self.propose)
+            propose.props("dense no-caps").mark("propose")
+        offers = {f"rule {each}": each for each in PROPOSERS}
+        offers |= {f"run {name}": f"agent of {name}" for name in self._runs}
+        offers |= {f"search {each}": f"search: {each}" for each in METHODS}
+        with ui.row().classes("w-full no-wrap gap-1"):
+            self._proposer = ui.select(offers, value=f"rule {PROPOSERS[0]}", label="by")
+            self._proposer.props("dense outlined options-dense").classes("grow")
+            self._budget = ui.number("blasts", value=100, min=1, step=50, format="%d")
+            self._budget.props("dense outlined").classes("w-20")
+        self._budget.bind_enabled_from(
+            self._proposer, "value", lambda value: str(value).startswith("search")
+        )
+
+    # What it does.
+
+    def _show(self, slot: int) -> None:
+        if not self._filling:
+            self._session.show(slot)
+
+    def _copy(self) -> None:
+        design = self._session.design
+        empty = [k for k, layout in enumerate(design.layouts) if not layout and k != design.active]
+        if not empty:
+            ui.notify("all four layouts are taken: clear one first", type="warning")
+            return
+        self._try(
+            lambda: self._session.put(
+                f"copy {SLOTS[design.active]} to {SLOTS[empty[0]]}",
+                design.with_layout(design.layout, empty[0]),
+            )
+        )
+        self._session.show(empty[0])
+
+    def _clear(self) -> None:
+        design = self._session.design
+        label = f"clear {SLOTS[design.active]}"
+        self._try(lambda: self._session.put(label, design.with_layout(())))
+
+    def _item(self, name: str | None) -> None:
+        if not self._filling and name is not None:
+            self._editor.item = name
+            self._editor.choose(Tool.PLACE)
+            self._after()
+
+    def turn(self, turned: bool | None = None) -> None:
+        """Turn what is placed, or as said."""
+        if self._filling:
+            return
+        self._editor.turned = not self._editor.turned if turned is None else turned
+        self._after()
+
+    def _use(self, name: str) -> None:
+        if self._filling:
+            return
+        if name == "particles":
+            self._session.engine = Engine()
+        else:
+            self._session.engine = Engine(name="gas", cell_m=float(name.split()[1]))
+        self._after()
+
+    def _against(self, names: Sequence[str]) -> None:
+        if not self._filling and names:
+            self._session.threats = tuple(names)
+            self._after()
+
+    def blast(self) -> None:
+        """Blast the layout that is edited."""
+        self._blast([self._session.design.active])
+
+    def blast_all(self) -> None:
+        """Blast every layout that is not empty, and no barrier."""
+        layouts = self._session.design.layouts
+        self._blast([k for k, layout in enumerate(layouts) if layout] or [0])
+
+    def _blast(self, slots: Sequence[int]) -> None:
+        if self._try(lambda: self._session.blast(slots)):
+            self._results()
+            self.follow()
+
+    def propose(self) -> None:
+        """Ask for the layout that is chosen."""
+        kind, _, name = str(self._proposer.value).partition(" ")
+        session = self._session
+        if kind == "search":
+            budget = int(self._budget.value or 0)
+            self._try(lambda: session.search(name, budget, from_layout=False))
+        elif kind == "run":
+            self._try(lambda: session.propose(str(self._runs[name]), is_run=True))
+        else:
+            self._try(lambda: session.propose(name))
+        self.follow()
+
+    def _take(self, status: Status) -> None:
+        active = self._session.design.active
+        if self._try(lambda: self._session.take(status, active)):
+            ui.notify(f"taken into layout {SLOTS[active]}", type="positive")
+
+    def _stop(self, folder: Path) -> None:
+        self._session.workers.stop(folder)
+        self.follow()
+
+    def _try(self, act: Callable[[], object]) -> bool:
+        """Do something, or say why not; return whether it was done."""
+        try:
+            act()
+        except BlastEnvError as error:
+            ui.notify(str(error), type="negative", multi_line=True, close_button=True, timeout=0)
+            return False
+        return True
+
+    # What it shows.
+
+    def refresh(self) -> None:
+        """Show the design as it is."""
+        session, design = self._session, self._session.design
+        self._filling = True
+        self._slots.value = design.active
+        self._counted.text = placing.counted(design.scenario, design.layout)
+        offers = placing.palette(design.scenario, design.layout)
+        names = [each.name for each in offers]
+        if offers and self._editor.item not in names:
+            self._editor.item = names[0]
+        options = {each.name: f"{each.label}, {each.left} left" for each in offers}
+        self._palette.set_options(options, value=self._editor.item if offers else None)
+        chosen = next((each for each in offers if each.name == self._editor.item), None)
+        self._turned.value = self._editor.turned
+        self._turned.visible = chosen is not None and chosen.can_turn
+        known = [each.name for each in threats_of(design.scenario)]
+        self._threats.set_options(known, value=list(session.threats))
+        engine = session.engine
+        self._engine.value = f"gas {engine.cell_m:g}" if engine.is_gas else "particles"
+        self._filling = False
+
+    def follow(self) -> bool:
+        """Show how far work has come; return whether anything is new."""
+        jobs = self._session.jobs()[:_SHOWN_JOBS]
+        if jobs == self._told:
+            return False
+        self._told = jobs
+        self._jobs.clear()
+        with self._jobs:
+            if not jobs:
+                ui.label("nothing yet: press Blast").classes("be-quiet")
+            for folder, status in jobs:
+                self._job(folder, status)
+        return True
+
+    def _job(self, folder: Path, status: Status) -> None:
+        icon, words = _STATES[status.state]
+        with ui.column().classes("be-job"):
+            with ui.row().classes("w-full items-center no-wrap gap-1"):
+                ui.icon(icon, size="18px", color="red-9" if status.state == "failed" else "blue-9")
+                ui.label(status.title).style("font-weight: 600; font-size: 13px")
+                ui.space()
+                ui.label(words).classes("be-quiet")
+            if not status.is_over:
+                bar = ui.linear_progress(status.share, show_value=False, size="8px")
+                bar.props(f'aria-label="{status.share:.0%} of {status.title}"')
+            if status.text and status.text != words:
+                refused = "be-refused" if status.state == "failed" else "be-quiet"
+                ui.label(status.text).classes(refused)
+            with ui.row().classes("gap-1"):
+                if not status.is_over:
+                    stop = ui.button("stop", icon="stop", on_click=partial(self._stop, folder))
+                    stop.props("dense outline no-caps size=sm")
+                if status.layout is not None:
+                    words = "take it" if status.is_over else "take best so far"
+                    take = ui.button(words, icon="input", on_click=partial(self._take, status))
+                    take.props("dense outline no-caps size=sm")
+                if status.file and status.state == "done":
+                    fetch = partial(ui.download.file, status.file)
+                    button = ui.button("download", icon="download", on_click=lambda: fetch())
+                    button.props("dense outline no-caps size=sm")

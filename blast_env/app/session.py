@@ -1,0 +1,330 @@
+"""A design that is open: edits that are kept at once, work that is under way, results.
+
+A session knows nothing of the page. All tabs on one design share its session, and designs have
+nothing to do with each other.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from blast_env.app import placing
+from blast_env.app.design import SLOTS, Design, History
+from blast_env.app.folder import DesignFolder, WorkFolder
+from blast_env.app.jobs import Workers, jobs_of, settle
+from blast_env.app.records import BlastRecord, Engine, Row, blast_key, comparison
+from blast_env.app.threats import NamedThreat, threats_of, usual_threats
+from blast_env.app.work import (
+    BlastTask,
+    FilmTask,
+    ProposalTask,
+    SearchTask,
+    Status,
+    Task,
+    ThreatOf,
+    plain_layout,
+)
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout
+from blast_env.scenario import Scenario
+
+BARE = "no barrier"
+"""What the blast without a layout is called."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A layout whose blast is shown beside others.
+
+    Attributes:
+        name: Its name.
+        layout: The layout.
+        key: Key of its blast.
+    """
+
+    name: str
+    layout: Layout
+    key: str
+
+
+@dataclass
+class Session:
+    """A design that is open.
+
+    Attributes:
+        folder: Where it is kept.
+        work: The work folder.
+        workers: What does its work.
+        history: The design with its steps.
+        engine: The engine that blasts are run with, and whose results are shown.
+        threats: Names of the threats that blasts are run with; those of the site that come first,
+            unless they were chosen.
+    """
+
+    folder: DesignFolder
+    work: WorkFolder
+    workers: Workers
+    history: History
+    engine: Engine = field(default_factory=Engine)
+    threats: tuple[str, ...] = ()
+    _listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
+
+    @classmethod
+    def opened(cls, folder: DesignFolder, work: WorkFolder, workers: Workers) -> "Session":
+        """Return the session of a design as it was left.
+
+        Raises:
+            BlastEnvError: If it cannot be read.
+        """
+        session = cls(folder, work, workers, folder.load())
+        settle(folder.jobs, workers)
+        session.threats = usual_threats(session.scenario)
+        return session
+
+    @property
+    def design(self) -> Design:
+        """The design as it is."""
+        return self.history.design
+
+    @property
+    def scenario(self) -> Scenario:
+        """Its site."""
+        return self.design.scenario
+
+    # Edits.
+
+    def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call a function after every edit; return what ends that."""
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener)
+
+    def put(self, label: str, design: Design) -> None:
+        """Make a step, and keep it.
+
+        Raises:
+            BlastEnvError: If it cannot be kept; the step is made all the same.
+        """
+        self._set(self.history.then(label, design))
+
+    def put_site(self, label: str, scenario: Scenario) -> tuple[str, ...]:
+        """Make a step to a changed site; return what of the layouts fell away, and why.
+
+        Raises:
+            BlastEnvError: As for `put`.
+        """
+        design, notes = self.design.with_scenario(scenario)
+        self.put(label, design)
+        return notes
+
+    def show(self, slot: int) -> None:
+        """Take another layout before oneself."""
+        self._set(self.history.showing(slot))
+
+    def undo(self) -> None:
+        """Take the last step back."""
+        self._set(self.history.undone())
+
+    def redo(self) -> None:
+        """Make the step again that was taken back last."""
+        self._set(self.history.redone())
+
+    def _set(self, history: History) -> None:
+        self.history = history
+        known = {each.name for each in threats_of(self.scenario)}
+        self.threats = tuple(each for each in self.threats if each in known)
+        self.threats = self.threats or usual_threats(self.scenario)
+        try:
+            self.folder.save(history)
+        finally:
+            for listener in [*self._listeners]:
+                listener()
+
+    # Work.
+
+    def chosen_threats(self) -> tuple[NamedThreat, ...]:
+        """Return the threats that blasts are run with."""
+        return tuple(each for each in threats_of(self.scenario) if each.name in self.threats)
+
+    def blast(self, slots: Iterable[int]) -> Path:
+        """Run the blasts of layouts under the chosen threats; return the folder of the work.
+
+        Raises:
+            BlastEnvError: If it cannot be begun.
+        """
+        chosen = [*slots]
+        names = ", ".join(SLOTS[each] for each in chosen)
+        folder = None
+        for slot in chosen:
+            task = BlastTask(
+                **self._what(self.design.layouts[slot]),
+                threats=self._threats_as_data(),
+                engine=self.engine,
+                blasts=str(self.folder.blasts),
+                cache=str(self.work.cache),
+            )
+            folder = self._begin(task, f"blast of {SLOTS[slot]}, {self.engine.label}")
+        if folder is None:
+            raise BlastEnvError(f"layouts: there are none to blast ({names})")
+        return folder
+
+    def propose(self, proposer: str, is_run: bool = False) -> Path:
+        """Ask a rule, or the agent of a run, for a layout against the chosen threats.
+
+        Raises:
+            BlastEnvError: If there is no build zone.
+        """
+        _ = self.scenario.zone
+        task = ProposalTask(
+            scenario=self._document(),
+            threats=self._threats_as_data(),
+            proposer=proposer,
+            is_run=is_run,
+        )
+        return self._begin(task, f"proposal: {Path(proposer).name if is_run else proposer}")
+
+    def search(self, method: str, budget: int, *, from_layout: bool = False) -> Path:
+        """Search for a layout against the chosen threats.
+
+        Args:
+            method: Name of the method.
+            budget: Most blasts.
+            from_layout: Whether to begin with the layout that is edited.
+
+        Raises:
+            BlastEnvError: If there is no build zone, or the budget is below 1.
+        """
+        _ = self.scenario.zone
+        if budget < 1:
+            raise BlastEnvError(f"budget is {budget} blasts, must be at least 1")
+        task = SearchTask(
+            scenario=self._document(),
+            threats=self._threats_as_data(),
+            method=method,
+            budget=budget,
+            engine=self.engine,
+            cache=str(self.work.cache),
+            begin_with=plain_layout(self.design.layout) if from_layout else (),
+        )
+        return self._begin(task, f"{method} search, {budget} blasts, {self.engine.label}")
+
+    def film(self, path: Path) -> Path:
+        """Write a film of the layout that is edited beside no barrier, under the first threat.
+
+        Raises:
+            BlastEnvError: If it cannot be begun.
+        """
+        task = FilmTask(
+            **self._what(self.design.layout),
+            threat=self._threats_as_data()[0],
+            engine=self.engine,
+            path=str(path),
+        )
+        return self._begin(task, f"film {path.name}")
+
+    def take(self, status: Status, slot: int) -> None:
+        """Take the layout of a proposal or a search as one of the design's.
+
+        Raises:
+            BlastEnvError: If there is none, or the site has changed so that it cannot stand.
+        """
+        if status.layout is None:
+            raise BlastEnvError(f"{status.title}: there is no layout to take")
+        layout = tuple(tuple(each) for each in status.layout)
+        design = self.design.with_layout(layout, slot)
+        self.put(f"{status.title} into {SLOTS[slot]}", design)
+
+    def jobs(self) -> list[tuple[Path, Status]]:
+        """Return all work that was asked for, the last first."""
+        return jobs_of(self.folder.jobs)
+
+    def _begin(self, task: Task, title: str) -> Path:
+        return self.workers.begin(task, self.folder.jobs, title)
+
+    def _what(self, layout: Layout) -> dict[str, Any]:
+        return {"scenario": self._document(), "layout": plain_layout(layout)}
+
+    def _document(self) -> dict[str, Any]:
+        return self.scenario.model_dump(mode="json", exclude_none=True)
+
+    def _threats_as_data(self) -> tuple[ThreatOf, ...]:
+        return tuple(
+            ThreatOf(
+                name=each.name,
+                position_m=each.charge.position_m,
+                tnt_kg=each.charge.tnt_kg,
+                height_m=each.charge.height_m,
+            )
+            for each in self.chosen_threats()
+        )
+
+    # Results.
+
+    def shown(self, threat: NamedThreat) -> tuple[Shown, ...]:
+        """Return the layouts with the keys of their blasts under a threat, no barrier first.
+
+        Empty layouts are left out: they are no barrier.
+        """
+        layouts: list[tuple[str, Layout]] = [(BARE, ())]
+        layouts += [
+            (name, layout)
+            for name, layout in zip(SLOTS, self.design.layouts, strict=True)
+            if layout
+        ]
+        return tuple(Shown(name, layout, self.key(layout, threat)) for name, layout in layouts)
+
+    def key(self, layout: Layout, threat: NamedThreat) -> str:
+        """Return the key of a blast."""
+        return blast_key(self.scenario.content_hash, layout, threat.charge, self.engine)
+
+    def comparison(self) -> list[Row]:
+        """Return the table of all blasts that were run for the design as it is now."""
+        records: list[tuple[str, float, BlastRecord]] = []
+        bare: dict[str, BlastRecord] = {}
+        for threat in self.chosen_threats():
+            for each in self.shown(threat):
+                record = self.folder.record_of(each.key)
+                if record is None:
+                    continue
+                if each.name == BARE:
+                    bare[record.threat] = record
+                records.append((each.name, placing.cost_of(self.scenario, each.layout), record))
+        return comparison(records, bare)
+
+    def waves(self, threat: NamedThreat) -> Sequence[tuple[str, BlastRecord]]:
+        """Return the blasts with gauges under a threat, by the names of the layouts."""
+        found = ((each.name, self.folder.record_of(each.key)) for each in self.shown(threat))
+        return [(name, record) for name, record in found if record is not None and record.waves]
+
+
+@dataclass
+class Sessions:
+    """The designs that are open, each once however many tabs look at it.
+
+    Attributes:
+        work: The work folder.
+        workers: What does the work of all.
+    """
+
+    work: WorkFolder
+    workers: Workers
+    _open: dict[str, Session] = field(default_factory=dict, init=False)
+
+    def of(self, design_id: str) -> Session:
+        """Return the session of a design.
+
+        Raises:
+            BlastEnvError: If there is none of that name, or it cannot be read.
+        """
+        if design_id not in self._open:
+            folder = self.work.open(design_id)
+            self._open[design_id] = Session.opened(folder, self.work, self.workers)
+        return self._open[design_id]
+
+    def new(self, scenario: Scenario, label: str) -> Session:
+        """Return the session of a new design.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        return self.of(self.work.create(scenario, label).design_id)

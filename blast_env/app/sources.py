@@ -1,0 +1,69 @@
+"""Where a site comes from: bundled, generated, or a file by its ending."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
+from typing import Final, TypeVar
+
+from blast_env.errors import BlastEnvError
+from blast_env.scenario import LayoutFile, Scenario, load_scenario
+from blast_env.sites import generate_site
+
+MOST_BYTES: Final = 200_000_000
+"""Larger files are refused before they are read."""
+
+Made = TypeVar("Made")
+
+Importer = Callable[[Path], Scenario]
+
+IMPORTERS: Final[Mapping[str, Importer]] = MappingProxyType({".toml": load_scenario})
+"""What makes a site of a file, by its ending."""
+
+
+def site_of_file(name: str, content: bytes) -> Scenario:
+    """Return the site of a file that was handed over.
+
+    Args:
+        name: Its name; the ending decides what it is.
+        content: What is in it.
+
+    Raises:
+        BlastEnvError: If it is no site; the message says all that is wrong with it.
+    """
+    return _from_file(name, content, IMPORTERS, "a site")
+
+
+def layout_of_file(name: str, content: bytes) -> LayoutFile:
+    """Return the layout of a file that was handed over.
+
+    Raises:
+        BlastEnvError: If it is no layout.
+    """
+    return _from_file(name, content, {".json": LayoutFile.load}, "a layout")
+
+
+def generated_site(seed: int) -> Scenario:
+    """Return the generated site of a seed.
+
+    Raises:
+        BlastEnvError: If the seed is out of bounds.
+    """
+    return generate_site(seed)
+
+
+def _from_file(
+    name: str, content: bytes, readers: Mapping[str, Callable[[Path], Made]], what: str
+) -> Made:
+    suffix = Path(name).suffix.lower()
+    if suffix not in readers:
+        known = ", ".join(readers)
+        raise BlastEnvError(f"{name}: has the suffix {suffix!r}, {what} must have {known}")
+    with TemporaryDirectory() as folder:
+        # The name stands in messages; nothing of it but its last part leads anywhere.
+        path = Path(folder) / Path(name.replace("\\", "/")).name
+        path.write_bytes(content)
+        try:
+            return readers[suffix](path)
+        except BlastEnvError as error:
+            raise BlastEnvError(str(error).replace(f"{folder}/", "")) from error

@@ -1,0 +1,201 @@
+"""What a worker does: proposals, searches and films; blasts are in `blasts`.
+
+Whatever takes long tells how far it has come through a `Teller`, and may be interrupted anywhere by
+`KeyboardInterrupt`.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from time import monotonic
+from typing import Final
+
+from blast_agents.rules import RULES, expected_charge
+from blast_agents.search import (
+    LayoutProblem,
+    Progress,
+    find_search_method,
+)
+
+from blast_env.app import placing
+from blast_env.app.blasts import run_blasts, warm_engines
+from blast_env.app.offers import PROPOSERS, SIGHT_LINES
+from blast_env.app.work import (
+    BlastTask,
+    FilmTask,
+    ProposalTask,
+    SearchTask,
+    Status,
+    ThreatOf,
+    plain_layout,
+    read_status,
+    read_task,
+    scenario_of,
+    write_status,
+)
+from blast_env.errors import UnknownNameError
+from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
+from blast_env.geometry import Layout
+from blast_env.physics.engines import find_engine
+from blast_env.physics.scene import Charge
+from blast_env.scenario import PointSource, Scenario
+from blast_env.sites import Visibility, visibility_layout
+
+_LEAST_PAUSE_S: Final = 0.1
+_REALISATIONS: Final = 8  # of the particle model, divided among the charges
+
+
+class Teller:
+    """Says in the status of work how far it has come; not more often than anyone can see.
+
+    Args:
+        folder: The folder of the work.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._status = read_status(folder).model_copy(update={"state": "running"})
+        self._told_s = 0.0
+        self.tell()
+
+    def tell(self, **changes: object) -> None:
+        """Say it at once; see `Status` for what there is to say."""
+        self._status = self._status.model_copy(update=changes)
+        self._told_s = monotonic()
+        write_status(self._status, self.folder)
+
+    def share(self, share: float) -> None:
+        """Say what share is done, if the last time is long enough ago."""
+        if self.is_due:
+            self.tell(share=min(max(share, 0.0), 1.0))
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the last time is long enough ago."""
+        return monotonic() - self._told_s >= _LEAST_PAUSE_S
+
+    @property
+    def status(self) -> Status:
+        """What was said last."""
+        return self._status
+
+
+def warm_up() -> None:
+    """Do once what makes first times slow: imports, and loading compiled code."""
+    warm_engines()
+
+
+def run_task(folder: Path) -> None:
+    """Do the work of a folder.
+
+    Raises:
+        BlastEnvError: If it cannot be done; the message is for the user.
+        KeyboardInterrupt: If it was stopped before there was anything to keep.
+    """
+    task, teller = read_task(folder), Teller(folder)
+    if isinstance(task, BlastTask):
+        run_blasts(task, teller.share)
+        teller.tell(state="done", share=1.0, text="done")
+    elif isinstance(task, SearchTask):
+        _search(task, teller)
+    elif isinstance(task, FilmTask):
+        _film(task, teller)
+    else:
+        _propose(task, teller)
+
+
+def _propose(task: ProposalTask, teller: Teller) -> None:
+    scenario = scenario_of(task.scenario)
+    layout = _proposed(task, scenario)
+    words = placing.counted(scenario, layout)
+    text = f"{words}, proposed by {Path(task.proposer).name}"
+    teller.tell(state="done", share=1.0, text=text, layout=plain_layout(layout))
+
+
+def _proposed(task: ProposalTask, scenario: Scenario) -> Layout:
+    known = _charges(task.threats)
+    if task.is_run:
+        from blast_agents.training import load_agent  # torch takes seconds to import
+
+        agent = load_agent(task.proposer)
+        return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None))
+    if task.proposer == SIGHT_LINES:
+        seen = scenario.with_charge(known[0]) if len(known) == 1 else scenario
+        return visibility_layout(scenario, Visibility.of(seen))
+    if task.proposer not in RULES:
+        raise UnknownNameError("rule", task.proposer, PROPOSERS)
+    return RULES[task.proposer](scenario, expected_charge([PointSource.at(c) for c in known]))
+
+
+def _charges(threats: Sequence[ThreatOf]) -> list[Charge]:
+    return [Charge(each.position_m, each.tnt_kg, each.height_m) for each in threats]
+
+
+def _search(task: SearchTask, teller: Teller) -> None:
+    scenario = scenario_of(task.scenario)
+    begin_with = tuple(tuple(each) for each in task.begin_with)
+    method = find_search_method(task.method, (begin_with,) if begin_with else ())
+    engine = find_engine(task.engine.name, task.engine.cell_m)
+    problem = LayoutProblem(
+        BlastEvaluator(scenario, engine, cache=task.cache), practice_case(scenario, task)
+    )
+    teller.tell(text="blasts without a barrier")
+    problem.unprotected_pa_s  # noqa: B018  # refuses a case in which nothing arrives
+
+    def report(progress: Progress) -> None:
+        share = progress.blasts / progress.budget
+        if progress.best is None:
+            teller.share(share)
+            return
+        best = plain_layout(progress.best.layout)
+        reduction = 100.0 * problem.reduction(progress.best)
+        text = f"{progress.blasts} of {progress.budget} blasts, best so far {reduction:.1f} % less"
+        if best != teller.status.layout:
+            teller.tell(share=share, text=text, layout=best)
+        elif teller.is_due:
+            teller.tell(share=share, text=text)
+
+    result = method.search(problem, task.budget, 0, report)
+    if result.impulse_pa_s is None:
+        raise KeyboardInterrupt
+    reduction = 100.0 * problem.reduction(result.history[-1])
+    text = (
+        f"{reduction:.1f} % less impulse on the search's own blasts, after {result.blasts} of"
+        f" {result.budget} ({task.engine.label}); blast it for a judgement"
+    )
+    state = "stopped" if result.interrupted else "done"
+    teller.tell(state=state, share=1.0, text=text, layout=plain_layout(result.layout))
+
+
+def practice_case(scenario: Scenario, task: SearchTask) -> Case:
+    """Return what a search may spend its blasts on: the threats, again and again with particles."""
+    charges = _charges(task.threats)
+    realisations = 1 if task.engine.is_gas else max(_REALISATIONS // len(charges), 1)
+    first = SeedRange.SEARCH.seeds(0, realisations * len(charges))
+    threats = [Threat(charges[k % len(charges)], seed) for k, seed in enumerate(first)]
+    return Case(scenario, tuple(threats), realisations)
+
+
+def _film(task: FilmTask, teller: Teller) -> None:
+    scenario, (charge,) = scenario_of(task.scenario), _charges((task.threat,))
+    layout, path = tuple(tuple(each) for each in task.layout), Path(task.path)
+    write: Callable[..., object]
+    if task.engine.is_gas:
+        from blast_env.rendering.pressure_film import write_pressure_film
+        from blast_env.simulation.gas import GasBlast
+
+        engine = find_engine(task.engine.name, task.engine.cell_m)
+        blasts = [GasBlast(scenario, each, 0, engine, charge) for each in ((), layout)]  # type: ignore[arg-type]
+        write = partial(write_pressure_film, blasts[-1], path, progress=teller.share)
+        write(beside=blasts[0] if layout else None)
+    else:
+        from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
+        from blast_env.simulation import Blast
+
+        bare, own = (Blast(scenario, each, 0, "event", charge) for each in ((), layout))
+        if layout:
+            panels = [FilmPanel(bare, "no barrier"), FilmPanel(own, "with the layout")]
+            write_side_by_side(panels, path, progress=teller.share)
+        else:
+            write_film(own, path, progress=teller.share)
+    teller.tell(state="done", share=1.0, text=f"wrote {path.name}", file=str(path))

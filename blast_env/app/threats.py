@@ -1,0 +1,55 @@
+"""Which charges a design is held against: by name, at places that can be pointed to."""
+
+from dataclasses import dataclass
+
+from blast_env.physics.scene import Charge
+from blast_env.scenario import RectangleSource, Scenario, SegmentSource
+from blast_env.scenario.sections import PointM
+
+
+@dataclass(frozen=True)
+class NamedThreat:
+    """A charge with what people call it."""
+
+    name: str
+    charge: Charge
+
+
+def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
+    """Return the charges that a site is held against.
+
+    Of a line its middle and its ends, of an area its middle and its corners; the middle comes
+    first, since most blasts are run there.
+    """
+    named = []
+    for index, source in enumerate(scenario.charge):
+        places: list[tuple[str, PointM]]
+        if isinstance(source, SegmentSource):
+            (x0, y0), (x1, y1) = source.segment_m
+            middle = ((x0 + x1) / 2.0, (y0 + y1) / 2.0)
+            places = [(", middle", middle), (", start", (x0, y0)), (", end", (x1, y1))]
+        elif isinstance(source, RectangleSource):
+            left, bottom, right, top = source.rectangle_m
+            places = [
+                (", middle", source.rectangle_m.centre),
+                (", lower left", (left, bottom)),
+                (", lower right", (right, bottom)),
+                (", upper left", (left, top)),
+                (", upper right", (right, top)),
+            ]
+        else:
+            places = [("", source.position_m)]
+        named += [
+            NamedThreat(f"charge {index + 1}{words}", Charge(at_m, source.tnt_kg, source.height_m))
+            for words, at_m in places
+        ]
+    return tuple(named)
+
+
+def usual_threats(scenario: Scenario) -> tuple[str, ...]:
+    """Return the names of the threats that a blast is run with unless others are chosen."""
+    return tuple(each.name for each in threats_of(scenario) if _is_first(each.name))
+
+
+def _is_first(name: str) -> bool:
+    return name.endswith(", middle") or "," not in name

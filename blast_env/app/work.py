@@ -1,0 +1,187 @@
+"""Work that a page asks for, as files: what is to be done, how far it has come, what came of it."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from blast_env.app.records import Engine, Kept
+from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.scenario import Scenario
+
+TASK: Final = "task.json"
+STATUS: Final = "status.json"
+
+State = Literal["waiting", "running", "done", "failed", "stopped"]
+
+
+class ThreatOf(Kept):
+    """A threat, as data."""
+
+    name: str
+    position_m: tuple[float, float]
+    tnt_kg: float
+    height_m: float = 0.0
+
+
+class BlastTask(Kept):
+    """Blasts of one layout.
+
+    Attributes:
+        scenario: The site as a document.
+        layout: The layout.
+        threats: A blast each.
+        engine: The engine.
+        blasts: Folder that the blasts are put into, each under its key.
+        cache: Folder for the loads of blasts.
+    """
+
+    kind: Literal["blast"] = "blast"
+    scenario: dict[str, Any]
+    layout: tuple[tuple[Any, ...], ...]
+    threats: tuple[ThreatOf, ...]
+    engine: Engine
+    blasts: str
+    cache: str
+
+
+class SearchTask(Kept):
+    """A search for a layout.
+
+    Attributes:
+        scenario: The site as a document.
+        threats: Those that the layout is for: one is known, more are hidden.
+        method: Name of the method.
+        budget: Most blasts.
+        engine: The engine.
+        cache: Folder for the loads of blasts.
+        begin_with: A layout to begin with, for methods that can.
+    """
+
+    kind: Literal["search"] = "search"
+    scenario: dict[str, Any]
+    threats: tuple[ThreatOf, ...]
+    method: str
+    budget: int
+    engine: Engine
+    cache: str
+    begin_with: tuple[tuple[Any, ...], ...] = ()
+
+
+class ProposalTask(Kept):
+    """A layout that is proposed at once.
+
+    Attributes:
+        scenario: The site as a document.
+        threats: As for `SearchTask`.
+        proposer: Name of a rule, or the folder of a trained agent's run.
+        is_run: Whether it is a folder.
+    """
+
+    kind: Literal["proposal"] = "proposal"
+    scenario: dict[str, Any]
+    threats: tuple[ThreatOf, ...]
+    proposer: str
+    is_run: bool = False
+
+
+class FilmTask(Kept):
+    """A film of one blast as a file to keep, without a barrier beside it.
+
+    Attributes:
+        scenario: The site as a document.
+        layout: The layout.
+        threat: The threat.
+        engine: The engine.
+        path: The file.
+    """
+
+    kind: Literal["film"] = "film"
+    scenario: dict[str, Any]
+    layout: tuple[tuple[Any, ...], ...]
+    threat: ThreatOf
+    engine: Engine
+    path: str
+
+
+Task = Annotated[BlastTask | SearchTask | ProposalTask | FilmTask, Field(discriminator="kind")]
+
+_TASK: Final[TypeAdapter[Task]] = TypeAdapter(Task)
+
+
+class Status(Kept):
+    """How far work has come.
+
+    Attributes:
+        state: Where it is.
+        title: What it is, for people.
+        share: Share that is done.
+        text: What is going on, or what came of it, or what is wrong.
+        layout: The best layout so far, or the one that is proposed; `None` without one.
+        file: A file that was made.
+    """
+
+    state: State = "waiting"
+    title: str = ""
+    share: float = 0.0
+    text: str = ""
+    layout: tuple[tuple[Any, ...], ...] | None = None
+    file: str | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing more will come."""
+        return self.state in ("done", "failed", "stopped")
+
+
+def write_task(task: Task, folder: Path, title: str) -> None:
+    """Put work into a folder of its own.
+
+    Raises:
+        BlastEnvError: If it cannot be written.
+    """
+    with write_atomically(folder / TASK) as temporary:
+        temporary.write_text(task.model_dump_json(), encoding="utf-8")
+    write_status(Status(title=title), folder)
+
+
+def read_task(folder: Path) -> Task:
+    """Return the work of a folder.
+
+    Raises:
+        BlastEnvError: If there is none.
+    """
+    try:
+        return _TASK.validate_json((folder / TASK).read_text(encoding="utf-8"))
+    except (OSError, ValidationError) as error:
+        raise BlastEnvError(f"{folder}: holds no work: {error}") from error
+
+
+def write_status(status: Status, folder: Path) -> None:
+    """Say how far work has come."""
+    with write_atomically(folder / STATUS) as temporary:
+        temporary.write_text(status.model_dump_json(), encoding="utf-8")
+
+
+def read_status(folder: Path) -> Status:
+    """Return how far work has come; where that cannot be read, that it failed."""
+    try:
+        return Status.model_validate_json((folder / STATUS).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        return Status(state="failed", title=folder.name, text=f"cannot be read: {error}")
+
+
+def scenario_of(document: dict[str, Any]) -> Scenario:
+    """Return the scenario of a document.
+
+    Raises:
+        ScenarioError: If it is none.
+    """
+    return Scenario.from_document(document, str(document.get("name", "the site")))
+
+
+def plain_layout(layout: Any) -> tuple[tuple[Any, ...], ...]:
+    """Return a layout as plain data."""
+    return tuple(tuple(json.loads(json.dumps(list(each)))) for each in layout)

@@ -1,0 +1,190 @@
+"""The hand on the plan: strokes of the mouse and keys, as places in metres."""
+
+from pathlib import Path
+
+import pytest
+
+from blast_env.app.editor import Editor, Tool
+from blast_env.app.edits import Kind, Thing
+from blast_env.app.folder import WorkFolder
+from blast_env.app.jobs import Workers
+from blast_env.app.plan import View, merged_cells, overlay_svg, plan_svg
+from blast_env.app.session import Session
+from blast_env.app.solids import boxes
+from blast_env.scenario import load_scenario, usable_cells
+from tests.gas_sites import WALL, hut
+
+
+@pytest.fixture
+def editor(tmp_path: Path) -> Editor:
+    return on(tmp_path, "courtyard")
+
+
+def on(folder: Path, name: str) -> Editor:
+    work = WorkFolder(folder)
+    created = work.create(load_scenario(name), "begin")
+    return Editor(Session.opened(created, work, Workers()))
+
+
+def stroke(editor: Editor, *places: tuple[float, float]) -> None:
+    editor.press(*places[0])
+    for place in places[1:]:
+        editor.move(*place)
+    editor.release()
+
+
+def test_a_stroke_of_modules_is_one_step(editor: Editor) -> None:
+    editor.choose(Tool.PLACE)
+    stroke(editor, (14.2, 6.2), (14.2, 6.7), (14.2, 7.2))
+    assert editor.session.design.layout == ((2, 2), (3, 2), (4, 2))
+    assert editor.session.history.present.label == "place 3"
+    editor.session.undo()
+    assert not editor.session.design.layout
+
+
+def test_why_a_module_cannot_stand_is_shown_as_it_is_dragged(editor: Editor) -> None:
+    editor.choose(Tool.PLACE)
+    assert editor.move(14.2, 15.0)
+    assert editor.ghost is not None
+    assert "path from the road" in editor.ghost.reason
+    svg = overlay_svg(View.of(editor.scenario, 600, 450), editor.scenario, editor.ghost, None)
+    assert "must stay empty" in svg
+    stroke(editor, (14.2, 15.0))
+    assert not editor.session.design.layout
+    assert "path from the road" in editor.message
+
+
+def test_the_stock_ends_a_stroke(editor: Editor) -> None:
+    editor.choose(Tool.PLACE)
+    stroke(editor, *((13.2, 5.2 + 0.5 * k) for k in range(18)))
+    assert len(editor.session.design.layout) == 16
+    assert "stock of 16 modules is used up" in editor.message
+
+
+def test_a_module_is_moved_with_the_select_tool_and_erased_with_the_right_button(
+    editor: Editor,
+) -> None:
+    editor.choose(Tool.PLACE)
+    stroke(editor, (14.2, 6.2))
+    editor.choose(Tool.SELECT)
+    stroke(editor, (14.2, 6.2), (16.2, 15.0))
+    assert editor.session.design.layout == ((2, 2),)  # put back: it may not stand there
+    assert "path" in editor.message
+    stroke(editor, (14.2, 6.2), (15.0, 15.0), (16.2, 8.2))
+    assert editor.session.design.layout == ((6, 6),)
+    editor.press(16.2, 8.2, erase=True)
+    editor.release()
+    assert not editor.session.design.layout
+
+
+def test_a_structure_is_dragged_and_sized_and_put_back_where_it_cannot_be(editor: Editor) -> None:
+    stroke(editor, (28.0, 15.0), (29.1, 15.0), (30.1, 15.0))
+    assert editor.session.scenario.structures[0].corner_m == (29.0, 10.0)
+    assert editor.selected == Thing(Kind.STRUCTURE)
+    stroke(editor, (33.0, 20.0), (35.0, 22.0))  # its upper right corner
+    assert editor.session.scenario.structures[0].rows == 24
+    before = editor.session.scenario
+    editor.press(30.0, 15.0)
+    editor.move(38.0, 15.0)
+    assert editor.ghost is not None
+    assert "must lie inside the site" in editor.ghost.reason
+    editor.release()
+    assert editor.session.scenario == before
+
+
+def test_tools_draw(editor: Editor) -> None:
+    for tool, start, end in (
+        (Tool.STRUCTURE, (35.0, 2.0), (37.0, 4.0)),
+        (Tool.KEEP_OUT, (14.0, 20.0), (15.0, 21.0)),
+        (Tool.CHARGE, (2.0, 2.0), (2.0, 2.0)),
+        (Tool.CHARGE_AREA, (2.0, 26.0), (4.0, 28.0)),
+        (Tool.GAUGE, (25.2, 15.2), (25.2, 15.2)),
+        (Tool.ZONE, (13.0, 5.0), (22.0, 25.0)),
+    ):
+        editor.choose(tool)
+        stroke(editor, start, end)
+        assert not editor.message, tool
+    scenario = editor.session.scenario
+    assert len(scenario.structures) == 2
+    assert len(scenario.zone.keep_outs) == 3
+    assert [each.kind for each in scenario.charge] == ["segment", "point", "rectangle"]
+    assert len(scenario.gauges) == 1
+    assert scenario.zone.columns == 18
+    assert len(editor.session.history.past) == 6
+
+
+def test_the_keyboard_places_moves_and_deletes(editor: Editor) -> None:
+    editor.choose(Tool.PLACE)
+    editor.step_cursor(0, 0)
+    for _ in range(4):
+        editor.step_cursor(1, 0)
+    assert editor.cursor == (24, 8)
+    editor.toggle_at_cursor()
+    assert editor.session.design.layout == ((24, 8),)
+    editor.toggle_at_cursor()
+    assert not editor.session.design.layout
+    editor.selected = Thing(Kind.KEEP_OUT, 1)
+    editor.nudge(0.5, 0.0)
+    assert editor.session.scenario.zone.keep_outs[1].corner_m == (18.5, 19.5)
+    editor.delete()
+    assert len(editor.session.scenario.zone.keep_outs) == 1
+    editor.selected = Thing(Kind.STRUCTURE)
+    editor.delete()
+    assert "structures" in editor.message  # the last protected one
+
+
+def test_without_a_zone_there_is_a_message(tmp_path: Path) -> None:
+    editor = on(tmp_path, "free_field")
+    editor.choose(Tool.PLACE)
+    stroke(editor, (2.0, 2.0))
+    assert "no build zone" in editor.message
+    editor.step_cursor(1, 0)
+    assert "no build zone" in editor.message
+
+
+def test_leaving_the_plan_puts_everything_back(editor: Editor) -> None:
+    editor.press(28.0, 15.0)
+    editor.move(29.0, 15.0)
+    assert editor.scenario != editor.session.scenario
+    editor.leave()
+    editor.release()
+    assert editor.scenario == editor.session.scenario == load_scenario("courtyard")
+
+
+def test_pixels_and_metres_are_each_other_s_reverse() -> None:
+    view = View.of(load_scenario("courtyard"), 680, 560).zoomed(1.7).panned(0.1, -0.2)
+    x_px, y_px = view.pixel(12.5, 7.0)
+    assert view.metres(x_px, y_px) == pytest.approx((12.5, 7.0), abs=0.01)
+    kept = view.zoomed(2.0, (12.5, 7.0))
+    assert kept.pixel(12.5, 7.0) == pytest.approx((x_px, y_px), abs=0.02)
+
+
+def test_merged_cells_cover_exactly_what_they_should() -> None:
+    for name in ("courtyard", "perimeter_gate"):
+        blocked = ~usable_cells(load_scenario(name))
+        covered = blocked & False
+        for bottom, left, top, right in merged_cells(blocked):
+            assert not covered[bottom:top, left:right].any()
+            covered[bottom:top, left:right] = True
+        assert (covered == blocked).all()
+
+
+def test_the_plan_says_nothing_that_a_browser_could_run() -> None:
+    document = load_scenario("courtyard").model_dump(mode="json", exclude_none=True)
+    document["build_zone"]["keep_outs"][0]["reason"] = "<script>alert(1)</script>"
+    scenario = type(load_scenario("courtyard")).from_document(document, "x")
+    view = View.of(scenario, 600, 400)
+    svg = plan_svg(view, scenario, ((0, 0),), Thing(Kind.STRUCTURE))
+    assert svg.count("building") == 1
+    assert "<script" not in svg
+
+
+def test_solids_have_the_heights_of_the_site() -> None:
+    scenario = hut()
+    solids = {each.name: each for each in boxes(scenario, WALL)}
+    assert solids["hut"].size_m == (2.0, 2.0, 2.0)
+    assert solids["hut"].opacity == 1.0
+    assert solids["barrier"].centre_m[2] == 0.75
+    open_air = {each.name: each for each in boxes(load_scenario("courtyard"), ())}
+    assert open_air["building"].size_m[2] == 12.0
+    assert open_air["building"].opacity < 1.0

@@ -1,0 +1,134 @@
+"""Edits of a site: on the grid, sound, or refused in the library's own words."""
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blast_env.app import edits
+from blast_env.app.edits import Kind, Thing
+from blast_env.errors import BlastEnvError
+from blast_env.scenario import Scenario, ScenarioError, load_scenario
+from tests.gas_sites import hut
+
+COURTYARD = load_scenario("courtyard")
+BUILDING = Thing(Kind.STRUCTURE)
+OFFSETS = st.floats(-60.0, 60.0, allow_nan=False)
+
+
+def on_grid(*values: float) -> bool:
+    return all(abs(2.0 * value - round(2.0 * value)) < 1e-9 for value in values)
+
+
+@given(OFFSETS, OFFSETS)
+def test_a_structure_lands_on_the_grid_or_is_refused(x_m: float, y_m: float) -> None:
+    left, bottom = 27.0 + edits.snapped(x_m), 10.0 + edits.snapped(y_m)
+    try:
+        moved = edits.moved(COURTYARD, BUILDING, (x_m, y_m))
+    except ScenarioError:
+        # Off the site, over the charge or over all of the zone.
+        assert not (22.0 <= left <= 36.0 and 0.0 <= bottom <= 20.0)
+        return
+    assert moved.structures[0].corner_m == (left, bottom)
+    corner = moved.structures[0].corner_m
+    assert on_grid(*corner)
+    assert abs(corner[0] - 27.0 - x_m) <= 0.25 + 1e-9
+    assert moved.site.rectangle_m.contains(moved.structures[0].rectangle_m)
+    assert moved.structures[0].rows == COURTYARD.structures[0].rows
+
+
+def test_a_move_and_its_reverse_give_the_same_site() -> None:
+    there = edits.moved(COURTYARD, BUILDING, (1.5, -2.0))
+    assert there != COURTYARD
+    assert edits.moved(there, BUILDING, (-1.5, 2.0)) == COURTYARD
+
+
+def test_a_gauge_is_put_into_the_middle_of_a_cell_of_half_a_metre() -> None:
+    moved = edits.moved(hut(), Thing(Kind.GAUGE, 1), (-0.1, 1.1))
+    assert moved.gauges[1].position_m == (9.0 - 0.25, 5.25, 0.25)
+
+
+def test_a_line_of_charges_moves_as_a_whole_and_ends_where_it_is_drawn_to() -> None:
+    moved = edits.moved(COURTYARD, Thing(Kind.CHARGE), (0.6, 0.0))
+    assert moved.charge[0].segment_m == ((5.5, 6.0), (5.5, 24.0))  # type: ignore[union-attr]
+    longer = edits.resized(COURTYARD, Thing(Kind.CHARGE), (6.1, 20.2))
+    assert longer.charge[0].segment_m == ((5.0, 6.0), (6.0, 20.0))  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("kind", "start", "end"),
+    [
+        (Kind.STRUCTURE, (30.2, 2.1), (34.4, 4.9)),
+        (Kind.CHARGE, (2.0, 3.0), (2.0, 3.0)),
+        (Kind.CHARGE, (2.0, 3.0), (8.0, 3.0)),
+        (Kind.KEEP_OUT, (14.0, 20.0), (15.9, 21.1)),
+        (Kind.COST_AREA, (14.0, 20.0), (15.9, 21.1)),
+        (Kind.GAUGE, (24.1, 15.2), (24.1, 15.2)),
+    ],
+)
+def test_what_is_drawn_can_be_taken_away_again(kind: Kind, start: Any, end: Any) -> None:
+    after, thing = edits.added(COURTYARD, kind, start, end)
+    assert thing in {each for each, _ in edits.things(after)}
+    assert after != COURTYARD
+    assert edits.removed(after, thing) == COURTYARD
+
+
+def test_a_drawn_zone_keeps_what_holds_in_the_old_one() -> None:
+    after, _ = edits.added(COURTYARD, Kind.ZONE, (12.6, 4.0), (22.0, 26.4))
+    assert after.zone.corner_m == (12.5, 4.0)
+    assert after.zone.shape == (45, 19)
+    assert after.zone.keep_outs == COURTYARD.zone.keep_outs
+    bare = edits.removed(COURTYARD, Thing(Kind.ZONE))
+    assert bare.build_zone is None
+    assert edits.added(bare, Kind.ZONE, (13.0, 5.0), (15.0, 7.0))[0].zone.stock == 4
+
+
+def test_the_reason_is_that_of_the_library() -> None:
+    with pytest.raises(ScenarioError, match="must lie inside the site"):
+        edits.moved(COURTYARD, BUILDING, (30.0, 0.0))
+    with pytest.raises(ScenarioError, match="none is protected"):
+        edits.with_values(COURTYARD, BUILDING, {"protected": False})
+    with pytest.raises(BlastEnvError, match="no build zone"):
+        edits.added(
+            edits.removed(COURTYARD, Thing(Kind.ZONE)), Kind.KEEP_OUT, (1.0, 1.0), (2.0, 2.0)
+        )
+    with pytest.raises(BlastEnvError, match="site itself"):
+        edits.removed(COURTYARD, Thing(Kind.SITE))
+
+
+def test_heights_come_and_go() -> None:
+    high = edits.with_values(COURTYARD, BUILDING, {"height_m": 6.0})
+    assert high.structures[0].height_m == 6.0
+    assert edits.with_values(high, BUILDING, {"height_m": None}) == COURTYARD
+
+
+@pytest.mark.parametrize(
+    ("place", "expected"),
+    [
+        ((28.0, 15.0), BUILDING),
+        ((5.2, 10.0), Thing(Kind.CHARGE)),
+        ((14.0, 15.0), Thing(Kind.KEEP_OUT)),
+        ((14.0, 20.0), Thing(Kind.ZONE)),
+        ((38.0, 2.0), None),
+    ],
+)
+def test_what_is_on_top_is_what_one_points_at(place: Any, expected: Thing | None) -> None:
+    assert edits.thing_at(COURTYARD, place[0], place[1], 0.5) == expected
+
+
+def test_a_square_stays_a_square() -> None:
+    field = load_scenario("free_field")
+    thing = Thing(Kind.STRUCTURE)
+    left, bottom = field.structures[0].corner_m
+    larger = edits.resized(field, thing, (left + 6.0, bottom + 5.0))
+    assert larger.structures[0].rows == larger.structures[0].columns == 12
+
+
+def test_every_thing_has_a_rectangle() -> None:
+    scenario: Scenario = hut()
+    for thing, words in edits.things(scenario):
+        assert words
+        assert scenario.site.rectangle_m.contains(edits.rectangle_of(scenario, thing))
+    with pytest.raises(BlastEnvError, match="has no gauge 7"):
+        edits.rectangle_of(scenario, Thing(Kind.GAUGE, 7))

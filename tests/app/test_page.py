@@ -1,0 +1,230 @@
+"""The page as a user without a browser meets it."""
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nicegui import events, ui
+from nicegui.elements.upload_files import SmallFileUpload
+from nicegui.testing import User
+from nicegui.testing.user_simulation import user_simulation
+
+from blast_env.app.folder import WorkFolder
+from blast_env.app.records import Engine
+from blast_env.app.server import add_pages
+from blast_env.app.session import Sessions
+from blast_env.scenario import Scenario, load_scenario
+from tests.app.test_work import CELLS, Here
+from tests.gas_sites import WALL, hut
+from tests.scenarios import BALLISTIC_COURTYARD
+
+Story = Callable[[User, Sessions], Awaitable[None]]
+
+
+@contextmanager
+def modules_kept() -> Iterator[None]:
+    """NiceGUI forgets the modules of pages after a simulation; all else here needs them."""
+    before = dict(sys.modules)
+    try:
+        yield
+    finally:
+        sys.modules.update(before)
+
+
+@asynccontextmanager
+async def page(folder: Path) -> AsyncIterator[tuple[User, Sessions]]:
+    sessions = Sessions(WorkFolder(folder), Here())
+    async with user_simulation(root=lambda: add_pages(sessions)) as user:
+        add_pages(sessions)
+        yield user, sessions
+
+
+def play(folder: Path, story: Story) -> None:
+    async def all_of_it() -> None:
+        async with page(folder) as (user, sessions):
+            await story(user, sessions)
+
+    with modules_kept():
+        asyncio.run(all_of_it())
+
+
+async def opened(user: User, sessions: Sessions, scenario: Scenario) -> Any:
+    session = sessions.new(scenario, "begin")
+    await user.open(f"/design/{session.folder.design_id}")
+    return session
+
+
+def mouse(user: User, kind: str, x_px: float, y_px: float, button: int = 0) -> None:
+    plan = user.find(kind=ui.interactive_image)
+    args = {"mouse_event_type": kind, "image_x": x_px, "image_y": y_px, "button": button}
+    plan.trigger("mouse", args | {"buttons": 1})
+
+
+def choose(user: User, words: str) -> None:
+    """Choose an entry of a menu."""
+    items = user.find(kind=ui.menu_item).elements
+    (entry,) = (item for item in items if words in {part.text for part in texts_in(item)})
+    with user:
+        for listener in entry._event_listeners.values():
+            if listener.type == "click":
+                events.handle_event(
+                    listener.handler,
+                    events.GenericEventArguments(sender=entry, client=entry.client, args=None),
+                )
+
+
+def texts_in(item: ui.element) -> list[Any]:
+    return [each for each in item.descendants() if hasattr(each, "text")]
+
+
+def test_a_site_is_chosen_a_module_placed_and_taken_back(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        await user.open("/")
+        user.find("courtyard").click()
+        (entry,) = sessions.work.designs()
+        await user.open(f"/design/{entry.design_id}")
+        await user.should_see("0 of 16 modules")
+        user.find("Place").click()
+        mouse(user, "mousedown", 260.0, 400.0)
+        mouse(user, "mouseup", 260.0, 400.0)
+        await user.should_see("1 of 16 modules")
+        user.find("Undo").click()
+        await user.should_see("0 of 16 modules")
+        user.find("Redo").click()
+        await user.should_see("1 of 16 modules")
+        # Another server, later: nothing is lost.
+        again = Sessions(WorkFolder(tmp_path), Here()).of(entry.design_id)
+        assert len(again.design.layout) == 1
+
+    play(tmp_path, story)
+
+
+def test_the_reason_is_said_while_the_mouse_is_there(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        await opened(user, sessions, load_scenario("courtyard"))
+        user.find("Place").click()
+        mouse(user, "mousemove", 260.0, 280.0)
+        await user.should_see("the path from the road to the door must stay open")
+
+    play(tmp_path, story)
+
+
+def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, BALLISTIC_COURTYARD)
+        session.put("layout", session.design.with_layout(CELLS))
+        user.find(marker="blast").click()
+        await user.should_see("layout A")
+        table = next(iter(user.find(kind=ui.table).elements))
+        assert [row["layout"] for row in table.rows] == ["no barrier"] * 2 + ["A"] * 2
+        assert all("%" in row["reduction"] for row in table.rows[2:])
+        assert {row["engine"] for row in table.rows} == {"particles (first look)"}
+        user.find(marker="propose").click()
+        await user.should_see("take it")
+        user.find("take it").click()
+        assert session.design.layout != CELLS
+        assert len(session.design.layout) == 16
+
+    play(tmp_path, story)
+
+
+def test_gas_results_have_maps_walls_and_gauges(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        session.engine = Engine(name="gas", cell_m=0.5)
+        session.blast([1])  # an empty one: no barrier
+        await user.should_see("Pa s on what is protected", retries=10)
+        pictures = next(
+            each for each in user.find(kind=ui.select).elements if each.props["label"] == "picture"
+        )
+        for picture in ("film", "peak over the ground", "impulse on the walls of hut", "gauges"):
+            assert picture in pictures.options
+            pictures.value = picture
+        await user.should_see(kind=ui.echart)
+        response = await user.http_client.get(
+            f"/blasts/{session.folder.design_id}/{session.shown(session.chosen_threats()[0])[0].key}"
+            "/map_peak.png"
+        )
+        assert response.content.startswith(b"\x89PNG")
+
+    play(tmp_path, story)
+
+
+def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        chooser = next(
+            each for each in user.find(kind=ui.select).elements if each.props["label"] == "selected"
+        )
+        chooser.value = "structure 0"
+        height = next(
+            each
+            for each in user.find(kind=ui.number).elements
+            if each.props["label"] == "height (m)"
+        )
+        height.value = 3.5
+        user.find("height (m)").trigger("blur")
+        assert session.scenario.structures[0].height_m == 3.5
+        height.value = 0.1
+        user.find("height (m)").trigger("blur")
+        assert session.scenario.structures[0].height_m == 3.5
+        await user.should_see("must be at least 0.5")
+
+    play(tmp_path, story)
+
+
+def test_an_unknown_design_leads_to_the_list_with_a_message(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        await user.open("/design/nothing")
+        await user.should_see("there is no design 'nothing'")
+        await user.should_see("Begin with a site")
+        response = await user.http_client.get("/blasts/nothing/key/000.jpg")
+        assert response.status_code == 404
+
+    play(tmp_path, story)
+
+
+def test_a_broken_file_is_a_message_and_the_design_stays(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        before = session.design
+        choose(user, "site from a file, into this design")
+        upload = user.find(kind=ui.upload)
+        (element,) = upload.elements
+        with user:
+            await element.handle_uploads(
+                [SmallFileUpload(name="bad.toml", content_type="", _data=b"schema_version = ")]
+            )
+        await user.should_see("line 1, column 18")
+        await user.should_see("Nothing was changed")
+        assert session.design == before
+
+    play(tmp_path, story)
+
+
+def test_two_tabs_do_not_mix(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        one = await opened(user, sessions, hut())
+        other = await opened(user, sessions, hut())
+        one.put("wall", one.design.with_layout(WALL))
+        await user.should_see("0 of 6 modules")
+        other.put("wall", other.design.with_layout(WALL[:2]))
+        await user.should_see("2 of 6 modules")
+
+    play(tmp_path, story)
+
+
+@pytest.mark.parametrize("suffix", [".json", ".csv", ".geojson", ".dxf"])
+def test_layouts_are_saved_in_every_form(tmp_path: Path, suffix: str) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        session.put("wall", session.design.with_layout(WALL))
+        choose(user, f"layout: {suffix}")
+        response = await user.download.next()
+        assert len(response.content) > 50
+
+    play(tmp_path, story)

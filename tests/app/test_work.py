@@ -1,0 +1,306 @@
+"""Work in processes: what a task leaves behind, stopping, dying, and the table of results."""
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from time import monotonic, sleep
+
+import pytest
+
+from blast_env.app import offers
+from blast_env.app.blasts import FRAMES
+from blast_env.app.design import SLOTS
+from blast_env.app.folder import WorkFolder
+from blast_env.app.jobs import Workers, settle
+from blast_env.app.records import Engine, blast_key, read_film
+from blast_env.app.session import Session, Sessions
+from blast_env.app.threats import threats_of
+from blast_env.app.work import Status, read_status, write_status
+from blast_env.app.worker import do
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.geometry import Layout
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.simulation.gas import GasBlast
+from tests.gas_sites import WALL, hut
+from tests.scenarios import BALLISTIC_COURTYARD
+
+CELLS: Layout = tuple((row, 0) for row in range(22, 32))
+
+
+class Here(Workers):
+    """Does all work at once and in this process."""
+
+    def tick(self) -> None:
+        while self._waiting:
+            do(self._waiting.popleft())
+
+
+def session_on(folder: Path, scenario: Scenario, workers: Workers | None = None) -> Session:
+    return Sessions(WorkFolder(folder), workers or Here()).new(scenario, "begin")
+
+
+def state_of(session: Session) -> Status:
+    return session.jobs()[0][1]
+
+
+@pytest.fixture(scope="module")
+def particles(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """The courtyard in sparse air, blasted with a layout."""
+    session = session_on(tmp_path_factory.mktemp("particles"), BALLISTIC_COURTYARD)
+    session.put("layout", session.design.with_layout(CELLS))
+    session.blast([0])
+    return session
+
+
+@pytest.fixture(scope="module")
+def gas(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """The hut, blasted by gas with a wall."""
+    session = session_on(tmp_path_factory.mktemp("gas"), hut())
+    session.engine = Engine(name="gas", cell_m=0.5)
+    session.put("wall", session.design.with_layout(WALL))
+    session.blast([0])
+    return session
+
+
+def test_a_particle_blast_has_a_film_and_the_loads_of_the_library(particles: Session) -> None:
+    assert state_of(particles).state == "done"
+    (threat,) = particles.chosen_threats()
+    assert threat.charge.position_m == (5.0, 15.0)
+    bare, own = particles.shown(threat)
+    record = particles.folder.record_of(own.key)
+    assert record is not None
+    evaluator = BlastEvaluator(particles.scenario, "event")
+    loads = [evaluator.loads(CELLS, Threat(threat.charge, seed)) for seed in range(8)]
+    mean = sum(each.protected_impulse_pa_s for each in loads) / 8
+    assert record.loads[0].impulse_pa_s == pytest.approx(mean)
+    assert record.loads[0].low_pa_s < mean < record.loads[0].high_pa_s
+    for key in (bare.key, own.key):
+        folder = particles.folder.blast_of(key)
+        film = read_film(folder)
+        assert film is not None
+        assert film.count == FRAMES == len(list(folder.glob("*.jpg")))
+
+
+def test_the_table_holds_layouts_against_no_barrier(particles: Session) -> None:
+    rows = particles.comparison()
+    assert [(row.layout, row.structure) for row in rows] == [
+        ("no barrier", "all protected"),
+        ("no barrier", "building"),
+        ("A", "all protected"),
+        ("A", "building"),
+    ]
+    values = [float(row.impulse.split()[0].replace(",", "")) for row in rows]
+    share = float(rows[2].reduction.removesuffix(" %").replace("\N{MINUS SIGN}", "-"))
+    assert share == pytest.approx(100.0 * (1.0 - values[2] / values[0]), abs=1.0)
+    assert rows[0].reduction == "\N{EN DASH}"
+    assert rows[2].cost == "10"
+    assert {row.engine for row in rows} == {"particles (first look)"}
+
+
+def test_an_edit_takes_results_away_and_undo_brings_them_back(particles: Session) -> None:
+    before = particles.comparison()
+    particles.put("less", particles.design.with_layout(CELLS[:5]))
+    assert len(particles.comparison()) == 2  # no barrier alone
+    particles.undo()
+    assert particles.comparison() == before
+
+
+def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Session) -> None:
+    assert state_of(gas).state == "done"
+    (threat,) = gas.chosen_threats()
+    result = GasBlast(hut(), WALL).run()
+    record = gas.folder.record_of(gas.shown(threat)[1].key)
+    assert record is not None
+    load = next(each for each in record.loads if each.structure == "hut")
+    assert load.impulse_pa_s == pytest.approx(result.impulse("hut").pa_s)
+    assert load.peak_kpa == pytest.approx(float(result.structures["peak_pa"].iloc[0]) / 1e3)
+    folder = gas.folder.blast_of(record.key)
+    assert {each.label for each in record.pictures} == {
+        "peak over the ground",
+        "impulse over the ground",
+        "peak on the walls of hut",
+        "impulse on the walls of hut",
+    }
+    assert all((folder / each.file).stat().st_size > 10_000 for each in record.pictures)
+    waves = {each.gauge: each for each in record.waves}
+    assert waves["front"].peak_kpa == pytest.approx(max(waves["front"].overpressure_kpa), rel=0.02)
+    assert [name for name, _ in gas.waves(threat)] == ["no barrier", "A"]
+    assert record.repeat["scenario hash"] == hut().content_hash
+
+
+def test_what_is_there_is_not_run_again(gas: Session) -> None:
+    (threat,) = gas.chosen_threats()
+    path = gas.folder.blast_of(gas.shown(threat)[1].key) / "record.json"
+    before = path.stat().st_mtime_ns
+    gas.blast([0])
+    assert path.stat().st_mtime_ns == before
+    assert state_of(gas).state == "done"
+
+
+def test_keys_know_what_a_result_depends_on() -> None:
+    (threat,) = threats_of(hut())
+    scenario_hash, engine = hut().content_hash, Engine(name="gas")
+    key = blast_key(scenario_hash, WALL, threat.charge, engine)
+    assert key == blast_key(scenario_hash, WALL[::-1], threat.charge, engine)
+    assert key == blast_key(scenario_hash, WALL, threat.charge, Engine(name="gas", cell_m=0.5))
+    others = {
+        blast_key(scenario_hash, WALL[:-1], threat.charge, engine),
+        blast_key(scenario_hash, WALL, threat.charge._replace(tnt_kg=6.0), engine),
+        blast_key(scenario_hash, WALL, threat.charge, Engine(name="gas", cell_m=0.25)),
+        blast_key("0", WALL, threat.charge, engine),
+    }
+    assert len(others | {key}) == 5
+
+
+@pytest.mark.parametrize("proposer", offers.PROPOSERS)
+def test_a_proposal_can_be_taken(tmp_path: Path, proposer: str) -> None:
+    session = session_on(tmp_path, BALLISTIC_COURTYARD)
+    session.propose(proposer)
+    status = state_of(session)
+    assert status.state == "done"
+    session.take(status, 1)
+    assert len(session.design.layouts[1]) > 5
+    assert session.history.present.label.endswith(f"into {SLOTS[1]}")
+
+
+def test_a_search_says_how_good_its_layout_is(tmp_path: Path) -> None:
+    session = session_on(tmp_path, BALLISTIC_COURTYARD)
+    session.search("random", 12)
+    status = state_of(session)
+    assert (status.state, status.share) == ("done", 1.0)
+    assert "% less impulse" in status.text
+    session.take(status, 0)
+    assert len(session.design.layout) == 16
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (lambda s: s.search("sorcery", 5), "no search method 'sorcery'"),
+        (lambda s: s.propose("a wall of wishes"), "no rule 'a wall of wishes'"),
+        (lambda s: s.propose("/nowhere", is_run=True), "nowhere"),
+    ],
+)
+def test_work_that_fails_says_why(tmp_path: Path, act: object, words: str) -> None:
+    session = session_on(tmp_path, BALLISTIC_COURTYARD)
+    act(session)  # type: ignore[operator]
+    assert state_of(session).state == "failed"
+    assert words in state_of(session).text
+
+
+def test_a_site_too_large_for_memory_is_a_message(tmp_path: Path) -> None:
+    document = hut().model_dump(mode="json", exclude_none=True)
+    document["site"] = {"width_m": 2000.0, "height_m": 2000.0, "air_height_m": 2000.0}
+    session = session_on(tmp_path, Scenario.from_document(document, "huge"))
+    session.engine = Engine(name="gas", cell_m=0.25)
+    session.blast([0])
+    assert state_of(session).state == "failed"
+    assert "would need" in state_of(session).text
+
+
+def test_what_cannot_be_begun_is_refused_at_once(tmp_path: Path) -> None:
+    session = session_on(tmp_path, load_scenario("free_field"))
+    with pytest.raises(BlastEnvError, match="no build zone"):
+        session.search("random", 10)
+    with pytest.raises(BlastEnvError, match="no build zone"):
+        session.propose(offers.PROPOSERS[0])
+    courtyard = session_on(tmp_path, load_scenario("courtyard"))
+    with pytest.raises(BlastEnvError, match="budget is 0"):
+        courtyard.search("random", 0)
+    with pytest.raises(BlastEnvError, match="no layout to take"):
+        courtyard.take(Status(title="x"), 0)
+
+
+def test_threats_have_places_that_one_can_point_to() -> None:
+    courtyard = threats_of(load_scenario("courtyard"))
+    assert [each.name for each in courtyard] == [
+        "charge 1, middle",
+        "charge 1, start",
+        "charge 1, end",
+    ]
+    assert courtyard[1].charge.position_m == (5.0, 6.0)
+    assert [each.name for each in threats_of(hut())] == ["charge 1"]
+
+
+# Processes.
+
+
+@pytest.fixture
+def workers() -> Iterator[Workers]:
+    workers = Workers(most=1)
+    yield workers
+    workers.close()
+
+
+def wait(workers: Workers, folder: Path, *states: str, most_s: float = 60.0) -> Status:
+    until_s = monotonic() + most_s
+    while monotonic() < until_s:
+        workers.tick()
+        status = read_status(folder)
+        if status.state in states:
+            return status
+        sleep(0.02)
+    raise AssertionError(f"{folder}: {read_status(folder)} is none of {states}")
+
+
+@pytest.mark.slow
+def test_a_search_is_stopped_and_keeps_its_best_and_its_process_goes_on(
+    tmp_path: Path, workers: Workers
+) -> None:
+    session = session_on(tmp_path, BALLISTIC_COURTYARD, workers)
+    workers.prepare()
+    first, second = session.search("random", 100_000), session.search("random", 4)
+    while read_status(first).layout is None:
+        wait(workers, first, "waiting", "running")
+        sleep(0.02)
+    assert read_status(second).state == "waiting"  # one process, one at a time
+    process = workers._processes[0].popen.pid
+    workers.stop(first)
+    stopped = wait(workers, first, "stopped")
+    assert stopped.layout is not None
+    assert "% less impulse" in stopped.text
+    session.take(stopped, 0)
+    assert wait(workers, second, "done").layout is not None
+    assert workers._processes[0].popen.pid == process
+
+    third = session.search("random", 100_000)
+    wait(workers, third, "running")
+    os.kill(process, signal.SIGKILL)
+    assert "ended unexpectedly" in wait(workers, third, "failed").text
+    fourth = session.search("random", 100_000)
+    wait(workers, fourth, "running")
+    workers.close()  # as when the server stops
+    assert read_status(fourth).state == "stopped"
+
+
+def test_work_that_waits_is_stopped_at_once(tmp_path: Path) -> None:
+    session = session_on(tmp_path, BALLISTIC_COURTYARD, Workers(most=0))
+    folder = session.blast([0])
+    session.workers.stop(folder)
+    assert read_status(folder).state == "stopped"
+
+
+def test_work_of_a_server_that_was_killed_is_not_shown_as_going_on(tmp_path: Path) -> None:
+    session = session_on(tmp_path, BALLISTIC_COURTYARD, Workers(most=0))
+    folder = session.blast([0])
+    write_status(read_status(folder).model_copy(update={"state": "running"}), folder)
+    settle(session.folder.jobs, Workers(most=0))
+    assert read_status(folder).state == "stopped"
+    assert "server stopped" in read_status(folder).text
+
+
+def test_tabs_on_one_design_share_it_and_designs_are_apart(tmp_path: Path) -> None:
+    sessions = Sessions(WorkFolder(tmp_path), Here())
+    one, other = sessions.new(hut(), "begin"), sessions.new(hut(), "begin")
+    assert sessions.of(one.folder.design_id) is one
+    heard: list[int] = []
+    stop = one.listen(lambda: heard.append(len(one.design.layout)))
+    one.put("wall", one.design.with_layout(WALL))
+    assert heard == [6]
+    assert other.design.layout == ()
+    stop()
+    one.undo()
+    assert heard == [6]
+    assert Sessions(WorkFolder(tmp_path), Here()).of(one.folder.design_id).design == one.design
