@@ -75,9 +75,9 @@ def cell_at(scenario: Scenario, x_m: float, y_m: float) -> Cell | None:
 
 
 def solids(scenario: Scenario, layout: Layout) -> Iterator[Solid]:
-    """Yield what the elements of a layout look like, in their order."""
-    for each in layout:
-        yield Solid(scenario.zone.cell_rectangle_m(each), scenario.zone.height_m)
+    """Yield what the modules of a layout look like, in the order of its elements."""
+    for module in scenario.zone.modules(layout) if layout else ():
+        yield Solid(scenario.zone.cell_rectangle_m(module.cell), module.height_m)
 
 
 def reason_against(scenario: Scenario, layout: Layout, new: Element) -> str | None:
@@ -92,7 +92,7 @@ def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple
         The layout, and a sentence for each element that fell away.
     """
     try:
-        return Placement.of(scenario, layout).cells, ()
+        return Placement.of(scenario, layout).layout, ()
     except LayoutError:
         placement, reasons = Placement.empty(scenario), []
     for each in layout:
@@ -101,7 +101,7 @@ def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple
             placement = placement.place(each)
         else:
             reasons.append(reason)
-    return placement.cells, tuple(reasons)
+    return placement.layout, tuple(reasons)
 
 
 def counted(scenario: Scenario, layout: Layout) -> str:

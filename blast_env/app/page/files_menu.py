@@ -108,8 +108,8 @@ class FilesMenu:
                 dialog.close()
                 try:
                     file = layout_of_file(event.file.name, await event.file.read())
-                    cells = file.cells_for(self._session.scenario)
-                    design = self._session.design.with_layout(cells)
+                    layout = file.layout_for(self._session.scenario)
+                    design = self._session.design.with_layout(layout)
                     self._session.put(f"layout of {event.file.name}", design)
                 except BlastEnvError as error:
                     complain(error)
