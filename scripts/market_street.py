@@ -5,17 +5,18 @@ in it exists: it lies in the North Sea.
 """
 
 import json
-import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import ezdxf
 import numpy as np
+import typer
 from ezdxf import units
 from ezdxf.enums import TextEntityAlignment
 
 from blast_env.arrays import FloatArray
+from blast_env.cli.output import print_line, user_errors
 from blast_env.files import write_atomically
 from blast_env.importing.plane import LocalPlane, rotated
 
@@ -181,6 +182,14 @@ def write_all(folder: Path) -> list[Path]:
     return files
 
 
+def main(
+    folder: Annotated[Path, typer.Argument(help="Where the files go; must exist.")],
+) -> None:
+    """Write the block as GeoJSON, as an extract of OpenStreetMap and as a drawing."""
+    with user_errors():
+        for path in write_all(folder):
+            print_line(f"wrote {path}")
+
+
 if __name__ == "__main__":
-    for written in write_all(Path(sys.argv[1])):
-        print(written)
+    typer.run(main)
