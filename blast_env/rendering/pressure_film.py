@@ -91,7 +91,7 @@ def write_pressure_film(
         plan = plan_until(end_s, frames_per_s, slow_motion)
         if suffix == ".gif":
             plan, width_px = for_gif(plan, width_px)
-        full_kpa = _full_kpa([shot.result for shot in shots]) if full_kpa is None else full_kpa
+        full_kpa = scale_end_kpa([shot.result for shot in shots]) if full_kpa is None else full_kpa
         painter = PressurePainter(shots, full_kpa, width_px - width_px % 2)
         with open_film(suffix, temporary, plan, blast.scenario.name, _comment(shots, plan)) as film:
             for number in range(plan.frame_count):
@@ -115,7 +115,7 @@ def _comment(shots: Sequence["PressureShot"], plan: FilmPlan) -> str:
     )
 
 
-def _full_kpa(results: Sequence[GasResult]) -> float:
+def scale_end_kpa(results: Sequence[GasResult]) -> float:
     """Return the end of the scale: the largest peak on the walls that count, rounded up."""
     peaks = []
     for result in results:
