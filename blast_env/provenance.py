@@ -19,6 +19,7 @@ _NO_INFLUENCE: Final = frozenset(
         "importing",
         "recording",
         "rendering",
+        "reporting",
         "sites",
         "studies",
     }

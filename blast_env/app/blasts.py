@@ -42,7 +42,7 @@ from blast_env.rendering.film import largest_load, paint_at, plan_film
 from blast_env.rendering.frames import Frame, FramePainter
 from blast_env.rendering.gas import Quantity, facades, full_load
 from blast_env.rendering.ground_map import ground_map, ground_recorders, map_levels
-from blast_env.rendering.pressure_film import largest_kpa, record_planes
+from blast_env.rendering.pressure_film import record_planes, scale_end_kpa
 from blast_env.rendering.pressure_frames import PressurePainter, default_section
 from blast_env.rendering.style import render_extra
 from blast_env.runner import share_of
@@ -235,7 +235,7 @@ def _scale(result: GasResult, kept: Path) -> Scale:
     except (OSError, ValidationError):
         names = _facades_of(result)
         return Scale(
-            film_kpa=largest_kpa([result]),
+            film_kpa=scale_end_kpa([result]),
             levels={each: map_levels(result, each) for each in _QUANTITIES},
             walls={
                 name: {each: full_load(result, name, each) for each in _QUANTITIES}

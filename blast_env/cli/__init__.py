@@ -11,6 +11,7 @@ from blast_env.cli.import_map import import_map
 from blast_env.cli.league import league
 from blast_env.cli.output import print_line
 from blast_env.cli.page import app as page
+from blast_env.cli.report import report
 from blast_env.cli.search import search
 from blast_env.cli.simulate import simulate
 from blast_env.cli.train import train
@@ -22,7 +23,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for _command in (simulate, validate, calibrate, evaluate, search, bench, train, league):
+for _command in (simulate, validate, calibrate, evaluate, search, bench, train, league, report):
     app.command()(_command)
 app.command("import")(import_map)  # a word that Python keeps for itself
 app.command("app")(page)

@@ -95,12 +95,14 @@ KINDS: Final = {
 }
 
 
-def kind_of(quantity: str) -> Kind:
-    """Return how a quantity is drawn.
+def kind_of(quantity: str | Kind) -> Kind:
+    """Return how a quantity is drawn; a kind, say one in other units, is drawn as it says.
 
     Raises:
         UnknownNameError: If there is no such quantity.
     """
+    if isinstance(quantity, Kind):
+        return quantity
     if quantity not in KINDS:
         raise UnknownNameError("quantity", quantity, KINDS)
     return KINDS[quantity]
@@ -177,7 +179,7 @@ _LEFT_TO_RIGHT: Final[dict[WallName, tuple[str, bool]]] = {
 def facades(
     result: GasResult,
     structure: str | None = None,
-    quantity: Quantity = "impulse",
+    quantity: Quantity | Kind = "impulse",
     beside: GasResult | None = None,
     full: float | None = None,
 ) -> Figure:
@@ -189,7 +191,8 @@ def facades(
     Args:
         result: The blast.
         structure: Name of the structure; the protected one with the largest impulse without it.
-        quantity: `"impulse"`, of all positive phases in Pa s, or `"peak"`, overpressure in kPa.
+        quantity: `"impulse"`, of all positive phases in Pa s, or `"peak"`, overpressure in kPa;
+            or how else one is drawn.
         beside: Another result with the same site and charge, drawn above on the same scale:
             without the barrier, or with another layout.
         full: End of the scale, for walls that are to be compared; see `full_load`. Without it the

@@ -93,7 +93,7 @@ def write_pressure_film(
         plan = plan_until(end_s, frames_per_s, slow_motion)
         if suffix == ".gif":
             plan, width_px = for_gif(plan, width_px)
-        full_kpa = largest_kpa([shot.result for shot in shots]) if full_kpa is None else full_kpa
+        full_kpa = scale_end_kpa([shot.result for shot in shots]) if full_kpa is None else full_kpa
         painter = PressurePainter(shots, full_kpa, width_px - width_px % 2)
         with open_film(suffix, temporary, plan, blast.scenario.name, _comment(shots, plan)) as film:
             for number in range(plan.frame_count):
@@ -117,8 +117,8 @@ def _comment(shots: Sequence["PressureShot"], plan: FilmPlan) -> str:
     )
 
 
-def largest_kpa(results: Sequence[GasResult]) -> float:
-    """Return the end of a film's scale: the largest peak on the walls that count, rounded up."""
+def scale_end_kpa(results: Sequence[GasResult]) -> float:
+    """Return the end of the scale: the largest peak on the walls that count, rounded up."""
     peaks = []
     for result in results:
         table = result.structures

@@ -1,0 +1,377 @@
+"""The pictures of a report, as PNG."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from io import BytesIO
+from typing import Final
+
+import numpy as np
+
+from blast_env.geometry import Rectangle
+from blast_env.physics.gas.engine import ROOF
+from blast_env.rendering.gas import KINDS, Kind, facades
+from blast_env.rendering.pressure_film import record_planes, scale_end_kpa
+from blast_env.rendering.pressure_frames import PressurePainter, default_section
+from blast_env.rendering.site_plan import add_outline, draw_site, draw_zone, rectangle_patch
+from blast_env.rendering.style import (
+    BARRIER,
+    EXPLOSIVE,
+    INK,
+    PROTECTED,
+    QUIET_INK,
+    STRUCTURE,
+    count_of,
+    render_extra,
+    unit_interval,
+)
+from blast_env.reporting.loads import Measured, Target
+from blast_env.reporting.outcomes import FrontPoint, ItemWorth, Outcome
+from blast_env.reporting.threats import NamedCharge
+from blast_env.reporting.units import UnitSystem
+from blast_env.scenario import PointSource, RectangleSource, Scenario
+from blast_env.simulation.gas import GasBlast
+from blast_env.units import MODULE_SIDE_M, MS_PER_S
+
+with render_extra():
+    from matplotlib import patheffects
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import PatchCollection
+    from matplotlib.colors import TwoSlopeNorm
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+    from matplotlib.ticker import PercentFormatter
+    from PIL import Image
+
+_DOTS_PER_IN: Final = 120
+_WIDTH_IN: Final = 9.0
+_HEIGHTS_IN: Final = (3.6, 8.5)
+_STILL_PX: Final = 1200
+_STILL_HEIGHT_M: Final = 1.5
+_LEAST_SHARE: Final = 0.1  # of a building's walls, for the walls of a part to be drawn
+_MOST_FACADES: Final = 4
+_BARE, _WALLED = "#D55E00", "#0072B2"  # Okabe and Ito's
+
+Picture = tuple[str, bytes]
+"""A caption, and a PNG."""
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as PNG."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=_DOTS_PER_IN)
+    return buffer.getvalue()
+
+
+# The site.
+
+
+def site_plan(
+    scenario: Scenario,
+    targets: Sequence[Target],
+    threats: Sequence[NamedCharge],
+    modules_m: Sequence[Rectangle],
+) -> bytes:
+    """Return the plan of a site with buildings, heights, threats and the layout."""
+    figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.9), layout="constrained")
+    axes = figure.subplots()
+    draw_site(axes, scenario.site.rectangle_m)
+    for target in targets:
+        _draw_target(axes, target)
+    if scenario.build_zone is not None:
+        draw_zone(axes, scenario.build_zone)
+    _draw_sources(axes, scenario)
+    patches = [rectangle_patch(each) for each in modules_m]
+    axes.add_collection(PatchCollection(patches, color=unit_interval(BARRIER), zorder=4))
+    for threat in threats:
+        _draw_threat(axes, threat)
+    figure.legend(
+        handles=_site_legend(scenario),
+        loc="outside lower center",
+        ncols=4,
+        fontsize=9,
+        frameon=False,
+    )
+    return png(figure)
+
+
+def _height_in(scenario: Scenario) -> float:
+    low, high = _HEIGHTS_IN
+    return min(max(_WIDTH_IN * scenario.site.height_m / scenario.site.width_m, low), high)
+
+
+def _draw_target(axes: Axes, target: Target) -> None:
+    colour = unit_interval(PROTECTED if target.protected else STRUCTURE)
+    patches = [rectangle_patch(each.rectangle_m) for each in target.structures]
+    axes.add_collection(
+        PatchCollection(patches, facecolor=(*colour, 0.35), edgecolor=colour, zorder=3)
+    )
+    height = "as high as the air" if target.height_m is None else f"{target.height_m:g} m"
+    biggest = max(target.structures, key=lambda each: each.rows * each.columns)
+    text = axes.text(
+        *biggest.rectangle_m.centre,
+        f"{target.name}\n{height}",
+        ha="center",
+        va="center",
+        fontsize=8,
+        fontweight="bold" if target.protected else "normal",
+        zorder=6,
+    )
+    text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
+
+
+def _draw_sources(axes: Axes, scenario: Scenario) -> None:
+    colour = unit_interval(EXPLOSIVE)
+    for source in scenario.charge:
+        if isinstance(source, RectangleSource):
+            add_outline(
+                axes, source.rectangle_m, facecolor=(*colour, 0.2), edgecolor=colour, fill=True
+            )
+        elif not isinstance(source, PointSource):
+            x, y = np.transpose(source.segment_m)
+            axes.plot(x, y, color=(*colour, 0.5), linewidth=2.5, zorder=2)
+
+
+def _draw_threat(axes: Axes, threat: NamedCharge) -> None:
+    x_m, y_m = threat.charge.position_m
+    axes.plot(
+        x_m,
+        y_m,
+        marker="*",
+        markersize=15,
+        color=unit_interval(EXPLOSIVE),
+        zorder=7,
+        markeredgecolor=unit_interval(INK),
+        markeredgewidth=0.6,
+    )
+    text = axes.annotate(
+        f"{threat.name}: {threat.charge.tnt_kg:g} kg",
+        (x_m, y_m),
+        xytext=(8, 8),
+        textcoords="offset points",
+        fontsize=9,
+        fontweight="bold",
+        color=unit_interval(EXPLOSIVE),
+        zorder=8,
+    )
+    text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
+
+
+def _site_legend(scenario: Scenario) -> list[Patch | Line2D]:
+    protected, other = unit_interval(PROTECTED), unit_interval(STRUCTURE)
+    quiet, red = unit_interval(QUIET_INK), unit_interval(EXPLOSIVE)
+    handles: list[Patch | Line2D] = [
+        Patch(facecolor=(*protected, 0.35), edgecolor=protected, label="protected"),
+        Patch(facecolor=(*other, 0.35), edgecolor=other, label="other building"),
+        Patch(facecolor=unit_interval(BARRIER), label="layout"),
+        Line2D([], [], marker="*", linestyle="none", markersize=12, color=red, label="threat"),
+        Line2D([], [], color=(*red, 0.5), linewidth=2.5, label="where charges may be"),
+    ]
+    zone = scenario.build_zone
+    if zone is not None:
+        handles.append(Patch(fill=False, edgecolor=quiet, linestyle="--", label="build zone"))
+        if zone.keep_outs:
+            handles.append(Patch(fill=False, edgecolor=quiet, hatch="////", label="keep-out"))
+    return handles
+
+
+# A threat.
+
+
+def kinds(units: UnitSystem) -> dict[str, Kind]:
+    """Return how impulses and peaks are drawn in some units."""
+    factors = {
+        "impulse": (units.impulse, 1.0 / units.pa_s_per_impulse),
+        "peak": (units.pressure, 1.0 / units.pa_per_pressure),
+    }
+    return {
+        name: replace(KINDS[name], unit=unit, factor=factor)
+        for name, (unit, factor) in factors.items()
+    }
+
+
+def blast_pictures(bare: Measured, walled: Measured, units: UnitSystem) -> tuple[Picture, ...]:
+    """Return the facades of what is protected, unfolded, and the histories on it."""
+    pictures: list[Picture] = []
+    for target in walled.targets:
+        if not target.protected or target.name not in walled.loads:
+            continue
+        pictures.append(_history(bare, walled, target, units))
+        for name in _shown_parts(walled, target):
+            for kind in kinds(units).values():
+                figure = facades(walled.result, name, kind, bare.result)
+                pictures.append((f"{name}: {kind.name}, walls unfolded", png(figure)))
+    return tuple(pictures)
+
+
+def _shown_parts(measured: Measured, target: Target) -> list[str]:
+    """Return the structures of a building that have most of its walls."""
+    faces = measured.result.faces
+    counts = [
+        int(((faces["structure"] == name) & (faces["face"] != ROOF)).sum()) for name in target.names
+    ]
+    least = _LEAST_SHARE * sum(counts)
+    shown = [name for name, count in zip(target.names, counts, strict=True) if count >= least]
+    return shown[:_MOST_FACADES]
+
+
+def _history(bare: Measured, walled: Measured, target: Target, units: UnitSystem) -> Picture:
+    """Return the mean overpressure on the most loaded wall over time, without and with."""
+    wall = bare.loads[target.name].wall
+    figure = Figure(figsize=(_WIDTH_IN, 3.2), layout="constrained")
+    axes = figure.subplots()
+    for measured, colour, words in ((bare, _BARE, "no barrier"), (walled, _WALLED, "layout")):
+        pressure = measured.histories.of(target.name, wall)
+        if pressure is not None:
+            axes.plot(
+                MS_PER_S * measured.histories.time_s,
+                pressure / units.pa_per_pressure,
+                color=colour,
+                linestyle="-" if measured is walled else "--",
+                linewidth=1.8,
+                label=words,
+            )
+    axes.axhline(0.0, color=unit_interval(QUIET_INK), linewidth=0.8)
+    axes.set(
+        xlabel="time since the detonation (ms)", ylabel=f"mean overpressure ({units.pressure})"
+    )
+    axes.set_xlim(left=0.0)
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(fontsize=9, frameon=False)
+    return f"{target.name}: overpressure over time, mean over its {wall} wall", png(figure)
+
+
+def film_stills(
+    bare: GasBlast,
+    walled: GasBlast,
+    moments_s: Sequence[float],
+    progress: Callable[[float], None],
+) -> tuple[Picture, ...]:
+    """Return moments of two blasts side by side, in plan and in a section."""
+    if not moments_s:
+        return ()
+    section = default_section(walled.site)
+    shots = []
+    for number, blast in enumerate((bare, walled)):
+
+        def tell(share: float, number: int = number) -> None:
+            progress(0.5 * (number + share))
+
+        height_m = min(_STILL_HEIGHT_M, 0.5 * blast.site.air_height_m)
+        shots.append(record_planes(blast, height_m, section, tell))
+    painter = PressurePainter(shots, scale_end_kpa([each.result for each in shots]), _STILL_PX)
+    pictures = []
+    for moment_s in moments_s:
+        buffer = BytesIO()
+        Image.fromarray(painter.paint(moment_s)).save(buffer, "PNG", optimize=True)
+        pictures.append((f"{MS_PER_S * moment_s:.1f} ms after the detonation", buffer.getvalue()))
+    return tuple(pictures)
+
+
+# What is worth what.
+
+
+def worth_map(scenario: Scenario, targets: Sequence[Target], items: Sequence[ItemWorth]) -> bytes:
+    """Return the layout with every module in the colour of what it is worth."""
+    figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.3), layout="constrained")
+    axes = figure.subplots()
+    draw_site(axes, scenario.site.rectangle_m)
+    for target in targets:
+        _draw_target(axes, target)
+    draw_zone(axes, scenario.zone)
+    worths = 100.0 * np.array([each.worth for each in items])
+    reach = max(float(np.abs(worths).max()), 1e-6)
+    scale = TwoSlopeNorm(0.0, -reach, reach)
+    squares = [rectangle_patch(scenario.zone.cell_rectangle_m(each.cell)) for each in items]
+    modules = PatchCollection(squares, cmap="PuOr", norm=scale, edgecolor=unit_interval(INK))
+    modules.set_array(worths)
+    modules.set(linewidth=0.5, zorder=5)
+    axes.add_collection(modules)
+    cells = np.array([each.centre_m for each in items])
+    low, high = cells.min(axis=0), cells.max(axis=0)
+    reach_m = max(8.0 * MODULE_SIDE_M, 0.6 * float((high - low).max()))
+    axes.set_xlim(low[0] - reach_m, high[0] + reach_m)
+    axes.set_ylim(low[1] - reach_m, high[1] + reach_m)
+    bar = figure.colorbar(ScalarMappable(scale, modules.get_cmap()), ax=axes, shrink=0.8)
+    bar.set_label("worth: percentage points of reduction lost without it")
+    return png(figure)
+
+
+def mass_figure(masses: dict[str, tuple[Outcome, ...]], units: UnitSystem) -> bytes:
+    """Return impulses without and with the layout for other masses, a threat a panel."""
+    figure = Figure(figsize=(_WIDTH_IN, 3.2), layout="constrained")
+    panels = figure.subplots(1, len(masses), squeeze=False, sharey=True)[0]
+    for axes, (name, outcomes) in zip(panels, masses.items(), strict=True):
+        _bars(axes, outcomes, units)
+        axes.set_title(name, fontsize=10)
+    panels[0].set_ylabel(f"impulse, by weight ({units.impulse})")
+    panels[-1].legend(fontsize=9, frameon=False)
+    return png(figure)
+
+
+def _bars(axes: Axes, outcomes: Sequence[Outcome], units: UnitSystem) -> None:
+    place = np.arange(len(outcomes))
+    for shift, colour, label, values in (
+        (-0.2, _BARE, "no barrier", [each.bare_pa_s for each in outcomes]),
+        (0.2, _WALLED, "layout", [each.walled_pa_s for each in outcomes]),
+    ):
+        heights = np.array(values) / units.pa_s_per_impulse
+        axes.bar(place + shift, heights, 0.38, color=colour, label=label)
+    axes.set_xticks(place, [each.name for each in outcomes], fontsize=8)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(axis="y", alpha=0.25)
+
+
+def place_figure(
+    scenario: Scenario,
+    targets: Sequence[Target],
+    charges: Sequence[NamedCharge],
+    outcomes: Sequence[Outcome],
+) -> bytes:
+    """Return the plan with the reduction for charges at other places."""
+    figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.3), layout="constrained")
+    axes = figure.subplots()
+    draw_site(axes, scenario.site.rectangle_m)
+    for target in targets:
+        _draw_target(axes, target)
+    _draw_sources(axes, scenario)
+    places = np.array([each.charge.position_m for each in charges])
+    shares = 100.0 * np.array([each.reduction for each in outcomes])
+    reach = max(float(np.nanmax(np.abs(shares))), 1e-6)
+    x_m, y_m = places.T
+    dots = axes.scatter(
+        x_m,
+        y_m,
+        c=shares,
+        s=70,
+        cmap="PuOr",
+        norm=TwoSlopeNorm(0.0, -reach, reach),
+        edgecolor=unit_interval(INK),
+        zorder=6,
+    )
+    figure.colorbar(dots, ax=axes, shrink=0.8).set_label("reduction (%)")
+    return png(figure)
+
+
+def front_figure(
+    points: Sequence[FrontPoint], own: tuple[float, float], threat_count: int
+) -> bytes:
+    """Return reduction against cost, with the layout of the report."""
+    figure = Figure(figsize=(_WIDTH_IN, 3.6), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(
+        [each.cost for each in points],
+        [each.reduction for each in points],
+        "o-",
+        color=_WALLED,
+        label="layouts of the search",
+    )
+    axes.plot(*own, "*", markersize=15, color=_BARE, label="the layout of this report")
+    axes.set(xlabel="cost", ylabel=f"reduction, mean of {count_of('threat', threat_count)}")
+    axes.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(fontsize=9, frameon=False)
+    return png(figure)

@@ -1,0 +1,239 @@
+"""Loads by building and wall, with how long they last."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.geometry import Rectangle
+from blast_env.physics.gas.probes import ARRIVAL_PA
+from blast_env.physics.gas.solver import GasSolver
+from blast_env.physics.scene import WALLS, WallName
+from blast_env.scenario import AnyStructure, Scenario
+from blast_env.simulation.gas import GasBlast, GasResult
+
+
+@dataclass(frozen=True)
+class Target:
+    """A building: one structure, or those that make it together.
+
+    Attributes:
+        name: Its name.
+        structures: The structures.
+    """
+
+    name: str
+    structures: tuple[AnyStructure, ...]
+
+    @property
+    def protected(self) -> bool:
+        """Whether its load counts."""
+        return any(each.protected for each in self.structures)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its structures."""
+        return tuple(each.name for each in self.structures)
+
+    @property
+    def height_m(self) -> float | None:
+        """Its height; `None` for as high as the air."""
+        heights = [each.height_m for each in self.structures]
+        known = [height_m for height_m in heights if height_m is not None]
+        return max(known) if len(known) == len(heights) else None
+
+    @property
+    def bounds_m(self) -> Rectangle:
+        """The rectangle around it."""
+        sides = np.array([each.rectangle_m for each in self.structures])
+        low, high = sides.min(axis=0), sides.max(axis=0)
+        return Rectangle(float(low[0]), float(low[1]), float(high[2]), float(high[3]))
+
+
+def targets_of(scenario: Scenario) -> tuple[Target, ...]:
+    """Return the buildings of a scenario, protected ones first."""
+    together: dict[str, list[AnyStructure]] = {}
+    for structure in scenario.structures:
+        together.setdefault(structure.building or structure.name, []).append(structure)
+    targets = [Target(name, tuple(parts)) for name, parts in together.items()]
+    return tuple(sorted(targets, key=lambda each: not each.protected))
+
+
+class WallHistories:
+    """Recorder of the mean overpressure on every wall of every building.
+
+    Args:
+        targets: The buildings.
+    """
+
+    def __init__(self, targets: Sequence[Target]) -> None:
+        self._targets = tuple(targets)
+        self._members: dict[tuple[str, WallName], NDArray[np.int64]] | None = None
+        self._times: list[float] = []
+        self._means: list[list[float]] = []
+
+    def record(self, solver: GasSolver, step_s: float) -> None:
+        """Add a step; its pressures are means over it."""
+        if self._members is None:
+            self._members = self._walls(solver)
+        pressure = solver.wall_overpressure_pa()
+        self._times.append(solver.time_s - 0.5 * step_s)
+        self._means.append([float(pressure[each].mean()) for each in self._members.values()])
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Middles of the steps (steps,)."""
+        return np.array(self._times)
+
+    def of(self, target: str, wall: WallName) -> FloatArray | None:
+        """Return the mean overpressure on a wall, Pa (steps,); `None` for one without air."""
+        keys = list(self._members or ())
+        if (target, wall) not in keys:
+            return None
+        return np.array(self._means)[:, keys.index((target, wall))]
+
+    def _walls(self, solver: GasSolver) -> dict[tuple[str, WallName], NDArray[np.int64]]:
+        """Return the faces of each wall that counts."""
+        faces = solver.faces
+        behind_m = np.asarray(solver.grid.origin_m) + solver.grid.cell_m * (faces.solid + 0.5)
+        number = 2 * faces.axis + (faces.side > 0)  # of `WALLS`; 4 and 5 look down and up
+        members = {}
+        for target in self._targets:
+            for index, wall in enumerate(WALLS):
+                inside = np.zeros(len(faces), dtype=bool)
+                for structure in target.structures:
+                    if wall in structure.faces:
+                        left, bottom, right, top = structure.rectangle_m
+                        x_m, y_m = behind_m[:, 0], behind_m[:, 1]
+                        inside |= (left < x_m) & (x_m < right) & (bottom < y_m) & (y_m < top)
+                chosen = np.flatnonzero(inside & (number == index))
+                if len(chosen):
+                    members[target.name, wall] = chosen
+        return members
+
+
+@dataclass(frozen=True)
+class TargetLoad:
+    """The load on a building, over its walls that count.
+
+    Attributes:
+        target: Its name.
+        impulse_pa_s: Impulse of all positive phases, mean over the walls.
+        first_impulse_pa_s: Impulse of the first positive phase, likewise.
+        peak_pa: Largest overpressure on a face of a cell.
+        arrival_s: When the wave comes; NaN if it does not.
+        wall: The wall with the largest impulse.
+        wall_impulse_pa_s: Impulse of all positive phases on it, mean.
+        duration_s: How long the mean overpressure on it stays positive at first; NaN if no wave
+            comes or the run ends before.
+    """
+
+    target: str
+    impulse_pa_s: float
+    first_impulse_pa_s: float
+    peak_pa: float
+    arrival_s: float
+    wall: WallName
+    wall_impulse_pa_s: float
+    duration_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A blast with the loads on buildings.
+
+    Attributes:
+        result: The blast.
+        histories: Mean overpressures on walls.
+        targets: The buildings.
+    """
+
+    result: GasResult
+    histories: WallHistories
+    targets: tuple[Target, ...]
+
+    @cached_property
+    def loads(self) -> dict[str, TargetLoad]:
+        """The load on every building with a wall in the air, by name."""
+        faces = self.result.faces
+        loads = {}
+        for target in self.targets:
+            counting = [
+                (faces["structure"] == each.name) & faces["face"].isin(each.faces)
+                for each in target.structures
+            ]
+            walls = faces[np.logical_or.reduce(counting)]
+            if len(walls):
+                loads[target.name] = self._load(target, walls)
+        return loads
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """Why loads on protected buildings are outside what the engine was checked for."""
+        names = (name for each in self.targets if each.protected for name in each.names)
+        notes = (note for name in names for note in self.result.impulse(name).notes)
+        return tuple(dict.fromkeys(notes))
+
+    def _load(self, target: Target, walls: pd.DataFrame) -> TargetLoad:
+        by_wall = walls.groupby("face", observed=True)["positive_impulse_pa_s"].mean()
+        wall = next(each for each in WALLS if each == by_wall.idxmax())
+        arrivals = walls["arrival_s"].to_numpy()
+        return TargetLoad(
+            target=target.name,
+            impulse_pa_s=float(walls["positive_impulse_pa_s"].mean()),
+            first_impulse_pa_s=float(walls["first_impulse_pa_s"].mean()),
+            peak_pa=float(walls["peak_pa"].max()),
+            arrival_s=float(np.nanmin(arrivals)) if np.isfinite(arrivals).any() else float("nan"),
+            wall=wall,
+            wall_impulse_pa_s=float(by_wall.max()),
+            duration_s=self._duration_s(target.name, wall),
+        )
+
+    def _duration_s(self, target: str, wall: WallName) -> float:
+        """Return how long the first positive phase on a wall lasts."""
+        pressure = self.histories.of(target, wall)
+        if pressure is None:
+            return float("nan")
+        return first_phase_s(self.histories.time_s, pressure)
+
+
+_NO_PHASE: Final = float("nan")
+
+
+def first_phase_s(time_s: FloatArray, overpressure_pa: FloatArray) -> float:
+    """Return how long an overpressure stays above 0 after it has reached 1 kPa first, s.
+
+    It begins where it rose above 0 before that. NaN if it never comes, or never ends.
+    """
+    arrived = np.flatnonzero(overpressure_pa >= ARRIVAL_PA)
+    if len(arrived) == 0:
+        return _NO_PHASE
+    before = np.flatnonzero(overpressure_pa[: arrived[0]] <= 0.0)
+    after = np.flatnonzero(overpressure_pa[arrived[0] :] <= 0.0)
+    if len(after) == 0:
+        return _NO_PHASE
+    first = before[-1] if len(before) else 0
+    return _zero_s(time_s, overpressure_pa, int(arrived[0] + after[0])) - float(time_s[first])
+
+
+def _zero_s(time_s: FloatArray, pressure_pa: FloatArray, index: int) -> float:
+    """Return when a pressure falls to 0 in the step before an index."""
+    high, low = pressure_pa[index - 1], pressure_pa[index]
+    share = high / (high - low)
+    return float(time_s[index - 1] + share * (time_s[index] - time_s[index - 1]))
+
+
+def measure(
+    blast: GasBlast,
+    targets: Sequence[Target],
+    progress: Callable[[float], None] | None = None,
+) -> Measured:
+    """Run a blast and return the loads on buildings."""
+    histories = WallHistories(targets)
+    result = blast.run(progress, lambda _: (histories,))
+    return Measured(result, histories, tuple(targets))

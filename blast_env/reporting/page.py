@@ -1,0 +1,245 @@
+"""The report as HTML that needs nothing else, and as PDF."""
+
+import json
+from base64 import b64encode
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from hashlib import sha256
+from math import isfinite, isnan
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import tomli_w
+
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.files import write_atomically
+from blast_env.physics.gas.engine import CHECKED_SCALED_DISTANCE
+from blast_env.provenance import code_version, command, versions
+from blast_env.reporting.figures import (
+    front_figure,
+    mass_figure,
+    place_figure,
+    site_plan,
+    worth_map,
+)
+from blast_env.reporting.limits import Limit
+from blast_env.reporting.outcomes import LoadPair
+from blast_env.reporting.study import Study
+from blast_env.reporting.threats import other_places
+from blast_env.units import MS_PER_S
+
+with import_extra("report", "reports"):
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+HTML_SUFFIXES: Final = (".html", ".htm")
+_TEMPLATE: Final = "report.html.j2"
+_NONE: Final = "\N{EN DASH}"
+_MINUS: Final = "\N{MINUS SIGN}"
+_LIBRARIES: Final = ("numpy", "numba", "scipy", "matplotlib")
+_HASH_DIGITS: Final = 16
+
+
+def write_report(
+    study: Study, html: str | Path, pdf: str | Path | None = None, commands: list[str] | None = None
+) -> list[Path]:
+    """Write a report.
+
+    Args:
+        study: What it shows.
+        html: The page: one file, with its pictures inside.
+        pdf: The same as PDF, if it is wanted.
+        commands: How it was made; by default the command line of this process.
+
+    Returns:
+        The files.
+
+    Raises:
+        BlastEnvError: If a suffix is another one, a file cannot be written, or WeasyPrint lacks
+            its libraries; the page is written before the PDF.
+    """
+    check_targets(html, pdf)
+    page = report_html(study, command() if commands is None else commands)
+    with write_atomically(html) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    if pdf is None:
+        return [Path(html)]
+    with write_atomically(pdf) as temporary:
+        _weasyprint().HTML(string=page).write_pdf(str(temporary))
+    return [Path(html), Path(pdf)]
+
+
+def check_targets(html: str | Path, pdf: str | Path | None) -> None:
+    """Refuse files of no use before any blast is run.
+
+    Raises:
+        BlastEnvError: If a suffix is another one, or a PDF is wanted and WeasyPrint not there.
+    """
+    if Path(html).suffix.lower() not in HTML_SUFFIXES:
+        raise BlastEnvError(f"{html}: suffix is {Path(html).suffix!r}, must be .html")
+    if pdf is not None:
+        if Path(pdf).suffix.lower() != ".pdf":
+            raise BlastEnvError(f"{pdf}: suffix is {Path(pdf).suffix!r}, must be .pdf")
+        _weasyprint()
+
+
+def _weasyprint() -> Any:
+    """Return the package that makes PDF; it needs libraries of the system, Pango above all."""
+    with import_extra("report", "PDF"):
+        try:
+            import weasyprint
+        except OSError as error:
+            raise BlastEnvError(
+                f"no PDF: WeasyPrint lacks a library of the system ({error}); install Pango, or "
+                "print the HTML page from a browser"
+            ) from error
+    return weasyprint
+
+
+def report_html(study: Study, commands: list[str]) -> str:
+    """Return the report as one HTML page."""
+    environment = Environment(
+        loader=PackageLoader("blast_env.reporting"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    units = study.options.units
+    environment.filters |= {
+        "impulse": lambda pa_s: _number(units.impulse_of(pa_s)),
+        "pressure": lambda pa: _number(units.pressure_of(pa)),
+        "percent": _percent,
+        "points": _points,
+        "ms": lambda time_s: _number(MS_PER_S * time_s),
+        "money": lambda cost: f"{cost:,.10g}",
+        "picture": lambda png: f"data:image/png;base64,{b64encode(png).decode()}",
+    }
+    return environment.get_template(_TEMPLATE).render(_context(study, commands))
+
+
+@dataclass(frozen=True)
+class _Verdict:
+    """Whether a building keeps its limit under a threat."""
+
+    limit: Limit
+    pair: LoadPair
+    kept: bool
+    kept_bare: bool
+
+
+def _context(study: Study, commands: list[str]) -> dict[str, Any]:
+    """Return what the template shows."""
+    scenario, options = study.scenario, study.options
+    coarse, fine = options.cells_m
+    protected = [each for each in study.targets if each.protected]
+    zone = scenario.zone
+    modules_m = [zone.cell_rectangle_m(cell) for cell in study.layout]
+    layout_json = json.dumps([list(cell) for cell in study.layout])
+    places = other_places(scenario, options.places)
+    return {
+        "study": study,
+        "scenario": scenario,
+        "units": options.units,
+        "coarse": coarse,
+        "fine": fine,
+        "protected": protected,
+        "others": [each for each in study.targets if not each.protected],
+        "plan": site_plan(scenario, study.targets, study.threats, modules_m),
+        "summary": _summary(study),
+        "verdicts": _verdicts(study),
+        "grid_error": study.grid_error,
+        "worth_map": worth_map(scenario, study.targets, study.items) if study.items else None,
+        "mass_figure": mass_figure(study.masses, options.units),
+        "place_figure": place_figure(scenario, study.targets, places, study.places),
+        "front_figure": _front(study) if study.front else None,
+        "checked": CHECKED_SCALED_DISTANCE,
+        "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "command": " ".join(_quoted(part) for part in commands),
+        "versions": versions(options.coarse.version, _LIBRARIES) | {"code": code_version()},
+        "scenario_toml": tomli_w.dumps(scenario.model_dump(mode="json", exclude_none=True)),
+        "layout_json": layout_json,
+        "layout_hash": sha256(layout_json.encode()).hexdigest()[:_HASH_DIGITS],
+        "rank": range(1, len(study.items) + 1),
+        "isnan": isnan,
+    }
+
+
+@dataclass(frozen=True)
+class SummaryLine:
+    """What a layout does for one building, over all threats, with the finer cells.
+
+    Attributes:
+        name: The building.
+        worst: The threat with the largest impulse with the layout.
+        least: Smallest reduction of its impulse under a threat.
+        most: Largest reduction.
+    """
+
+    name: str
+    worst: LoadPair
+    least: float
+    most: float
+
+
+def _summary(study: Study) -> list[SummaryLine]:
+    fine = study.options.cells_m[1]
+    lines = []
+    for target in study.targets:
+        own = [
+            each
+            for each in study.pairs
+            if each.target.name == target.name and each.cell_m == fine and target.protected
+        ]
+        if own:
+            gone = [each.reduction for each in own]
+            worst = max(own, key=lambda each: each.walled.impulse_pa_s)
+            lines.append(SummaryLine(target.name, worst, float(min(gone)), float(max(gone))))
+    return lines
+
+
+def _verdicts(study: Study) -> list[_Verdict]:
+    """Return for every limit and threat whether it is kept, with the finer cells."""
+    fine = study.options.cells_m[1]
+    return [
+        _Verdict(limit, pair, limit.is_kept(pair.walled), limit.is_kept(pair.bare))
+        for limit in study.options.limits
+        for pair in study.pairs
+        if pair.target.name == limit.target and pair.cell_m == fine
+    ]
+
+
+def _front(study: Study) -> bytes:
+    """Return the front with the layout of the report, on the same cells."""
+    coarse = study.options.cells_m[0]
+    weighted = []
+    for threat in study.threats:
+        outcomes = {each.name: each for each in study.masses[threat.name]}
+        own = outcomes.get(f"{threat.charge.tnt_kg:g} kg")
+        if own is not None:
+            weighted.append(own.reduction)
+    if not weighted:
+        raise AssertionError(f"no threat was run with cells of {coarse:g} m")
+    return front_figure(study.front, (study.bill.cost, float(np.mean(weighted))), len(weighted))
+
+
+def _number(value: float) -> str:
+    """Return a number with three significant digits, or a dash where there is none."""
+    if not isfinite(value):
+        return _NONE
+    if value == 0.0:
+        return "0"
+    digits = max(0, 2 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:,.{digits}f}".replace("-", _MINUS)
+
+
+def _percent(share: float) -> str:
+    return _NONE if isnan(share) else f"{100.0 * share:.1f} %".replace("-", _MINUS)
+
+
+def _points(share: float) -> str:
+    return f"{100.0 * share:+.2f}".replace("-", _MINUS)
+
+
+def _quoted(part: str) -> str:
+    return f'"{part}"' if " " in part else part

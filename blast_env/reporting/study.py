@@ -1,0 +1,387 @@
+"""Everything that a report needs to know, blast by blast."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pandas as pd
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.geometry import Cell, Layout
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
+from blast_env.reporting.figures import Picture, blast_pictures, film_stills
+from blast_env.reporting.limits import Limit, check_limits
+from blast_env.reporting.loads import Measured, Target, measure, targets_of
+from blast_env.reporting.outcomes import FrontPoint, ItemWorth, LoadPair, Outcome
+from blast_env.reporting.quantities import Bill, bill_of
+from blast_env.reporting.threats import (
+    NamedCharge,
+    asked_threats,
+    chief_threats,
+    other_masses,
+    other_places,
+)
+from blast_env.reporting.units import UNITS, UnitSystem
+from blast_env.scenario import Scenario, check_layout
+from blast_env.simulation.gas import GasBlast
+from blast_env.statistics import reductions
+
+MOST_THREATS: Final = 6
+MOST_FRONT: Final = 30
+_MASSES: Final = (0.5, 2.0)
+
+
+@dataclass(frozen=True)
+class StudyOptions:
+    """What is to be looked at, and how finely.
+
+    Attributes:
+        charges: The threats; without any, the worst place of each source.
+        most_threats: How many of those at most, 1 to 6.
+        cells_m: Sides of cells, two of them, the coarser one first: loads with both say what the
+            grid does.
+        limits: What buildings may take.
+        units: Units of loads.
+        front: CSV file of a search with the layouts of a front.
+        places: How many places of each source the sensitivity looks at.
+        items: Whether to rank what each module is worth.
+        stills: Moments of the film.
+        processes: Worker processes of blasts that need no pictures.
+        cache: Folder in which those blasts are kept.
+
+    Raises:
+        BlastEnvError: If something is out of bounds.
+    """
+
+    charges: tuple[Charge, ...] = ()
+    most_threats: int = 2
+    cells_m: tuple[float, float] = (0.5, 0.25)
+    limits: tuple[Limit, ...] = ()
+    units: UnitSystem = field(default_factory=lambda: UNITS["si"])
+    front: Path | None = None
+    places: int = 5
+    items: bool = True
+    stills: int = 4
+    processes: int = 1
+    cache: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Check them."""
+        for name, value, low, high in (
+            ("threats", self.most_threats, 1, MOST_THREATS),
+            ("charges", len(self.charges), 0, MOST_THREATS),
+            ("places", self.places, 1, 50),
+            ("stills", self.stills, 0, 12),
+        ):
+            if not low <= value <= high:
+                raise BlastEnvError(f"{name} is {value}, must be {low} to {high}")
+        coarse, fine = self.cells_m
+        if not coarse > fine:
+            raise BlastEnvError(
+                f"cells are {coarse:g} m and {fine:g} m, must be two sizes, the coarser one first"
+            )
+        for cell_m in self.cells_m:
+            GasEngine(cell_m=cell_m)
+
+    @property
+    def coarse(self) -> GasEngine:
+        """The engine of what is run many times."""
+        return GasEngine(cell_m=self.cells_m[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What a report shows.
+
+    Attributes:
+        scenario: The scenario.
+        layout: The layout.
+        options: What was asked for.
+        targets: The buildings.
+        threats: The threats.
+        bill: What the layout is made of.
+        pairs: Loads by threat, building and cell size.
+        pictures: Facades and histories, by threat.
+        stills: Moments of the film of the first threat.
+        items: What each module is worth, the most valuable one first.
+        masses: The first threats with other masses, by the name of the threat.
+        places: Charges at other places.
+        front: The front, if one was searched.
+        notes: What loads are to be distrusted for, by threat and cell size.
+        left_out: What could not be looked at.
+        digests: Digest of every blast with pictures.
+    """
+
+    scenario: Scenario
+    layout: Layout
+    options: StudyOptions
+    targets: tuple[Target, ...]
+    threats: tuple[NamedCharge, ...]
+    bill: Bill
+    pairs: tuple[LoadPair, ...]
+    pictures: dict[str, tuple[Picture, ...]]
+    stills: tuple[Picture, ...]
+    items: tuple[ItemWorth, ...]
+    masses: dict[str, tuple[Outcome, ...]]
+    places: tuple[Outcome, ...]
+    front: tuple[FrontPoint, ...]
+    notes: tuple[str, ...]
+    left_out: tuple[str, ...]
+    digests: tuple[tuple[str, str], ...]
+
+    def pair(self, target: Target, threat: NamedCharge, cell_m: float) -> LoadPair:
+        """Return the loads on a building under a threat with one size of cells."""
+        return next(
+            each
+            for each in self.pairs
+            if (each.target.name, each.threat.name, each.cell_m)
+            == (target.name, threat.name, cell_m)
+        )
+
+    @property
+    def grid_error(self) -> float:
+        """Largest difference of a reduction between the two sizes of cells."""
+        coarse, fine = self.options.cells_m
+        differences = [
+            abs(
+                self.pair(target, threat, coarse).reduction
+                - self.pair(target, threat, fine).reduction
+            )
+            for target in self.targets
+            if target.protected
+            for threat in self.threats
+        ]
+        return float(np.nanmax(differences))
+
+
+Told = Callable[[str, float], None]
+"""Told what is going on, and which share of it is done."""
+
+
+def run_study(
+    scenario: Scenario,
+    layout: Sequence[Cell],
+    options: StudyOptions | None = None,
+    progress: Told = lambda _, __: None,
+) -> Study:
+    """Run all blasts of a report.
+
+    Args:
+        scenario: The scenario.
+        layout: The layout.
+        options: What is to be looked at.
+        progress: Told what is going on, and which share of it is done.
+
+    Raises:
+        BlastEnvError: If the layout does not fit, a charge is out of place, a limit is of no
+            building, or a front cannot be read; all that before the first blast.
+    """
+    options = options or StudyOptions()
+    cells = check_layout(scenario, layout)
+    if not cells:
+        raise BlastEnvError("the layout is empty: there is nothing to report on")
+    targets = targets_of(scenario)
+    check_limits(options.limits, targets)
+    threats = (
+        asked_threats(scenario, options.charges)
+        if options.charges
+        else chief_threats(scenario, options.most_threats)
+    )
+    for threat in threats:
+        check_layout(scenario.with_possible_charges([threat.charge]), cells)
+    front = _front_layouts(options.front, scenario)
+    bill = bill_of(scenario, cells)
+    work = _Work(scenario, cells, options, targets, threats, progress)
+    work.run_threats()
+    stills = work.film() if options.stills else ()
+    masses, left_out = work.other_masses()
+    return Study(
+        scenario=scenario,
+        layout=cells,
+        options=options,
+        targets=targets,
+        threats=threats,
+        bill=bill,
+        pairs=tuple(work.pairs),
+        pictures=work.pictures,
+        stills=stills,
+        items=work.item_worths() if options.items else (),
+        masses=masses,
+        places=work.other_places(),
+        front=work.front_points(front),
+        notes=tuple(dict.fromkeys(work.notes)),
+        left_out=left_out,
+        digests=tuple(work.digests),
+    )
+
+
+class _Work:
+    """The blasts of a report, one part after the other."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        layout: Layout,
+        options: StudyOptions,
+        targets: tuple[Target, ...],
+        threats: tuple[NamedCharge, ...],
+        progress: Told,
+    ) -> None:
+        self.scenario, self.layout, self.options = scenario, layout, options
+        self.targets, self.threats, self.progress = targets, threats, progress
+        self.pairs: list[LoadPair] = []
+        self.pictures: dict[str, tuple[Picture, ...]] = {}
+        self.notes: list[str] = []
+        self.digests: list[tuple[str, str]] = []
+        self._evaluator = BlastEvaluator(scenario, options.coarse, cache=options.cache)
+
+    def run_threats(self) -> None:
+        """Run every threat with both sizes of cells, without and with the layout."""
+        for threat in self.threats:
+            for cell_m in self.options.cells_m:
+                both = [self._measured(threat, cell_m, layout) for layout in ((), self.layout)]
+                self.pairs += self._pairs(threat, cell_m, both[0], both[1])
+            # Of the finer cells: only these two results are in memory at once.
+            self.pictures[threat.name] = blast_pictures(both[0], both[1], self.options.units)
+
+    def _measured(self, threat: NamedCharge, cell_m: float, layout: Layout) -> Measured:
+        words = "with the layout" if layout else "without a barrier"
+        label = f"{threat.name} {words}, cells of {cell_m:g} m"
+        blast = GasBlast(self.scenario, layout, 0, GasEngine(cell_m=cell_m), threat.charge)
+        measured = measure(blast, self.targets, partial(self.progress, label))
+        self.notes += [f"{label}: {note}" for note in measured.notes]
+        self.digests.append((label, measured.result.digest))
+        return measured
+
+    def _pairs(
+        self, threat: NamedCharge, cell_m: float, bare: Measured, walled: Measured
+    ) -> Iterator[LoadPair]:
+        for target in self.targets:
+            if target.name in bare.loads and target.name in walled.loads:
+                loads = bare.loads[target.name], walled.loads[target.name]
+                yield LoadPair(target, threat, cell_m, *loads)
+
+    def film(self) -> tuple[Picture, ...]:
+        """Return moments of the first threat, without and with the layout."""
+        charge = self.threats[0].charge
+        blasts = [
+            GasBlast(self.scenario, layout, 0, self.options.coarse, charge)
+            for layout in ((), self.layout)
+        ]
+        moments_s = self._moments_s()
+        return film_stills(blasts[0], blasts[1], moments_s, partial(self.progress, "film"))
+
+    def _moments_s(self) -> list[float]:
+        """Return the times of the stills: before and after the arrival at what is protected."""
+        own = [
+            each
+            for each in self.pairs
+            if each.threat is self.threats[0]
+            and each.target.protected
+            and each.bare.arrival_s > 0.0
+        ]
+        if not own:
+            return []
+        first = min(own, key=lambda each: each.bare.arrival_s).bare
+        arrival_s = first.arrival_s
+        phase_s = first.duration_s if np.isfinite(first.duration_s) else arrival_s
+        last_s = arrival_s + 2.0 * phase_s
+        moments_s = np.linspace(0.5 * arrival_s, last_s, self.options.stills)
+        return [float(moment_s) for moment_s in moments_s]
+
+    def other_masses(self) -> tuple[dict[str, tuple[Outcome, ...]], tuple[str, ...]]:
+        """Return every threat with other masses, and what is not possible."""
+        found, left_out = {}, []
+        for threat in self.threats:
+            charges, notes = other_masses(self.scenario, threat.charge, _MASSES)
+            left_out += list(notes)
+            own = NamedCharge(f"{threat.charge.tnt_kg:g} kg", threat.charge, "as in the threat")
+            ordered = sorted((own, *charges), key=lambda each: each.charge.tnt_kg)
+            found[threat.name] = self._outcomes(f"{threat.name}, other masses", ordered)
+        return found, tuple(left_out)
+
+    def other_places(self) -> tuple[Outcome, ...]:
+        """Return the same charges at other places."""
+        places = other_places(self.scenario, self.options.places)
+        return self._outcomes("other places", places)
+
+    def _outcomes(self, label: str, charges: Sequence[NamedCharge]) -> tuple[Outcome, ...]:
+        layouts: tuple[Layout, ...] = ((), self.layout)
+        impulses = self._impulses_pa_s(label, layouts, [each.charge for each in charges])
+        return tuple(
+            Outcome(each.name, each.why, float(bare), float(walled))
+            for each, (bare, walled) in zip(charges, impulses.T, strict=True)
+        )
+
+    def item_worths(self) -> tuple[ItemWorth, ...]:
+        """Return what every module is worth: the impulse where it alone is left out."""
+        fewer = [
+            self.layout[:index] + self.layout[index + 1 :] for index in range(len(self.layout))
+        ]
+        charges = [each.charge for each in self.threats]
+        impulses = self._impulses_pa_s("without each module", ((), self.layout, *fewer), charges)
+        bare, whole, without = impulses[0], impulses[1], impulses[2:]
+        worths = ((without - whole) / bare).mean(axis=1)
+        items = [
+            ItemWorth(cell, self.scenario.zone.cell_centre_m(cell), float(worth))
+            for cell, worth in zip(self.layout, worths, strict=True)
+        ]
+        return tuple(sorted(items, key=lambda each: -each.worth))
+
+    def front_points(self, layouts: Sequence[Layout]) -> tuple[FrontPoint, ...]:
+        """Return layouts of a front with their reductions by gas dynamics, the cheapest first."""
+        if not layouts:
+            return ()
+        charges = [each.charge for each in self.threats]
+        impulses = self._impulses_pa_s("front", ((), *layouts), charges)
+        bare = np.broadcast_to(impulses[0], impulses[1:].shape)
+        gone = reductions(impulses[1:], bare).mean(axis=1)
+        points = [
+            FrontPoint(layout, bill_of(self.scenario, layout).cost, float(share))
+            for layout, share in zip(layouts, gone, strict=True)
+        ]
+        return tuple(sorted(points, key=lambda each: (each.cost, each.reduction)))
+
+    def _impulses_pa_s(
+        self, label: str, layouts: Sequence[Layout], charges: Sequence[Charge]
+    ) -> FloatArray:
+        """Return the weighted impulses on what is protected (layouts, charges)."""
+        pairs = [(layout, Threat(charge, 0)) for layout in layouts for charge in charges]
+        told = partial(self.progress, label)
+        loads = self._evaluator.loads_of_many(pairs, self.options.processes, told)
+        impulses = np.array([each.protected_impulse_pa_s for each in loads])
+        return np.asarray(impulses.reshape(len(layouts), len(charges)))
+
+
+def _front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
+    """Return the layouts of a front that a search wrote.
+
+    Raises:
+        BlastEnvError: If the file is anything else, or a layout does not fit the scenario.
+    """
+    if path is None:
+        return ()
+    try:
+        table = pd.read_csv(path, dtype={"layout": str}, keep_default_na=False)
+        texts = table["layout"].tolist()
+        layouts = [_layout_from(text) for text in texts]
+    except (OSError, KeyError, ValueError) as error:
+        raise BlastEnvError(
+            f"{path}: is not the front.csv of a search (column `layout`, cells as row,column): "
+            f"{error}"
+        ) from error
+    if len(layouts) > MOST_FRONT:
+        raise BlastEnvError(f"{path}: has {len(layouts)} layouts, must have at most {MOST_FRONT}")
+    return tuple(check_layout(scenario, layout) for layout in layouts if layout)
+
+
+def _layout_from(text: str) -> Layout:
+    """Return a layout from the text that searches write: `3,4 3,5`."""
+    cells = (cell.split(",") for cell in text.split())
+    return tuple((int(row), int(column)) for row, column in cells)

@@ -1,0 +1,217 @@
+"""Whole reports: what they say is what the blasts gave."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pypdfium2
+import pytest
+from typer.testing import CliRunner
+
+import blast_env
+from blast_env.cli import app
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
+from blast_env.reporting import UNITS, Study, StudyOptions, run_study, write_report
+from blast_env.reporting.loads import Measured, measure, targets_of
+from blast_env.reporting.page import report_html
+from blast_env.scenario import Scenario, save_scenario, write_layout
+from blast_env.simulation.gas import GasBlast
+from tests.reporting.sites import LAYOUT, small_hut
+
+
+@pytest.fixture(scope="module")
+def page(study: Study) -> str:
+    return report_html(study, ["blast-env", "report", "a site.toml"])
+
+
+@pytest.fixture(scope="module")
+def measured() -> Measured:
+    scenario = small_hut()
+    return measure(GasBlast(scenario, LAYOUT), targets_of(scenario))
+
+
+def test_loads_are_those_of_the_blast(study: Study, measured: Measured) -> None:
+    (threat,), (target,) = study.threats, study.targets
+    result = blast_env.simulate(small_hut(), LAYOUT, engine="gas")
+    (row,) = result.structures.to_dict("records")
+    pair = study.pair(target, threat, 0.5)
+    assert pair.walled.impulse_pa_s == pytest.approx(row["positive_impulse_pa_s"])
+    assert pair.walled.peak_pa == row["peak_pa"]
+    assert pair.walled.arrival_s == row["arrival_s"]
+    assert pair.walled.wall == row["most_loaded_face"]
+    assert pair.walled.wall_impulse_pa_s == pytest.approx(row["most_loaded_pa_s"])
+    assert pair.walled == measured.loads["hut"]
+    assert 0.1 < pair.reduction < 0.5
+    assert {each.cell_m for each in study.pairs} == {0.5, 0.25}
+    fine = study.pair(target, threat, 0.25)
+    assert study.grid_error == pytest.approx(abs(pair.reduction - fine.reduction))
+    digests = dict(study.digests)
+    assert digests["T1 with the layout, cells of 0.5 m"] == result.digest
+
+
+def test_histories_are_the_momentum_of_the_walls(measured: Measured) -> None:
+    """Mean overpressure over time is the impulse of all phases, positive and negative."""
+    faces = measured.result.faces
+    for wall in ("west", "north"):
+        own = faces[faces["face"] == wall]
+        own = own[own["structure"] == "hut"]
+        total = own["positive_impulse_pa_s"] + own["negative_impulse_pa_s"]
+        history = measured.histories.of("hut", wall)
+        assert history is not None
+        along = np.trapezoid(history, measured.histories.time_s)
+        assert along == pytest.approx(
+            float(total.mean()), abs=0.02 * own["positive_impulse_pa_s"].mean()
+        )
+    assert measured.histories.of("hut", "roof") is None  # type: ignore[arg-type]
+
+
+def test_worth_of_a_module_is_what_comes_back_without_it(study: Study) -> None:
+    (threat,) = study.threats
+    impulses = [
+        GasBlast(small_hut(), layout, charge=threat.charge).run().impulse("hut").pa_s
+        for layout in ((), LAYOUT, LAYOUT[1:])
+    ]
+    bare, whole, without = impulses
+    worths = {each.cell: each.worth for each in study.items}
+    assert worths.keys() == set(LAYOUT)
+    assert worths[LAYOUT[0]] == pytest.approx((without - whole) / bare)
+    assert [each.worth for each in study.items] == sorted(worths.values(), reverse=True)
+    # The charge is in the middle before the wall: its ends are worth alike, the middle more.
+    assert worths[LAYOUT[0]] == pytest.approx(worths[LAYOUT[-1]], rel=1e-3)
+    assert worths[LAYOUT[1]] > worths[LAYOUT[0]] > 0.0
+
+
+def test_more_mass_is_more_impulse_and_places_are_those_of_the_scenario(study: Study) -> None:
+    outcomes = study.masses["T1"]
+    assert [each.name for each in outcomes] == ["2.5 kg", "5 kg", "10 kg"]
+    bare = [each.bare_pa_s for each in outcomes]
+    assert bare == sorted(bare)
+    (place,) = study.places
+    assert place.walled_pa_s == outcomes[1].walled_pa_s
+    (point,) = study.front
+    assert point.layout == ((2, 0), (3, 0))
+    assert point.cost == 2.0
+    assert 0.0 < point.reduction < outcomes[1].reduction  # two modules of four
+
+
+def test_page_needs_nothing_else(page: str) -> None:
+    sources = re.findall(r'(?:src|href)="([^"]{0,40})', page)
+    assert len(sources) >= 8
+    assert all(each.startswith("data:image/png;base64,iVBOR") for each in sources)
+    assert "<script" not in page
+    assert "@import" not in page
+    assert "url(" not in page
+
+
+def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: str) -> None:
+    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    assert f"<td>{fine.bare.impulse_pa_s:.0f}</td>" in page
+    assert f"<td>{100 * fine.reduction:.1f} %</td>" in page
+    assert small_hut().content_hash in page
+    assert "<code>blast-env report &#34;a site.toml&#34;</code>" in page
+    assert "[[1, 0], [2, 0], [3, 0], [4, 0]]" in page
+    assert "name = &#34;hut&#34;" in page
+    for label, digest in study.digests:
+        assert f'{label}</td><td class="l"><code>{digest[:16]}' in page
+    titles = re.findall(r"<h2>(?:\d\. )?([^<]+)</h2>", page)
+    assert titles == [
+        *("Site and threats", "Layout", "Loads", "The blast", "What each module is worth"),
+        *("Other masses and places", "Reduction against cost", "Validity and limits"),
+        "To repeat it",
+    ]
+
+
+def test_limits_are_passed_or_failed(study: Study, page: str) -> None:
+    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    assert fine.walled.wall_impulse_pa_s < 300.0 < fine.bare.wall_impulse_pa_s
+    verdicts = re.findall(r'<span class="(\w+)">(\w+)</span>', page)
+    assert verdicts == [("fail", "FAIL"), ("pass", "pass")]
+    assert "1 of 1</strong> cases with the layout, 0 without" in page
+
+
+def test_other_units_and_loads_within_what_was_checked(study: Study, page: str) -> None:
+    """What is outside is said by name; here a copy of the study without notes, in psi."""
+    assert any("checked from 9.2" in note for note in study.notes)
+    assert "outside what the engine was checked for" in page
+    other = replace(study, notes=(), options=replace(study.options, units=UNITS["psi"]))
+    changed = report_html(other, ["blast-env"])
+    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    assert f"<td>{fine.bare.impulse_pa_s / 6.894757:.1f}</td>" in changed
+    assert f"<td>{fine.bare.peak_pa / 6894.757:.1f}</td>" in changed
+    assert "Impulses in psi·ms, overpressures in psi" in changed
+    assert "No load in this report is outside that range." in changed
+
+
+def test_pdf_has_the_same_pages_of_text_and_pictures(study: Study, tmp_path: Path) -> None:
+    html, pdf = write_report(study, tmp_path / "a.html", tmp_path / "a.pdf", ["blast-env"])
+    assert html.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    document = pypdfium2.PdfDocument(pdf)
+    text = "".join(each.get_textpage().get_text_range() for each in document)
+    assert "What each module is worth" in text
+    assert small_hut().content_hash[:20] in text
+    assert f"{len(document)} / {len(document)}" in text
+    pictures = sum(1 for each in document for item in each.get_objects() if item.type == 3)
+    assert pictures >= 8
+    # Nothing runs out of the page: the outermost pixels are white.
+    for each in document:
+        pixels = np.asarray(each.render(scale=0.5).to_numpy())
+        assert (pixels[:, :12] > 250).all()
+        assert (pixels[:, -12:] > 250).all()
+
+
+@pytest.mark.parametrize(
+    ("html", "pdf", "words"),
+    [("a.txt", None, "must be .html"), ("a.html", "a.ps", "must be .pdf")],
+)
+def test_suffixes(study: Study, html: str, pdf: str | None, words: str, tmp_path: Path) -> None:
+    with pytest.raises(BlastEnvError, match=words):
+        write_report(study, tmp_path / html, None if pdf is None else tmp_path / pdf)
+
+
+@pytest.mark.parametrize("content", ["", "a,b\n1,2\n", "layout\n3;4\n", 'layout\n"90,0"\n'])
+def test_front_of_another_kind_is_named(content: str, tmp_path: Path) -> None:
+    path = tmp_path / "front.csv"
+    path.write_text(content)
+    with pytest.raises(BlastEnvError):
+        run_study(small_hut(), LAYOUT, StudyOptions(front=path))
+
+
+def test_layout_of_nothing_is_refused() -> None:
+    with pytest.raises(BlastEnvError, match="the layout is empty"):
+        run_study(small_hut(), ())
+
+
+def test_command_passes_on_what_it_was_asked(
+    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[Scenario, Layout, StudyOptions]] = []
+
+    def run(scenario: Scenario, layout: Layout, options: StudyOptions, _: object) -> Study:
+        asked.append((scenario, layout, options))
+        return study
+
+    monkeypatch.setattr("blast_env.reporting.run_study", run)
+    monkeypatch.setattr("blast_env.reporting.write_report", lambda _, *paths: list(paths))
+    site, wall, out, pdf = (
+        str(tmp_path / name) for name in ("s.toml", "w.json", "a.html", "a.pdf")
+    )
+    save_scenario(small_hut(), site)
+    write_layout(wall, small_hut(), LAYOUT, {})
+    files = ("report", site, "--layout", wall, "--out", out, "--pdf", pdf)
+    few = ("--stills", "0", "--no-items", "--charge", "2,3,4", "--units", "psi", "--limit", "hut=9")
+    done = CliRunner().invoke(app, [*files, *few])
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.split() == ["wrote", out, "wrote", pdf]
+    ((scenario, layout, options),) = asked
+    assert (scenario, layout) == (small_hut(), LAYOUT)
+    assert (options.stills, options.items, options.units.name) == (0, False, "psi")
+    assert options.charges == (Charge((2.0, 3.0), 4.0),)
+    assert options.limits[0].impulse_pa_s == pytest.approx(9 * 6.894757)
+
+
+def test_engines_of_both_sizes_are_gas() -> None:
+    assert StudyOptions().coarse == GasEngine(cell_m=0.5)
