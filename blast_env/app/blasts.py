@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from pydantic import ValidationError
 
+from blast_env.app import placing
 from blast_env.app.records import (
     FILM,
     FRAME,
@@ -28,7 +29,7 @@ from blast_env.app.records import (
     read_record,
     write_kept,
 )
-from blast_env.app.work import BlastTask, ThreatOf, plain_layout, scenario_of
+from blast_env.app.work import BlastTask, ThreatOf, scenario_of
 from blast_env.calibration.model import CalibrationError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.files import make_folder, write_atomically
@@ -106,7 +107,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
         BlastEnvError: If they cannot be run.
     """
     scenario = scenario_of(task.scenario)
-    layout: Layout = tuple(tuple(each) for each in task.layout)
+    layout = placing.layout_from(scenario, task.layout)
     work: list[tuple[ThreatOf, Layout]] = []
     for threat in task.threats:
         # Gas has its scale from the blast without a barrier; particles are looked at first.
@@ -134,7 +135,7 @@ def _run_one(
         key=key,
         threat=threat.name,
         engine=task.engine,
-        layout=plain_layout(layout),
+        layout=placing.plain(layout),
         seconds=perf_counter() - began_s,
         repeat={
             "scenario hash": scenario.content_hash,

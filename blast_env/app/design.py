@@ -57,7 +57,7 @@ class Design:
         """
         number = self.active if slot is None else slot
         layouts = [*self.layouts]
-        layouts[number] = Placement.of(self.scenario, layout).cells
+        layouts[number] = Placement.of(self.scenario, layout).layout
         return replace(self, layouts=tuple(layouts))
 
     def with_scenario(self, scenario: Scenario) -> tuple["Design", tuple[str, ...]]:
@@ -90,12 +90,13 @@ class Design:
             BlastEnvError: If it is none; the message says why.
         """
         try:
-            scenario, listed = record["scenario"], record["layouts"]
-            layouts = tuple(tuple(tuple(each) for each in layout) for layout in listed)
-            active = int(record["active"])
+            scenario = Scenario.from_document(record["scenario"], source)
+            layouts = tuple(placing.layout_from(scenario, each) for each in record["layouts"])
+            return cls(scenario, layouts, int(record["active"]))
+        except BlastEnvError:
+            raise
         except (KeyError, TypeError, ValueError) as error:
             raise BlastEnvError(f"{source}: is no design: {error!r}") from error
-        return cls(Scenario.from_document(scenario, source), layouts, active)
 
 
 @dataclass(frozen=True)

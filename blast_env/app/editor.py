@@ -12,7 +12,7 @@ from blast_env.app import edits, placing
 from blast_env.app.edits import Kind, Thing
 from blast_env.app.session import Session
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell, Layout, Rectangle
+from blast_env.geometry import Cell, Element, Layout, Rectangle
 from blast_env.scenario import Scenario, ScenarioError
 from blast_env.scenario.sections import PointM
 from blast_env.units import MODULE_SIDE_M
@@ -67,7 +67,7 @@ class _Stroke:
     layout: Layout
     moves: bool = False
     sizes: bool = False
-    lifted: placing.Element | None = None
+    lifted: Element | None = None
     made: Scenario | None = None
     thing: Thing | None = None
     changed: int = 0
@@ -250,7 +250,8 @@ class Editor:
             self.selected = None
             return
         own = self.selected
-        if own is not None and edits.has(scenario, own) and own.kind is not Kind.GAUGE:
+        fixed = (Kind.GAUGE, Kind.ITEM)
+        if own is not None and edits.has(scenario, own) and own.kind not in fixed:
             box = edits.rectangle_of(scenario, own)
             near = max(abs(x_m - box.right), abs(y_m - box.top)) <= _HANDLE_M
             if near and (box.left, box.bottom) != (box.right, box.top):
@@ -290,9 +291,7 @@ class Editor:
             stroke.made = None
             self.ghost = Ghost(target, reason_of(error))
 
-    def _drag_element(
-        self, x_m: float, y_m: float, stroke: _Stroke, lifted: placing.Element
-    ) -> None:
+    def _drag_element(self, x_m: float, y_m: float, stroke: _Stroke, lifted: Element) -> None:
         scenario = self.session.scenario
         cell = placing.cell_at(scenario, x_m, y_m)
         if cell is None:

@@ -36,6 +36,7 @@ class Kind(StrEnum):
     KEEP_OUT = "keep-out"
     COST_AREA = "cost area"
     GAUGE = "gauge"
+    ITEM = "item"
 
 
 class Thing(NamedTuple):
@@ -53,6 +54,7 @@ _PATHS: Final[Mapping[Kind, tuple[str, ...]]] = {
     Kind.KEEP_OUT: ("build_zone", "keep_outs"),
     Kind.COST_AREA: ("build_zone", "cost_areas"),
     Kind.GAUGE: ("gauges",),
+    Kind.ITEM: ("build_zone", "items"),
 }
 """Where each kind is in a scenario file."""
 
@@ -78,6 +80,7 @@ def changed(scenario: Scenario, edit: Callable[[Document], None]) -> Scenario:
     """
     document = document_of(scenario)
     edit(document)
+    _fit_catalogue(document)
     return Scenario.from_document(document, scenario.name)
 
 
@@ -96,6 +99,8 @@ def things(scenario: Scenario) -> Iterator[tuple[Thing, str]]:
             yield Thing(Kind.KEEP_OUT, index), f"keep-out: {area.reason}"
         for index, cost_area in enumerate(zone.cost_areas):
             yield Thing(Kind.COST_AREA, index), f"cost area: {cost_area.reason}"
+        for index, item in enumerate(zone.items):
+            yield Thing(Kind.ITEM, index), f"item of the catalogue: {item.name}"
     for index, gauge in enumerate(scenario.gauges):
         yield Thing(Kind.GAUGE, index), f"gauge {gauge.name}"
 
@@ -107,6 +112,8 @@ def has(scenario: Scenario, thing: Thing) -> bool:
 
 def rectangle_of(scenario: Scenario, thing: Thing) -> Rectangle:
     """Return the smallest rectangle around a thing; of a point, one without extent.
+
+    An item of the catalogue is nowhere, or everywhere in the build zone: that is its rectangle.
 
     Raises:
         BlastEnvError: If there is no such thing.
@@ -175,7 +182,7 @@ def moved(scenario: Scenario, thing: Thing, by_m: PointM) -> Scenario:
     Raises:
         ScenarioError: If it cannot be there.
     """
-    if thing.kind is Kind.SITE:
+    if thing.kind in (Kind.SITE, Kind.ITEM):
         return scenario
     corner = rectangle_of(scenario, thing)
     shift = _HALF if thing.kind is Kind.GAUGE else 0.0  # gauges are in the middle of cells
@@ -293,8 +300,13 @@ def added(scenario: Scenario, kind: Kind, start_m: PointM, end_m: PointM) -> tup
         Kind.COST_AREA: lambda: {
             **_sized(area),
             "reason": "costly ground",
-            "module_cost": 2.0 * scenario.zone.module_cost,
+            **(
+                {"cost_factor": 2.0}
+                if scenario.zone.items
+                else {"module_cost": 2.0 * scenario.zone.module_cost}
+            ),
         },
+        Kind.ITEM: lambda: _item(scenario),
         Kind.GAUGE: lambda: _gauge(scenario, start_m),
         Kind.ZONE: lambda: _zone(scenario, area),
     }[kind]()
@@ -309,7 +321,7 @@ def added(scenario: Scenario, kind: Kind, start_m: PointM, end_m: PointM) -> tup
         else:
             table[key] = [*table.get(key, []), section]
 
-    if kind in (Kind.KEEP_OUT, Kind.COST_AREA):
+    if kind in (Kind.KEEP_OUT, Kind.COST_AREA, Kind.ITEM):
         _ = scenario.zone  # refuses a site without one
     after = changed(scenario, edit)
     last = max(each.number for each, _ in things(after) if each.kind is kind)
@@ -328,6 +340,17 @@ def with_charge_area(scenario: Scenario, start_m: PointM, end_m: PointM) -> tupl
     section = {"kind": "rectangle", "tnt_kg": _usual_tnt_kg(scenario), **_sized(area)}
     after = changed(scenario, lambda document: document["charge"].append(section))
     return after, Thing(Kind.CHARGE, len(after.charge) - 1)
+
+
+def _fit_catalogue(document: Document) -> None:
+    """Let the stock of a zone be no more than its catalogue has, and an empty one be none."""
+    zone = document.get("build_zone") or {}
+    if "items" not in zone:
+        return
+    if not zone["items"]:
+        del zone["items"]
+    elif zone.get("stock", 0) > sum(item["stock"] for item in zone["items"]):
+        del zone["stock"]
 
 
 def _own(document: Document, thing: Thing) -> Document:
@@ -368,6 +391,19 @@ def _gauge(scenario: Scenario, at_m: PointM) -> Document:
     number = next(n for n in range(1, 200) if f"gauge{n}" not in names)
     place = [_plain(snapped(value - _HALF) + _HALF) for value in at_m]
     return {"name": f"gauge{number}", "position_m": [*place, 1.25]}
+
+
+def _item(scenario: Scenario) -> Document:
+    names = {each.name for each in scenario.zone.items}
+    number = next(n for n in range(1, 200) if f"wall{n}" not in names)
+    return {
+        "name": f"wall{number}",
+        "length_modules": 4,
+        "thickness_modules": 1,
+        "height_m": scenario.zone.height_m or 3.0,
+        "cost": 4.0 * scenario.zone.module_cost,
+        "stock": max(scenario.zone.stock // 4, 1),
+    }
 
 
 def _zone(scenario: Scenario, area: Rectangle) -> Document:

@@ -1,18 +1,19 @@
 """What can be placed on a site, and what stands in a layout, for whoever edits or draws one.
 
-The single place that knows what the elements of a layout are; whether one may stand somewhere is
-for `Placement` to say.
+The single place of the page that knows what the elements of a layout are; whether one may stand
+somewhere is for `Placement` to say.
 """
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 from blast_env.errors import LayoutError
-from blast_env.geometry import Cell, Layout, Rectangle
+from blast_env.geometry import Cell, Element, Layout, Piece, Rectangle
 from blast_env.scenario import Placement, Scenario
 from blast_env.units import MODULE_SIDE_M
 
-Element = Cell
+PlainLayout = tuple[tuple[Any, ...], ...]
+"""A layout as data: lists of numbers and names."""
 
 
 class Placeable(NamedTuple):
@@ -21,16 +22,12 @@ class Placeable(NamedTuple):
     Attributes:
         name: Its name; empty for the single module.
         label: What people call it.
-        rows: Rows of cells that it covers.
-        columns: Columns of cells that it covers.
         can_turn: Whether it can be turned by a right angle.
         left: How many of them are left.
     """
 
     name: str
     label: str
-    rows: int
-    columns: int
     can_turn: bool
     left: int
 
@@ -41,28 +38,73 @@ class Solid(NamedTuple):
     Attributes:
         rectangle_m: What it covers.
         height_m: Its height; `None` is as high as the air.
+        name: Name of its item; empty for a single module.
     """
 
     rectangle_m: Rectangle
     height_m: float | None
+    name: str
+
+
+def plain(layout: Iterable[Element]) -> PlainLayout:
+    """Return a layout as data."""
+    return tuple(tuple(each) for each in layout)
+
+
+def layout_from(scenario: Scenario, data: Sequence[Sequence[Any]]) -> Layout:
+    """Return the layout of data, whether or not it may stand.
+
+    Raises:
+        LayoutError: If it is none for this site.
+    """
+    if scenario.build_zone is None:
+        if data:
+            raise LayoutError(f"{scenario.name} has no build zone, so that nothing can stand on it")
+        return ()
+    return scenario.build_zone.catalogue.layout_from([tuple(each) for each in data])
 
 
 def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
     """Return what can be placed; nothing without a build zone."""
-    if scenario.build_zone is None:
+    zone = scenario.build_zone
+    if zone is None:
         return ()
-    left = Placement.of(scenario, layout).stock_left
-    return (Placeable("", "module, 0.5 x 0.5 m", 1, 1, False, left),)
+    placement = Placement.of(scenario, layout)
+    if not zone.items:
+        height = "" if zone.height_m is None else f", {zone.height_m:g} m high"
+        return (Placeable("", f"module of 0.5 m{height}", False, placement.stock_left),)
+    return tuple(
+        Placeable(
+            item.name,
+            f"{item.name}, {item.length_modules * MODULE_SIDE_M:g} x"
+            f" {item.thickness_modules * MODULE_SIDE_M:g} m, {item.height_m:g} m high,"
+            f" cost {item.cost:g}",
+            len(item.orientations) > 1,
+            left,
+        )
+        for item, left in zip(zone.items, placement.stocks_left, strict=True)
+    )
 
 
-def element(scenario: Scenario, item: str, cell: Cell, turned: bool = False) -> Element:  # noqa: ARG001
-    """Return the element that an item on a cell is."""
-    return cell
+def element(scenario: Scenario, item: str, cell: Cell, turned: bool = False) -> Element:
+    """Return the element that an item is with its lower left cell there.
+
+    An item that there is none of is taken for the first one, one that cannot be turned for not
+    turned.
+    """
+    items = {each.name: each for each in scenario.zone.items}
+    if not items:
+        return cell
+    chosen = items.get(item, scenario.zone.items[0])
+    return Piece(*cell, chosen.name, turned and turned in chosen.orientations)
 
 
-def element_at(scenario: Scenario, layout: Layout, cell: Cell) -> Element | None:  # noqa: ARG001
+def element_at(scenario: Scenario, layout: Layout, cell: Cell) -> Element | None:
     """Return the element of a layout that covers a cell."""
-    return cell if cell in layout else None
+    if scenario.build_zone is None:
+        return None
+    catalogue = scenario.build_zone.catalogue
+    return next((each for each in layout if cell in catalogue.cells(each)), None)
 
 
 def cell_at(scenario: Scenario, x_m: float, y_m: float) -> Cell | None:
@@ -74,10 +116,24 @@ def cell_at(scenario: Scenario, x_m: float, y_m: float) -> Cell | None:
     return int((y_m - bottom) // MODULE_SIDE_M), int((x_m - left) // MODULE_SIDE_M)
 
 
+def rectangle_of(scenario: Scenario, new: Element) -> Rectangle:
+    """Return what an element covers, also where there is no such cell."""
+    return scenario.zone.element_rectangle_m(new)
+
+
+def moved_to(old: Element, cell: Cell) -> Element:
+    """Return an element with its lower left cell somewhere else."""
+    return old._replace(row=cell[0], column=cell[1]) if isinstance(old, Piece) else cell
+
+
 def solids(scenario: Scenario, layout: Layout) -> Iterator[Solid]:
-    """Yield what the modules of a layout look like, in the order of its elements."""
-    for module in scenario.zone.modules(layout) if layout else ():
-        yield Solid(scenario.zone.cell_rectangle_m(module.cell), module.height_m)
+    """Yield what the elements of a layout look like, in their order."""
+    if scenario.build_zone is None:
+        return
+    catalogue = scenario.build_zone.catalogue
+    for each in layout:
+        variant = catalogue.variant(each)
+        yield Solid(rectangle_of(scenario, each), variant.height_m, variant.name)
 
 
 def reason_against(scenario: Scenario, layout: Layout, new: Element) -> str | None:
@@ -96,33 +152,24 @@ def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple
     except LayoutError:
         placement, reasons = Placement.empty(scenario), []
     for each in layout:
-        reason = placement.explain(each)
-        if reason is None:
+        try:
             placement = placement.place(each)
-        else:
-            reasons.append(reason)
+        except LayoutError as error:
+            reasons.append(str(error))
     return placement.layout, tuple(reasons)
 
 
 def counted(scenario: Scenario, layout: Layout) -> str:
     """Return how many elements a layout has, of how many, and what they cost."""
-    if scenario.build_zone is None:
+    zone = scenario.build_zone
+    if zone is None:
         return "no build zone"
-    placement, zone = Placement.of(scenario, layout), scenario.build_zone
-    words = f"{len(layout)} of {zone.stock} modules, cost {placement.cost:g}"
+    placement = Placement.of(scenario, layout)
+    what = "pieces" if zone.items else "modules"
+    words = f"{len(layout)} of {zone.stock} {what}, cost {placement.cost:g}"
     return words if zone.budget is None else f"{words} of {zone.budget:g}"
 
 
 def cost_of(scenario: Scenario, layout: Layout) -> float:
     """Return what a layout costs."""
     return Placement.of(scenario, layout).cost
-
-
-def rectangle_of(scenario: Scenario, new: Element) -> Rectangle:
-    """Return what an element covers, also where there is no such cell."""
-    return scenario.zone.cell_rectangle_m(new)
-
-
-def moved_to(old: Element, cell: Cell) -> Element:  # noqa: ARG001
-    """Return an element with its lower left cell somewhere else."""
-    return cell

@@ -312,7 +312,11 @@ def _gauges(view: View, scenario: Scenario) -> Iterator[str]:
 
 
 def _selection(view: View, scenario: Scenario, selected: Thing | None) -> Iterator[str]:
-    if selected is None or not edits.has(scenario, selected) or selected.kind is Kind.SITE:
+    if (
+        selected is None
+        or not edits.has(scenario, selected)
+        or selected.kind in (Kind.SITE, Kind.ITEM)
+    ):
         return
     box = edits.rectangle_of(scenario, selected)
     grown = 0.6 if selected.kind in (Kind.CHARGE, Kind.GAUGE) else 0.0

@@ -164,7 +164,13 @@ def read_film(folder: Path) -> Film | None:
 
 def blast_key(scenario_hash: str, layout: Layout, charge: Charge, engine: Engine) -> str:
     """Return by what a blast is found again: all that its result depends on."""
-    depends = (scenario_hash, sorted(layout), tuple(charge), engine.name, engine.cell_m or 0.5)
+    depends = (
+        scenario_hash,
+        sorted(map(tuple, layout)),
+        tuple(charge),
+        engine.name,
+        engine.cell_m or 0.5,
+    )
     return sha256(repr(depends).encode()).hexdigest()[:24]
 
 

@@ -23,7 +23,6 @@ from blast_env.app.work import (
     Status,
     Task,
     ThreatOf,
-    plain_layout,
 )
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
@@ -204,7 +203,7 @@ class Session:
             budget=budget,
             engine=self.engine,
             cache=str(self.work.cache),
-            begin_with=plain_layout(self.design.layout) if from_layout else (),
+            begin_with=placing.plain(self.design.layout) if from_layout else (),
         )
         return self._begin(task, f"{method} search, {budget} blasts, {self.engine.label}")
 
@@ -230,7 +229,7 @@ class Session:
         """
         if status.layout is None:
             raise BlastEnvError(f"{status.title}: there is no layout to take")
-        layout = tuple(tuple(each) for each in status.layout)
+        layout = placing.layout_from(self.scenario, status.layout)
         design = self.design.with_layout(layout, slot)
         self.put(f"{status.title} into {SLOTS[slot]}", design)
 
@@ -242,7 +241,7 @@ class Session:
         return self.workers.begin(task, self.folder.jobs, title)
 
     def _what(self, layout: Layout) -> dict[str, Any]:
-        return {"scenario": self._document(), "layout": plain_layout(layout)}
+        return {"scenario": self._document(), "layout": placing.plain(layout)}
 
     def _document(self) -> dict[str, Any]:
         return self.scenario.model_dump(mode="json", exclude_none=True)

@@ -48,7 +48,7 @@ def boxes(scenario: Scenario, layout: Layout) -> Iterator[Box]:
         colour = PROTECTED if each.protected else STRUCTURE
         yield _standing(each.rectangle_m, each.height_m, air_m, colour, each.name)
     for solid in placing.solids(scenario, layout):
-        yield _standing(solid.rectangle_m, solid.height_m, air_m, BARRIER, "barrier")
+        yield _standing(solid.rectangle_m, solid.height_m, air_m, BARRIER, solid.name or "barrier")
     for number, source in enumerate(scenario.charge, start=1):
         yield from _charge(source, f"charge {number}")
     for gauge in scenario.gauges:

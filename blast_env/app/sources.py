@@ -4,11 +4,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import LayoutFile, Scenario, load_scenario
 from blast_env.sites import generate_site
+
+if TYPE_CHECKING:
+    from blast_env.importing import ImportedSite, ImportOptions
 
 MOST_BYTES: Final = 200_000_000
 """Larger files are refused before they are read."""
@@ -18,7 +21,10 @@ Made = TypeVar("Made")
 Importer = Callable[[Path], Scenario]
 
 IMPORTERS: Final[Mapping[str, Importer]] = MappingProxyType({".toml": load_scenario})
-"""What makes a site of a file, by its ending."""
+"""What makes a site of a file as it is, by its ending."""
+
+MAPS: Final = (".geojson", ".json", ".osm", ".pbf", ".dxf")
+"""Endings of maps and drawings, which take options: `imported_site`."""
 
 
 def site_of_file(name: str, content: bytes) -> Scenario:
@@ -32,6 +38,30 @@ def site_of_file(name: str, content: bytes) -> Scenario:
         BlastEnvError: If it is no site; the message says all that is wrong with it.
     """
     return _from_file(name, content, IMPORTERS, "a site")
+
+
+def is_map(name: str) -> bool:
+    """Return whether a file is a map or a drawing by its name."""
+    return Path(name).suffix.lower() in MAPS
+
+
+def imported_site(name: str, content: bytes, options: "ImportOptions") -> "ImportedSite":
+    """Return the site that a map or drawing shows, and by how much it deviates.
+
+    Args:
+        name: Name of the file.
+        content: What is in it.
+        options: What the user decides.
+
+    Raises:
+        BlastEnvError: If it cannot be imported, or a package that this needs is not installed.
+    """
+    from blast_env.importing import import_site  # here, because it needs the extra `maps`
+
+    def read(path: Path) -> "ImportedSite":
+        return import_site(path, options)
+
+    return _from_file(name, content, dict.fromkeys(MAPS, read), "a map")
 
 
 def layout_of_file(name: str, content: bytes) -> LayoutFile:

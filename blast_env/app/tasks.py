@@ -27,7 +27,6 @@ from blast_env.app.work import (
     SearchTask,
     Status,
     ThreatOf,
-    plain_layout,
     read_status,
     read_task,
     scenario_of,
@@ -109,7 +108,7 @@ def _propose(task: ProposalTask, teller: Teller) -> None:
     layout = _proposed(task, scenario)
     words = placing.counted(scenario, layout)
     text = f"{words}, proposed by {Path(task.proposer).name}"
-    teller.tell(state="done", share=1.0, text=text, layout=plain_layout(layout))
+    teller.tell(state="done", share=1.0, text=text, layout=placing.plain(layout))
 
 
 def _proposed(task: ProposalTask, scenario: Scenario) -> Layout:
@@ -133,7 +132,7 @@ def _charges(threats: Sequence[ThreatOf]) -> list[Charge]:
 
 def _search(task: SearchTask, teller: Teller) -> None:
     scenario = scenario_of(task.scenario)
-    begin_with = tuple(tuple(each) for each in task.begin_with)
+    begin_with = placing.layout_from(scenario, task.begin_with)
     method = find_search_method(task.method, (begin_with,) if begin_with else ())
     engine = find_engine(task.engine.name, task.engine.cell_m)
     problem = LayoutProblem(
@@ -147,7 +146,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
         if progress.best is None:
             teller.share(share)
             return
-        best = plain_layout(progress.best.layout)
+        best = placing.plain(progress.best.layout)
         reduction = 100.0 * problem.reduction(progress.best)
         text = f"{progress.blasts} of {progress.budget} blasts, best so far {reduction:.1f} % less"
         if best != teller.status.layout:
@@ -164,7 +163,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
         f" {result.budget} ({task.engine.label}); blast it for a judgement"
     )
     state = "stopped" if result.interrupted else "done"
-    teller.tell(state=state, share=1.0, text=text, layout=plain_layout(result.layout))
+    teller.tell(state=state, share=1.0, text=text, layout=placing.plain(result.layout))
 
 
 def practice_case(scenario: Scenario, task: SearchTask) -> Case:
@@ -178,7 +177,7 @@ def practice_case(scenario: Scenario, task: SearchTask) -> Case:
 
 def _film(task: FilmTask, teller: Teller) -> None:
     scenario, (charge,) = scenario_of(task.scenario), _charges((task.threat,))
-    layout, path = tuple(tuple(each) for each in task.layout), Path(task.path)
+    layout, path = placing.layout_from(scenario, task.layout), Path(task.path)
     write: Callable[..., object]
     if task.engine.is_gas:
         from blast_env.rendering.pressure_film import write_pressure_film

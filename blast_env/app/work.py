@@ -1,6 +1,5 @@
 """Work that a page asks for, as files: what is to be done, how far it has come, what came of it."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -180,8 +179,3 @@ def scenario_of(document: dict[str, Any]) -> Scenario:
         ScenarioError: If it is none.
     """
     return Scenario.from_document(document, str(document.get("name", "the site")))
-
-
-def plain_layout(layout: Any) -> tuple[tuple[Any, ...], ...]:
-    """Return a layout as plain data."""
-    return tuple(tuple(json.loads(json.dumps(list(each)))) for each in layout)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from blast_env.app import edits, placing
 from blast_env.app.editor import Editor, Tool
 from blast_env.app.edits import Kind, Thing
 from blast_env.app.folder import WorkFolder
@@ -11,6 +12,7 @@ from blast_env.app.jobs import Workers
 from blast_env.app.plan import View, merged_cells, overlay_svg, plan_svg
 from blast_env.app.session import Session
 from blast_env.app.solids import boxes
+from blast_env.geometry import Piece
 from blast_env.scenario import load_scenario, usable_cells
 from tests.gas_sites import WALL, hut
 
@@ -188,3 +190,44 @@ def test_solids_have_the_heights_of_the_site() -> None:
     open_air = {each.name: each for each in boxes(load_scenario("courtyard"), ())}
     assert open_air["building"].size_m[2] == 12.0
     assert open_air["building"].opacity < 1.0
+
+
+CATALOGUE = {
+    "name": "t_wall",
+    "length_modules": 4,
+    "height_m": 2.5,
+    "cost": 10.0,
+    "stock": 2,
+}
+
+
+def test_pieces_of_a_catalogue_are_placed_turned_moved_and_kept(tmp_path: Path) -> None:
+    editor = on(tmp_path, "courtyard")
+    editor.attempt(
+        "catalogue",
+        lambda site: edits.with_values(site, Thing(Kind.ZONE), {"items": [CATALOGUE]}),
+    )
+    assert [each.name for each in placing.palette(editor.scenario, ())] == ["t_wall"]
+    editor.choose(Tool.PLACE)
+    stroke(editor, (13.2, 6.2))
+    editor.turned = True
+    stroke(editor, (13.2, 8.2))
+    assert editor.session.design.layout == (
+        Piece(2, 0, "t_wall", False),
+        Piece(6, 0, "t_wall", True),
+    )
+    stroke(editor, (16.2, 8.2))
+    assert "stock of 2 't_wall' is used up" in editor.message
+    editor.choose(Tool.SELECT)
+    stroke(editor, (13.7, 6.2), (15.0, 6.8), (16.2, 7.2))
+    assert editor.session.design.layout[-1] == Piece(4, 6, "t_wall", False)
+    kept = WorkFolder(tmp_path).open(editor.session.folder.design_id).load()
+    assert kept == editor.session.history
+    solids = {each.name: each.size_m for each in boxes(editor.scenario, editor.layout)}
+    assert solids["t_wall"] in ((2.0, 0.5, 2.5), (0.5, 2.0, 2.5))
+    editor.selected = Thing(Kind.ITEM)
+    editor.delete()  # of a catalogue nothing is left, and single modules are placed again
+    assert not editor.session.design.layout
+    assert "layout A: 2 taken away" in editor.message
+    editor.session.undo()
+    assert len(editor.session.design.layout) == 2

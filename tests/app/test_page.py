@@ -20,6 +20,7 @@ from blast_env.app.session import Sessions
 from blast_env.scenario import Scenario, load_scenario
 from tests.app.test_work import CELLS, Here
 from tests.gas_sites import WALL, hut
+from tests.importing.maps import BLOCK
 from tests.scenarios import BALLISTIC_COURTYARD
 
 Story = Callable[[User, Sessions], Awaitable[None]]
@@ -202,6 +203,30 @@ def test_a_broken_file_is_a_message_and_the_design_stays(tmp_path: Path) -> None
         await user.should_see("line 1, column 18")
         await user.should_see("Nothing was changed")
         assert session.design == before
+
+    play(tmp_path, story)
+
+
+def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        choose(user, "site from a file, into this design")
+        (element,) = user.find(kind=ui.upload).elements
+        content = BLOCK.read_bytes()
+        with user:
+            await element.handle_uploads(
+                [SmallFileUpload(name=BLOCK.name, content_type="", _data=content)]
+            )
+        await user.should_see("protected buildings (names, by commas)")
+        user.find(marker="import").click()
+        await user.should_see("no building is protected", retries=50)
+        user.find("protected buildings (names, by commas)").type("Library")
+        user.find(marker="import").click()
+        await user.should_see(marker="take-site", retries=50)
+        await user.should_see("of its outline")
+        user.find(marker="take-site").click()
+        assert session.scenario.georeference is not None
+        assert any(each.protected for each in session.scenario.structures)
 
     play(tmp_path, story)
 

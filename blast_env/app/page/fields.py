@@ -58,8 +58,19 @@ _FIELDS: Final[Mapping[Kind, tuple[FormField, ...]]] = {
     Kind.COST_AREA: (
         FormField("reason", "reason", "text"),
         FormField("cost of a module", "module_cost", optional=True),
+        FormField("cost of items, times", "cost_factor", optional=True),
         *_CORNER,
         *_SIZE,
+    ),
+    Kind.ITEM: (
+        FormField("name", "name", "text"),
+        FormField("length (modules)", "length_modules", "integer"),
+        FormField("thickness (modules)", "thickness_modules", "integer"),
+        FormField("height (m)", "height_m"),
+        FormField("cost", "cost"),
+        FormField("stock", "stock", "integer"),
+        FormField("may be turned", "rotatable", "switch"),
+        FormField("stops vehicles", "stops_vehicles", "switch"),
     ),
     Kind.GAUGE: (
         FormField("name", "name", "text"),
@@ -114,6 +125,7 @@ def section_of(scenario: Scenario, thing: Thing) -> Document:
         Kind.KEEP_OUT: document.get("build_zone", {}).get("keep_outs", []),
         Kind.COST_AREA: document.get("build_zone", {}).get("cost_areas", []),
         Kind.GAUGE: document.get("gauges", []),
+        Kind.ITEM: document.get("build_zone", {}).get("items", []),
     }
     section: Document = tables[thing.kind][thing.number]
     return section

@@ -9,21 +9,20 @@ import tomli_w
 from nicegui import events, ui
 
 from blast_env.app.design import SLOTS
+from blast_env.app.page.import_dialog import ImportDialog, complain
 from blast_env.app.session import Session
-from blast_env.app.sources import IMPORTERS, MOST_BYTES, layout_of_file, site_of_file
+from blast_env.app.sources import (
+    IMPORTERS,
+    MAPS,
+    MOST_BYTES,
+    is_map,
+    layout_of_file,
+    site_of_file,
+)
 from blast_env.errors import BlastEnvError
 from blast_env.export import SUFFIXES, LayoutPlan, export_layout
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario
-
-
-def complain(error: BlastEnvError) -> None:
-    """Show what is wrong, with all its lines, until it has been read."""
-    with ui.dialog(value=True) as dialog, ui.card().classes("w-[560px] max-w-full"):
-        ui.label("That does not work").style("font-weight: 600; font-size: 16px")
-        ui.label(str(error)).style("white-space: pre-wrap; overflow-wrap: anywhere")
-        ui.label("Nothing was changed; the design is as it was.").classes("be-quiet")
-        ui.button("close", on_click=dialog.close).props("autofocus no-caps")
 
 
 async def read_site(event: events.UploadEventArguments) -> Scenario | None:
@@ -40,6 +39,9 @@ def site_upload(label: str, use: Callable[[Scenario, str], None]) -> ui.upload:
 
     async def take(event: events.UploadEventArguments) -> None:
         upload.reset()
+        if is_map(event.file.name):
+            ImportDialog(event.file.name, await event.file.read(), use)
+            return
         scenario = await read_site(event)
         if scenario is not None:
             use(scenario, event.file.name)
@@ -53,7 +55,7 @@ def site_upload(label: str, use: Callable[[Scenario, str], None]) -> ui.upload:
             f"the file is too large: at most {MOST_BYTES // 1_000_000} MB", type="negative"
         ),
     )
-    upload.props(f'accept="{",".join(IMPORTERS)}" flat bordered').classes("w-full")
+    upload.props(f'accept="{",".join((*IMPORTERS, *MAPS))}" flat bordered').classes("w-full")
     return upload
 
 

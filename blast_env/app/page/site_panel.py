@@ -10,6 +10,7 @@ from blast_env.app.editor import Editor
 from blast_env.app.edits import Kind, Thing
 from blast_env.app.page.fields import FormField, change_of, fields_of, section_of, value_of
 from blast_env.physics.scene import WALLS
+from blast_env.scenario import Scenario
 
 _SIDES: Final = {"left_right": "left and right", "bottom_top": "bottom and top"}
 _SITE: Final = Thing(Kind.SITE)
@@ -42,7 +43,10 @@ class SitePanel:
             with ui.row().classes("gap-1"):
                 self._delete = ui.button("delete", icon="delete", on_click=self._remove)
                 self._delete.props("dense outline no-caps size=sm")
-                ui.label("arrow keys move it by 0.5 m").classes("be-quiet self-center")
+                item = ui.button("item", icon="add", on_click=self._add_item)
+                item.props("dense outline no-caps size=sm")
+                item.tooltip("add an item to the catalogue of what can be placed")
+            ui.label("arrow keys move what is selected by 0.5 m").classes("be-quiet")
             self._facts = ui.label().classes("be-quiet")
 
     def refresh(self) -> None:
@@ -128,6 +132,16 @@ class SitePanel:
             return
         kind, _, number = str(event.value).rpartition(" ")
         self._editor.selected = Thing(Kind(kind), int(number))
+        self._after()
+
+    def _add_item(self) -> None:
+        editor = self._editor
+
+        def add(site: Scenario) -> Scenario:
+            after, editor.selected = edits.added(site, Kind.ITEM, (0.0, 0.0), (0.0, 0.0))
+            return after
+
+        editor.attempt("add an item", add)
         self._after()
 
     def _remove(self) -> None:

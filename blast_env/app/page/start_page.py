@@ -4,7 +4,8 @@ from datetime import datetime
 
 from nicegui import ui
 
-from blast_env.app.page.files_menu import complain, site_upload
+from blast_env.app.page.files_menu import site_upload
+from blast_env.app.page.import_dialog import complain
 from blast_env.app.session import Sessions
 from blast_env.app.sources import generated_site
 from blast_env.errors import BlastEnvError
