@@ -74,4 +74,4 @@ def test_vectors_have_a_site_each(mode: str) -> None:
 
 
 def test_its_specification_can_be_written_down() -> None:
-    assert '"first_seed": 10000' in gym.spec(ID).to_json()
+    assert '"scenario": "sites"' in gym.spec(ID).to_json()
