@@ -85,15 +85,23 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     which piece may be placed where. Those planes and values come last.
 
     ## Rewards
-    The sum of two terms, both in psi s and in `info["reward_terms"]`:
+    The rewards of an episode add up to minus the impulse on the protected structures, -I, and the
+    cost of illegal actions. A step's reward is the sum of terms, all in psi s and in
+    `info["reward_terms"]`:
 
-    - `impulse`: minus the calibrated impulse per area of the protected structures, times their
-      weights, added up. `reward="terminal"` pays it when the charge goes off. With
-      `"incremental"` a module earns I(before) - I(after) at once, and the last step also pays
-      -I(no barrier) (with the option `layout`, of that layout); the sum over an episode is the
-      same (not if it is discounted), for a set of blasts a module.
+    - `impulse`: over an episode, minus the calibrated impulse per area of the protected
+      structures, times their weights, added up. `reward="terminal"` pays it when the charge goes
+      off. With `"incremental"` the first step pays -I(no barrier) (with the option `layout`, of
+      that layout), and a module earns I(before) - I(after) at once; the sum over an episode is
+      the same (not if it is discounted), for a set of blasts a module.
+    - `deposit`, with `"terminal"`: the first step pays -2 I(no barrier), which comes back when
+      the charge goes off.
     - `illegal_actions`: an illegal action changes nothing, is counted in
       `info["illegal_actions"]`, and costs `illegal_action_cost`.
+
+    A time limit (`gymnasium.make(..., max_episode_steps=)`, `TimeLimit`) may cut an episode off
+    before the charge goes off. That never pays better than to finish with the same modules: with
+    `"incremental"` it pays the same, with `"terminal"` the deposit is lost.
 
     ## Starting state
     No module stands. The scenario's distribution gives position and mass of the charge:
@@ -110,7 +118,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
     ## Episode end
     Terminated when the agent finishes, when nothing more can be placed, or after
-    `illegal_action_limit` illegal actions. Never truncated.
+    `illegal_action_limit` illegal actions. Never truncated by itself.
 
     ## Information
     Always `action_mask` and `illegal_actions`; after a step `reward_terms`; at the end
@@ -156,8 +164,10 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     >>> for row in (10, 12, 14, 16, 22, 24, 26, 28):
     ...     for cell in ((row, 0), (row + 1, 0)):
     ...         observation, reward, ended, _, info = env.step(cell[0] * 16 + cell[1])
-    >>> ended, reward == -info["impulse_psi_s"], 0.0 < info["reduction"] < 1.0
-    (True, True, True)
+    >>> ended, info["reward_terms"]["impulse"] == -info["impulse_psi_s"]
+    (True, True)
+    >>> 0.0 < info["reduction"] < 1.0
+    True
 
     ## Version history
     - v0: first version.
@@ -182,6 +192,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     of a visible charge and 16 hidden charges: the spread is then twice the scatter or more.
 
     An episode costs `threats * realisations` blasts, and as many without a barrier.
+
+    The largest impulse with any of 144 random layouts, whole and unfinished, was 1.37 times that
+    without a barrier, blast by blast (`python -m scripts.layouts deposit`): hence the deposit.
 
     Two-dimensional: nothing flies over a wall. The calibration holds for the distances and the
     charge mass that it was made for (`calibration_in_range`) and for a facade in the open; how far

@@ -69,6 +69,7 @@ class Episode:
         initial: The layout at the start.
         placement: The modules placed so far.
         illegal_actions: How many illegal actions there were.
+        begun: Whether there has been an action.
         ended: Whether the charge has gone off.
     """
 
@@ -78,6 +79,7 @@ class Episode:
     initial: Layout
     placement: Placement
     illegal_actions: int = 0
+    begun: bool = False
     ended: bool = False
 
     def action_mask(self) -> NDArray[np.bool_]:
@@ -103,8 +105,14 @@ class Episode:
         self.placement, is_illegal, self.ended = self._after(action, illegal)
         self.illegal_actions += is_illegal
         transition = Transition(
-            self.initial, before.layout, self.placement.layout, self.ended, self.objective
+            initial=self.initial,
+            before=before.layout,
+            after=self.placement.layout,
+            begins=not self.begun,
+            ended=self.ended,
+            objective=self.objective,
         )
+        self.begun = True
         return _with_illegal_term(reward(transition), -illegal.cost if is_illegal else 0.0)
 
     def blasts_due(self, action: int, illegal: IllegalActions) -> tuple[BlastAsked, ...]:

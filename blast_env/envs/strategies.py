@@ -171,6 +171,7 @@ class Transition:
         initial: The layout at `reset`.
         before: The layout before the action.
         after: The layout after it; the same, unless the action placed a module.
+        begins: Whether it is the first action of the episode.
         ended: Whether the charge goes off now.
         objective: Assesses layouts under the threats of the episode.
     """
@@ -178,12 +179,18 @@ class Transition:
     initial: Layout
     before: Layout
     after: Layout
+    begins: bool
     ended: bool
     objective: Objective
 
 
 class Reward(Protocol):
-    """Pays for an action, in named terms."""
+    """Pays for an action, in named terms.
+
+    An episode may be cut off after any action, by a time limit that a user puts round the
+    environment, and the environment does not learn of it. So what is paid until then should be no
+    more than what finishing would have paid.
+    """
 
     def __call__(self, transition: Transition) -> Mapping[str, float]:
         """Return the terms; the reward is their sum.
@@ -192,24 +199,39 @@ class Reward(Protocol):
         """
 
 
+DEPOSIT: Final = 2.0
+"""Times the impulse without a barrier: more than any layout lets through; measured by
+`python -m scripts.layouts deposit`."""
+
+
 @dataclass(frozen=True)
 class TerminalReward:
-    """Minus the impulse of the whole layout, paid when the charge goes off."""
+    """Minus the impulse of the whole layout, paid when the charge goes off.
+
+    The first action also pays a deposit, which comes back when the charge goes off: an episode that
+    is cut off before loses it. It is more than any layout lets through, so that to finish always
+    pays better than to be cut off.
+    """
 
     def __call__(self, transition: Transition) -> Mapping[str, float]:
-        """Return the term `impulse`, psi*s; 0 before the end."""
-        if not transition.ended:
-            return {"impulse": 0.0}
-        return {"impulse": -transition.objective.assess(transition.after).impulse_psi_s}
+        """Return the terms `impulse`, 0 before the end, and `deposit`, 0 in between; psi*s."""
+        assess = transition.objective.assess
+        impulse = deposit = 0.0
+        if transition.begins != transition.ended:
+            deposit = DEPOSIT * assess(()).impulse_psi_s
+        if transition.ended:
+            impulse = -assess(transition.after).impulse_psi_s
+        return {"impulse": impulse, "deposit": deposit if transition.ended else -deposit}
 
 
 @dataclass(frozen=True)
 class IncrementalReward:
     """What each module takes off the impulse, paid at once; a set of blasts per module.
 
-    A placement earns I(before) - I(after). The last step also pays -I(initial), the impulse of the
-    layout at `reset`, which is the one without a barrier unless an option says otherwise. So the
-    sum over an episode is that of `TerminalReward`.
+    A placement earns I(before) - I(after). The first action also pays -I(initial), the impulse of
+    the layout at `reset`, which is the one without a barrier unless an option says otherwise. So
+    what has been paid is at any time minus the impulse with what stands: what finishing would come
+    to, and over an episode the sum of `TerminalReward`.
     """
 
     def __call__(self, transition: Transition) -> Mapping[str, float]:
@@ -219,7 +241,7 @@ class IncrementalReward:
         if transition.after != transition.before:
             before, after = assess(transition.before), assess(transition.after)
             impulse += before.impulse_psi_s - after.impulse_psi_s
-        if transition.ended:
+        if transition.begins:
             impulse -= assess(transition.initial).impulse_psi_s
         return {"impulse": impulse}
 

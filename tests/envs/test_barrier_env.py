@@ -29,11 +29,11 @@ def test_finishing_sets_off_the_charge_with_what_stands() -> None:
     env = make()
     env.reset(seed=1)
     env.step(7)
-    _, reward, ended, truncated, info = env.step(FINISH)
+    _, _, ended, truncated, info = env.step(FINISH)
     assert ended
     assert not truncated
     assert info["layout"] == ((1, 2),)
-    assert reward == -info["impulse_psi_s"] < 0.0
+    assert info["reward_terms"]["impulse"] == -info["impulse_psi_s"] < 0.0
 
 
 def test_the_final_information_is_that_of_the_same_blasts_run_by_hand() -> None:
@@ -76,13 +76,14 @@ def test_the_weights_of_structures_count() -> None:
 
 def test_an_illegal_action_changes_nothing_but_the_count_and_the_reward() -> None:
     env = make(illegal_action_cost=0.25)
-    observation, info = env.reset(seed=1)
+    env.reset(seed=1)
+    observation, _, _, _, info = env.step(7)
     assert not info["action_mask"][HYDRANT]
     after, reward, ended, _, info = env.step(HYDRANT)
     assert same(observation, after)
     assert not ended
     assert reward == -0.25
-    assert info["reward_terms"] == {"impulse": 0.0, "illegal_actions": -0.25}
+    assert info["reward_terms"] == {"impulse": 0.0, "deposit": 0.0, "illegal_actions": -0.25}
     assert info["illegal_actions"] == 1
     env.step(0)
     again = env.step(0)  # the cell is taken now
@@ -131,18 +132,83 @@ def test_incremental_rewards_add_up_to_the_terminal_one(threat: str, layout: tup
         steps = play(env, seed=5, layout=layout)
         rewards[reward] = [step[1] for step in steps[1:]]
     assert sum(rewards["incremental"]) == pytest.approx(sum(rewards["terminal"]), abs=1e-12)
-    assert not any(rewards["terminal"][:-1])
+    assert not any(rewards["terminal"][1:-1])
     assert sum(rewards["terminal"]) < 0.0
+
+
+def test_terminal_rewards_add_up_to_the_impulse_and_the_deposit_comes_back() -> None:
+    steps = play(make(), seed=5)[1:]
+    terms = [step[4]["reward_terms"] for step in steps]
+    impulse_psi_s = steps[-1][4]["impulse_psi_s"]
+    assert [each["impulse"] for each in terms] == [0.0] * (len(terms) - 1) + [-impulse_psi_s]
+    assert sum(step[1] for step in steps) == pytest.approx(-impulse_psi_s, rel=1e-12)
+    deposits = [each["deposit"] for each in terms]
+    unprotected_psi_s = steps[-1][4]["unprotected_impulse_pa_s"] / PA_PER_PSI
+    assert deposits[0] == -deposits[-1] == pytest.approx(-2.0 * unprotected_psi_s)
+    assert not any(deposits[1:-1])
+
+
+def test_who_finishes_at_once_pays_the_impulse_exactly() -> None:
+    for reward in ("terminal", "incremental"):
+        env = make(reward=reward)
+        env.reset(seed=1)
+        _, paid, ended, _, info = env.step(FINISH)
+        assert ended
+        assert paid == -info["impulse_psi_s"]
 
 
 def test_a_module_earns_what_it_takes_off_the_impulse() -> None:
     env = make(reward="incremental")
-    _, info = env.reset(seed=1, options={"charge_position_m": (3.0, 9.0)})
+    env.reset(seed=1, options={"charge_position_m": (3.0, 9.0), "layout": [(0, 4)]})
+    env.step(HYDRANT)  # illegal: the first step pays for what stands from the start
     earned = env.step(3 * COLUMNS)[1]
     _, last, _, _, info = env.step(FINISH)
-    unprotected_psi_s = info["unprotected_impulse_pa_s"] / PA_PER_PSI
-    assert earned == pytest.approx(unprotected_psi_s - info["impulse_psi_s"], abs=1e-12)
-    assert last == pytest.approx(-unprotected_psi_s)
+    evaluator, (charge,), ((seed,),) = (
+        BlastEvaluator(small_scenario(), ThinEngine()),
+        info["charges"],
+        info["blast_seeds"],
+    )
+    before = evaluator.loads([(0, 4)], Threat(charge, seed)).protected_impulse_psi_s
+    assert earned == pytest.approx(before - info["impulse_psi_s"], abs=1e-12)
+    assert last == 0.0
+
+
+@pytest.mark.parametrize("reward", ["terminal", "incremental"])
+@pytest.mark.parametrize("threat", ["visible", "hidden"])
+@pytest.mark.parametrize("limit", [1, 2, 3])
+def test_to_be_cut_off_never_pays_better_than_to_finish(
+    reward: str, threat: str, limit: int
+) -> None:
+    """A time limit that a user puts round the environment, which does not learn of it."""
+    env = make(small_scenario(stock=6), reward=reward, threat=threat)
+    limited = gym.wrappers.TimeLimit(env, limit)
+    for seed in range(6):
+        cells = np.random.default_rng(seed).permutation(8)[:limit].tolist()
+        limited.reset(seed=seed)
+        steps = [limited.step(cell) for cell in cells]
+        assert steps[-1][2:4] == (False, True)
+        cut_off = sum(float(step[1]) for step in steps)
+        env.reset(seed=seed)
+        finished = sum(env.step(cell)[1] for cell in (*cells, FINISH))
+        assert finished < 0.0
+        if reward == "incremental":
+            assert cut_off == pytest.approx(finished, rel=1e-12)
+        else:
+            assert cut_off < finished
+
+
+def test_a_limit_of_gymnasium_s_make_cuts_off_alike() -> None:
+    env = gym.make(
+        "BlastBarrier-v0",
+        max_episode_steps=2,
+        scenario=small_scenario(),
+        engine=ThinEngine(),
+        realisations=1,
+    )
+    env.reset(seed=1)
+    steps = [env.step(cell) for cell in (0, 1)]
+    assert [step[2:4] for step in steps] == [(False, False), (False, True)]
+    assert sum(float(step[1]) for step in steps) < 0.0
 
 
 class PayPerModule:
