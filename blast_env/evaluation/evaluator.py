@@ -24,7 +24,7 @@ from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.scene import Charge
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
-from blast_env.scenario import AnyScenario, Scenario, check_layout, find_scenario
+from blast_env.scenario import AnyCharge, AnyScenario, Scenario, check_layout, find_scenario
 from blast_env.simulation import Blast
 
 
@@ -132,12 +132,15 @@ class BlastEvaluator:
             ScenarioError: If a charge is not clear of a structure or the border.
         """
         check_workers("processes", processes)
-        keys = [self._key(layout, threat) for layout, threat in pairs]
-        asked = dict.fromkeys(keys)
+        asked: dict[BlastKey, AnyCharge] = {}
+        keys = []
+        for layout, threat in pairs:
+            keys.append(self._key(layout, threat))
+            asked.setdefault(keys[-1], threat.charge)
         found = {key: loads for key in asked if (loads := self._known(key)) is not None}
         missing = [key for key in asked if key not in found]
         run = partial(_run_one, calibration=self.calibration)
-        blasts = [_Work(self.scenario, self.engine, key) for key in missing]
+        blasts = [_Work(self.scenario, self.engine, key, asked[key]) for key in missing]
         for done, (index, loads) in enumerate(as_completed(run, blasts, processes), start=1):
             found[missing[index]] = loads
             self._remember(missing[index], loads)
@@ -153,7 +156,8 @@ class BlastEvaluator:
         cells = tuple(sorted(check_layout(self.scenario, layout)))
         # Gas dynamics has no fan and no air to draw: a charge has one realisation.
         seed = 0 if is_gas(self.engine) else threat.seed
-        return self._key_of_nothing._replace(layout=cells, charge=threat.charge, seed=seed)
+        charge = threat.charge_against(self.scenario, cells)
+        return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
 
     def _known(self, key: BlastKey) -> BlastLoads | None:
         """Return loads that are remembered here or there."""
@@ -171,11 +175,15 @@ class BlastEvaluator:
 
 @dataclass(frozen=True)
 class _Work:
-    """One blast to run, perhaps in a worker process."""
+    """One blast to run, perhaps in a worker process.
+
+    Its charge is that of the key, or the vehicle that brings it there.
+    """
 
     scenario: Scenario
     engine: Engine
     key: BlastKey
+    charge: AnyCharge
 
 
 def _run_one(work: _Work, calibration: Calibration | None) -> BlastLoads:
@@ -183,10 +191,11 @@ def _run_one(work: _Work, calibration: Calibration | None) -> BlastLoads:
     if is_gas(engine):
         from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
 
-        return gas_loads(GasBlast(scenario, key.layout, key.seed, engine, key.charge).run())
+        return gas_loads(GasBlast(scenario, key.layout, key.seed, engine, work.charge).run())
     if calibration is None:
         raise AssertionError("an evaluator of particles has a calibration")
-    return blast_loads(Blast(scenario, key.layout, key.seed, engine, key.charge).run(), calibration)
+    blast = Blast(scenario, key.layout, key.seed, engine, work.charge)
+    return blast_loads(blast.run(), calibration)
 
 
 _MOST_EVALUATORS: Final = 4

@@ -116,10 +116,11 @@ def _draw_source(surface: pygame.Surface, view: View, source: AnySource, radius_
         around = area.inflate(2 * radius_px, 2 * radius_px)
         pygame.draw.rect(surface, EXPLOSIVE, around, border_radius=radius_px)
         return
-    start, end = (view.pixel(x_m * UNITS_PER_M, y_m * UNITS_PER_M) for x_m, y_m in source.segment_m)
-    pygame.draw.line(surface, EXPLOSIVE, start, end, 2 * radius_px)
-    for centre in (start, end):
-        pygame.draw.circle(surface, EXPLOSIVE, centre, radius_px)
+    for line_m in source.lines_m:
+        start, end = (view.pixel(x_m * UNITS_PER_M, y_m * UNITS_PER_M) for x_m, y_m in line_m)
+        pygame.draw.line(surface, EXPLOSIVE, start, end, 2 * radius_px)
+        for centre in (start, end):
+            pygame.draw.circle(surface, EXPLOSIVE, centre, radius_px)
 
 
 def placing_signs(sources: Sequence[AnySource], has_others: bool) -> list[Sign]:

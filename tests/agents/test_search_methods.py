@@ -19,6 +19,7 @@ from blast_agents.search.methods import every_layout
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
 from blast_env.evaluation.cases import practice_hidden
+from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement, Scenario
 from tests.agents.search_cases import WatchedEvaluator, ballistic, small_problem, small_scenario
 
@@ -237,6 +238,7 @@ def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
     problem = LayoutProblem(evaluator, practice_hidden(scenario, 8, 1, 0))
+    assert isinstance(problem.charge, Charge)
     assert problem.charge.position_m == pytest.approx((5.0, 15.0))
 
 

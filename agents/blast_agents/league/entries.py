@@ -11,8 +11,8 @@ from blast_agents.search import SearchMethod, find_search_method
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import PointSource, Scenario
+from blast_env.scenario import AnyCharge, Scenario
+from blast_env.scenario.vehicles import source_of
 from blast_env.sites import Visibility, visibility_layout
 
 
@@ -60,7 +60,7 @@ class Rule:
         name: In tables.
     """
 
-    rule: Callable[[Scenario, Charge], Layout]
+    rule: Callable[[Scenario, AnyCharge], Layout]
     name: str
 
     def propose(self, case: Case) -> Layout:
@@ -86,7 +86,7 @@ class VisibilityLayout:
         """Return the layout for the charge, or for all the places where a hidden one may be."""
         scenario = case.scenario
         if case.charge is not None:
-            scenario = scenario.model_copy(update={"charge": (PointSource.at(case.charge),)})
+            scenario = scenario.model_copy(update={"charge": (source_of(case.charge),)})
         return visibility_layout(scenario, Visibility.of(scenario))
 
 

@@ -13,8 +13,7 @@ from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResul
 from blast_agents.search.session import SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Cell, Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, Scenario
+from blast_env.scenario import AnyCharge, Placement, Scenario
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class RuleSearch:
         name: Name in tables and on the command line.
     """
 
-    rule: Callable[[Scenario, Charge], Layout]
+    rule: Callable[[Scenario, AnyCharge], Layout]
     name: str
 
     def search(
