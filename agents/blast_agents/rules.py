@@ -66,13 +66,26 @@ def line_of_sight_wall(scenario: AnyScenario, charge: AnyCharge, share: float = 
         BlastEnvError: If the scenario has no build zone, `share` is not from 0 to 1, or the charge
             is in the middle of the protected structures.
     """
+    charge_m = expected_charge([source_of(charge)]).position_m
+    return wall_added_to(Placement.empty(scenario), charge_m, share).layout
+
+
+def wall_added_to(placement: Placement, charge_m: PointM, share: float) -> Placement:
+    """Return a placement with a wall beside what stands already; see `line_of_sight_wall`.
+
+    Args:
+        placement: What stands already.
+        charge_m: Where the charge is.
+        share: As for `line_of_sight_wall`.
+
+    Raises:
+        BlastEnvError: As for `line_of_sight_wall`.
+    """
     if not 0.0 <= share <= 1.0:
         raise BlastEnvError(f"share is {share:g}, must be from 0 to 1")
-    placement = Placement.empty(scenario)
-    aim_m = expected_charge([source_of(charge)]).position_m
-    view = _View.of(placement.scenario, aim_m, placement.free)
+    view = _View.of(placement.scenario, charge_m, placement.free)
     if not view.between.any():
-        return ()
+        return placement
     wall_m = view.wall_depth_m(share)
     ends = [_End(side=1.0), _End(side=-1.0)]
     while ends and not placement.is_full:
@@ -83,7 +96,7 @@ def line_of_sight_wall(scenario: AnyScenario, charge: AnyCharge, share: float = 
             continue
         placement = placement.place(cell)
         ends = [view.end_with(cell, wall_m, each) for each in ends]
-    return placement.layout
+    return placement
 
 
 def wall_near_charge(scenario: AnyScenario, charge: AnyCharge) -> Layout:

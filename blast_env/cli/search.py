@@ -195,8 +195,8 @@ def search(
     method: Annotated[
         str,
         typer.Option(
-            help="random, greedy, annealing, genetic, nsga2, exhaustive, wall_near_charge or "
-            "wall_near_building."
+            help="random, greedy, annealing, genetic, nsga2, exhaustive, wall_near_charge, "
+            "wall_near_building, line_of_posts or posts_and_wall."
         ),
     ] = "genetic",
     scenario: Annotated[str, typer.Option(help="Bundled name, or a scenario file.")] = "courtyard",

@@ -259,7 +259,10 @@ def test_the_front_is_near_the_true_one(problem: LayoutProblem, optimum: SearchR
 
 def test_every_method_has_its_name() -> None:
     assert all(name == method.name for name, method in SEARCH_METHODS.items())
-    assert {*DRAWN, "exhaustive", "wall_near_charge", "wall_near_building"} == set(SEARCH_METHODS)
+    assert {
+        *(*DRAWN, "exhaustive", "wall_near_charge", "wall_near_building"),
+        *("line_of_posts", "posts_and_wall"),
+    } == set(SEARCH_METHODS)
 
 
 def test_genetic_search_beats_random_search_on_the_courtyard() -> None:

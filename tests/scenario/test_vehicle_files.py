@@ -81,9 +81,22 @@ def test_walls_with_gaps_narrower_than_the_vehicle_let_it_no_further_than_its_en
 def test_a_vehicle_that_nothing_could_stop_is_refused() -> None:
     zone = site_document()["build_zone"] | {"rows": 4, "stock": 4}
     assert problems(build_zone=zone) == [
-        "charge[0]: nothing can stop the vehicle: even with a module on each of the 16 usable"
-        " cells it comes as near as 1 m to a protected structure"
+        "charge[0]: nothing can stop the vehicle: even with something that stops it on each of the"
+        " 16 cells where that can stand, it comes as near as 1 m to a protected structure"
     ]
+
+
+@pytest.mark.parametrize(("stops", "stock"), [(False, 3), (True, 0)])
+def test_a_catalogue_in_which_nothing_stops_vehicles_is_refused(stops: bool, stock: int) -> None:
+    hedge = {"name": "hedge", "length_modules": 3, "height_m": 1.5, "cost": 1.0, "stock": 9}
+    post = {"name": "post", "length_modules": 1, "height_m": 1.0, "cost": 1.0}
+    items = [hedge | {"stops_vehicles": False}, post | {"stops_vehicles": stops, "stock": stock}]
+    zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4, "items": items}
+    assert problems(build_zone=zone) == [
+        "charge[0]: nothing can stop the vehicle: no item in stock stops vehicles"
+    ]
+    items[1] |= {"stops_vehicles": True, "stock": 1}
+    assert gate_site(build_zone=zone)
 
 
 def test_all_is_said_at_once() -> None:

@@ -7,6 +7,7 @@ from math import comb, exp
 
 import numpy as np
 
+from blast_agents.posts import line_of_posts, posts_and_wall
 from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
 from blast_agents.search.moves import Draw, Moves, random_walls
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
@@ -88,6 +89,12 @@ WALL_NEAR_CHARGE = RuleSearch(wall_near_charge, "wall_near_charge")
 
 
 WALL_NEAR_BUILDING = RuleSearch(wall_near_building, "wall_near_building")
+
+
+LINE_OF_POSTS = RuleSearch(line_of_posts, "line_of_posts")
+
+
+POSTS_AND_WALL = RuleSearch(posts_and_wall, "posts_and_wall")
 
 
 @dataclass(frozen=True)
