@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from blast_env.geometry import Rectangle
 from blast_env.scenario import AnySource, RectangleSource, Site
 from blast_env.scenario.sections import PointM
+from blast_env.scenario.vehicles import squares_of
 from blast_env.units import MODULE_SIDE_M
 
 Plane = NDArray[np.float32]
@@ -33,8 +34,7 @@ class SiteGrid:
     @classmethod
     def of(cls, site: Site) -> "SiteGrid":
         """Return the grid of a site; the last squares jut out of one that is no whole number."""
-        rows, columns = (ceil(m / MODULE_SIDE_M - 1e-9) for m in (site.height_m, site.width_m))
-        return cls(rows, columns)
+        return cls(*squares_of(site))
 
     def lattice(self, corner_m: tuple[float, float], rows: int, columns: int) -> "Lattice":
         """Return where a lattice of modules lies on the grid.

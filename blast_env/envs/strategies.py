@@ -136,13 +136,15 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
         representative: The scenario that the spaces were made for.
 
     Raises:
-        BlastEnvError: If site, build zone or items have another size, or there is no build zone.
+        BlastEnvError: If site, build zone or items have another size, there is no build zone, or
+            only one of them has a vehicle.
     """
     for what, size, expected in zip(
         (
             "site (width, height in m)",
             "build zone (rows, columns)",
             "catalogue (item, turned, size)",
+            "number of vehicles (none or some)",
         ),
         _sizes(scenario),
         _sizes(representative),
@@ -160,7 +162,8 @@ def _sizes(scenario: Scenario) -> tuple[tuple[object, ...], ...]:
     variants = [
         (each.name, each.turned, each.rows, each.columns) for each in zone.catalogue.variants
     ]
-    return (site.width_m, site.height_m), zone.shape, tuple(variants)
+    vehicles = ("some",) if scenario.vehicles else ("none",)
+    return (site.width_m, site.height_m), zone.shape, tuple(variants), vehicles
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from math import ceil
+from math import ceil, hypot
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -187,6 +187,12 @@ class VehicleGround:
     def entry_stand_off_m(self) -> float:
         """How near to a protected structure it is when it has just entered."""
         return float(_nearest_wall(self.reach().starts_m, self.structures)[0].min())
+
+
+def squares_of(site: Site) -> tuple[int, int]:
+    """Return how many rows and columns of squares of 0.5 m cover a site."""
+    rows, columns = (ceil(m / MODULE_SIDE_M - 1e-9) for m in (site.height_m, site.width_m))
+    return rows, columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -459,6 +465,21 @@ def stand_off_m(structures: Iterable[AnyStructure], position_m: PointM) -> float
     """Return how far a place is from the nearest wall that counts of a protected structure."""
     distances_m, _ = _nearest_wall(np.array([position_m]), structures)
     return float(distances_m[0])
+
+
+def nearest_point_m(structures: Iterable[AnyStructure], position_m: PointM) -> PointM:
+    """Return the point of the walls that count of protected structures that is nearest to a place.
+
+    Raises:
+        ValueError: If no structure is protected.
+    """
+    x_m, y_m = position_m
+    walls = [wall for each in structures if each.protected for wall in _walls(each)]
+    points = [
+        (min(max(x_m, left), right), min(max(y_m, bottom), top))
+        for left, bottom, right, top in walls
+    ]
+    return min(points, key=lambda point: hypot(point[0] - x_m, point[1] - y_m))
 
 
 def _nearest_wall(
