@@ -1,7 +1,7 @@
 """Axis-parallel rectangles, the only plane figure that sites are made of; cells of a grid."""
 
 from collections import Counter
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
 Cell = tuple[int, int]
@@ -40,6 +40,12 @@ class Rectangle(NamedTuple):
     def from_corner(cls, corner: tuple[float, float], size: tuple[float, float]) -> "Rectangle":
         """Return the rectangle with this lower left corner and (width, height)."""
         return cls(corner[0], corner[1], corner[0] + size[0], corner[1] + size[1])
+
+    @classmethod
+    def around(cls, rectangles: "Sequence[Rectangle]") -> "Rectangle":
+        """Return the smallest rectangle that contains all of at least one."""
+        left, bottom, right, top = zip(*rectangles, strict=True)
+        return cls(min(left), min(bottom), max(right), max(top))
 
     @property
     def centre(self) -> tuple[float, float]:

@@ -224,7 +224,8 @@ def write_pictures(settings: DemoSettings, comparison: Comparison) -> list[Path]
             width_px=settings.film_width_px,
             progress=progress,
         )
-    plan = LayoutPlan(scenario, layout, threat.charge, {"run": str(settings.run)})
+    charge = threat.charge_against(scenario, layout)
+    plan = LayoutPlan(scenario, layout, charge, {"run": str(settings.run)})
     return [
         film,
         save_figure(heat_map(bare), settings.out / "heat_map_no_barrier.png"),

@@ -31,7 +31,13 @@ from blast_env.rendering.style import (
     render_extra,
     unit_interval,
 )
-from blast_env.scenario import AnySource, BuildZone, Placement, RectangleSource, Scenario
+from blast_env.scenario import (
+    AnySource,
+    BuildZone,
+    Placement,
+    RectangleSource,
+    Scenario,
+)
 from blast_env.scenario.build_scene import build_scene
 
 with render_extra():
@@ -182,7 +188,7 @@ def _draw_source(axes: Axes, source: AnySource, share: float) -> None:
         axes.add_patch(patch)
         x_m, y_m = source.rectangle_m.centre
     else:
-        (x0_m, y0_m), (x1_m, y1_m) = source.segment_m
+        (x0_m, y0_m), (x1_m, y1_m) = source.lines_m[0]
         axes.plot(
             (x0_m, x1_m),
             (y0_m, y1_m),
@@ -203,7 +209,7 @@ def _write_source(
     """Write the mass of a charge and how likely it is: into an area, or beside a line or point."""
     if isinstance(source, RectangleSource):
         offset_pt, turn, across, along = (0.0, 0.0), 0.0, "center", "center"
-    elif source.segment_m[0][0] == source.segment_m[1][0] != source.segment_m[0][1]:
+    elif source.lines_m[0][0][0] == source.lines_m[0][1][0] != source.lines_m[0][0][1]:
         offset_pt, turn, across, along = (-7.0, 0.0), 90.0, "right", "center"
     else:
         offset_pt, turn, across, along = (0.0, 7.0), 0.0, "center", "bottom"

@@ -18,8 +18,7 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Scenario
+from blast_env.scenario import AnyCharge, Scenario
 from scripts.difficulty_outcomes import Outcome, TaskResult
 
 STAND_OFFS: Final = {0.0: "near the charge", 0.5: "in the middle", 1.0: "near the building"}
@@ -157,7 +156,7 @@ class Study:
         """Impulses of all random layouts on the first training threats (layouts, charges)."""
         return self._impulses(self._pool, self._tried)
 
-    def _again(self, charge: Charge) -> tuple[Threat, ...]:
+    def _again(self, charge: AnyCharge) -> tuple[Threat, ...]:
         """Return a charge with further training seeds."""
         first = self._effort.charges
         seeds = SeedRange.SEARCH.seeds(first, self._effort.visible_round)
@@ -175,7 +174,7 @@ class Study:
         both = np.concatenate((first[order], second), axis=1).mean(axis=1)
         return self._pool[int(order[np.argmin(both)])]
 
-    def _on_charge(self, layouts: Sequence[Layout], charge: Charge) -> FloatArray:
+    def _on_charge(self, layouts: Sequence[Layout], charge: AnyCharge) -> FloatArray:
         """Return the impulses of layouts, means over the held-out realisations (layouts,)."""
         seeds = SeedRange.JUDGEMENT.seeds(0, self._effort.realisations)
         means: FloatArray = self._impulses(layouts, [Threat(charge, seed) for seed in seeds]).mean(

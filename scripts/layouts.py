@@ -18,6 +18,7 @@ from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.files import make_folder
 from blast_env.geometry import Cell, Layout
 from blast_env.scenario import Placement, Scenario, load_scenario
+from blast_env.scenario.build_scene import charge_against
 from blast_env.studies.agreement import layouts as study
 from blast_env.studies.agreement.layouts import AVERAGED, Noise
 from blast_env.tables import markdown_table, write_csv
@@ -128,7 +129,8 @@ def engines(
         rng = np.random.default_rng(0)
         whole = layouts_in_turn(scenario, ("scattered", "walls"), layouts, rng)
         drawn = [layout[: rng.integers(1, len(layout) + 1)] for layout in whole]
-        threats = [scenario.sample_charge(rng) for _ in range(charges)]
+        drawn_charges = [scenario.sample_charge(rng) for _ in range(charges)]
+        threats = [charge_against(scenario, (), charge) for charge in drawn_charges]
         with progress_bar("blasts") as progress:
             loads = study.measured_loads(scenario, drawn, threats, processes, progress)
         write_csv(study.mean_loads(drawn, loads), out)

@@ -7,8 +7,7 @@ from time import perf_counter
 from typing import Protocol
 
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import AnyScenario, Scenario, find_scenario
+from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class Proposal:
 class LayoutAgent(Protocol):
     """Proposes a layout for a site, at once: no blast is simulated."""
 
-    def propose(self, scenario: Scenario, charge: Charge | None = None) -> Layout:
+    def propose(self, scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
         """Return a layout that keeps every condition of the build zone; always the same one.
 
         Args:
@@ -46,7 +45,7 @@ def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
     return Proposal(layout, perf_counter() - began_s)
 
 
-def propose(agent: LayoutAgent, scenario: AnyScenario, charge: Charge | None) -> Proposal:
+def propose(agent: LayoutAgent, scenario: AnyScenario, charge: AnyCharge | None) -> Proposal:
     """Return what an agent proposes, and how long it took.
 
     Args:

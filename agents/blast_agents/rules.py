@@ -12,8 +12,16 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Layout
 from blast_env.physics.scene import Charge
-from blast_env.scenario import AnyScenario, AnySource, Placement, Scenario
+from blast_env.scenario import (
+    AnyCharge,
+    AnyScenario,
+    AnySource,
+    Placement,
+    Scenario,
+    VehicleSource,
+)
 from blast_env.scenario.sections import PointM
+from blast_env.scenario.vehicles import source_of
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 
@@ -32,7 +40,7 @@ _LEAST_GAIN_M: Final = MODULE_SIDE_M / 2.0
 _TOLERANCE_M: Final = 1e-9
 
 
-def line_of_sight_wall(scenario: AnyScenario, charge: Charge, share: float = 0.5) -> Layout:
+def line_of_sight_wall(scenario: AnyScenario, charge: AnyCharge, share: float = 0.5) -> Layout:
     """Return a wall across the line of sight from a charge to the protected structures.
 
     The wall stands at right angles to the line from the charge to the middle of the protected
@@ -46,7 +54,7 @@ def line_of_sight_wall(scenario: AnyScenario, charge: Charge, share: float = 0.5
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
         charge: Where the charge is; its mass plays no part. See `expected_charge` for one whose
-            place is not known.
+            place is not known, as that of a vehicle: the middle of its first entry stands for it.
         share: How far through the build zone: 0 as near to the charge as a module can stand on
             the line of sight (or, where none can, beside it), 1 as near to the structures.
 
@@ -58,12 +66,26 @@ def line_of_sight_wall(scenario: AnyScenario, charge: Charge, share: float = 0.5
         BlastEnvError: If the scenario has no build zone, `share` is not from 0 to 1, or the charge
             is in the middle of the protected structures.
     """
+    charge_m = expected_charge([source_of(charge)]).position_m
+    return wall_added_to(Placement.empty(scenario), charge_m, share).layout
+
+
+def wall_added_to(placement: Placement, charge_m: PointM, share: float) -> Placement:
+    """Return a placement with a wall beside what stands already; see `line_of_sight_wall`.
+
+    Args:
+        placement: What stands already.
+        charge_m: Where the charge is.
+        share: As for `line_of_sight_wall`.
+
+    Raises:
+        BlastEnvError: As for `line_of_sight_wall`.
+    """
     if not 0.0 <= share <= 1.0:
         raise BlastEnvError(f"share is {share:g}, must be from 0 to 1")
-    placement = Placement.empty(scenario)
-    view = _View.of(placement.scenario, charge.position_m, placement.free)
+    view = _View.of(placement.scenario, charge_m, placement.free)
     if not view.between.any():
-        return ()
+        return placement
     wall_m = view.wall_depth_m(share)
     ends = [_End(side=1.0), _End(side=-1.0)]
     while ends and not placement.is_full:
@@ -74,20 +96,20 @@ def line_of_sight_wall(scenario: AnyScenario, charge: Charge, share: float = 0.5
             continue
         placement = placement.place(cell)
         ends = [view.end_with(cell, wall_m, each) for each in ends]
-    return placement.layout
+    return placement
 
 
-def wall_near_charge(scenario: AnyScenario, charge: Charge) -> Layout:
+def wall_near_charge(scenario: AnyScenario, charge: AnyCharge) -> Layout:
     """Return the line-of-sight wall as near to the charge as a module can stand."""
     return line_of_sight_wall(scenario, charge, NEAR_CHARGE)
 
 
-def wall_near_building(scenario: AnyScenario, charge: Charge) -> Layout:
+def wall_near_building(scenario: AnyScenario, charge: AnyCharge) -> Layout:
     """Return the line-of-sight wall as near to the protected structures as a module can stand."""
     return line_of_sight_wall(scenario, charge, NEAR_BUILDING)
 
 
-RULES: Final[Mapping[str, Callable[[AnyScenario, Charge], Layout]]] = MappingProxyType(
+RULES: Final[Mapping[str, Callable[[AnyScenario, AnyCharge], Layout]]] = MappingProxyType(
     {"wall near the charge": wall_near_charge, "wall near the building": wall_near_building}
 )
 """The two rules that an engineer would try first, by name."""
@@ -100,10 +122,12 @@ def expected_charge(sources: Sequence[AnySource]) -> Charge:
         sources: At least one; of a scenario, or what is known of a hidden charge.
 
     Returns:
-        The means, by weight, of the places, of the masses and of the heights.
+        The means, by weight, of the places, of the masses and of the heights. The place of a
+        vehicle is the middle of its first entry.
     """
     weights = np.array([source.weight for source in sources])
-    x_m, y_m = weights @ [source_bounds_m(source).centre for source in sources] / weights.sum()
+    middles_m = np.array([_middle_m(source) for source in sources])
+    x_m, y_m = weights @ middles_m / weights.sum()
     tnt_kg = weights @ [source.tnt_kg for source in sources] / weights.sum()
     height_m = weights @ [source.height_m for source in sources] / weights.sum()
     return Charge((float(x_m), float(y_m)), float(tnt_kg), float(height_m))
@@ -207,6 +231,13 @@ class _View:
         if reach_m <= end.reach_m:  # the module is at the other end
             return end
         return _End(end.side, reach_m, abs(float(self.depth_m[cell]) - wall_m))
+
+
+def _middle_m(source: AnySource) -> PointM:
+    """Return the middle of where a charge may be, of a vehicle that of its first entry."""
+    if isinstance(source, VehicleSource):
+        return source.entries[0].bounds_m.centre
+    return source_bounds_m(source).centre
 
 
 def _protected_middle_m(scenario: Scenario) -> tuple[float, float]:

@@ -36,6 +36,7 @@ from blast_env.provenance import command, versions
 from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import save_scenario
+from blast_env.scenario.build_scene import charge_against
 from blast_env.sites import SITES
 from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
@@ -194,7 +195,10 @@ def _plans(comparison: Comparison, provenance: dict[str, Any]) -> dict[str, Layo
     pairs = zip(comparison.cases, comparison.layouts, strict=True)
     return {
         f"layout_{number:0{digits}}": LayoutPlan(
-            case.scenario, layout, case.charge, {**provenance, "seed": case.threats[0].seed}
+            case.scenario,
+            layout,
+            None if case.charge is None else charge_against(case.scenario, layout, case.charge),
+            {**provenance, "seed": case.threats[0].seed},
         )
         for number, (case, layout) in enumerate(pairs, start=1)
     }

@@ -202,7 +202,7 @@ def _print_totals(evaluation: LayoutEvaluation) -> None:
         (evaluation.unprotected_cvar, evaluation.cvar),
         evaluation.cvar_level,
     )
-    charge = worst.threat.charge
+    charge = worst.charge
     print_line(
         f"worst threat: {charge.tnt_kg:g} kg TNT at ({charge.position_m[0]:.2f}, "
         f"{charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: {worst.impulse_pa_s:,.0f} Pa s, "

@@ -12,8 +12,9 @@ import pandas as pd
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
 from blast_env.geometry import Element, layout_counts
 from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
-from blast_env.scenario.build_scene import draw_charge
+from blast_env.scenario.build_scene import draw_threat
 from blast_env.simulation.gas import GasBlast, GasResult
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
@@ -51,9 +52,9 @@ def report_gas_blast(
     Raises:
         BlastEnvError: If it cannot be run, or a file cannot be written.
     """
-    charge = draw_charge(scenario, seed)
+    charge = draw_threat(scenario, seed)
     if charge_m is not None:
-        charge = charge._replace(position_m=charge_m)
+        charge = Charge(charge_m, charge.tnt_kg, charge.height_m)
     blast = GasBlast(scenario, tuple(layout), seed, engine, charge)
     with progress_bar(f"gas blast in {scenario.name}") as progress:
         result = blast.run(progress)

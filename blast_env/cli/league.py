@@ -109,7 +109,9 @@ def _contest(
     engine: str,
 ) -> Contest:
     agents = tuple(run.entry for run in runs if run.is_for(track))
-    return Contest(track, (*standard_entries(methods, budgets), *agents), store, engine)
+    vehicles = all(case.scenario.vehicles for case in track.cases)
+    entries = standard_entries(methods, budgets, vehicles)
+    return Contest(track, (*entries, *agents), store, engine)
 
 
 def _print_outlook(contests: Sequence[Contest]) -> None:

@@ -46,7 +46,7 @@ from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
-from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
+from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario, write_layout
 from blast_env.statistics import reductions
 from blast_env.tables import write_csv
 
@@ -158,8 +158,13 @@ def _provenance(
         "command": command(),
         "options": asdict(options),
         "threats": [
-            {"charge_position_m": t.charge.position_m, "tnt_kg": t.charge.tnt_kg, "seed": t.seed}
-            for t in problem.threats
+            {
+                "charge_position_m": charge.position_m,
+                "tnt_kg": charge.tnt_kg,
+                "seed": threat.seed,
+            }
+            for threat in problem.threats
+            for charge in [threat.charge_against(problem.scenario, result.layout)]
         ],
         "versions": versions(problem.evaluator.engine.version),
         "result": {
@@ -191,8 +196,8 @@ def search(
     method: Annotated[
         str,
         typer.Option(
-            help="random, greedy, annealing, genetic, nsga2, exhaustive, wall_near_charge or "
-            "wall_near_building."
+            help="random, greedy, annealing, genetic, nsga2, exhaustive, wall_near_charge, "
+            "wall_near_building, line_of_posts or posts_and_wall."
         ),
     ] = "genetic",
     scenario: Annotated[str, typer.Option(help="Bundled name, or a scenario file.")] = "courtyard",
@@ -295,12 +300,12 @@ def _practice(scenario: Scenario, options: SearchOptions, engine: Engine) -> Cas
     return practice_hidden(scenario, model.threats, realisations, options.seed, risk)
 
 
-def _visible_charge(scenario: Scenario, options: SearchOptions) -> Charge:
+def _visible_charge(scenario: Scenario, options: SearchOptions) -> AnyCharge:
     """Return the charge that is known: always that of the search's own seed."""
     charge = scenario.sample_charge(np.random.default_rng(options.seed))
     if options.charge_position_m is None:
         return charge
-    moved = charge._replace(position_m=options.charge_position_m)
+    moved = Charge(options.charge_position_m, charge.tnt_kg, charge.height_m)
     scenario.with_charge(moved)  # refuses a place that is not clear
     return moved
 

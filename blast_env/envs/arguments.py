@@ -12,6 +12,7 @@ import numpy as np
 from blast_env.errors import BlastEnvError, UnknownArgumentError, UnknownNameError
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
+from blast_env.scenario import AnyCharge, VehicleCharge
 
 _Parameters = ParamSpec("_Parameters")
 
@@ -160,8 +161,15 @@ class ResetOptions:
         fixed = (self.charge_position_m, self.tnt_kg, self.charge_height_m)
         return any(each is not None for each in fixed)
 
-    def charge(self, drawn: Charge) -> Charge:
-        """Return a charge that was drawn, with what is fixed in its place."""
+    def charge(self, drawn: AnyCharge) -> AnyCharge:
+        """Return a charge that was drawn, with what is fixed in its place.
+
+        One with a fixed position does not come in a vehicle.
+        """
+        if isinstance(drawn, VehicleCharge):
+            if self.charge_position_m is None:
+                return drawn.with_charge(self.tnt_kg, self.charge_height_m)
+            drawn = Charge(self.charge_position_m, drawn.tnt_kg, drawn.height_m)
         return Charge(
             drawn.position_m if self.charge_position_m is None else self.charge_position_m,
             drawn.tnt_kg if self.tnt_kg is None else self.tnt_kg,

@@ -111,6 +111,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     other seeds of fan and air; the impulse is the mean. Charges and seeds follow from the seed of
     `reset` alone, so that with one seed all layouts meet the same blasts.
 
+    The charge of a vehicle is the exception: it goes off at the worst place that the layout lets
+    the vehicle reach, without a barrier at the worst place of the empty site; of several threats of
+    one vehicle the second is at its second worst place, and so on. Nothing is drawn, and nothing is
+    hidden but what the layout decides. With `"charge_position_m"` no vehicle brings the charge.
+
     Options of `reset`: `"charge_position_m"`, (x, y) of every charge; `"tnt_kg"`, the mass of
     every charge; `"charge_height_m"`, the height of its centre above the ground (the particle
     engines know no height); `"layout"`, cells that hold a module, or pieces, from the start;
@@ -125,8 +130,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     `impulse_psi_s`, `impulse_pa_s` and `impulse_sim` (simulation units), as the reward counts
     them; `unprotected_impulse_pa_s`, the same blasts without a barrier, and `reduction`, the share
     that the layout takes off it (NaN if nothing arrives without a barrier); `layout`,
-    `scenario_hash`, `charges` (position, kg TNT, height) and `blast_seeds` (a tuple a charge) to
-    repeat the blasts; `calibration` and
+    `scenario_hash`, `charges` (position, kg TNT, height; a vehicle's where the layout let it come)
+    and `blast_seeds` (a tuple a charge) to repeat the blasts; `calibration` and
     `calibration_in_range`; `blasts`, `cache_hits` (loads that needed no blast) and
     `cache_hit_rate`, their share, counted since the environment was made.
 

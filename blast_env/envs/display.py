@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.envs.episode import Episode
+from blast_env.envs.vehicle_observations import VehicleView
 from blast_env.geometry import Rectangle
 from blast_env.physics.engines import is_gas
 from blast_env.scenario import AnySource, Placement, PointSource, Scenario
@@ -218,6 +219,9 @@ def _state_lines(episode: Episode) -> list[str]:
     extras = [f"{count} {name}" for name, count in left if count]
     if zone.budget is not None:
         extras.append(f"budget: {placement.budget_left:g} of {zone.budget:g} left")
+    vehicles = VehicleView.of(placement.scenario, episode.observable.sources)
+    if vehicles.vehicles:
+        extras.append(f"stand-off {vehicles.stand_off_m(placement.layout):.1f} m")
     if episode.illegal_actions:
         plural = "" if episode.illegal_actions == 1 else "s"
         extras.append(f"{episode.illegal_actions} illegal action{plural}")

@@ -37,8 +37,8 @@ from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.geometry import Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import is_gas
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, Scenario
+from blast_env.scenario import AnyCharge, Placement, Scenario
+from blast_env.scenario.build_scene import charge_against
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk
 
 ILLEGAL_TERM: Final = "illegal_actions"
@@ -170,7 +170,9 @@ class Episode:
             "scenario_hash": self.observable.scenario.content_hash,
             "calibration": self.objective.evaluator.calibration_name,
             "calibration_in_range": protected.in_range,
-            "charges": case.charges,
+            "charges": tuple(
+                charge_against(case.scenario, self.placement.cells, each) for each in case.charges
+            ),
             "blast_seeds": tuple(
                 tuple(seeds[index :: len(case.charges)]) for index in range(len(case.charges))
             ),
@@ -253,7 +255,7 @@ class Task:
         )
 
     def _case(
-        self, scenario: Scenario, charges: Sequence[Charge], seeds: NDArray[np.int64]
+        self, scenario: Scenario, charges: Sequence[AnyCharge], seeds: NDArray[np.int64]
     ) -> Case:
         """Return what the layout meets; `seeds` has the shape (charges, realisations)."""
         threats = tuple(

@@ -20,6 +20,12 @@ from blast_env.envs.item_observations import (
     items_left,
 )
 from blast_env.envs.site_grid import Lattice, Plane, SiteGrid
+from blast_env.envs.vehicle_observations import (
+    EMPTY_REACH,
+    REACH,
+    VehicleView,
+    vehicle_channels,
+)
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import draw_threats
 from blast_env.evaluation.evaluator import Evaluators
@@ -208,6 +214,14 @@ class GridObservation:
     | `<item>_left`, for each item | pieces that may still be placed / pieces at first = |
     | `<item>_legal`, `<item>_turned_legal` | 1 where a piece may have its lower left cell now |
 
+    Where the scenario has a vehicle, two planes come last. The plane `charge` shows where it
+    enters, whether the threat is visible or hidden: where it goes off is up to the layout.
+
+    | plane | value |
+    |---|---|
+    | `reach_without_barrier` | 1 where the vehicle gets to on the empty site |
+    | `reach` | 1 where it gets to with what stands so far |
+
     Whole numbers up to 255 are how stable-baselines3 knows an image: its `CnnPolicy` takes the
     planes as they are and divides by 255 itself. Its network wants sites of 18 m x 18 m or more.
     """
@@ -225,8 +239,9 @@ class GridObservation:
     )
 
     def channels_of(self, scenario: Scenario) -> tuple[str, ...]:
-        """Return the names of the planes; those of the catalogue, if there is one, come last."""
-        return (*self.channels, *ItemChannels.of(scenario.zone.catalogue).all)
+        """Return the names of the planes; those of catalogue and vehicles, if any, come last."""
+        items = ItemChannels.of(scenario.zone.catalogue).all
+        return (*self.channels, *items, *vehicle_channels(scenario))
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (channels, rows, columns)."""
@@ -253,11 +268,14 @@ class GridObservation:
             names = (*items.heights, *items.costs)
             values = np.concatenate([item_heights(zone), item_costs(zone)]).astype(np.float32)
             planes |= {name: value * whole for name, value in zip(names, values, strict=True)}
+        vehicles = VehicleView.of(scenario, observable.sources)
+        if scenario.vehicles:
+            planes[EMPTY_REACH] = vehicles.reached(()).astype(np.float32)
         channels = self.channels_of(scenario)
         static = np.zeros((len(channels), grid.rows, grid.columns), dtype=np.uint8)
         for name, plane in planes.items():
             static[channels.index(name)] = _levels(plane)
-        return GridEpisode(static, lattice, channels, items)
+        return GridEpisode(static, lattice, channels, items, vehicles)
 
 
 @dataclass(frozen=True)
@@ -304,12 +322,14 @@ class GridEpisode:
         zone: Where the build zone lies on the grid.
         channels: Names of the planes.
         items: Names of those of the catalogue.
+        vehicles: The vehicles that may be seen.
     """
 
     static: NDArray[np.uint8]
     zone: Lattice
     channels: tuple[str, ...]
     items: ItemChannels
+    vehicles: VehicleView
 
     def observe(self, placement: Placement) -> NDArray[np.uint8]:
         """Return all planes for the modules placed so far, (channels, rows, columns)."""
@@ -321,6 +341,9 @@ class GridEpisode:
         planes[self._of("stock_share", "stock", "budget_share")] = levels
         if self.items.all:
             self._show_items(planes, placement)
+        if REACH in self.channels:
+            reached = self.vehicles.reached(placement.layout)
+            planes[self.channels.index(REACH)] = _levels(reached.astype(np.float32))
         return planes
 
     def _show_items(self, planes: NDArray[np.uint8], placement: Placement) -> None:
@@ -415,6 +438,10 @@ class FeaturesObservation:
     | cells | height of the module that stands on a cell |
     | cells | 1 where a module stands that stops vehicles |
     | variants x cells | 1 where a piece may have its lower left cell now, variant by variant |
+
+    Where the scenario has a vehicle, the box from 3 on is around where it enters, and one more
+    value comes last: how near it comes to a protected structure with what stands so far, as a share
+    of the site's diagonal.
     """
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
@@ -424,6 +451,7 @@ class FeaturesObservation:
         length = _FIXED + 3 * cells
         if catalogue.has_items:
             length += MOST_STRUCTURES + 3 * len(zone.items) + (2 + len(catalogue.variants)) * cells
+        length += bool(scenario.vehicles)
         return spaces.Box(0.0, 1.0, (length,), np.float32)
 
     def episode(self, observable: Observable) -> "FeaturesEpisode":
@@ -452,8 +480,11 @@ class FeaturesObservation:
             )
             fixed += [_structure_heights(scenario), item_heights(zone), item_costs(zone)]
             fixed.append(np.zeros(changing))
+        if scenario.vehicles:
+            fixed.append(np.zeros(1))
         values = np.concatenate(fixed).astype(np.float32)
-        return FeaturesEpisode(np.clip(values, 0.0, 1.0))
+        vehicles = VehicleView.of(scenario, observable.sources)
+        return FeaturesEpisode(np.clip(values, 0.0, 1.0), vehicles)
 
 
 @dataclass(frozen=True, eq=False)
@@ -462,9 +493,11 @@ class FeaturesEpisode:
 
     Attributes:
         static: What does not change (features,); the rest is 0.
+        vehicles: The vehicles that may be seen.
     """
 
     static: Array
+    vehicles: VehicleView
 
     def observe(self, placement: Placement) -> Array:
         """Return all values for the modules placed so far, (features,)."""
@@ -473,11 +506,16 @@ class FeaturesEpisode:
         cells = placement.free.size
         values[_FIXED : _FIXED + cells] = occupied_cells(placement).ravel()
         values[_FIXED + cells : _FIXED + 2 * cells] = placement.free.ravel()
+        ending = []
         if placement.catalogue.has_items:
             placed = PlacedItems.of(placement)
-            shown = (placed.heights, placed.stops_vehicles, placement.legal)
-            ending = np.concatenate([items_left(placement), *(each.ravel() for each in shown)])
-            values[-len(ending) :] = ending
+            ending += [items_left(placement), placed.heights, placed.stops_vehicles]
+            ending.append(placement.legal)
+        if self.vehicles.scenario.vehicles:
+            ending.append(np.array([self.vehicles.stand_off_share(placement.layout)]))
+        if ending:
+            last = np.concatenate([each.ravel() for each in ending])
+            values[-len(last) :] = last
         return values
 
 

@@ -14,7 +14,6 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
 from blast_env.physics.engine import BlastRun, Engine
 from blast_env.physics.particles import CollisionType, lattice_capacity
-from blast_env.physics.scene import Charge
 from blast_env.physics.structure import BARRIER_NAME, ModularPart
 from blast_env.recording.tables import collision_table
 from blast_env.scenario import AnyScenario, check_layout, find_scenario
@@ -242,9 +241,8 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     def _make_observation_space(self) -> spaces.Dict:
         # With the heaviest charge every bound is the highest.
         source = max(self.scenario.charge, key=lambda source: source.tnt_kg)
-        position_m = source.sample_position_m(np.random.default_rng(0))
-        charge = Charge(position_m, source.tnt_kg, source.height_m)
-        scene = Blast(self.scenario, charge=charge).scene
+        heaviest = self.scenario.model_copy(update={"charge": (source,)})
+        scene = Blast(heaviest).scene
         modules = sum(section.rows * section.columns for section in self.scenario.structures)
         stepping = scene.parameters.stepping
         # A step of the engine can begin just before the time limit.

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from blast_env.geometry import Rectangle
 from blast_env.scenario import AnySource, RectangleSource, Site
+from blast_env.scenario.sections import PointM
+from blast_env.scenario.vehicles import squares_of
 from blast_env.units import MODULE_SIDE_M
 
 Plane = NDArray[np.float32]
@@ -32,8 +34,7 @@ class SiteGrid:
     @classmethod
     def of(cls, site: Site) -> "SiteGrid":
         """Return the grid of a site; the last squares jut out of one that is no whole number."""
-        rows, columns = (ceil(m / MODULE_SIDE_M - 1e-9) for m in (site.height_m, site.width_m))
-        return cls(rows, columns)
+        return cls(*squares_of(site))
 
     def lattice(self, corner_m: tuple[float, float], rows: int, columns: int) -> "Lattice":
         """Return where a lattice of modules lies on the grid.
@@ -58,18 +59,22 @@ class SiteGrid:
         """Return how likely the charge of a source is in each square, (rows, columns).
 
         The plane adds up to 1. A point is shared between the four squares around it such that
-        their mean place is the point's.
+        their mean place is the point's. That of a vehicle is where it enters.
         """
         if isinstance(source, RectangleSource):
             plane = self.rectangle(source.rectangle_m)
         else:
-            start, end = (np.array(point) for point in source.segment_m)
-            length_m = float(np.hypot(*(end - start)))
-            count = 1 + _POINTS_PER_MODULE * ceil(length_m / MODULE_SIDE_M)
-            share = (np.arange(count) + 0.5) / count
-            plane = self._points(start + share[:, np.newaxis] * (end - start))
+            plane = np.sum([self._line(*ends_m) for ends_m in source.lines_m], axis=0)
         # A narrow rectangle covers next to nothing of its squares, which rounding must not lose.
         return plane / np.float32(plane.sum(dtype=np.float64))
+
+    def _line(self, start_m: PointM, end_m: PointM) -> Plane:
+        """Return points close to each other along a line."""
+        start, end = np.array(start_m), np.array(end_m)
+        length_m = float(np.hypot(*(end - start)))
+        count = 1 + _POINTS_PER_MODULE * ceil(length_m / MODULE_SIDE_M)
+        share = (np.arange(count) + 0.5) / count
+        return self._points(start + share[:, np.newaxis] * (end - start))
 
     def _points(self, points_m: NDArray[np.float64]) -> Plane:
         """Return points (n, 2), each shared between the four squares around it."""

@@ -11,18 +11,18 @@ import numpy as np
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.comparison import Objective
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import AnyScenario, AnySource, PointSource, Scenario, ScenarioField
+from blast_env.scenario import AnyCharge, AnyScenario, AnySource, Scenario, ScenarioField
+from blast_env.scenario.vehicles import source_of
 from blast_env.sites import SITES, SiteSource
 
 
 class ThreatModel(Protocol):
     """Draws the charges of an episode and decides what may be seen of them."""
 
-    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[Charge, ...]:
+    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[AnyCharge, ...]:
         """Draw the charges that the layout is assessed against, with nothing but `rng`."""
 
-    def shown(self, scenario: Scenario, charges: tuple[Charge, ...]) -> tuple[AnySource, ...]:
+    def shown(self, scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[AnySource, ...]:
         """Return where the charge is, or may be, as far as the agent may know."""
 
 
@@ -30,17 +30,17 @@ class ThreatModel(Protocol):
 class VisibleThreat:
     """One charge, and the agent sees where it is: a layout for each charge."""
 
-    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[Charge, ...]:
+    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[AnyCharge, ...]:
         """Draw one charge."""
         return (scenario.sample_charge(rng),)
 
     def shown(
         self,
         scenario: Scenario,  # noqa: ARG002
-        charges: tuple[Charge, ...],
+        charges: tuple[AnyCharge, ...],
     ) -> tuple[AnySource, ...]:
-        """Return the charge itself."""
-        return tuple(PointSource.at(each) for each in charges)
+        """Return the charge itself, or the vehicle that brings it."""
+        return tuple(source_of(each) for each in charges)
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,14 @@ class HiddenThreat:
 
     threats: int
 
-    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[Charge, ...]:
-        """Draw the charges, independently of each other."""
-        return tuple(scenario.sample_charge(rng) for _ in range(self.threats))
+    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[AnyCharge, ...]:
+        """Draw the charges, independently of each other but for the ranks of vehicles' places."""
+        return scenario.sample_charges(rng, self.threats)
 
     def shown(
         self,
         scenario: Scenario,
-        charges: tuple[Charge, ...],  # noqa: ARG002
+        charges: tuple[AnyCharge, ...],  # noqa: ARG002
     ) -> tuple[AnySource, ...]:
         """Return the places of the scenario; nothing of the charges."""
         return scenario.charge
@@ -136,13 +136,15 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
         representative: The scenario that the spaces were made for.
 
     Raises:
-        BlastEnvError: If site, build zone or items have another size, or there is no build zone.
+        BlastEnvError: If site, build zone or items have another size, there is no build zone, or
+            only one of them has a vehicle.
     """
     for what, size, expected in zip(
         (
             "site (width, height in m)",
             "build zone (rows, columns)",
             "catalogue (item, turned, size)",
+            "number of vehicles (none or some)",
         ),
         _sizes(scenario),
         _sizes(representative),
@@ -160,7 +162,8 @@ def _sizes(scenario: Scenario) -> tuple[tuple[object, ...], ...]:
     variants = [
         (each.name, each.turned, each.rows, each.columns) for each in zone.catalogue.variants
     ]
-    return (site.width_m, site.height_m), zone.shape, tuple(variants)
+    vehicles = ("some",) if scenario.vehicles else ("none",)
+    return (site.width_m, site.height_m), zone.shape, tuple(variants), vehicles
 
 
 @dataclass(frozen=True)

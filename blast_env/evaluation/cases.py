@@ -10,9 +10,17 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
-from blast_env.scenario import AnyScenario, ScenarioField, find_scenario
-from blast_env.scenario.build_scene import draw_charge
+from blast_env.scenario import (
+    AnyCharge,
+    AnyScenario,
+    ScenarioField,
+    VehicleCharge,
+    find_scenario,
+)
+from blast_env.scenario.build_scene import charge_against, draw_threat
+from blast_env.scenario.vehicles import ranked
 from blast_env.statistics import MeanRisk, Risk
 
 
@@ -23,12 +31,15 @@ class Threat:
     Two layouts that meet the same threat meet the same charge, fan and air: the difference
     between their loads is then due to the layouts alone (common random numbers).
 
+    The charge of a vehicle is the same one with either layout, at the place where that lets it
+    come: its worst place, its second worst, and so on.
+
     Attributes:
         charge: The charge.
         seed: Decides the fan and the air.
     """
 
-    charge: Charge
+    charge: AnyCharge
     seed: int
 
     def __post_init__(self) -> None:
@@ -38,6 +49,9 @@ class Threat:
             BlastEnvError: If the seed is not an integer of at least 0, or the charge is not a
                 pair of coordinates and a mass.
         """
+        object.__setattr__(self, "seed", _seed(self.seed, "seed"))
+        if isinstance(self.charge, VehicleCharge):
+            return
         try:
             (x_m, y_m), tnt_kg, *height_m = self.charge
             charge = Charge((float(x_m), float(y_m)), float(tnt_kg), *map(float, height_m))
@@ -46,11 +60,17 @@ class Threat:
                 f"charge is {self.charge!r}, must be ((x, y) in m, kg of TNT)"
             ) from None
         object.__setattr__(self, "charge", charge)
-        object.__setattr__(self, "seed", _seed(self.seed, "seed"))
+
+    def charge_against(self, scenario: AnyScenario, layout: Sequence[Element]) -> Charge:
+        """Return the charge where it goes off with a layout; see `build_scene.charge_against`."""
+        return charge_against(find_scenario(scenario), layout, self.charge)
 
 
 def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, ...]:
     """Return one threat a seed, its charge drawn from the scenario as `simulate` draws it.
+
+    Where several seeds draw the same vehicle, its charge is once at its worst place, once at its
+    second worst, and so on.
 
     Args:
         scenario: The scenario, or its bundled name or path.
@@ -66,7 +86,8 @@ def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, .
         if seed in plain[:index]:
             raise BlastEnvError(f"seeds[{index}] is {seed}, is there already: must be none twice")
     found = find_scenario(scenario)
-    return tuple(Threat(draw_charge(found, seed), seed) for seed in plain)
+    charges = ranked(draw_threat(found, seed) for seed in plain)
+    return tuple(Threat(charge, seed) for charge, seed in zip(charges, plain, strict=True))
 
 
 class SeedRange(Enum):
@@ -144,7 +165,7 @@ class Case:
     threats: tuple[Threat, ...]  # type: ignore[misc]  # a scenario has no default
     realisations: int = 1
     risk: Risk = MEAN
-    charge: Charge | None = None
+    charge: AnyCharge | None = None
     name: str = ""
     seed: int = 0
     practice: "Case | None" = None
@@ -169,7 +190,7 @@ class Case:
                 raise BlastEnvError(f"a search may not meet {both.pop()}: layouts are judged on it")
 
     @property
-    def charges(self) -> tuple[Charge, ...]:
+    def charges(self) -> tuple[AnyCharge, ...]:
         """The charges, each as often as it was drawn."""
         count = max(len(self.threats) // self.realisations, 1)
         return tuple(threat.charge for threat in self.threats[:count])
@@ -187,7 +208,7 @@ class Case:
 
 
 def visible_case(
-    scenario: AnyScenario, charge: Charge, seeds: Sequence[int], risk: Risk = MEAN
+    scenario: AnyScenario, charge: AnyCharge, seeds: Sequence[int], risk: Risk = MEAN
 ) -> Case:
     """Return the case of a known charge: it goes off once a seed, with another fan and air."""
     threats = tuple(Threat(charge, seed) for seed in seeds)
@@ -196,7 +217,7 @@ def visible_case(
 
 def practice_visible(
     scenario: AnyScenario,
-    charge: Charge,
+    charge: AnyCharge,
     realisations: int,
     seed: int,
     risk: Risk = MEAN,
@@ -233,7 +254,8 @@ def practice_hidden(
 
     Returns:
         A case whose first charge is the one in the middle of all, and each further one as far as
-        possible from those before it, so that the first few stand for all.
+        possible from those before it, so that the first few stand for all. Those of vehicles come
+        before them, the worst first.
 
     Raises:
         BlastEnvError: If there are to be none.
@@ -242,7 +264,7 @@ def practice_hidden(
     _at_least_one("realisations", realisations)
     rng = np.random.default_rng(seed)
     found = find_scenario(scenario)
-    drawn = _spread_first([found.sample_charge(rng) for _ in range(charges)])
+    drawn = _spread_first(found.sample_charges(rng, charges))
     seeds = SeedRange.SEARCH.draw_distinct(rng, realisations * charges)
     threats = [Threat(drawn[index % charges], each) for index, each in enumerate(seeds)]
     return Case(found, tuple(threats), realisations, risk, seed=seed)
@@ -257,8 +279,17 @@ def check_distinct(threats: Sequence[Threat]) -> None:
             )
 
 
-def _spread_first(charges: Sequence[Charge]) -> list[Charge]:
-    """Return charges, each as far as possible from those before it, the middle one first."""
+def _spread_first(charges: Sequence[AnyCharge]) -> list[AnyCharge]:
+    """Return charges, each as far as possible from those before it, the middle one first.
+
+    Those of vehicles come before them, by their rank.
+    """
+    vehicles = [charge for charge in charges if isinstance(charge, VehicleCharge)]
+    fixed = [charge for charge in charges if isinstance(charge, Charge)]
+    return [*sorted(vehicles, key=lambda vehicle: vehicle.rank), *_spread_places(fixed)]
+
+
+def _spread_places(charges: Sequence[Charge]) -> list[Charge]:
     places_m = np.array([charge.position_m for charge in charges]).reshape(-1, 2)
     apart_m = np.hypot(*(places_m[:, np.newaxis] - places_m).T)
     order: list[int] = []

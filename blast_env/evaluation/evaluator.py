@@ -23,7 +23,7 @@ from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.scene import Charge
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
-from blast_env.scenario import AnyScenario, Scenario, check_layout, find_scenario
+from blast_env.scenario import AnyCharge, AnyScenario, Scenario, check_layout, find_scenario
 from blast_env.simulation import Blast
 
 
@@ -131,10 +131,13 @@ class BlastEvaluator:
             ScenarioError: If a charge is not clear of a structure or the border.
         """
         check_workers("processes", processes)
-        keys = [self._key(layout, threat) for layout, threat in pairs]
-        asked = dict.fromkeys(keys)
+        asked: dict[BlastKey, AnyCharge] = {}
+        keys = []
+        for layout, threat in pairs:
+            keys.append(self._key(layout, threat))
+            asked.setdefault(keys[-1], threat.charge)
         found = {key: loads for key in asked if (loads := self._known(key)) is not None}
-        missing = [self._work(key) for key in asked if key not in found]
+        missing = [self._work(key, charge) for key, charge in asked.items() if key not in found]
         for done, (index, loads) in enumerate(as_completed(_run_one, missing, processes), start=1):
             found[missing[index].key] = loads
             self._keep(missing[index].key, loads)
@@ -147,10 +150,11 @@ class BlastEvaluator:
         cells = tuple(sorted(check_layout(self.scenario, layout)))
         # Gas dynamics has no fan and no air to draw: a charge has one realisation.
         seed = 0 if is_gas(self.engine) else threat.seed
-        return self._key_of_nothing._replace(layout=cells, charge=threat.charge, seed=seed)
+        charge = threat.charge_against(self.scenario, cells)
+        return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
 
-    def _work(self, key: BlastKey) -> "_Work":
-        return _Work(self.scenario, self.engine, self.calibration, key)
+    def _work(self, key: BlastKey, charge: AnyCharge) -> "_Work":
+        return _Work(self.scenario, self.engine, self.calibration, key, charge)
 
     def _known(self, key: BlastKey) -> BlastLoads | None:
         """Return loads that are remembered here or there."""
@@ -175,12 +179,16 @@ class BlastEvaluator:
 
 @dataclass(frozen=True)
 class _Work:
-    """One blast to run, perhaps in a worker process."""
+    """One blast to run, perhaps in a worker process.
+
+    Its charge is that of the key, or the vehicle that brings it there.
+    """
 
     scenario: Scenario
     engine: Engine
     calibration: Calibration | None
     key: BlastKey
+    charge: AnyCharge
 
 
 def _run_one(work: _Work) -> BlastLoads:
@@ -188,10 +196,10 @@ def _run_one(work: _Work) -> BlastLoads:
     if is_gas(engine):
         from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
 
-        return gas_loads(GasBlast(scenario, key.layout, key.seed, engine, key.charge).run())
+        return gas_loads(GasBlast(scenario, key.layout, key.seed, engine, work.charge).run())
     if work.calibration is None:
         raise AssertionError("an evaluator of particles has a calibration")
-    result = Blast(scenario, key.layout, key.seed, engine, key.charge).run()
+    result = Blast(scenario, key.layout, key.seed, engine, work.charge).run()
     return blast_loads(result, work.calibration)
 
 
@@ -280,7 +288,10 @@ class Evaluators:
             key = evaluator._key(layout, threat)
             if key not in missing and evaluator._known(key) is None:
                 missing[key] = (number, evaluator)
-        blasts = [evaluator._work(key) for key, (_, evaluator) in missing.items()]
+        blasts = [
+            evaluator._work(key, asked[number].threat.charge)
+            for key, (number, evaluator) in missing.items()
+        ]
         was_run = [False] * len(asked)
         for index, loads in as_completed(_run_one, blasts, processes):
             number, evaluator = missing[blasts[index].key]

@@ -24,10 +24,12 @@ from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import GAS, find_engine
+from blast_env.physics.scene import Charge
 from blast_env.provenance import versions
 from blast_env.recording.tables import module_table
 from blast_env.scenario import AnyScenario, Scenario, check_layout
 from blast_env.scenario.build_scene import build_site
+from blast_env.scenario.vehicles import stand_off_m
 from blast_env.statistics import (
     Estimate,
     check_cvar_level,
@@ -76,6 +78,8 @@ THREAT_COLUMNS: Final = (
     Column("unprotected_impulse_pa_s", "Pa s", "protected structures, without it"),
     Column("reduction", "", "of that impulse"),
     Column("in_range", "", "whether the calibration was made for this threat"),
+    Column("stand_off_m", "m", "from the charge to the nearest protected wall, with the barrier"),
+    Column("unprotected_stand_off_m", "m", "the same without it: less only for a vehicle"),
 )
 
 
@@ -119,7 +123,7 @@ def threat_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
 
 
 def _threat_row(outcome: "ThreatOutcome") -> dict[str, object]:
-    charge = outcome.threat.charge
+    charge = outcome.charge
     return {
         "seed": outcome.threat.seed,
         "charge_x_m": charge.position_m[0],
@@ -129,6 +133,8 @@ def _threat_row(outcome: "ThreatOutcome") -> dict[str, object]:
         "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
         "reduction": outcome.reduction,
         "in_range": outcome.in_range,
+        "stand_off_m": outcome.stand_off_m,
+        "unprotected_stand_off_m": outcome.unprotected_stand_off_m,
     }
 
 
@@ -186,13 +192,14 @@ def case_table(comparison: Comparison) -> pd.DataFrame:
     rows = []
     for index, (case, layout) in enumerate(zip(comparison.cases, comparison.layouts, strict=True)):
         threat = case.threats[0]
+        charge = threat.charge_against(case.scenario, layout)
         rows.append(
             {
                 "scenario": case.scenario.name,
                 "seed": threat.seed,
-                "charge_x_m": threat.charge.position_m[0],
-                "charge_y_m": threat.charge.position_m[1],
-                "tnt_kg": threat.charge.tnt_kg,
+                "charge_x_m": charge.position_m[0],
+                "charge_y_m": charge.position_m[1],
+                "tnt_kg": charge.tnt_kg,
                 "modules": len(layout),
                 "impulse_pa_s": float(comparison.impulse_pa_s[index].mean()),
                 "unprotected_impulse_pa_s": float(comparison.unprotected_pa_s[index].mean()),
@@ -258,8 +265,8 @@ def _estimate(estimate: Estimate) -> dict[str, float | None]:
 def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
     return {
         "seed": outcome.threat.seed,
-        "charge_position_m": list(outcome.threat.charge.position_m),
-        "tnt_kg": outcome.threat.charge.tnt_kg,
+        "charge_position_m": list(outcome.charge.position_m),
+        "tnt_kg": outcome.charge.tnt_kg,
         "impulse_pa_s": outcome.impulse_pa_s,
         "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
         "reduction": _or_none(outcome.reduction),
@@ -285,12 +292,18 @@ class ThreatOutcome:
 
     Attributes:
         threat: The threat.
+        charge: Its charge, where it goes off with the barrier.
+        stand_off_m: How far that is from the nearest wall that counts.
+        unprotected_stand_off_m: How far it is without the barrier; only a vehicle comes nearer.
         impulse_pa_s: Impulse on the protected structures with the barrier, Pa*s.
         unprotected_impulse_pa_s: The same without it, Pa*s.
         in_range: Whether the calibration was made for such a threat.
     """
 
     threat: Threat
+    charge: Charge
+    stand_off_m: float
+    unprotected_stand_off_m: float
     impulse_pa_s: float
     unprotected_impulse_pa_s: float
     in_range: bool
@@ -361,11 +374,21 @@ class LayoutEvaluation:
     @cached_property
     def outcomes(self) -> tuple[ThreatOutcome, ...]:
         """What the layout does against each threat."""
-        return tuple(
-            ThreatOutcome(
-                threat, load.protected_impulse_pa_s, bare.protected_impulse_pa_s, load.in_range
-            )
-            for threat, load, bare in zip(self.threats, self.loads, self.unprotected, strict=True)
+        return tuple(map(self._outcome, self.threats, self.loads, self.unprotected))
+
+    def _outcome(self, threat: Threat, load: BlastLoads, bare: BlastLoads) -> ThreatOutcome:
+        scenario = self.scenario
+        charge, unprotected = (
+            threat.charge_against(scenario, layout) for layout in (self.layout, ())
+        )
+        return ThreatOutcome(
+            threat=threat,
+            charge=charge,
+            stand_off_m=stand_off_m(scenario.structures, charge.position_m),
+            unprotected_stand_off_m=stand_off_m(scenario.structures, unprotected.position_m),
+            impulse_pa_s=load.protected_impulse_pa_s,
+            unprotected_impulse_pa_s=bare.protected_impulse_pa_s,
+            in_range=load.in_range,
         )
 
     @property

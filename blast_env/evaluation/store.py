@@ -26,7 +26,7 @@ class BlastKey(NamedTuple):
     Attributes:
         scenario_hash: Content hash of the scenario.
         layout: The layout's cells, sorted.
-        charge: The charge.
+        charge: The charge, at the place where it goes off.
         seed: Seed of fan and air.
         engine: The engine with its version; see `engine_text`.
         calibration: Digest of the calibration, for the loads in psi*s.

@@ -16,9 +16,10 @@ from blast_env.scenario import (
     AnySource,
     AnyStructure,
     BuildZone,
+    PointSource,
     RectangleSource,
     ScenarioField,
-    SegmentSource,
+    VehicleSource,
     check_layout,
 )
 from blast_env.scenario.build_scene import barrier_outline
@@ -109,7 +110,7 @@ class LayoutPlan:
                 kind = FeatureKind.PROTECTED_STRUCTURE
             yield _area(kind, structure.rectangle_m, structure.name, **_said_of(structure))
         for source in scenario.charge:
-            yield _charge_place(source)
+            yield from _charge_places(source)
         if self.charge is not None:
             name = f"charge of {self.charge.tnt_kg:g} kg TNT"
             places_m = (rounded_m(*self.charge.position_m),)
@@ -182,15 +183,20 @@ def _zone_features(zone: BuildZone) -> Iterator[Feature]:
         yield _area(FeatureKind.KEEP_OUT, keep_out.rectangle_m, keep_out.reason)
 
 
-def _charge_place(source: AnySource) -> Feature:
-    """Return where a charge may be: a point, a line or an area."""
+def _charge_places(source: AnySource) -> Iterator[Feature]:
+    """Yield where a charge may be: a point, a line or an area, or the entries of a vehicle."""
     name = f"charge of {source.tnt_kg:g} kg TNT may be here"
     properties = {"tnt_kg": source.tnt_kg, "weight": source.weight}
     if isinstance(source, RectangleSource):
-        return _area(FeatureKind.CHARGE_PLACE, source.rectangle_m, name, **properties)
-    ends_m = source.segment_m if isinstance(source, SegmentSource) else (source.position_m,)
-    places_m = tuple(rounded_m(*place) for place in ends_m)
-    return Feature(FeatureKind.CHARGE_PLACE, places_m, name, properties)
+        yield _area(FeatureKind.CHARGE_PLACE, source.rectangle_m, name, **properties)
+        return
+    if isinstance(source, VehicleSource):
+        name = f"vehicle with {source.tnt_kg:g} kg TNT enters here"
+        properties |= {"width_m": source.width_m}
+    for ends_m in source.lines_m:
+        line_m = ends_m[:1] if isinstance(source, PointSource) else ends_m
+        places_m = tuple(rounded_m(*place) for place in line_m)
+        yield Feature(FeatureKind.CHARGE_PLACE, places_m, name, properties)
 
 
 def _area(kind: FeatureKind, rectangle: Rectangle, name: str, **properties: str | float) -> Feature:

@@ -38,6 +38,7 @@ from blast_env.rendering.style import (
     render_extra,
     unit_interval,
 )
+from blast_env.rendering.vehicle_plan import draw_vehicles, stand_off_text, vehicle_legend
 from blast_env.scenario import BuildZone
 from blast_env.scenario.build_scene import build_site
 from blast_env.statistics import Estimate
@@ -58,8 +59,9 @@ _PERCENT = 100.0
 def draw_plan(axes: Axes, evaluation: LayoutEvaluation, scene: BlastSite) -> None:
     """Draw the site, the layout, and the charges in the colours of their reductions."""
     draw_layout(axes, evaluation.scenario.build_zone, scene)
+    draw_vehicles(axes, evaluation.scenario, evaluation.layout)
     _draw_charges(axes, evaluation)
-    axes.add_line(_worst_ring(*evaluation.worst.threat.charge.position_m))
+    axes.add_line(_worst_ring(*evaluation.worst.charge.position_m))
     axes.set_title("Site, layout and charges", fontsize=11)
 
 
@@ -78,7 +80,7 @@ def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
     scale = Normalize(0.0, _PERCENT)
     for marker, in_range in (("o", True), ("s", False)):
         chosen = np.array([outcome.in_range is in_range for outcome in outcomes])
-        places = np.array([outcome.threat.charge.position_m for outcome in outcomes])[chosen]
+        places = np.array([outcome.charge.position_m for outcome in outcomes])[chosen]
         axes.scatter(
             places[:, 0],
             places[:, 1],
@@ -105,6 +107,7 @@ def plan_legend(evaluation: LayoutEvaluation, scene: BlastSite) -> list[Artist]:
         label = "charge outside the calibration's range"
         handles.append(_charge_handle("s", label))
     handles.append(_worst_ring())
+    handles += vehicle_legend(evaluation.scenario)
     site = layout_legend(scene.structures, evaluation.scenario.build_zone)
     return [*handles, *(handle for handle in site if handle.get_label() != "charge")]
 
@@ -195,12 +198,14 @@ def _title(evaluation: LayoutEvaluation) -> str:
 
 
 def _subtitle(evaluation: LayoutEvaluation) -> str:
-    charge = evaluation.worst.threat.charge
+    charge = evaluation.worst.charge
     x_m, y_m = charge.position_m
+    stand_off = stand_off_text(evaluation.scenario, evaluation.layout)
     range_note = "" if evaluation.in_range else "; partly outside the calibration's range"
     return (
         f"{count_of('threat', len(evaluation.threats))}; worst: {charge.tnt_kg:g} kg TNT at "
         f"({x_m:.1f} m, {y_m:.1f} m), {evaluation.worst.impulse_pa_s:,.0f} Pa·s; "
+        f"{stand_off and f'{stand_off}; '}"
         f"calibration {evaluation.calibration}, engine {evaluation.engine_name}{range_note}"
     )
 
@@ -390,7 +395,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
         zip(all_axes, shown, scenes, strict=True), start=1
     ):
         _draw_case(axes, panel, scene, f"case {number}")
-        _write_threat(axes, panel, "" if is_one_site else f"{panel.case.scenario.name}, ")
+        _write_threat(axes, panel, scene, "" if is_one_site else f"{panel.case.scenario.name}, ")
         axes.set_xlabel("x (m)" if number > len(shown) - columns else "")
         axes.set_ylabel("y (m)" if number % columns == 1 or columns == 1 else "")
     all_zones = [panel.case.scenario.build_zone for panel in shown]
@@ -398,6 +403,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
     richest = max(zones, key=lambda zone: len(zone.keep_outs), default=None)
     structures = [outline for scene in scenes for outline in scene.structures]
     handles = layout_legend(structures, richest)
+    driven = next((each.case.scenario for each in shown if each.case.scenario.vehicles), None)
+    handles += [] if driven is None else vehicle_legend(driven)
     figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9, frameon=False)
     place = panels[0].case.scenario.name if is_one_site else "different sites"
     write_heading(
@@ -426,7 +433,8 @@ def _empty_panels(shown: Sequence[_Panel], columns: int) -> tuple[Figure, list[A
 
 def _draw_case(axes: Axes, panel: _Panel, scene: BlastSite, name: str) -> None:
     draw_layout(axes, panel.case.scenario.build_zone, scene)
-    draw_charge(axes, panel.case.threats[0].charge.position_m)
+    draw_vehicles(axes, panel.case.scenario, panel.layout)
+    draw_charge(axes, scene.charge.position_m)
     axes.tick_params(labelsize=7.5)
     mark = "" if panel.in_range else _OUT_OF_RANGE
     axes.set_title(
@@ -438,10 +446,9 @@ def _draw_case(axes: Axes, panel: _Panel, scene: BlastSite, name: str) -> None:
     )
 
 
-def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
+def _write_threat(axes: Axes, panel: _Panel, scene: BlastSite, site: str) -> None:
     """Write two quiet lines between title and panel."""
-    charge_here = panel.case.threats[0].charge
-    (x_m, y_m), tnt_kg = charge_here.position_m, charge_here.tnt_kg
+    (x_m, y_m), tnt_kg = scene.charge.position_m, scene.charge.tnt_kg
     charge = f"{tnt_kg:g} kg TNT at ({x_m:.1f}, {y_m:.1f}) m"
     axes.annotate(
         f"{site}{layout_counts(panel.layout)}\n{charge}",

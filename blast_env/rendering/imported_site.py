@@ -98,8 +98,11 @@ def _draw_charges(axes: Axes, imported: ImportedSite) -> None:
             axes.add_patch(patch)
         else:
             marker = "*" if isinstance(source, PointSource) else ""
-            x, y = np.transpose(source.segment_m)
-            axes.plot(x, y, color=colour, linewidth=2.2, marker=marker, markersize=11.0, zorder=4)
+            for line_m in source.lines_m:
+                x, y = np.transpose(line_m)
+                axes.plot(
+                    x, y, color=colour, linewidth=2.2, marker=marker, markersize=11.0, zorder=4
+                )
 
 
 def _draw_north(axes: Axes, imported: ImportedSite) -> None:

@@ -42,10 +42,12 @@ from blast_env.scenario import (
     PointSource,
     RectangleSource,
     Scenario,
+    VehicleSource,
 )
-from blast_env.scenario.build_scene import build_scene, build_site
+from blast_env.scenario.build_scene import build_scene, build_site, vehicle_reach
+from blast_env.scenario.vehicles import squares_of
 from blast_env.simulation import Blast, BlastResult
-from blast_env.units import UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
 with render_extra():
     import pygame
@@ -70,6 +72,9 @@ _HATCH_STEP_PX: Final = 6
 
 
 _MAYBE_ALPHA: Final = 110
+
+
+_REACH_ALPHA: Final = 40
 
 
 _SMALLEST_CHARGE_PX: Final = 5
@@ -116,10 +121,11 @@ def _draw_source(surface: pygame.Surface, view: View, source: AnySource, radius_
         around = area.inflate(2 * radius_px, 2 * radius_px)
         pygame.draw.rect(surface, EXPLOSIVE, around, border_radius=radius_px)
         return
-    start, end = (view.pixel(x_m * UNITS_PER_M, y_m * UNITS_PER_M) for x_m, y_m in source.segment_m)
-    pygame.draw.line(surface, EXPLOSIVE, start, end, 2 * radius_px)
-    for centre in (start, end):
-        pygame.draw.circle(surface, EXPLOSIVE, centre, radius_px)
+    for line_m in source.lines_m:
+        start, end = (view.pixel(x_m * UNITS_PER_M, y_m * UNITS_PER_M) for x_m, y_m in line_m)
+        pygame.draw.line(surface, EXPLOSIVE, start, end, 2 * radius_px)
+        for centre in (start, end):
+            pygame.draw.circle(surface, EXPLOSIVE, centre, radius_px)
 
 
 def placing_signs(sources: Sequence[AnySource], has_others: bool) -> list[Sign]:
@@ -138,6 +144,9 @@ def placing_signs(sources: Sequence[AnySource], has_others: bool) -> list[Sign]:
         ("cell not available", lambda s, r: s.blit(hatched_surface(r.size), r) and None),
         ("build zone", lambda s, r: dashed_rectangle(s, r, QUIET_INK, 3)),
     ]
+    if any(isinstance(source, VehicleSource) for source in sources):
+        signs[0] = ("vehicle enters, or charge may be", _charge_sign(known))
+        signs.append(("ground that it reaches", _reach_sign))
     if has_others:
         signs.insert(2, ("other structure", _outlined(load_colour(0.0), STRUCTURE, 2)))
     return signs
@@ -156,6 +165,13 @@ def legend_of(lettering: Lettering, signs: Sequence[Sign], columns: int) -> pyga
         draw(surface, pygame.Rect(left, top + (pitch - side) // 2, side, side))
         surface.blit(text, (left + side + gap, top + (pitch - text.get_height()) // 2))
     return surface
+
+
+def _reach_sign(surface: pygame.Surface, place: pygame.Rect) -> None:
+    sign = empty_surface(*place.size)
+    sign.fill(EXPLOSIVE)
+    sign.set_alpha(_REACH_ALPHA)
+    surface.blit(sign, place)
 
 
 def _charge_sign(known: bool) -> Draw:
@@ -224,6 +240,8 @@ class PlacingPainter:
         surface = self._ground.copy()
         if self._scenario.build_zone is not None:
             self._draw_cells(surface, self._scenario.build_zone, placement)
+        for source in self._vehicles:
+            self._draw_reach(surface, source, placement)
         scene = build_site(self._scenario, placement.layout)
         for obstacle in scene.obstacles():
             draw_obstacle(surface, self._view, obstacle, full_impulse=1.0)
@@ -276,6 +294,25 @@ class PlacingPainter:
         ground.fill(SITE, self._view.rectangle(self._view.site))
         return ground
 
+    @property
+    def _vehicles(self) -> list[VehicleSource]:
+        """The vehicles that may bring the charge."""
+        return [source for source in self._sources if isinstance(source, VehicleSource)]
+
+    def _draw_reach(
+        self, surface: pygame.Surface, source: VehicleSource, placement: Placement
+    ) -> None:
+        """Draw the ground that a vehicle gets to."""
+        rows, columns = squares_of(self._scenario.site)
+        ground = vehicle_reach(self._scenario, source, placement.layout).ground(rows, columns)
+        veil = empty_surface(*surface.get_size())
+        for row, column in zip(*np.nonzero(ground), strict=True):
+            corner_m = (column * MODULE_SIDE_M, row * MODULE_SIDE_M)
+            square_m = Rectangle.from_corner(corner_m, (MODULE_SIDE_M, MODULE_SIDE_M))
+            veil.fill(EXPLOSIVE, cell_rectangle(self._view, square_m))
+        veil.set_alpha(_REACH_ALPHA)
+        surface.blit(veil, (0, 0))
+
     def _draw_cells(self, surface: pygame.Surface, zone: BuildZone, placement: Placement) -> None:
         """Draw which cells are free and which are not."""
         whole = cell_rectangle(self._view, zone.rectangle_m)
@@ -302,7 +339,9 @@ def sources_text(sources: Sequence[AnySource]) -> str:
         return charge_text(Charge(first.position_m, first.tnt_kg))
     masses = sorted({source.tnt_kg for source in sources})
     bounds = dict.fromkeys((masses[0], masses[-1]))
-    return f"hidden charge of {' to '.join(f'{mass:g}' for mass in bounds)} kg TNT"
+    vehicles = all(isinstance(source, VehicleSource) for source in sources)
+    what = "vehicle with" if vehicles else "hidden charge of"
+    return f"{what} {' to '.join(f'{mass:g}' for mass in bounds)} kg TNT"
 
 
 def _border(view: View) -> pygame.Rect:

@@ -28,15 +28,18 @@ from blast_env.scenario.models import (
     SegmentSource,
     SimulationSection,
     Site,
+    VehicleSource,
 )
 from blast_env.scenario.placement import Placement, check_layout, usable_cells
 from blast_env.scenario.problems import Problem, ScenarioError
+from blast_env.scenario.vehicles import AnyCharge, VehicleCharge
 from blast_env.scenario.versions import SCHEMA_VERSION
 from blast_env.scenario.zone import BuildZone, CostArea, KeepOut
 
 __all__ = [
     "SCHEMA_VERSION",
     "AccessWay",
+    "AnyCharge",
     "AnyScenario",
     "AnySource",
     "AnyStructure",
@@ -65,6 +68,8 @@ __all__ = [
     "SegmentSource",
     "SimulationSection",
     "Site",
+    "VehicleCharge",
+    "VehicleSource",
     "bundled_scenarios",
     "check_layout",
     "find_problems",

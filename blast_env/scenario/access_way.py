@@ -11,7 +11,7 @@ from scipy.ndimage import label
 
 from blast_env.arrays import BoolArray
 from blast_env.scenario.catalogue import Variant
-from blast_env.scenario.sections import Section
+from blast_env.scenario.sections import Ground, Section
 from blast_env.units import MODULE_SIDE_M
 
 
@@ -31,12 +31,15 @@ class AccessWay(Section):
     Attributes:
         width_m: Side of the vehicle's square; whole modules.
         between: The two sides of the zone that the way connects.
+        gate: Where a gate stands that opens for the way's vehicle alone: no module may stand
+            there, and vehicles with a charge do not get through.
     """
 
     width_m: Annotated[
         StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0), AfterValidator(_check_whole_modules)
     ]
     between: Literal["left_right", "bottom_top"]
+    gate: Ground | None = None
 
     @property
     def width_cells(self) -> int:

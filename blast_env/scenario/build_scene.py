@@ -11,16 +11,26 @@ from blast_env.physics.presets import for_charge
 from blast_env.physics.scene import BlastSite, Charge, Gauge, Scene, StructureOutline
 from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
 from blast_env.scenario import (
+    AnyCharge,
     BuildZone,
     Placement,
     PointSource,
     Problem,
     Scenario,
     ScenarioError,
+    VehicleCharge,
+    VehicleSource,
     check_layout,
     usable_cells,
 )
 from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
+from blast_env.scenario.vehicles import (
+    NOTHING,
+    Obstacles,
+    Reach,
+    WorstPlaces,
+    obstacles_of,
+)
 from blast_env.scenario.zone import TOLERANCE_M, distance_m
 from blast_env.units import UNITS_PER_M
 
@@ -38,8 +48,22 @@ def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
     return tuple(np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3))
 
 
-def draw_charge(scenario: Scenario, seed: int) -> Charge:
+def draw_charge(scenario: Scenario, seed: int, layout: Sequence[Element] = ()) -> Charge:
     """Return the charge that a seed draws from a scenario.
+
+    Args:
+        scenario: The scenario.
+        seed: Decides it.
+        layout: What a vehicle's charge comes as near as it can against; see `worst_places`.
+
+    Raises:
+        ValueError: If the seed is negative.
+    """
+    return charge_against(scenario, layout, draw_threat(scenario, seed))
+
+
+def draw_threat(scenario: Scenario, seed: int) -> AnyCharge:
+    """Return what `draw_charge` does before a layout is known.
 
     Raises:
         ValueError: If the seed is negative.
@@ -47,11 +71,48 @@ def draw_charge(scenario: Scenario, seed: int) -> Charge:
     return scenario.sample_charge(random_streams(seed)[0])
 
 
+def worst_places(
+    scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
+) -> WorstPlaces:
+    """Return where the charge of a vehicle goes off, as near as a layout lets it come.
+
+    Args:
+        scenario: The scenario.
+        source: The vehicle.
+        layout: (row, column) of the build-zone cells that hold a barrier module, or pieces.
+    """
+    return scenario.vehicle_ground(source).worst_places(_obstacles(scenario, layout))
+
+
+def vehicle_reach(
+    scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
+) -> Reach:
+    """Return where a vehicle gets to; arguments as for `worst_places`."""
+    return scenario.vehicle_ground(source).reach(_obstacles(scenario, layout))
+
+
+def charge_against(scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> Charge:
+    """Return a charge at the place where it goes off: that of a vehicle depends on the layout.
+
+    Args:
+        scenario: The scenario.
+        layout: (row, column) of the build-zone cells that hold a barrier module, or pieces.
+        charge: The charge; one at a place is returned as it is.
+    """
+    if isinstance(charge, VehicleCharge):
+        return worst_places(scenario, charge.source, layout).charge(charge.rank)
+    return charge
+
+
+def _obstacles(scenario: Scenario, layout: Sequence[Element]) -> Obstacles:
+    return NOTHING if not layout else obstacles_of(scenario.zone, layout)
+
+
 def build_site(
     scenario: Scenario,
     layout: Sequence[Element] = (),
     seed: int = 0,
-    charge: Charge | None = None,
+    charge: AnyCharge | None = None,
 ) -> BlastSite:
     """Lay out a scenario for one blast, for an engine that needs no balls.
 
@@ -67,10 +128,10 @@ def build_site(
         ValueError: If the seed is negative.
     """
     placement = Placement.of(scenario, layout)
-    if charge is not None:
+    if isinstance(charge, Charge):  # a vehicle keeps clear of everything
         _check_clear(scenario.with_charge(charge), placement)
-    charge_rng, *_ = random_streams(seed)
-    charge = scenario.sample_charge(charge_rng) if charge is None else charge
+    drawn = draw_threat(scenario, seed) if charge is None else charge
+    charge = charge_against(scenario, placement.layout, drawn)
     structures = tuple(_outline(section) for section in scenario.structures)
     if placement.layout:
         structures += (barrier_outline(scenario.zone, placement.layout),)
@@ -89,7 +150,7 @@ def build_scene(
     scenario: Scenario,
     layout: Sequence[Element] = (),
     seed: int = 0,
-    charge: Charge | None = None,
+    charge: AnyCharge | None = None,
 ) -> Scene:
     """Lay out a scenario for one blast of particles, which know no heights.
 

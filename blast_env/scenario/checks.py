@@ -1,15 +1,16 @@
 """Checks between the sections of a scenario: whether they fit each other."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Final, TypeVar
 
+import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Cell, Rectangle
 from blast_env.physics.parameters import AirParameters, SimulationParameters
 from blast_env.physics.particles import lattice_capacity
 from blast_env.physics.presets import for_charge
@@ -20,15 +21,22 @@ from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
     GaugeSection,
+    Ground,
+    PlaceSource,
+    PointM,
     SimulationSection,
     Site,
+    VehicleSource,
 )
+from blast_env.scenario.vehicles import Obstacles, VehicleGround
 from blast_env.scenario.versions import MAX_ITEMS
 from blast_env.scenario.zone import (
     TOLERANCE_M,
     BuildZone,
+    EmptyZone,
     Surroundings,
     distance_m,
+    empty_zone,
     source_bounds_m,
 )
 from blast_env.scenario.zone_checks import build_zone_problems
@@ -204,25 +212,141 @@ def _structure_problems(parts: Parts) -> Iterator[Problem]:
 
 def _charge_problems(parts: Parts) -> Iterator[Problem]:
     """Check that the charge, wherever it is, fits between the structures and the border."""
+    for index, source in parts.sources.items():
+        if isinstance(source, VehicleSource):
+            yield from _vehicle_problems(parts, f"charge[{index}]", source)
+        else:
+            yield from _place_problems(parts, f"charge[{index}]", source)
+        yield from _above_the_air(parts, f"charge[{index}].height_m", source.height_m)
+
+
+def _place_problems(parts: Parts, key: str, source: PlaceSource) -> Iterator[Problem]:
+    """Check a charge whose places are known."""
     radius = parts.charge_radius_m
     words = "" if parts.parameters is None else f" by {radius:g} m, the charge's radius"
-    for index, source in parts.sources.items():
-        bounds = source_bounds_m(source)
-        if parts.site and not parts.site.rectangle_m.contains(bounds.grown(radius)):
-            where, site = extent(bounds), extent(parts.site.rectangle_m)
-            message = f"its centre may be at {where}, must lie inside the site ({site}){words}"
-            yield Problem(f"charge[{index}]", message)
-        for j, structure in parts.structures.items():
-            distance = distance_m(source, structure.rectangle_m)
-            if distance < radius - TOLERANCE_M and not is_over(source.height_m, structure):
-                message = (
-                    f"its centre comes as near as {distance:g} m to structures[{j}],"
-                    f" {_described(structure)}, must keep clear of it{words}"
-                )
-                if structure.height_m is not None:
-                    message += f", or be higher than its {structure.height_m:g} m"
-                yield Problem(f"charge[{index}]", message)
-        yield from _above_the_air(parts, f"charge[{index}].height_m", source.height_m)
+    bounds = source_bounds_m(source)
+    if parts.site and not parts.site.rectangle_m.contains(bounds.grown(radius)):
+        where, site = extent(bounds), extent(parts.site.rectangle_m)
+        message = f"its centre may be at {where}, must lie inside the site ({site}){words}"
+        yield Problem(key, message)
+    for j, structure in parts.structures.items():
+        distance = distance_m(source, structure.rectangle_m)
+        if distance < radius - TOLERANCE_M and not is_over(source.height_m, structure):
+            message = (
+                f"its centre comes as near as {distance:g} m to structures[{j}],"
+                f" {_described(structure)}, must keep clear of it{words}"
+            )
+            if structure.height_m is not None:
+                message += f", or be higher than its {structure.height_m:g} m"
+            yield Problem(key, message)
+
+
+def _vehicle_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
+    """Check that a vehicle fits onto the site and gets somewhere, and that it can be stopped."""
+    problems = [*_vehicle_size_problems(parts, key, source), *_entry_problems(parts, key, source)]
+    listed: dict[str, Sequence[Ground]] = {
+        "drivable": source.drivable,
+        "keep_outs": source.keep_outs,
+    }
+    for name, areas in listed.items():
+        for index, area in enumerate(areas):
+            where = f"the ground ({extent(area.rectangle_m)})"
+            problems += _outside_site(parts, f"{key}.{name}[{index}]", where, area.rectangle_m)
+    yield from problems
+    if parts.site is not None and parts.all_structures and not problems:
+        yield from _way_problems(parts, key, vehicle_ground(parts, source))
+
+
+def _vehicle_size_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
+    """Check that the charge is inside its vehicle, and the vehicle not larger than the site."""
+    least_m = 2.0 * parts.charge_radius_m
+    if source.width_m < least_m - TOLERANCE_M:
+        message = f"is {source.width_m:g}, must be at least {least_m:g}, the charge's diameter"
+        yield Problem(f"{key}.width_m", message)
+    if parts.site is not None:
+        most_m = min(parts.site.width_m, parts.site.height_m)
+        if source.width_m > most_m + TOLERANCE_M:
+            message = f"is {source.width_m:g}, must be at most {most_m:g}, the site's shorter side"
+            yield Problem(f"{key}.width_m", message)
+
+
+def _entry_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
+    """Check that entries lie on the border, and are wide enough."""
+    if parts.site is None:
+        return
+    for index, entry in enumerate(source.entries):
+        if entry.side(parts.site) is None:
+            message = (
+                f"runs from {_place(entry.start_m)} to {_place(entry.end_m)}, must lie on one side"
+                f" of the site's border ({extent(parts.site.rectangle_m)})"
+            )
+            yield Problem(f"{key}.entries[{index}]", message)
+        elif entry.length_m < source.width_m - TOLERANCE_M:
+            message = (
+                f"is {entry.length_m:g} m long, must be at least {source.width_m:g} m, the"
+                " vehicle's width"
+            )
+            yield Problem(f"{key}.entries[{index}]", message)
+
+
+def _way_problems(parts: Parts, key: str, ground: VehicleGround) -> Iterator[Problem]:
+    """Check that a vehicle gets onto the site and on, and no nearer than a barrier lets it."""
+    width = f"{ground.source.width_m:g} m, its width"
+    reach = ground.reach()
+    if not reach.enters:
+        message = (
+            "the vehicle cannot enter: structures, gates and ground that is closed to it leave no"
+            f" entry a gap of {width}"
+        )
+        yield Problem(f"{key}.entries", message)
+    elif any(each.protected for each in ground.structures):
+        stand_off_m = ground.worst_places().stand_off_m
+        if stand_off_m >= ground.entry_stand_off_m - TOLERANCE_M:
+            message = (
+                f"the vehicle comes no nearer to a protected structure than {stand_off_m:g} m, as"
+                " near as where it enters: structures, gates and ground that is closed to it leave"
+                f" no gap of {width}"
+            )
+            yield Problem(key, message)
+        elif parts.build_zone is not None:
+            yield from _stopping_problems(parts, key, ground, parts.build_zone)
+
+
+def _stopping_problems(
+    parts: Parts, key: str, ground: VehicleGround, zone: BuildZone
+) -> Iterator[Problem]:
+    """Check that a barrier can keep a vehicle any further away than the empty site does."""
+    cells = _stopping_cells(empty_zone(_surroundings(parts, zone)))
+    if not cells:
+        yield Problem(key, "nothing can stop the vehicle: no item in stock stops vehicles")
+        return
+    full = Obstacles(stops=tuple(zone.cell_rectangle_m(cell) for cell in cells))
+    stand_off_m = ground.worst_places().stand_off_m
+    if ground.worst_places(full).stand_off_m <= stand_off_m + TOLERANCE_M:
+        message = (
+            "nothing can stop the vehicle: even with something that stops it on each of the"
+            f" {len(cells)} cells where that can stand, it comes as near as {stand_off_m:g} m to a"
+            " protected structure"
+        )
+        yield Problem(key, message)
+
+
+def _stopping_cells(empty: EmptyZone) -> list[Cell]:
+    """Return the cells on which something can stand that stops vehicles."""
+    cells: set[Cell] = set()
+    for variant, fits in zip(empty.catalogue.variants, empty.fits, strict=True):
+        if variant.stops_vehicles and empty.catalogue.stocks[variant.item] > 0:
+            for row, column in np.argwhere(fits):
+                cells.update(variant.cells_at(int(row), int(column)))
+    return sorted(cells)
+
+
+def vehicle_ground(parts: Parts, source: VehicleSource) -> VehicleGround:
+    """Return what a vehicle meets on the empty site, which must be sound."""
+    assert parts.site is not None
+    way = None if parts.build_zone is None else parts.build_zone.access_way
+    gates = () if way is None or way.gate is None else (way.gate.rectangle_m,)
+    return VehicleGround(source, parts.site, tuple(parts.structures.values()), gates)
 
 
 def _build_zone_problems(parts: Parts) -> Iterator[Problem]:
@@ -233,8 +357,12 @@ def _build_zone_problems(parts: Parts) -> Iterator[Problem]:
     yield from _outside_site(
         parts, "build_zone", f"the zone ({extent(zone.rectangle_m)})", zone.rectangle_m
     )
+    yield from build_zone_problems(_surroundings(parts, zone))
+
+
+def _surroundings(parts: Parts, zone: BuildZone) -> Surroundings:
     structures, sources = tuple(parts.structures.values()), tuple(parts.sources.values())
-    yield from build_zone_problems(Surroundings(zone, structures, sources, parts.charge_radius_m))
+    return Surroundings(zone, structures, sources, parts.charge_radius_m, parts.site)
 
 
 def _height_problems(parts: Parts) -> Iterator[Problem]:
@@ -333,6 +461,11 @@ def _outside_site(
     if parts.site and not parts.site.rectangle_m.contains(rectangle):
         site = extent(parts.site.rectangle_m)
         yield Problem(key, f"{description} must lie inside the site ({site})")
+
+
+def _place(point_m: PointM) -> str:
+    """Return a point in words."""
+    return f"({point_m[0]:g}, {point_m[1]:g}) m"
 
 
 def _described(structure: AnyStructure) -> str:

@@ -31,6 +31,7 @@ from blast_env.scenario.checks import (
     check_parts,
     check_sources,
     sound_parts,
+    vehicle_ground,
 )
 from blast_env.scenario.georeference import AnyGeoreference
 from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
@@ -52,7 +53,9 @@ from blast_env.scenario.sections import (
     Site,
     SizeM,
     StructureSection,
+    VehicleSource,
 )
+from blast_env.scenario.vehicles import AnyCharge, VehicleCharge, VehicleGround, ranked
 from blast_env.scenario.versions import (
     FIRST_VERSION,
     SCHEMA_VERSION,
@@ -85,6 +88,8 @@ __all__ = [
     "Site",
     "SizeM",
     "StructureSection",
+    "VehicleCharge",
+    "VehicleSource",
 ]
 
 
@@ -183,6 +188,9 @@ class Scenario(Section):
             del content["site"]["air_height_m"]
         if self.build_zone is not None:
             content["build_zone"] = _without_words(self.build_zone)
+        for source in content["charge"]:
+            for area in source.get("keep_outs", ()):
+                del area["reason"]
         content["parameters"] = self.parameters.model_dump(mode="json")
         text = json.dumps(_without_negative_zero(content), sort_keys=True, allow_nan=False)
         return sha256(text.encode()).hexdigest()
@@ -244,7 +252,7 @@ class Scenario(Section):
         """
         return self._with_points((), (charge,))
 
-    def with_possible_charges(self, charges: Sequence[Charge]) -> "Scenario":
+    def with_possible_charges(self, charges: Sequence[AnyCharge]) -> "Scenario":
         """Return the scenario in which these charges are possible as well.
 
         A module must keep clear of a charge that was put where the scenario has none.
@@ -255,13 +263,18 @@ class Scenario(Section):
         return self._with_points(self.charge, tuple(dict.fromkeys(charges)))
 
     def _with_points(
-        self, sources: tuple[AnySource, ...], charges: tuple[Charge, ...]
+        self, sources: tuple[AnySource, ...], charges: tuple[AnyCharge, ...]
     ) -> "Scenario":
-        """Return the scenario with other sources, those given and charges at fixed points.
+        """Return the scenario with other sources, those given and those of some charges.
 
         The other sections are sound, and need no check but that of the charge against them.
         """
-        document = [{"kind": "point", **charge._asdict()} for charge in charges]
+        document = [
+            {"kind": "point", **charge._asdict()}
+            if isinstance(charge, Charge)
+            else charge.source.model_dump()
+            for charge in charges
+        ]
         try:
             together = _SOURCES.validate_python((*sources, *document))
         except ValidationError:  # all that is wrong is in the error of the whole
@@ -296,12 +309,30 @@ class Scenario(Section):
             simulation["overrides"][group] = {**old, **values}
         return Scenario.from_document(document, self.name)
 
-    def sample_charge(self, rng: np.random.Generator) -> Charge:
-        """Draw a charge: a source by its weight, then a place in it."""
+    @property
+    def vehicles(self) -> tuple[VehicleSource, ...]:
+        """The sources that are vehicles."""
+        return tuple(source for source in self.charge if isinstance(source, VehicleSource))
+
+    def vehicle_ground(self, source: VehicleSource) -> VehicleGround:
+        """Return what a vehicle meets on the empty site."""
+        return vehicle_ground(self._parts((source,)), source)
+
+    def sample_charges(self, rng: np.random.Generator, count: int) -> tuple[AnyCharge, ...]:
+        """Draw charges, independently of each other: a source by its weight, then a place in it.
+
+        Those of one vehicle are at its worst place, its second worst, and so on.
+        """
+        return ranked(self.sample_charge(rng) for _ in range(count))
+
+    def sample_charge(self, rng: np.random.Generator) -> AnyCharge:
+        """Draw a charge: a source by its weight, then a place in it, or a vehicle's worst one."""
         weights = np.array([source.weight for source in self.charge])
         # Drawn also for a single source, so that adding one does not shift the stream.
         chosen = int(rng.choice(len(weights), p=weights / weights.sum()))
         source = self.charge[chosen]
+        if isinstance(source, VehicleSource):
+            return VehicleCharge(source)
         return Charge(source.sample_position_m(rng), source.tnt_kg, source.height_m)
 
     @model_validator(mode="after")
@@ -351,6 +382,8 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
         del area["reason"]
     for item in content["items"]:
         del item["description"]
+    if zone.access_way is not None and zone.access_way.gate is None:
+        del content["access_way"]["gate"]
     for key in _LATER_KEYS:
         if getattr(zone, key) == BuildZone.model_fields[key].default:
             del content[key]

@@ -244,7 +244,11 @@ class Placement:
     def _surroundings(self) -> Surroundings:
         scenario = self.scenario
         return Surroundings(
-            self._zone, scenario.structures, scenario.charge, scenario.charge_radius_m
+            self._zone,
+            scenario.structures,
+            scenario.charge,
+            scenario.charge_radius_m,
+            scenario.site,
         )
 
     @cached_property

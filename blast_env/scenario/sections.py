@@ -55,6 +55,9 @@ Height = Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0)]
 Count = Annotated[StrictInt, Field(ge=1, le=1000)]
 
 
+Reason = Annotated[str, Field(min_length=1, max_length=200)]
+
+
 def _check_name(name: str) -> str:
     """Refuse a name that could not be a part of a file name or of a column heading."""
     if re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,39}", name) is None:
@@ -124,6 +127,11 @@ class PointSource(ChargeSource):
         """Start and end of the diagonal that the source spans."""
         return self.position_m, self.position_m
 
+    @property
+    def lines_m(self) -> tuple[tuple[PointM, PointM], ...]:
+        """The point as a line without a length."""
+        return (self.segment_m,)
+
     def sample_position_m(self, rng: np.random.Generator) -> PointM:  # noqa: ARG002
         """Return the point; nothing is drawn."""
         return self.position_m
@@ -140,6 +148,11 @@ class SegmentSource(ChargeSource):
     def segment_m(self) -> tuple[PointM, PointM]:
         """Start and end of the segment."""
         return self.start_m, self.end_m
+
+    @property
+    def lines_m(self) -> tuple[tuple[PointM, PointM], ...]:
+        """The lines on which the charge may be."""
+        return (self.segment_m,)
 
     def sample_position_m(self, rng: np.random.Generator) -> PointM:
         """Draw a point of the segment."""
@@ -169,7 +182,110 @@ class RectangleSource(ChargeSource):
         )
 
 
-AnySource = Annotated[PointSource | SegmentSource | RectangleSource, Field(discriminator="kind")]
+class Ground(Section):
+    """A rectangle of the site."""
+
+    corner_m: PointM
+    size_m: SizeM
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The rectangle."""
+        return Rectangle.from_corner(self.corner_m, self.size_m)
+
+
+class Area(Ground):
+    """A rectangle of the site for which something else holds, and why."""
+
+    reason: Reason
+
+
+class Entry(Section):
+    """A part of the site's border through which a vehicle can drive.
+
+    Attributes:
+        start_m: One end of it.
+        end_m: The other one, on the same side of the border.
+    """
+
+    start_m: PointM
+    end_m: PointM
+
+    @property
+    def bounds_m(self) -> Rectangle:
+        """The segment as a rectangle without a width."""
+        (x0, y0), (x1, y1) = self.start_m, self.end_m
+        return Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
+
+    @property
+    def length_m(self) -> float:
+        """Length of a segment along a side of the site."""
+        left, bottom, right, top = self.bounds_m
+        return max(right - left, top - bottom)
+
+    def side(self, site: Site) -> WallName | None:
+        """Return the side of the site that the segment lies on; `None` if on none."""
+        bounds, border = self.bounds_m, site.rectangle_m
+        if not border.contains(bounds):
+            return None
+        sides: tuple[tuple[WallName, float, float], ...] = (
+            ("west", bounds.right, border.left),
+            ("east", border.right, bounds.left),
+            ("south", bounds.top, border.bottom),
+            ("north", border.top, bounds.bottom),
+        )
+        return next((side for side, high, low in sides if high <= low + 1e-9), None)
+
+    def strip_m(self, site: Site, side: WallName, width_m: float) -> Rectangle:
+        """Return the ground just inside the border, as deep as a vehicle is wide."""
+        left, bottom, right, top = self.bounds_m
+        border = site.rectangle_m
+        return {
+            "west": Rectangle(border.left, bottom, border.left + width_m, top),
+            "east": Rectangle(border.right - width_m, bottom, border.right, top),
+            "south": Rectangle(left, border.bottom, right, border.bottom + width_m),
+            "north": Rectangle(left, border.top - width_m, right, border.top),
+        }[side]
+
+
+class VehicleSource(ChargeSource):
+    """A charge in a vehicle, which goes off at one of the worst places that it can get to.
+
+    Where it gets to depends on the layout: see `blast_env.scenario.vehicles`.
+
+    Attributes:
+        entries: Where it enters the site.
+        width_m: Its width, and the side of the square of ground that it takes up.
+        drivable: The ground on which it can drive; without any, all of the site.
+        keep_outs: Ground that is closed to it all the same, and why.
+        places: How many of the worst places count; the charge goes off at one after the other.
+        apart_m: Least distance between two of them; without it, the width.
+    """
+
+    kind: Literal["vehicle"]
+    entries: Annotated[tuple[Entry, ...], Field(min_length=1, max_length=100)]
+    width_m: Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=100.0)]
+    drivable: Annotated[tuple[Ground, ...], Field(max_length=100)] = ()
+    keep_outs: Annotated[tuple[Area, ...], Field(max_length=100)] = ()
+    places: Annotated[StrictInt, Field(ge=1, le=100)] = 4
+    apart_m: Length | None = None
+
+    @property
+    def lines_m(self) -> tuple[tuple[PointM, PointM], ...]:
+        """The lines along which it enters."""
+        return tuple((entry.start_m, entry.end_m) for entry in self.entries)
+
+    @property
+    def least_apart_m(self) -> float:
+        """Least distance between two of the places."""
+        return self.width_m if self.apart_m is None else self.apart_m
+
+
+PlaceSource = PointSource | SegmentSource | RectangleSource
+"""A source whose places are known before any layout."""
+
+
+AnySource = Annotated[PlaceSource | VehicleSource, Field(discriminator="kind")]
 
 
 def _check_faces(faces: tuple[WallName, ...]) -> tuple[WallName, ...]:

@@ -21,8 +21,13 @@ NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "charge": ("height_m",),
     "structures": ("height_m", "faces", "building"),
     "build_zone": ("height_m", "items"),
+    "build_zone.access_way": ("gate",),
 }
 """What version 2 added, by section; all of it has a default, which is what version 1 means."""
+
+
+NEW_KINDS: Final[Mapping[str, tuple[str, ...]]] = {"charge": ("vehicle",)}
+"""Kinds of sections that version 2 added."""
 
 
 MAX_ITEMS: Final = 100
@@ -56,6 +61,12 @@ def version_problems(content: Any) -> Iterator[Problem]:
                     f"schema_version {SCHEMA_VERSION} has this key, the file has schema_version"
                     f" {FIRST_VERSION}",
                 )
+    for parts, kind in _new_kinds(content):
+        yield Problem(
+            key_path((*parts, "kind")),
+            f"schema_version {SCHEMA_VERSION} has the kind {kind!r}, the file has schema_version"
+            f" {FIRST_VERSION}",
+        )
 
 
 def unused_new_keys(scenario: BaseModel) -> Iterator[KeyParts]:
@@ -72,7 +83,7 @@ def lowest_version(scenario: BaseModel) -> int:
     for _, table, keys in _tables(scenario):
         if isinstance(table, BaseModel) and not all(_is_unused(table, key) for key in keys):
             return SCHEMA_VERSION
-    return FIRST_VERSION
+    return SCHEMA_VERSION if any(_new_kinds(scenario)) else FIRST_VERSION
 
 
 def _is_unused(table: BaseModel, key: str) -> bool:
@@ -82,17 +93,30 @@ def _is_unused(table: BaseModel, key: str) -> bool:
 def _tables(content: Any) -> Iterator[tuple[KeyParts, Any, tuple[str, ...]]]:
     """Yield where a table with newer keys is, the table, and the keys."""
     for name, keys in NEW_KEYS.items():
-        section = _item(content, name) if name else content
+        path = tuple(name.split(".")) if name else ()
+        section = content
+        for key in path:
+            section = _item(section, key)
         if isinstance(section, list | tuple):
             for index, item in enumerate(section[:MAX_ITEMS]):
-                yield (name, index), item, keys
+                yield (*path, index), item, keys
         else:
-            yield (name,) if name else (), section, keys
+            yield path, section, keys
+
+
+def _new_kinds(content: Any) -> Iterator[tuple[KeyParts, str]]:
+    """Yield where a section of a newer kind is, and the kind."""
+    for name, kinds in NEW_KINDS.items():
+        section = _item(content, name)
+        if isinstance(section, list | tuple):
+            for index, item in enumerate(section[:MAX_ITEMS]):
+                if _item(item, "kind") in kinds:
+                    yield (name, index), _item(item, "kind")
 
 
 def _item(table: Any, key: str) -> Any:
-    """Return what a table holds under a key."""
-    return table.get(key) if isinstance(table, Mapping) else getattr(table, key)
+    """Return what a table holds under a key; `None` if it is no table, or has no such key."""
+    return table.get(key) if isinstance(table, Mapping) else getattr(table, key, None)
 
 
 def _given(table: Any) -> Collection[str]:

@@ -24,13 +24,15 @@ from blast_env.scenario.catalogue import MOST_ITEMS, Catalogue, Cost, Item, Plac
 from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
+    Area,
     Count,
     Height,
     PointM,
     PointSource,
     RectangleSource,
     Section,
-    SizeM,
+    Site,
+    VehicleSource,
 )
 from blast_env.units import MODULE_SIDE_M
 
@@ -40,22 +42,6 @@ BUDGET_TOLERANCE: Final = 1e-9
 
 MOST_STOCK: Final = 10_000
 """Modules, or pieces of all items together, that there may be to place."""
-
-
-Reason = Annotated[str, Field(min_length=1, max_length=200)]
-
-
-class Area(Section):
-    """A rectangle of the build zone for which something else holds, and why."""
-
-    corner_m: PointM
-    size_m: SizeM
-    reason: Reason
-
-    @property
-    def rectangle_m(self) -> Rectangle:
-        """The area."""
-        return Rectangle.from_corner(self.corner_m, self.size_m)
 
 
 class KeepOut(Area):
@@ -237,15 +223,27 @@ Boxes = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def source_bounds_m(source: AnySource) -> Rectangle:
-    """Return the smallest rectangle around all the places that the charge's centre may be at."""
+    """Return the smallest rectangle around all the places that the charge's centre may be at.
+
+    Of a vehicle, whose places depend on the layout, around those where it enters the site.
+    """
     if isinstance(source, RectangleSource):
         return source.rectangle_m
+    if isinstance(source, VehicleSource):
+        return Rectangle.around([entry.bounds_m for entry in source.entries])
     (x0, y0), (x1, y1) = source.segment_m
     return Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
 
 
 def distances_m(source: AnySource, boxes: Boxes) -> FloatArray:
-    """Return how near the centre of a charge from this source can come to each rectangle."""
+    """Return how near the centre of a charge from this source can come to each rectangle.
+
+    Of a vehicle, how near the border is where it enters the site.
+    """
+    if isinstance(source, VehicleSource):
+        each = [box_distances_m(entry.bounds_m, boxes) for entry in source.entries]
+        nearest: FloatArray = np.minimum.reduce(each)
+        return nearest
     if isinstance(source, PointSource | RectangleSource):
         return box_distances_m(source_bounds_m(source), boxes)
     return _segment_distances(*source.segment_m, boxes)
@@ -308,12 +306,14 @@ class Surroundings:
         structures: The structures on the site.
         sources: Where the charge may come from.
         charge_radius_m: Radius of the disc that the charge fills.
+        site: The site, for the entries of vehicles; `None` if it is unsound.
     """
 
     zone: BuildZone
     structures: tuple[AnyStructure, ...]
     sources: tuple[AnySource, ...]
     charge_radius_m: float
+    site: Site | None
 
 
 @dataclass(frozen=True)
@@ -398,12 +398,32 @@ def _blocked(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, Bo
         yield reason, _overlapping(structure.rectangle_m, boxes)
     if zone.clearance_m > 0.0:
         yield from _too_close(surroundings, boxes)
+    if zone.access_way is not None and zone.access_way.gate is not None:
+        gate = zone.access_way.gate.rectangle_m
+        yield "is where the gate of the access way stands", _overlapping(gate, boxes)
     for index, source in enumerate(surroundings.sources):
+        if isinstance(source, VehicleSource):
+            yield (
+                f"is where a vehicle enters (charge[{index}])",
+                _on_entries(source, surroundings.site, boxes),
+            )
+            continue
         yield (
             f"is closer than the charge's radius of {radius_m:g} m to where the charge"
             f" may be (charge[{index}])",
             distances_m(source, boxes) < radius_m - TOLERANCE_M,
         )
+
+
+def _on_entries(source: VehicleSource, site: Site | None, boxes: Boxes) -> BoolArray:
+    """Return the squares that overlap a vehicle that stands at one of its entries."""
+    inside = np.zeros(np.broadcast_shapes(boxes[0].shape, boxes[1].shape), dtype=bool)
+    if site is not None:
+        for entry in source.entries:
+            side = entry.side(site)
+            if side is not None:
+                inside |= _overlapping(entry.strip_m(site, side, source.width_m), boxes)
+    return inside
 
 
 def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, BoolArray]]:

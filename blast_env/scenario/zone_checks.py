@@ -5,9 +5,17 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from blast_env.arrays import BoolArray
+from blast_env.geometry import Rectangle
 from blast_env.scenario.access_way import AccessWay, closing_places, is_open
 from blast_env.scenario.problems import Problem, extent
-from blast_env.scenario.zone import Area, BuildZone, EmptyZone, Surroundings, empty_zone
+from blast_env.scenario.sections import Area
+from blast_env.scenario.zone import (
+    TOLERANCE_M,
+    BuildZone,
+    EmptyZone,
+    Surroundings,
+    empty_zone,
+)
 from blast_env.units import MODULE_SIDE_M
 
 
@@ -120,10 +128,29 @@ def _access_way_problem(
     if way.width_m > widest_m:
         message = f"is {way.width_m:g}, must be at most {widest_m:g}, the zone's shorter side"
         return Problem("build_zone.access_way.width_m", message)
+    if way.gate is not None:
+        fault = _gate_fault(zone, way, way.gate.rectangle_m)
+        if fault is not None:
+            return Problem("build_zone.access_way.gate", fault)
     if not is_open(way, passable):
         message = f"the structures leave no {way.description} through the empty zone"
         return Problem("build_zone.access_way", message)
     if available.any() and closing[available].all():
         what = "a piece at any place" if zone.items else "a module on any usable cell"
         return Problem("build_zone.access_way", f"{what} would close the {way.description}")
+    return None
+
+
+def _gate_fault(zone: BuildZone, way: AccessWay, gate: Rectangle) -> str | None:
+    """Return what is wrong with the gate of an access way, or `None`."""
+    if not zone.rectangle_m.contains(gate):
+        bound = extent(zone.rectangle_m)
+        return f"the gate ({extent(gate)}) must lie inside the build zone ({bound})"
+    left, bottom, right, top = gate
+    opening_m = top - bottom if way.between == "left_right" else right - left
+    if opening_m < way.width_m - TOLERANCE_M:
+        return (
+            f"the gate ({extent(gate)}) is {opening_m:g} m wide across the way, must be at least"
+            f" {way.width_m:g} m, the way's width"
+        )
     return None

@@ -33,8 +33,8 @@ from blast_env.recording.tables import (
     structure_table,
 )
 from blast_env.runner import check_workers, in_order
-from blast_env.scenario import AnyScenario, ScenarioField
-from blast_env.scenario.build_scene import build_scene, draw_charge
+from blast_env.scenario import AnyCharge, AnyScenario, ScenarioField
+from blast_env.scenario.build_scene import build_scene, draw_threat
 
 if TYPE_CHECKING:
     from blast_env.physics.gas.engine import GasEngine
@@ -59,7 +59,7 @@ class Blast:
     layout: Sequence[Element] = ()
     seed: int = 0
     engine: str | Engine = "pymunk"
-    charge: Charge | None = None
+    charge: AnyCharge | None = None
 
     @cached_property
     def scene(self) -> Scene:
@@ -78,8 +78,8 @@ class Blast:
             raise BlastEnvError(
                 f"charge_position_m is {position_m!r}, must be a pair of numbers (x, y)"
             ) from None
-        drawn = draw_charge(self.scenario, self.seed) if self.charge is None else self.charge
-        return replace(self, charge=drawn._replace(position_m=(x_m, y_m)))
+        drawn = draw_threat(self.scenario, self.seed) if self.charge is None else self.charge
+        return replace(self, charge=Charge((x_m, y_m), drawn.tnt_kg, drawn.height_m))
 
     @cached_property
     def particle_engine(self) -> ParticleEngine:
@@ -309,7 +309,7 @@ def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
     seed: int = ...,
     *,
     engine: "Literal['gas'] | GasEngine",
-    charge: Charge | None = ...,
+    charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
     cell_m: float | None = ...,
 ) -> "GasResult": ...
@@ -321,7 +321,7 @@ def simulate(
     layout: Sequence[Element] = ...,
     seed: int = ...,
     engine: str | Engine = ...,
-    charge: Charge | None = ...,
+    charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
 ) -> BlastResult: ...
 
@@ -331,7 +331,7 @@ def simulate(
     layout: Sequence[Element] = (),
     seed: int = 0,
     engine: str | Engine = "pymunk",
-    charge: Charge | None = None,
+    charge: AnyCharge | None = None,
     progress: Callable[[float], None] | None = None,
     cell_m: float | None = None,
 ) -> "BlastResult | GasResult":

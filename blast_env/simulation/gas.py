@@ -30,13 +30,13 @@ from blast_env.physics.gas.engine import (
     scaled_distance,
 )
 from blast_env.physics.gas.probes import LoadTable
-from blast_env.physics.scene import BlastSite, Charge
+from blast_env.physics.scene import BlastSite
 from blast_env.physics.structure import module_name
 from blast_env.provenance import versions
 from blast_env.recording.excel import SheetTable, write_tables
 from blast_env.recording.parquet import write_table
 from blast_env.recording.tables import RunRecord
-from blast_env.scenario import ScenarioField
+from blast_env.scenario import AnyCharge, ScenarioField
 from blast_env.scenario.build_scene import build_site
 from blast_env.tables import Column, table_of
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
@@ -119,7 +119,7 @@ class GasBlast:
     layout: Sequence[Element] = ()
     seed: int = 0
     engine: GasEngine = field(default_factory=GasEngine)
-    charge: Charge | None = None
+    charge: AnyCharge | None = None
 
     @cached_property
     def site(self) -> BlastSite:

@@ -16,10 +16,10 @@ from blast_env.scenario import (
     PointSource,
     Scenario,
     SegmentSource,
+    VehicleSource,
     find_scenario,
 )
-from blast_env.scenario.sections import PointM
-from blast_env.scenario.zone import Area
+from blast_env.scenario.sections import Entry, Ground, PointM
 
 _TURNED_WALL: Final[Mapping[WallName, WallName]] = {
     "west": "south",
@@ -74,8 +74,20 @@ def _source(source: AnySource, height_m: float) -> AnySource:
     if isinstance(source, SegmentSource):
         start_m, end_m = (_point(each, height_m) for each in source.segment_m)
         return source.model_copy(update={"start_m": start_m, "end_m": end_m})
+    if isinstance(source, VehicleSource):
+        changes: dict[str, Any] = {
+            "entries": tuple(_entry(each, height_m) for each in source.entries),
+            "drivable": tuple(_ground(each, height_m) for each in source.drivable),
+            "keep_outs": tuple(_ground(each, height_m) for each in source.keep_outs),
+        }
+        return source.model_copy(update=changes)
     corner_m = _corner(source.rectangle_m, height_m)
     return source.model_copy(update={"corner_m": corner_m, "size_m": source.size_m[::-1]})
+
+
+def _entry(entry: Entry, height_m: float) -> Entry:
+    ends_m = {"start_m": _point(entry.start_m, height_m), "end_m": _point(entry.end_m, height_m)}
+    return entry.model_copy(update=ends_m)
 
 
 def _structure(structure: AnyStructure, height_m: float) -> AnyStructure:
@@ -98,18 +110,19 @@ def _zone(zone: BuildZone, height_m: float) -> BuildZone:
         "corner_m": _corner(zone.rectangle_m, height_m),
         "rows": zone.columns,
         "columns": zone.rows,
-        "keep_outs": tuple(_area(each, height_m) for each in zone.keep_outs),
-        "cost_areas": tuple(_area(each, height_m) for each in zone.cost_areas),
-        "access_way": None if zone.access_way is None else _way(zone.access_way),
+        "keep_outs": tuple(_ground(each, height_m) for each in zone.keep_outs),
+        "cost_areas": tuple(_ground(each, height_m) for each in zone.cost_areas),
+        "access_way": None if zone.access_way is None else _way(zone.access_way, height_m),
     }
     return zone.model_copy(update=changes)
 
 
-def _area(area: Area, height_m: float) -> Area:
-    corner_m = _corner(area.rectangle_m, height_m)
-    return area.model_copy(update={"corner_m": corner_m, "size_m": area.size_m[::-1]})
+def _ground(ground: Ground, height_m: float) -> Ground:
+    corner_m = _corner(ground.rectangle_m, height_m)
+    return ground.model_copy(update={"corner_m": corner_m, "size_m": ground.size_m[::-1]})
 
 
-def _way(way: AccessWay) -> AccessWay:
+def _way(way: AccessWay, height_m: float) -> AccessWay:
     across = "bottom_top" if way.between == "left_right" else "left_right"
-    return way.model_copy(update={"between": across})
+    gate = None if way.gate is None else _ground(way.gate, height_m)
+    return way.model_copy(update={"between": across, "gate": gate})

@@ -14,8 +14,8 @@ from blast_env.scenario import (
     AnyScenario,
     AnySource,
     PointSource,
+    RectangleSource,
     Scenario,
-    SegmentSource,
     find_scenario,
 )
 from blast_env.scenario.sections import PointM
@@ -26,7 +26,7 @@ DIRECTIONS: Final = 360
 
 
 PLACES: Final = 9
-"""Places along a segment, or in a rectangle, 3 x 3."""
+"""Places along a segment or an entry, or in a rectangle, 3 x 3."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,17 +104,24 @@ def _directions() -> tuple[tuple[float, float], ...]:
 
 
 def _places(source: AnySource) -> list[PointM]:
-    """Return the places of a source, each in the middle of as large a part of it."""
+    """Return the places of a source, each in the middle of as large a part of it.
+
+    Those of a vehicle are along its entries: where it gets to is for the layout to decide.
+    """
     if isinstance(source, PointSource):
         return [source.position_m]
-    if isinstance(source, SegmentSource):
-        (x0, y0), (x1, y1) = source.segment_m
-        shares = [(index + 0.5) / PLACES for index in range(PLACES)]
-        return [(x0 + share * (x1 - x0), y0 + share * (y1 - y0)) for share in shares]
+    if not isinstance(source, RectangleSource):
+        return [place for ends_m in source.lines_m for place in _places_along(*ends_m)]
     side = round(PLACES**0.5)
     shares = [(index + 0.5) / side for index in range(side)]
     (left, bottom), (width, height) = source.corner_m, source.size_m
     return [(left + across * width, bottom + up * height) for up in shares for across in shares]
+
+
+def _places_along(start_m: PointM, end_m: PointM) -> list[PointM]:
+    (x0, y0), (x1, y1) = start_m, end_m
+    shares = [(index + 0.5) / PLACES for index in range(PLACES)]
+    return [(x0 + share * (x1 - x0), y0 + share * (y1 - y0)) for share in shares]
 
 
 def _entry_m(origin: FloatArray, direction: FloatArray, rectangle: Rectangle) -> FloatArray:

@@ -22,6 +22,7 @@ from blast_env.rendering.site_plan import write_heading
 from blast_env.rendering.style import render_extra
 from blast_env.runner import run_all
 from blast_env.scenario import Scenario
+from blast_env.scenario.zone import source_bounds_m
 from blast_env.simulation import Blast
 from blast_env.studies.shielding.scenes import BlockGeometry, structure_scenario
 from blast_env.units import MODULE_SIDE_M, MS_PER_S, UNITS_PER_M
@@ -181,7 +182,8 @@ def dense_elastic_air() -> SimulationParameters:
 
 def _stand_off_m(scenario: Scenario) -> float:
     (structure,), (charge,) = scenario.structures, scenario.charge
-    return structure.rectangle_m.left - charge.sample_position_m(np.random.default_rng(0))[0]
+    x_m, _ = source_bounds_m(charge).centre
+    return structure.rectangle_m.left - x_m
 
 
 def _counts(scenario: Scenario, times_s: tuple[float, ...], seed: int) -> FloatArray:

@@ -9,8 +9,7 @@ from blast_agents.proposal import Proposal
 from blast_agents.rules import expected_charge, line_of_sight_wall
 from blast_agents.search import Layout
 
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Scenario, SegmentSource
+from blast_env.scenario import AnyCharge, Scenario, SegmentSource
 from tests.agents.search_cases import small_scenario
 
 ROAD = SegmentSource(kind="segment", start_m=(5.0, 15.0), end_m=(5.0, 25.0), tnt_kg=100.0)
@@ -26,9 +25,9 @@ def road_scenario(stock: int = 3) -> Scenario:
 class WallAgent:
     """Proposes a wall in the middle of the zone, and remembers what it was told."""
 
-    told: list[Charge | None] = field(default_factory=list, repr=False, compare=False)
+    told: list[AnyCharge | None] = field(default_factory=list, repr=False, compare=False)
 
-    def propose(self, scenario: Scenario, charge: Charge | None = None) -> Layout:
+    def propose(self, scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
         self.told.append(charge)
         return line_of_sight_wall(scenario, charge or expected_charge(scenario.charge), 0.5)
 

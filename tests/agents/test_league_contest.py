@@ -113,7 +113,8 @@ def test_an_agent_is_told_the_charge_only_where_it_is_known(tmp_path: Path) -> N
 
 def test_a_rule_stands_in_the_middle_of_a_hidden_threat() -> None:
     (case,) = hidden_track(SCENARIO, 1).cases
-    middle = practice_of(case).threats[0].charge._replace(position_m=(5.0, 20.0))
+    first = practice_of(case).threats[0].charge
+    middle = Charge((5.0, 20.0), first.tnt_kg, first.height_m)
     assert Rule(wall_near_charge, "rule").propose(case) == wall_near_charge(SCENARIO, middle)
 
 

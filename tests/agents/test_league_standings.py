@@ -19,6 +19,7 @@ from blast_agents.league.tracks import HIDDEN_SEEDS
 from matplotlib.figure import Figure
 
 from blast_env.errors import BlastEnvError
+from blast_env.physics.scene import Charge
 from blast_env.statistics import Estimate, reduction_estimate
 from tests.agents.league_cases import TRAINING, result, road_scenario, standings
 
@@ -161,7 +162,8 @@ def test_the_tables_hold_what_was_found() -> None:
     assert list(agent["reduction"]) == pytest.approx([0.6, 0.4, 0.2])
     assert list(agent["case"]) == ["road 0", "road 1", "road 2"]
     assert list(agent["unprotected_impulse_pa_s"]) == [200.0, 20.0, 400.0]
-    charges = [case.charge.position_m for case in it.track.cases if case.charge is not None]
+    told = [case.charge for case in it.track.cases if isinstance(case.charge, Charge)]
+    charges = [charge.position_m for charge in told]
     assert list(zip(agent["charge_x_m"], agent["charge_y_m"], strict=True)) == charges
     assert set(agent["layout"]) == {"0,0"}
 

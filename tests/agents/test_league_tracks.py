@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange
+from blast_env.physics.scene import Charge
 from blast_env.scenario import save_scenario
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.agents.league_cases import ROAD, road_scenario
@@ -41,7 +42,8 @@ def test_seeds_of_different_leagues_and_cases_cannot_meet() -> None:
 
 def test_a_known_threat_is_the_same_charge_in_search_and_judgement() -> None:
     track = known_track(SCENARIO, 5, 3)
-    places = {case.charge.position_m for case in track.cases if case.charge is not None}
+    told = [case.charge for case in track.cases if isinstance(case.charge, Charge)]
+    places = {charge.position_m for charge in told}
     assert len(places) == 5
     (x_m, low_m), (_, high_m) = ROAD.start_m, ROAD.end_m
     assert all(x == x_m and low_m <= y <= high_m for x, y in places)

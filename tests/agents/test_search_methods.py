@@ -19,6 +19,7 @@ from blast_agents.search.methods import every_layout
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
 from blast_env.evaluation.cases import practice_hidden
+from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement, Scenario
 from tests.agents.search_cases import WatchedEvaluator, ballistic, small_problem, small_scenario
 
@@ -237,6 +238,7 @@ def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
     problem = LayoutProblem(evaluator, practice_hidden(scenario, 8, 1, 0))
+    assert isinstance(problem.charge, Charge)
     assert problem.charge.position_m == pytest.approx((5.0, 15.0))
 
 
@@ -257,7 +259,10 @@ def test_the_front_is_near_the_true_one(problem: LayoutProblem, optimum: SearchR
 
 def test_every_method_has_its_name() -> None:
     assert all(name == method.name for name, method in SEARCH_METHODS.items())
-    assert {*DRAWN, "exhaustive", "wall_near_charge", "wall_near_building"} == set(SEARCH_METHODS)
+    assert {
+        *(*DRAWN, "exhaustive", "wall_near_charge", "wall_near_building"),
+        *("line_of_posts", "posts_and_wall"),
+    } == set(SEARCH_METHODS)
 
 
 def test_genetic_search_beats_random_search_on_the_courtyard() -> None:

@@ -169,7 +169,7 @@ def test_hidden_charges_come_first_and_spread() -> None:
     threats = practice_hidden(scenario, 16, 2, seed=3).threats
     assert [t.charge for t in threats[:16]] == [t.charge for t in threats[16:]]
     assert len({threat.seed for threat in threats}) == 32
-    first, *others = (threat.charge.position_m[1] for threat in threats[:16])
+    first, *others = (t.charge_against(scenario, ()).position_m[1] for t in threats[:16])
     assert abs(first - float(np.median([first, *others]))) < 2.0
     assert {min(others), max(others)} == {*others[:2]}
 

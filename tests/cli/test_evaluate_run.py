@@ -54,7 +54,9 @@ def test_a_visible_threat_gets_a_layout_for_each_charge(visible: Path, tmp_path:
         expected = evaluate_layout(scenario, layout, threats=[threat])
         assert table["impulse_pa_s"][number - 1] == pytest.approx(expected.impulse_pa_s.value)
         provenance = LayoutFile.load(path).provenance
-        assert provenance["charge"]["position_m"] == list(threat.charge.position_m)
+        assert provenance["charge"]["position_m"] == list(
+            threat.charge_against(scenario, layout).position_m
+        )
         assert (provenance["run"], provenance["seed"]) == (str(visible), threat.seed)
     assert f"mean reduction {100.0 * table['reduction'].mean():.1f} %" in result.stdout
     assert "MaskablePPO of" in result.stdout

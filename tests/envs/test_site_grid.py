@@ -65,6 +65,7 @@ def test_the_places_of_a_charge_add_up_to_1_around_their_middle(source: AnySourc
     if isinstance(source, RectangleSource):
         middle = source.rectangle_m.centre
     else:
+        assert isinstance(source, SegmentSource | PointSource)
         middle = tuple(np.mean(source.segment_m, axis=0))
     # The share of a square that is covered does not tell where in it the rectangle begins.
     tolerance = 0.3 if isinstance(source, RectangleSource) else 1e-4

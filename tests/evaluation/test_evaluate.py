@@ -68,7 +68,7 @@ def test_the_numbers_are_those_of_the_blasts(evaluation: LayoutEvaluation) -> No
     assert evaluation.worst.reduction == pytest.approx(1.0 - with_wall[worst] / without[worst])
     assert evaluation.threat_table.impulse_pa_s.to_numpy() == pytest.approx(with_wall)
     assert evaluation.threat_table.charge_y_m.tolist() == [
-        threat.charge.position_m[1] for threat in THREATS
+        outcome.charge.position_m[1] for outcome in evaluation.outcomes
     ]
 
 

@@ -49,7 +49,8 @@ def comparable(scenario: Scenario) -> dict[str, Any]:
 
 def ends_m(source: AnySource) -> tuple[PointM, PointM]:
     assert not isinstance(source, RectangleSource)
-    return source.segment_m
+    (line_m,) = source.lines_m
+    return line_m
 
 
 def in_utm(feature: dict[str, Any]) -> Any:

@@ -42,11 +42,11 @@ def test_charges_are_where_they_were_in_the_colour_of_their_reductions(
             np.asarray(each.get_offsets()).tolist(), np.asarray(each.get_array()), strict=True
         )
     }
-    expected = {o.threat.charge.position_m: 100.0 * o.reduction for o in evaluation.outcomes}
+    expected = {o.charge.position_m: 100.0 * o.reduction for o in evaluation.outcomes}
     assert drawn == pytest.approx(expected)
     assert len(np.asarray(squares.get_offsets())) == 1
     ring = plan.lines[-1]
-    worst = evaluation.worst.threat.charge.position_m
+    worst = evaluation.worst.charge.position_m
     assert tuple(np.ravel(ring.get_xydata())) == worst
 
 

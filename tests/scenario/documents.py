@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from blast_env.scenario import Scenario, ScenarioError, bundled_scenarios
+from tests.vehicle_sites import site_document, vehicle_document
 
 REPOSITORY = Path(__file__).parents[2]
 Document = dict[str, Any]
@@ -93,7 +94,22 @@ def tall_document() -> Document:
     document["charge"][0]["height_m"] = 1.0
     document["structures"][0] |= {"height_m": 6.0, "faces": ["west", "south"], "building": "farm"}
     document["build_zone"]["height_m"] = 3.0
+    gate = {"corner_m": [12.0, 12.0], "size_m": [0.5, 2.0]}
+    document["build_zone"]["access_way"]["gate"] = gate
     return document
+
+
+def driven_document() -> Document:
+    """Return a document with every key of a vehicle."""
+    vehicle = vehicle_document(
+        height_m=0.5,
+        weight=2.0,
+        drivable=[{"corner_m": [0.0, 0.0], "size_m": [14.0, 8.0]}],
+        keep_outs=[{"corner_m": [7.0, 0.0], "size_m": [1.0, 2.0], "reason": "a pond"}],
+        places=3,
+        apart_m=2.5,
+    )
+    return site_document(vehicle, name="driven")
 
 
 def minimal_document() -> Document:
@@ -122,7 +138,8 @@ def all_documents() -> list[Document]:
         tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8"))
         for name in bundled_scenarios()
     ]
-    return [full_document(), tall_document(), minimal_document(), *bundled]
+    own = [full_document(), tall_document(), driven_document(), minimal_document()]
+    return [*own, *bundled]
 
 
 def key_paths(value: object, path: KeyPath = ()) -> Iterator[KeyPath]:

@@ -18,6 +18,7 @@ from blast_env.evaluation import BlastEvaluator, Case, Evaluators, Threat, draw_
 from blast_env.export import LayoutPlan
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
+    AnyCharge,
     LayoutFile,
     Placement,
     Scenario,
@@ -126,7 +127,7 @@ class _Nowhere:
     def propose(
         self,
         scenario: Scenario,
-        charge: Charge | None = None,  # noqa: ARG002
+        charge: AnyCharge | None = None,  # noqa: ARG002
     ) -> tuple[tuple[int, int], ...]:
         assert isinstance(scenario, Scenario)
         return ()

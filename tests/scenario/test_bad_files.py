@@ -28,8 +28,9 @@ OPTIONAL = {
     *("module_capacity", "keep_outs", "preset", "overrides", "air", "explosive", "spacing_units"),
     *("jitter", "ball_count", "collide_within_charge"),
     *("clearance_m", "module_cost", "cost_areas", "budget", "access_way"),
-    *("air_height_m", "height_m", "faces", "gauges"),
+    *("air_height_m", "height_m", "faces", "gauges", "gate"),
     *("building", "georeference", "crs", "rotation_deg"),
+    *("drivable", "places", "apart_m"),
 }
 CASES = [(document, path) for document in all_documents() for path in key_paths(document)]
 KEYS = [(document, path) for document, path in CASES if isinstance(path[-1], str)]

@@ -52,7 +52,7 @@ def test_scenario_with_heights_survives_saving(tmp_path: Path) -> None:
 def test_version_is_the_lowest_that_holds_the_content(tmp_path: Path, document: Document) -> None:
     """A file that uses nothing of version 2 is one of version 1, which older releases read."""
     newer = scenario_from({**document, "schema_version": 2})
-    assert newer.schema_version == (2 if document["name"] == "tall" else 1)
+    assert newer.schema_version == (2 if document["name"] in ("tall", "driven") else 1)
     assert newer == scenario_from(document)
     assert newer.content_hash == scenario_from(document).content_hash
     save_scenario(newer, tmp_path / "copy.toml")
@@ -92,6 +92,7 @@ COUNTING_PATHS: list[KeyPath] = [
     ("structures", 0, "height_m"),
     ("structures", 0, "faces"),
     ("build_zone", "height_m"),
+    ("build_zone", "access_way", "gate"),
 ]
 
 WORDS: list[KeyPath] = [("georeference",), ("structures", 0, "building")]
@@ -103,7 +104,8 @@ NEW_PATHS = COUNTING_PATHS + WORDS
 def test_new_keys_are_all_tried() -> None:
     listed = {(section, key) for section, keys in NEW_KEYS.items() for key in keys}
     listed.remove(("build_zone", "items"))  # test_catalogue.py
-    assert listed == {(str(path[0]) if path[1:] else "", str(path[-1])) for path in NEW_PATHS}
+    named = [[str(part) for part in path if isinstance(part, str)] for path in NEW_PATHS]
+    assert listed == {(".".join(above), key) for *above, key in named}
 
 
 @pytest.mark.parametrize("path", NEW_PATHS, ids=written)
@@ -409,7 +411,9 @@ def test_engines_without_heights_can_say_what_they_leave_aside() -> None:
     assert all(word in note for word, note in zip(words, notes, strict=True))
 
 
-@pytest.mark.parametrize("path", [path for path in COUNTING_PATHS if path[-1] != "air_height_m"])
+@pytest.mark.parametrize(
+    "path", [path for path in COUNTING_PATHS if path[-1] not in ("air_height_m", "gate")]
+)
 def test_each_note_has_its_cause(path: KeyPath) -> None:
     document = changed(minimal_document(), ("schema_version",), 2)
     zone = {"corner_m": [5.0, 0.0], "rows": 20, "columns": 4, "stock": 12}

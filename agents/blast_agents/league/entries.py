@@ -5,14 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blast_agents.posts import VEHICLE_RULES
 from blast_agents.proposal import LayoutAgent
 from blast_agents.rules import RULES, expected_charge, random_layout
 from blast_agents.search import SearchMethod, find_search_method
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import PointSource, Scenario
+from blast_env.scenario import AnyCharge, Scenario
+from blast_env.scenario.vehicles import source_of
 from blast_env.sites import Visibility, visibility_layout
 
 
@@ -60,7 +61,7 @@ class Rule:
         name: In tables.
     """
 
-    rule: Callable[[Scenario, Charge], Layout]
+    rule: Callable[[Scenario, AnyCharge], Layout]
     name: str
 
     def propose(self, case: Case) -> Layout:
@@ -86,7 +87,7 @@ class VisibilityLayout:
         """Return the layout for the charge, or for all the places where a hidden one may be."""
         scenario = case.scenario
         if case.charge is not None:
-            scenario = scenario.model_copy(update={"charge": (PointSource.at(case.charge),)})
+            scenario = scenario.model_copy(update={"charge": (source_of(case.charge),)})
         return visibility_layout(scenario, Visibility.of(scenario))
 
 
@@ -148,18 +149,22 @@ def search_name(method: str, budget: int) -> str:
     return f"{method}, {budget:,} blasts"
 
 
-def standard_entries(methods: Sequence[str], budgets: Sequence[int]) -> tuple[Entry, ...]:
+def standard_entries(
+    methods: Sequence[str], budgets: Sequence[int], vehicles: bool = False
+) -> tuple[Entry, ...]:
     """Return all entries but agents: no barrier, a random layout, rules, lines of sight, searches.
 
     Args:
         methods: Names of search methods.
         budgets: Blasts a case; each method enters with each.
+        vehicles: Whether every case has a vehicle: the rules against them enter then.
 
     Raises:
         UnknownNameError: If there is no such method; the message names the nearest one.
         BlastEnvError: If a budget is below 1.
     """
-    rules = (Rule(rule, name) for name, rule in RULES.items())
+    named = {**RULES, **VEHICLE_RULES} if vehicles else RULES
+    rules = (Rule(rule, name) for name, rule in named.items())
     found = [find_search_method(name) for name in methods]
     searches = (Search(method, budget) for method in found for budget in budgets)
     return (NoBarrier(), RandomLayout(), *rules, VisibilityLayout(), *searches)

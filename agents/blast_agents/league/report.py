@@ -19,6 +19,7 @@ from blast_env.geometry import layout_text
 from blast_env.provenance import package_version
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.style import count_of
+from blast_env.scenario.build_scene import charge_against
 from blast_env.statistics import reductions
 from blast_env.tables import write_csv
 
@@ -82,7 +83,8 @@ def _summary(standings: Standings, result: Result) -> dict[str, Any]:
 def _case(
     case: Case, proposal: Proposal, impulses_pa_s: FloatArray, bare_pa_s: FloatArray
 ) -> dict[str, Any]:
-    x_m, y_m = (np.nan, np.nan) if case.charge is None else case.charge.position_m
+    told = None if case.charge is None else charge_against(case.scenario, (), case.charge)
+    x_m, y_m = (np.nan, np.nan) if told is None else told.position_m
     return {
         "case": case.name,
         "scenario_hash": case.scenario.content_hash,

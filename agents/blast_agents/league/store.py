@@ -23,6 +23,7 @@ from blast_env.files import FolderStore
 from blast_env.geometry import Layout
 from blast_env.physics.engines import find_engine
 from blast_env.provenance import code_version, versions
+from blast_env.scenario import AnyCharge, VehicleCharge
 
 _PACKAGES: Final = ("numpy", "pymoo")
 """What a search draws its numbers with."""
@@ -158,8 +159,15 @@ class ResultStore:
 
 
 def _text(key: SearchKey | EvaluationKey) -> str:
-    threats = [(each.charge, each.seed) for each in key.threats]
+    threats = [(_plain(each.charge), each.seed) for each in key.threats]
     return json.dumps([type(key).__name__, key._replace(threats=()), threats])
+
+
+def _plain(charge: AnyCharge) -> object:
+    """Return a charge as what JSON knows."""
+    if isinstance(charge, VehicleCharge):
+        return charge.source.model_dump(mode="json"), charge.rank
+    return charge
 
 
 @cache

@@ -10,7 +10,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, SeedRange, draw_threats
 from blast_env.evaluation.cases import practice_hidden, practice_visible, visible_case
 from blast_env.scenario import AnyScenario, Scenario, find_scenario, load_scenario
-from blast_env.scenario.build_scene import draw_charge
+from blast_env.scenario.build_scene import draw_threat
 from blast_env.sites import SiteSource
 
 TRACKS: Final = ("known", "hidden", "sites")
@@ -68,7 +68,7 @@ def known_track(scenario: AnyScenario, cases: int, seeds: int, seed: int = 0) ->
     scenario.zone  # noqa: B018  # refuses a scenario without one
     drawn = []
     for index, first in enumerate(_first_seeds(cases, seeds, seed)):
-        charge, search_seed = draw_charge(scenario, first), seed * MOST_CASES + index
+        charge, search_seed = draw_threat(scenario, first), seed * MOST_CASES + index
         judged = visible_case(scenario, charge, range(first, first + seeds))
         drawn.append(
             replace(

@@ -7,14 +7,14 @@ from math import comb, exp
 
 import numpy as np
 
+from blast_agents.posts import line_of_posts, posts_and_wall
 from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
 from blast_agents.search.moves import Draw, Moves, random_walls
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
 from blast_agents.search.session import SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Cell, Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, Scenario
+from blast_env.scenario import AnyCharge, Placement, Scenario
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class RuleSearch:
         name: Name in tables and on the command line.
     """
 
-    rule: Callable[[Scenario, Charge], Layout]
+    rule: Callable[[Scenario, AnyCharge], Layout]
     name: str
 
     def search(
@@ -89,6 +89,12 @@ WALL_NEAR_CHARGE = RuleSearch(wall_near_charge, "wall_near_charge")
 
 
 WALL_NEAR_BUILDING = RuleSearch(wall_near_building, "wall_near_building")
+
+
+LINE_OF_POSTS = RuleSearch(line_of_posts, "line_of_posts")
+
+
+POSTS_AND_WALL = RuleSearch(posts_and_wall, "posts_and_wall")
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,8 @@ from blast_env.evaluation import BlastEvaluator, Case, Threat
 from blast_env.evaluation.cases import check_distinct
 from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Element, Layout, layout_text
-from blast_env.physics.scene import Charge
 from blast_env.runner import check_workers
-from blast_env.scenario import Scenario
+from blast_env.scenario import AnyCharge, Scenario
 from blast_env.statistics import reductions
 
 
@@ -62,7 +61,7 @@ class LayoutProblem:
         return self.scenario.zone.stock
 
     @property
-    def charge(self) -> Charge:
+    def charge(self) -> AnyCharge:
         """The charge if it is known, else the middle of where the scenario lets one be."""
         known = set(self.case.charges)
         return known.pop() if len(known) == 1 else expected_charge(self.scenario.charge)

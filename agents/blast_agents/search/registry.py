@@ -7,6 +7,8 @@ from typing import Final
 
 from blast_agents.search.evolution import GeneticSearch, Nsga2Search
 from blast_agents.search.methods import (
+    LINE_OF_POSTS,
+    POSTS_AND_WALL,
     WALL_NEAR_BUILDING,
     WALL_NEAR_CHARGE,
     AnnealingSearch,
@@ -29,6 +31,8 @@ _OTHERS: Final[tuple[SearchMethod, ...]] = (
     ExhaustiveSearch(),
     WALL_NEAR_CHARGE,
     WALL_NEAR_BUILDING,
+    LINE_OF_POSTS,
+    POSTS_AND_WALL,
 )
 
 SEARCH_METHODS: Final[Mapping[str, SearchMethod]] = MappingProxyType(

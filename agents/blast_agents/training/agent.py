@@ -39,15 +39,15 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
 from blast_env.scenario import (
+    AnyCharge,
     AnyScenario,
     AnySource,
     Placement,
-    PointSource,
     Scenario,
     find_scenario,
 )
+from blast_env.scenario.vehicles import source_of
 
 CHECKPOINT_FORMAT: Final = 1
 
@@ -312,7 +312,7 @@ class TrainedAgent:
         """Return loads as the observation asks for them; nothing is made ready before."""
         return SimulatedModuleLoads(self._evaluators)(scenario, sources, blasts)
 
-    def propose(self, scenario: AnyScenario, charge: Charge | None = None) -> Layout:
+    def propose(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
         """Return the layout of the most likely legal actions.
 
         Args:
@@ -327,7 +327,11 @@ class TrainedAgent:
         return self._layouts(find_scenario(scenario), charge, None, 1)[0]
 
     def sample(
-        self, scenario: AnyScenario, charge: Charge | None = None, count: int = 8, seed: int = 0
+        self,
+        scenario: AnyScenario,
+        charge: AnyCharge | None = None,
+        count: int = 8,
+        seed: int = 0,
     ) -> tuple[Layout, ...]:
         """Return layouts of actions drawn as the policy would draw them in training.
 
@@ -346,14 +350,14 @@ class TrainedAgent:
         return self._layouts(find_scenario(scenario), charge, generator, count)
 
     def _layouts(
-        self, scenario: Scenario, charge: Charge | None, draw: torch.Generator | None, count: int
+        self, scenario: Scenario, charge: AnyCharge | None, draw: torch.Generator | None, count: int
     ) -> tuple[Layout, ...]:
         check_size(scenario, self.representative)
         with torch_threads(1):  # for a few small sums more of them only wait
             return self._placed(scenario, charge, draw, count)
 
     def _placed(
-        self, scenario: Scenario, charge: Charge | None, draw: torch.Generator | None, count: int
+        self, scenario: Scenario, charge: AnyCharge | None, draw: torch.Generator | None, count: int
     ) -> tuple[Layout, ...]:
         episode = self._episode(scenario, charge)
         catalogue = scenario.zone.catalogue
@@ -374,10 +378,10 @@ class TrainedAgent:
             open_ones = going_on
         return tuple(placement.layout for placement in placements)
 
-    def _episode(self, scenario: Scenario, charge: Charge | None) -> EpisodeObservation:
+    def _episode(self, scenario: Scenario, charge: AnyCharge | None) -> EpisodeObservation:
         sources = scenario.charge
         if charge is not None:
-            sources = (PointSource.at(charge),)
+            sources = (source_of(charge),)
         observable = Observable(scenario, sources, self._module_loads)
         return OBSERVATIONS[self.observation].episode(observable)
 

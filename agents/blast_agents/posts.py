@@ -1,0 +1,273 @@
+"""Rules of thumb against vehicles: a line of posts, and a wall behind it."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import ceil, floor
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from blast_agents.rules import NEAR_CHARGE, wall_added_to
+from blast_env.arrays import BoolArray
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Cell, Layout, Rectangle
+from blast_env.scenario import (
+    AnyCharge,
+    AnyScenario,
+    Placement,
+    Scenario,
+    VehicleSource,
+    find_scenario,
+)
+from blast_env.scenario.build_scene import worst_places
+from blast_env.units import MODULE_SIDE_M
+
+_TOLERANCE: Final = 1e-6
+"""Of lengths in modules, and of scaled distances."""
+
+
+def line_of_posts(
+    scenario: AnyScenario,
+    charge: AnyCharge | None = None,  # noqa: ARG001
+) -> Layout:
+    """Return a line of posts that keeps vehicles as far away as the stock reaches.
+
+    Tried are straight lines along every row and column of the build zone, from one thing that
+    stops a vehicle to the next, and rings around the protected structures at every distance; each
+    with as few posts as leave no gap that the narrowest vehicle fits through. A post is a module
+    or, with a catalogue, an item that stops vehicles, the same one along a line and with its length
+    along it. The line that keeps the vehicles furthest away, by the least scaled distance of any,
+    is taken, and of several the cheapest. Posts without which it keeps them as far away are left
+    out.
+
+    Every post goes through `Placement`: budget, access way and all other conditions hold.
+
+    Args:
+        scenario: The scenario, or its bundled name or path; it has a build zone and a vehicle.
+        charge: Plays no part: the line is against all vehicles of the scenario.
+
+    Returns:
+        The posts; none if no line keeps the vehicles any further away.
+
+    Raises:
+        BlastEnvError: If the scenario has no build zone or no vehicle.
+    """
+    return _line_of_posts(find_scenario(scenario)).layout
+
+
+def posts_and_wall(
+    scenario: AnyScenario,
+    charge: AnyCharge | None = None,  # noqa: ARG001
+) -> Layout:
+    """Return the line of posts, and what is left of the stock as a wall behind it.
+
+    The wall stands across the line of sight from the worst place that the posts leave a vehicle to
+    the protected structures, as near to that place as it can; see `line_of_sight_wall`.
+
+    Args:
+        scenario: As for `line_of_posts`.
+        charge: As for `line_of_posts`.
+
+    Raises:
+        BlastEnvError: As for `line_of_posts`.
+    """
+    found = find_scenario(scenario)
+    posts = _line_of_posts(found)
+    source = min(found.vehicles, key=lambda each: _Vehicles.scaled_m(found, each, posts.layout))
+    place = worst_places(found, source, posts.layout).charge(0)
+    return wall_added_to(posts, place.position_m, NEAR_CHARGE).layout
+
+
+VEHICLE_RULES: Final[Mapping[str, Callable[[AnyScenario, AnyCharge | None], Layout]]] = (
+    MappingProxyType({"line of posts": line_of_posts, "posts and a wall": posts_and_wall})
+)
+"""The two rules that an engineer would try first against a vehicle, by name."""
+
+
+def _line_of_posts(scenario: Scenario) -> Placement:
+    scenario.zone  # noqa: B018  # refuses a scenario without one
+    if not scenario.vehicles:
+        raise BlastEnvError(
+            f"{scenario.name} has no vehicle (a source of kind 'vehicle'): no line of posts to set"
+        )
+    vehicles = _Vehicles(scenario)
+    best = Placement.empty(scenario)
+    farthest = vehicles.farthest(best)
+    for item, line in product(vehicles.items(), vehicles.lines()):
+        placement = vehicles.with_posts(line, item)
+        if placement is None:
+            continue
+        distance = vehicles.farthest(placement)
+        cheaper = placement.cost < best.cost - _TOLERANCE
+        if distance > farthest + _TOLERANCE or (cheaper and distance > farthest - _TOLERANCE):
+            best, farthest = placement, distance
+    return vehicles.without_idle_posts(best)
+
+
+Line = tuple[tuple[Cell, ...], ...]
+"""Straight runs of squares in the build zone's grid, from end to end, also beyond the zone."""
+
+
+class _Post(NamedTuple):
+    """What stands along a run.
+
+    Attributes:
+        variant: Number of the variant.
+        length: Modules along the run.
+    """
+
+    variant: int
+    length: int
+
+    def is_legal(self, placement: Placement, cell: Cell) -> bool:
+        """Whether it may be set down now with its first module there."""
+        zone = placement.scenario.zone
+        return zone.has(cell) and bool(placement.legal[self.variant, *cell])
+
+
+@dataclass(frozen=True)
+class _Vehicles:
+    """All vehicles of a scenario together, and the squares of its build zone's grid.
+
+    Attributes:
+        scenario: The scenario.
+    """
+
+    scenario: Scenario
+
+    @staticmethod
+    def scaled_m(scenario: Scenario, source: VehicleSource, layout: Layout) -> float:
+        """Return how near a vehicle comes, m / kg^(1/3)."""
+        distance_m = worst_places(scenario, source, layout).stand_off_m
+        return float(distance_m / np.cbrt(source.tnt_kg))
+
+    def farthest(self, placement: Placement) -> float:
+        """Return the least scaled distance at which any vehicle is kept, m / kg^(1/3)."""
+        return min(
+            self.scaled_m(self.scenario, source, placement.layout)
+            for source in self.scenario.vehicles
+        )
+
+    @cached_property
+    def span(self) -> tuple[range, range]:
+        """Rows and columns of the grid, continued to the border of the site."""
+        zone, site = self.scenario.zone, self.scenario.site
+        (left, bottom), side = zone.corner_m, MODULE_SIDE_M
+        rows = range(-floor(bottom / side), ceil((site.height_m - bottom) / side - _TOLERANCE))
+        columns = range(-floor(left / side), ceil((site.width_m - left) / side - _TOLERANCE))
+        return rows, columns
+
+    @cached_property
+    def closed(self) -> BoolArray:
+        """Which squares of the span something closes to every vehicle (rows, columns)."""
+        rows, columns = self.span
+        closed = np.ones((len(rows), len(columns)), dtype=bool)
+        for source in self.scenario.vehicles:
+            own = np.zeros_like(closed)
+            for rectangle in self.scenario.vehicle_ground(source).closed_m:
+                own[self._squares(rectangle)] = True
+            closed &= own
+        return closed
+
+    def lines(self) -> Iterator[Line]:
+        """Yield straight lines, then rings from the nearest on."""
+        rows, columns = self.span
+        zone = self.scenario.zone
+        for row in range(zone.rows):
+            yield (tuple((row, column) for column in columns),)
+        for column in range(zone.columns):
+            yield (tuple((row, column) for row in rows),)
+        protected = [each.rectangle_m for each in self.scenario.structures if each.protected]
+        around = Rectangle.around(protected)
+        for steps in range(max(len(rows), len(columns))):
+            yield self._ring(around.grown(steps * MODULE_SIDE_M))
+
+    def items(self) -> list[int]:
+        """Return the numbers of the items that stop vehicles, or that of the single module."""
+        variants = Placement.empty(self.scenario).catalogue.variants
+        return sorted({each.item for each in variants if each.stops_vehicles})
+
+    def with_posts(self, line: Line, item: int) -> Placement | None:
+        """Return as few posts as close a line, or `None` if they do not.
+
+        Args:
+            line: The line.
+            item: Number of the item that the posts are.
+        """
+        placement = Placement.empty(self.scenario)
+        for run in line:
+            post = self._along(item, run)
+            end = 0  # of what closes the run so far
+            for index in range(len(run) + 1):
+                if index < len(run) and not self._is_closed(placement, run[index]):
+                    continue
+                while index - end >= self.width - _TOLERANCE:
+                    latest = min(ceil(end + self.width - _TOLERANCE) - 1, index - post.length)
+                    tried = range(latest, end - 1, -1)
+                    at = next((at for at in tried if post.is_legal(placement, run[at])), None)
+                    if at is None:
+                        return None
+                    element = placement.catalogue.element_at(post.variant, *run[at])
+                    placement = placement.place(element)
+                    end = at + post.length
+                end = index + 1
+        return placement
+
+    def without_idle_posts(self, placement: Placement) -> Placement:
+        """Return the placement without posts that keep no vehicle any further away."""
+        farthest = self.farthest(placement)
+        for post in placement.layout:
+            fewer = tuple(each for each in placement.layout if each != post)
+            without = Placement.of(self.scenario, fewer)
+            if self.farthest(without) > farthest - _TOLERANCE:
+                placement = without
+        return placement
+
+    @cached_property
+    def width(self) -> float:
+        """Width of the narrowest vehicle in modules."""
+        return min(each.width_m for each in self.scenario.vehicles) / MODULE_SIDE_M
+
+    def _along(self, item: int, run: tuple[Cell, ...]) -> "_Post":
+        """Return an item with as much of its length along a run as it may have."""
+        is_row = run[0][0] == run[-1][0]
+        variants = Placement.empty(self.scenario).catalogue.variants
+        posts = [
+            _Post(number, each.columns if is_row else each.rows)
+            for number, each in enumerate(variants)
+            if each.item == item
+        ]
+        return max(posts, key=lambda post: post.length)
+
+    def _is_closed(self, placement: Placement, square: Cell) -> bool:
+        """Whether something closes a square to every vehicle: what stands there, or a post."""
+        rows, columns = self.span
+        return bool(
+            self.closed[square[0] - rows.start, square[1] - columns.start]
+            or square in placement.cells
+        )
+
+    def _ring(self, inner_m: Rectangle) -> Line:
+        """Return the runs of squares just outside of a rectangle, where there are any."""
+        rows, columns = self.span
+        vertical, horizontal = self._squares(inner_m)
+        low, high = vertical.start + rows.start - 1, vertical.stop + rows.start
+        left, right = horizontal.start + columns.start - 1, horizontal.stop + columns.start
+        up = [row for row in range(low, high + 1) if row in rows]
+        across = [column for column in range(left, right + 1) if column in columns]
+        runs = [tuple((row, column) for row in up) for column in (left, right) if column in columns]
+        runs += [tuple((row, column) for column in across) for row in (low, high) if row in rows]
+        return tuple(runs)
+
+    def _squares(self, rectangle_m: Rectangle) -> tuple[slice, slice]:
+        """Return the squares of the span that a rectangle overlaps."""
+        (left, bottom), side = self.scenario.zone.corner_m, MODULE_SIDE_M
+        rows, columns = self.span
+        low = floor((rectangle_m.bottom - bottom) / side + _TOLERANCE) - rows.start
+        high = ceil((rectangle_m.top - bottom) / side - _TOLERANCE) - rows.start
+        first = floor((rectangle_m.left - left) / side + _TOLERANCE) - columns.start
+        last = ceil((rectangle_m.right - left) / side - _TOLERANCE) - columns.start
+        return slice(max(low, 0), max(high, 0)), slice(max(first, 0), max(last, 0))

@@ -1,0 +1,135 @@
+"""The environment with a vehicle: its charge depends on the layout, and the agent sees its way."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.observations import FeaturesObservation, GridObservation
+from blast_env.envs.strategies import SingleScenario, check_size
+from blast_env.envs.vehicle_observations import EMPTY_REACH, REACH
+from blast_env.errors import BlastEnvError
+from blast_env.scenario.build_scene import vehicle_reach, worst_places
+from tests.vehicle_sites import POSTS, gate_site, site_document, vehicle_document, vehicle_of
+
+SITE = gate_site(vehicle_document(places=2))
+SOURCE = vehicle_of(SITE)
+FINISH = np.int64(16 * 4)
+
+
+def env(**changes: Any) -> BlastBarrierEnv:
+    return BlastBarrierEnv(SITE, **({"engine": "gas", "observation": "grid"} | changes))
+
+
+@pytest.fixture(scope="module")
+def finished() -> tuple[float, dict[str, Any]]:
+    """Reward and information at the end of an episode with the posts."""
+    barrier = env(threat="hidden", threats=3)
+    barrier.reset(seed=0, options={"layout": POSTS})
+    _, reward, terminated, _, info = barrier.step(FINISH)
+    assert terminated
+    return float(reward), info
+
+
+def test_the_charges_are_where_the_layout_let_the_vehicle_come(
+    finished: tuple[float, dict[str, Any]],
+) -> None:
+    _, info = finished
+    worst = worst_places(SITE, SOURCE, POSTS)
+    expected = tuple(worst.charge(rank) for rank in range(3))
+    assert info["charges"] == expected
+    assert expected[2] == expected[0]
+    assert info["reduction"] > 0.4
+    assert info["impulse_pa_s"] < info["unprotected_impulse_pa_s"]
+
+
+def test_incremental_rewards_add_up_though_the_charge_moves(
+    finished: tuple[float, dict[str, Any]],
+) -> None:
+    barrier = env(threat="hidden", threats=3, reward="incremental")
+    barrier.reset(seed=0)
+    actions = [row * 4 + column for row, column in POSTS]
+    rewards = [float(barrier.step(action)[1]) for action in actions]
+    _, last, terminated, _, info = barrier.step(FINISH)
+    assert terminated
+    assert sum(rewards) + float(last) == pytest.approx(finished[0])
+    # A line with a gap keeps nothing away: it is the post in the last gap of 2 m or more that pays.
+    assert rewards[4] == max(rewards) > 100.0 * max(rewards[:4])
+    assert info["charges"] == finished[1]["charges"]
+
+
+def test_the_planes_show_the_entry_and_the_ground_that_the_vehicle_reaches() -> None:
+    for threat in ("visible", "hidden"):
+        barrier = env(threat=threat)
+        observation, _ = barrier.reset(seed=1)
+        channels = GridObservation().channels_of(SITE)
+        planes = dict(zip(channels, observation, strict=True))
+        bare = vehicle_reach(SITE, SOURCE).ground(16, 28)
+        assert (planes[EMPTY_REACH] == 255 * bare).all()
+        assert (planes[REACH] == 255 * bare).all()
+        rows, columns = np.nonzero(planes["charge"])
+        assert set(columns.tolist()) == {0}
+        assert (rows.min(), rows.max()) == (3, 12) or (rows.min(), rows.max()) == (4, 11)
+        for row, column in POSTS:
+            observation, *_ = barrier.step(row * 4 + column)
+        planes = dict(zip(channels, observation, strict=True))
+        assert (planes[REACH] == 255 * vehicle_reach(SITE, SOURCE, POSTS).ground(16, 28)).all()
+        assert (planes[EMPTY_REACH] == 255 * bare).all()
+        assert planes[REACH][:, 8:].max() == 0
+
+
+def test_the_vector_ends_with_the_stand_off() -> None:
+    barrier = env(observation="features")
+    first, _ = barrier.reset(seed=1)
+    last, _ = barrier.reset(seed=1, options={"layout": POSTS})
+    diagonal_m = np.hypot(14.0, 8.0)
+    assert first[-1] == pytest.approx(1.0 / diagonal_m)
+    assert last[-1] == pytest.approx(7.0 / diagonal_m)
+    assert len(first) == FeaturesObservation().space(SITE).shape[0]  # type: ignore[index]
+    cells = 16 * 4
+    assert last[-1 - 3 * cells : -1 - 2 * cells].sum() == len(POSTS)
+
+
+def test_with_a_catalogue_the_vector_keeps_the_order_of_its_parts() -> None:
+    items = [{"name": "post", "length_modules": 1, "height_m": 1.0, "cost": 1.0, "stock": 8}]
+    zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4, "items": items}
+    barrier = BlastBarrierEnv(gate_site(build_zone=zone), engine="gas", observation="features")
+    observation, info = barrier.reset(seed=0)
+    assert observation[-1] == pytest.approx(1.0 / np.hypot(14.0, 8.0))
+    legal = np.asarray(info["action_mask"][:-1], dtype=bool)
+    assert (observation[-1 - len(legal) : -1] == legal).all()
+
+
+def test_a_fixed_charge_comes_in_no_vehicle() -> None:
+    barrier = env()
+    barrier.reset(seed=0, options={"charge_position_m": (2.0, 2.0), "tnt_kg": 7.0})
+    *_, info = barrier.step(FINISH)
+    assert info["charges"] == (((2.0, 2.0), 7.0, 0.0),)
+    barrier.reset(seed=0, options={"tnt_kg": 7.0})
+    *_, info = barrier.step(FINISH)
+    assert info["charges"] == (((9.0, 4.0), 7.0, 0.0),)
+
+
+def test_the_environment_keeps_the_rules_of_gymnasium() -> None:
+    check_env(env(), skip_render_check=True)
+
+
+def test_a_site_without_a_vehicle_has_another_size() -> None:
+    point = {"kind": "point", "position_m": [2.0, 4.0], "tnt_kg": 5.0}
+    without = gate_site(**(site_document() | {"charge": [point]}))
+    with pytest.raises(BlastEnvError, match="number of vehicles"):
+        check_size(without, SingleScenario(SITE).representative)
+
+
+def test_the_picture_shows_the_ground_that_is_left() -> None:
+    barrier = env(render_mode="rgb_array")
+    barrier.reset(seed=0)
+    before = np.asarray(barrier.render(), dtype=int)
+    barrier.reset(seed=0, options={"layout": POSTS})
+    after = np.asarray(barrier.render(), dtype=int)
+    # Beside the hut, far from zone and text: red as long as the vehicle gets there.
+    height, width = before.shape[:2]
+    reddened = (before[..., 0] - before[..., 2] > 10) & (after[..., 0] - after[..., 2] <= 10)
+    assert reddened[:, int(0.6 * width) :].sum() > 0.02 * height * width

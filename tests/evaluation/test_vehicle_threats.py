@@ -1,0 +1,108 @@
+"""Threats that depend on the layout: a vehicle's charge, with the barrier and without it."""
+
+import numpy as np
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import (
+    BlastEvaluator,
+    Case,
+    Evaluators,
+    LayoutEvaluation,
+    Threat,
+    compare,
+    draw_threats,
+    evaluate_layout,
+)
+from blast_env.evaluation.cases import practice_hidden
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
+from blast_env.scenario import VehicleCharge
+from blast_env.scenario.build_scene import build_site, worst_places
+from blast_env.simulation import simulate
+from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of
+
+SITE = gate_site(vehicle_document(places=2), calibration="ballistic_kb_100kg")
+SOURCE = vehicle_of(SITE)
+GAS = GasEngine()
+
+
+@pytest.fixture(scope="module")
+def evaluation() -> LayoutEvaluation:
+    """Posts against two places, by gas."""
+    return evaluate_layout(SITE, POSTS, seeds=range(2), engine=GAS)
+
+
+def test_each_threat_is_at_its_own_worst_place_with_the_posts_and_without(
+    evaluation: LayoutEvaluation,
+) -> None:
+    with_posts, bare = worst_places(SITE, SOURCE, POSTS), worst_places(SITE, SOURCE)
+    for rank, outcome in enumerate(evaluation.outcomes):
+        assert outcome.threat == Threat(VehicleCharge(SOURCE, rank), rank)
+        assert outcome.charge.position_m == with_posts.places_m[rank]
+        assert outcome.stand_off_m == pytest.approx(with_posts.distances_m[rank])
+        assert outcome.unprotected_stand_off_m == pytest.approx(bare.distances_m[rank])
+        charge = Charge(bare.places_m[rank], 5.0)
+        alone = simulate(gate_site(), charge=charge, engine=GAS)
+        assert outcome.unprotected_impulse_pa_s == pytest.approx(alone.impulse("hut").pa_s)
+    assert evaluation.mean_reduction > 0.5  # distance does that, not the posts of 1 m
+    table = evaluation.threat_table
+    assert table["stand_off_m"].tolist() == pytest.approx(list(with_posts.distances_m))
+    assert table["charge_x_m"].tolist() == [place[0] for place in with_posts.places_m]
+    assert evaluation.to_dict()["result"]["worst"]["charge_position_m"][0] < 4.0
+
+
+def test_the_mechanism_is_the_same_for_all_that_judge_layouts(
+    evaluation: LayoutEvaluation,
+) -> None:
+    case = Case(SITE, evaluation.threats)
+    together = compare(Evaluators(GAS), [case, case], [POSTS, ()])
+    assert together.case_reductions.tolist() == [evaluation.mean_reduction, 0.0]
+
+
+def test_more_threats_than_places_meet_the_worst_ones_again_and_cost_nothing() -> None:
+    evaluator = BlastEvaluator(SITE, GAS)
+    threats = draw_threats(SITE, range(5))
+    ranks = [each.charge.rank for each in threats if isinstance(each.charge, VehicleCharge)]
+    assert ranks == list(range(5))
+    loads = evaluator.loads_of_many([(POSTS, threat) for threat in threats])
+    assert evaluator.blasts == 2
+    impulses = np.array([each.protected_impulse_pa_s for each in loads])
+    assert (impulses[[0, 1, 0, 1, 0]] == impulses).all()
+
+
+def test_layouts_that_leave_the_vehicle_where_it_is_share_no_blast() -> None:
+    """The key of a blast has the place and the layout: both count."""
+    evaluator = BlastEvaluator(SITE, GAS)
+    threat = draw_threats(SITE, [0])[0]
+    evaluator.loads_of_many([(POSTS, threat), (POSTS[::-1], threat), ((), threat)])
+    assert (evaluator.blasts, evaluator.cache_hits) == (2, 1)
+
+
+def test_particles_judge_a_vehicle_too() -> None:
+    threat = Threat(VehicleCharge(SOURCE), 3)
+    evaluator = BlastEvaluator(SITE, "event")
+    load = evaluator.loads(POSTS, threat).protected_impulse_sim
+    place = worst_places(SITE, SOURCE, POSTS).charge(0)
+    assert load == simulate(SITE, POSTS, 3, "event", place).impulse_sim("hut")
+
+
+def test_a_blast_without_a_charge_given_has_the_vehicle_at_its_worst_place() -> None:
+    for layout in ((), POSTS):
+        expected = worst_places(SITE, SOURCE, layout).charge(0)
+        assert build_site(SITE, layout, seed=4).charge == expected
+
+
+def test_a_search_meets_the_worst_places_first() -> None:
+    road = {"kind": "segment", "start_m": [2.0, 2.0], "end_m": [2.0, 6.0], "tnt_kg": 5.0}
+    both = gate_site(charge=[vehicle_document(), road])
+    threats = practice_hidden(both, 12, 1, seed=0).threats
+    vehicles = [each.charge for each in threats if isinstance(each.charge, VehicleCharge)]
+    assert 0 < len(vehicles) < 12
+    assert [each.charge for each in threats[: len(vehicles)]] == vehicles
+    assert [each.rank for each in vehicles] == list(range(len(vehicles)))
+
+
+def test_a_threat_needs_a_sound_seed() -> None:
+    with pytest.raises(BlastEnvError, match="seed is -1, must be at least 0"):
+        Threat(VehicleCharge(SOURCE), -1)
