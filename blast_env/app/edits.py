@@ -16,6 +16,7 @@ from blast_env.scenario import (
     AnySource,
     RectangleSource,
     Scenario,
+    VehicleSource,
 )
 from blast_env.scenario.sections import PointM
 from blast_env.scenario.zone import source_bounds_m
@@ -169,7 +170,12 @@ def _beside(source: AnySource, x_m: float, y_m: float) -> float:
     """Return how far a place is from where a charge may be."""
     if isinstance(source, RectangleSource):
         return 0.0
-    (x0, y0), (x1, y1) = source.segment_m
+    lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
+    return min(_from_line_m(line_m, x_m, y_m) for line_m in lines_m)
+
+
+def _from_line_m(line_m: tuple[PointM, PointM], x_m: float, y_m: float) -> float:
+    (x0, y0), (x1, y1) = line_m
     square = (x1 - x0) ** 2 + (y1 - y0) ** 2
     along = ((x_m - x0) * (x1 - x0) + (y_m - y0) * (y1 - y0)) / square if square else 0.0
     share = min(max(along, 0.0), 1.0)

@@ -25,7 +25,7 @@ from blast_env.rendering.style import (
     SITE,
     STRUCTURE,
 )
-from blast_env.scenario import AnySource, Placement, RectangleSource, Scenario
+from blast_env.scenario import AnySource, Placement, RectangleSource, Scenario, VehicleSource
 from blast_env.scenario.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 
@@ -281,7 +281,12 @@ def _charge_place(view: View, source: AnySource, radius_m: float, colour: str) -
     if isinstance(source, RectangleSource):
         area = source.rectangle_m.grown(radius_m)
         return _rectangle(view, area, colour, colour, 1.5, opacity=0.25)
-    (x0, y0), (x1, y1) = (view.pixel(*place) for place in source.segment_m)
+    lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
+    return "".join(_charge_line(view, line_m, radius_px, colour) for line_m in lines_m)
+
+
+def _charge_line(view: View, line_m: tuple[PointM, PointM], radius_px: float, colour: str) -> str:
+    (x0, y0), (x1, y1) = (view.pixel(*place) for place in line_m)
     return (
         f'<line x1="{x0}" y1="{y0}" x2="{x1}" y2="{y1}" stroke="{colour}" stroke-opacity="0.35"'
         f' stroke-width="{2.0 * radius_px:.1f}" stroke-linecap="round"></line>'

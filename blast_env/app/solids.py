@@ -5,7 +5,8 @@ from typing import Final, NamedTuple
 
 from blast_env.app import placing
 from blast_env.geometry import Layout, Rectangle
-from blast_env.scenario import AnySource, RectangleSource, Scenario
+from blast_env.scenario import AnySource, RectangleSource, Scenario, VehicleSource
+from blast_env.scenario.sections import PointM
 
 PROTECTED: Final = "#008070"
 STRUCTURE: Final = "#8a8276"
@@ -69,8 +70,13 @@ def _charge(source: AnySource, name: str) -> Iterator[Box]:
         low = source.height_m
         yield _box(source.rectangle_m, low, low + 0.2, CHARGE, 0.5, name)
         return
-    (x0, y0), (x1, y1) = source.segment_m
-    height_m = source.height_m
+    lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
+    for line_m in lines_m:
+        yield from _charge_on_line(line_m, source.height_m, name)
+
+
+def _charge_on_line(line_m: tuple[PointM, PointM], height_m: float, name: str) -> Iterator[Box]:
+    (x0, y0), (x1, y1) = line_m
     line = Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
     if x0 == x1 or y0 == y1:
         yield _box(line.grown(0.15), height_m, height_m + 0.2, CHARGE, 0.6, name)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from blast_env.physics.scene import Charge
-from blast_env.scenario import RectangleSource, Scenario, SegmentSource
+from blast_env.scenario import RectangleSource, Scenario, SegmentSource, VehicleSource
 from blast_env.scenario.sections import PointM
 
 
@@ -37,6 +37,8 @@ def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
                 (", upper left", (left, top)),
                 (", upper right", (right, top)),
             ]
+        elif isinstance(source, VehicleSource):
+            continue  # where it gets to depends on the layout
         else:
             places = [("", source.position_m)]
         named += [

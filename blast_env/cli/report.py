@@ -42,7 +42,7 @@ def report(
         Path | None, typer.Option(help="front.csv of `blast-env search --method nsga2`.")
     ] = None,
     places: Annotated[int, typer.Option(help="Other places of each charge source.")] = 5,
-    items: Annotated[bool, typer.Option(help="Rank what each module is worth.")] = True,
+    items: Annotated[bool, typer.Option(help="Rank what each module or piece is worth.")] = True,
     stills: Annotated[int, typer.Option(help="Moments of the film, 0 to 12.")] = 4,
     processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
     cache: Annotated[
@@ -52,7 +52,7 @@ def report(
     """Report on a layout by gas dynamics: HTML that needs nothing else, and PDF.
 
     Site and threats, bill of quantities, loads with two sizes of cells, facades, film stills, what
-    each module is worth, other masses and places, limits, validity, and everything to repeat it.
+    each item is worth, other masses and places, limits, validity, and everything to repeat it.
     """
     with user_errors():
         # Here, because reports need extras, and Numba half a second.

@@ -28,7 +28,7 @@ from blast_env.reporting.loads import Measured, Target
 from blast_env.reporting.outcomes import FrontPoint, ItemWorth, Outcome
 from blast_env.reporting.threats import NamedCharge
 from blast_env.reporting.units import UnitSystem
-from blast_env.scenario import PointSource, RectangleSource, Scenario
+from blast_env.scenario import PointSource, RectangleSource, Scenario, VehicleSource
 from blast_env.simulation.gas import GasBlast
 from blast_env.units import MODULE_SIDE_M, MS_PER_S
 
@@ -129,8 +129,9 @@ def _draw_sources(axes: Axes, scenario: Scenario) -> None:
                 axes, source.rectangle_m, facecolor=(*colour, 0.2), edgecolor=colour, fill=True
             )
         elif not isinstance(source, PointSource):
-            x, y = np.transpose(source.segment_m)
-            axes.plot(x, y, color=(*colour, 0.5), linewidth=2.5, zorder=2)
+            lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
+            for line_m in lines_m:
+                axes.plot(*np.transpose(line_m), color=(*colour, 0.5), linewidth=2.5, zorder=2)
 
 
 def _draw_threat(axes: Axes, threat: NamedCharge) -> None:
@@ -274,7 +275,7 @@ def film_stills(
 
 
 def worth_map(scenario: Scenario, targets: Sequence[Target], items: Sequence[ItemWorth]) -> bytes:
-    """Return the layout with every module in the colour of what it is worth."""
+    """Return the layout with every module or piece in the colour of what it is worth."""
     figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.3), layout="constrained")
     axes = figure.subplots()
     draw_site(axes, scenario.site.rectangle_m)
@@ -284,13 +285,13 @@ def worth_map(scenario: Scenario, targets: Sequence[Target], items: Sequence[Ite
     worths = 100.0 * np.array([each.worth for each in items])
     reach = max(float(np.abs(worths).max()), 1e-6)
     scale = TwoSlopeNorm(0.0, -reach, reach)
-    squares = [rectangle_patch(scenario.zone.cell_rectangle_m(each.cell)) for each in items]
+    squares = [rectangle_patch(each.rectangle_m) for each in items]
     modules = PatchCollection(squares, cmap="PuOr", norm=scale, edgecolor=unit_interval(INK))
     modules.set_array(worths)
     modules.set(linewidth=0.5, zorder=5)
     axes.add_collection(modules)
-    cells = np.array([each.centre_m for each in items])
-    low, high = cells.min(axis=0), cells.max(axis=0)
+    sides = np.array([each.rectangle_m for each in items])
+    low, high = sides[:, :2].min(axis=0), sides[:, 2:].max(axis=0)
     reach_m = max(8.0 * MODULE_SIDE_M, 0.6 * float((high - low).max()))
     axes.set_xlim(low[0] - reach_m, high[0] + reach_m)
     axes.set_ylim(low[1] - reach_m, high[1] + reach_m)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from blast_env.geometry import Cell, Layout
+from blast_env.geometry import Layout, Rectangle
 from blast_env.reporting.loads import Target, TargetLoad
 from blast_env.reporting.threats import NamedCharge
 from blast_env.statistics import reductions
@@ -56,17 +56,17 @@ class Outcome:
 
 @dataclass(frozen=True)
 class ItemWorth:
-    """What one module of the layout is worth.
+    """What one module or piece of the layout is worth.
 
     Attributes:
-        cell: Its cell.
-        centre_m: Its centre.
+        name: Its row and column, and its item if it is a piece.
+        rectangle_m: The ground that it covers.
         worth: By how much of the impulse without a barrier the impulse grows where it is left
             out, mean over the threats; below 0 where the layout is better without it.
     """
 
-    cell: Cell
-    centre_m: tuple[float, float]
+    name: str
+    rectangle_m: Rectangle
     worth: float
 
 
@@ -75,7 +75,7 @@ class FrontPoint:
     """A layout of a front.
 
     Attributes:
-        layout: Its cells.
+        layout: Its modules or pieces.
         cost: Its cost.
         reduction: Share of the impulse that is gone, mean over the threats.
     """

@@ -1,12 +1,12 @@
 """The report as HTML that needs nothing else, and as PDF."""
 
-import json
 from base64 import b64encode
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
 from math import isfinite, isnan
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +14,7 @@ import tomli_w
 
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.files import write_atomically
+from blast_env.geometry import layout_counts, layout_text
 from blast_env.physics.gas.engine import CHECKED_SCALED_DISTANCE
 from blast_env.provenance import code_version, command, versions
 from blast_env.reporting.figures import (
@@ -27,6 +28,7 @@ from blast_env.reporting.limits import Limit
 from blast_env.reporting.outcomes import LoadPair
 from blast_env.reporting.study import Study
 from blast_env.reporting.threats import other_places
+from blast_env.scenario import write_layout
 from blast_env.units import MS_PER_S
 
 with import_extra("report", "reports"):
@@ -134,8 +136,8 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
     coarse, fine = options.cells_m
     protected = [each for each in study.targets if each.protected]
     zone = scenario.zone
-    modules_m = [zone.cell_rectangle_m(cell) for cell in study.layout]
-    layout_json = json.dumps([list(cell) for cell in study.layout])
+    modules_m = [zone.element_rectangle_m(each) for each in study.layout]
+    layout_json = _layout_file(study)
     places = other_places(scenario, options.places)
     return {
         "study": study,
@@ -160,8 +162,9 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "scenario_toml": tomli_w.dumps(scenario.model_dump(mode="json", exclude_none=True)),
         "layout_json": layout_json,
         "layout_hash": sha256(layout_json.encode()).hexdigest()[:_HASH_DIGITS],
-        "rank": range(1, len(study.items) + 1),
-        "isnan": isnan,
+        "layout_words": layout_counts(study.layout),
+        "texts": [layout_text(each.layout) for each in study.front],
+        "bill": study.bill.astype(object).where(study.bill.notna(), None).to_dict("records"),
     }
 
 
@@ -220,7 +223,7 @@ def _front(study: Study) -> bytes:
             weighted.append(own.reduction)
     if not weighted:
         raise AssertionError(f"no threat was run with cells of {coarse:g} m")
-    return front_figure(study.front, (study.bill.cost, float(np.mean(weighted))), len(weighted))
+    return front_figure(study.front, (study.cost, float(np.mean(weighted))), len(weighted))
 
 
 def _number(value: float) -> str:
@@ -239,6 +242,13 @@ def _percent(share: float) -> str:
 
 def _points(share: float) -> str:
     return f"{100.0 * share:+.2f}".replace("-", _MINUS)
+
+
+def _layout_file(study: Study) -> str:
+    """Return the layout as a file that commands take."""
+    with TemporaryDirectory() as folder:
+        path = write_layout(Path(folder) / "layout.json", study.scenario, study.layout)
+        return path.read_text(encoding="utf-8")
 
 
 def _quoted(part: str) -> str:

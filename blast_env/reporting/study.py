@@ -12,14 +12,15 @@ import pandas as pd
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Threat
-from blast_env.geometry import Cell, Layout
+from blast_env.export.bill import bill_of_quantities
+from blast_env.export.plan import LayoutPlan
+from blast_env.geometry import Element, Layout, Piece, layout_text
 from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.reporting.figures import Picture, blast_pictures, film_stills
 from blast_env.reporting.limits import Limit, check_limits
 from blast_env.reporting.loads import Measured, Target, measure, targets_of
 from blast_env.reporting.outcomes import FrontPoint, ItemWorth, LoadPair, Outcome
-from blast_env.reporting.quantities import Bill, bill_of
 from blast_env.reporting.threats import (
     NamedCharge,
     asked_threats,
@@ -28,7 +29,7 @@ from blast_env.reporting.threats import (
     other_places,
 )
 from blast_env.reporting.units import UNITS, UnitSystem
-from blast_env.scenario import Scenario, check_layout
+from blast_env.scenario import Placement, Scenario, check_layout
 from blast_env.simulation.gas import GasBlast
 from blast_env.statistics import reductions
 
@@ -50,7 +51,7 @@ class StudyOptions:
         units: Units of loads.
         front: CSV file of a search with the layouts of a front.
         places: How many places of each source the sensitivity looks at.
-        items: Whether to rank what each module is worth.
+        items: Whether to rank what each module or piece is worth.
         stills: Moments of the film.
         processes: Worker processes of blasts that need no pictures.
         cache: Folder in which those blasts are kept.
@@ -105,11 +106,12 @@ class Study:
         options: What was asked for.
         targets: The buildings.
         threats: The threats.
-        bill: What the layout is made of.
+        bill: What the layout is made of; `blast_env.export.bill.BILL_COLUMNS`.
+        cost: Its cost.
         pairs: Loads by threat, building and cell size.
         pictures: Facades and histories, by threat.
         stills: Moments of the film of the first threat.
-        items: What each module is worth, the most valuable one first.
+        items: What each module or piece is worth, the most valuable one first.
         masses: The first threats with other masses, by the name of the threat.
         places: Charges at other places.
         front: The front, if one was searched.
@@ -123,7 +125,8 @@ class Study:
     options: StudyOptions
     targets: tuple[Target, ...]
     threats: tuple[NamedCharge, ...]
-    bill: Bill
+    bill: pd.DataFrame
+    cost: float
     pairs: tuple[LoadPair, ...]
     pictures: dict[str, tuple[Picture, ...]]
     stills: tuple[Picture, ...]
@@ -166,7 +169,7 @@ Told = Callable[[str, float], None]
 
 def run_study(
     scenario: Scenario,
-    layout: Sequence[Cell],
+    layout: Sequence[Element],
     options: StudyOptions | None = None,
     progress: Told = lambda _, __: None,
 ) -> Study:
@@ -196,11 +199,11 @@ def run_study(
     for threat in threats:
         check_layout(scenario.with_possible_charges([threat.charge]), cells)
     front = _front_layouts(options.front, scenario)
-    bill = bill_of(scenario, cells)
-    work = _Work(scenario, cells, options, targets, threats, progress)
-    work.run_threats()
-    stills = work.film() if options.stills else ()
-    masses, left_out = work.other_masses()
+    bill = bill_of_quantities(LayoutPlan(scenario, cells))
+    runs = Runs(scenario, cells, options, targets, threats, progress)
+    runs.run_threats()
+    stills = runs.film() if options.stills else ()
+    masses, left_out = runs.other_masses()
     return Study(
         scenario=scenario,
         layout=cells,
@@ -208,20 +211,21 @@ def run_study(
         targets=targets,
         threats=threats,
         bill=bill,
-        pairs=tuple(work.pairs),
-        pictures=work.pictures,
+        cost=Placement.of(scenario, cells).cost,
+        pairs=tuple(runs.pairs),
+        pictures=runs.pictures,
         stills=stills,
-        items=work.item_worths() if options.items else (),
+        items=runs.item_worths() if options.items else (),
         masses=masses,
-        places=work.other_places(),
-        front=work.front_points(front),
-        notes=tuple(dict.fromkeys(work.notes)),
+        places=runs.other_places(),
+        front=runs.front_points(front),
+        notes=tuple(dict.fromkeys(runs.notes)),
         left_out=left_out,
-        digests=tuple(work.digests),
+        digests=tuple(runs.digests),
     )
 
 
-class _Work:
+class Runs:
     """The blasts of a report, one part after the other."""
 
     def __init__(
@@ -320,17 +324,21 @@ class _Work:
         )
 
     def item_worths(self) -> tuple[ItemWorth, ...]:
-        """Return what every module is worth: the impulse where it alone is left out."""
+        """Return what every module or piece is worth: the impulse where it alone is left out."""
         fewer = [
             self.layout[:index] + self.layout[index + 1 :] for index in range(len(self.layout))
         ]
         charges = [each.charge for each in self.threats]
-        impulses = self._impulses_pa_s("without each module", ((), self.layout, *fewer), charges)
+        impulses = self._impulses_pa_s("without each item", ((), self.layout, *fewer), charges)
         bare, whole, without = impulses[0], impulses[1], impulses[2:]
         worths = ((without - whole) / bare).mean(axis=1)
         items = [
-            ItemWorth(cell, self.scenario.zone.cell_centre_m(cell), float(worth))
-            for cell, worth in zip(self.layout, worths, strict=True)
+            ItemWorth(
+                layout_text([element]),
+                self.scenario.zone.element_rectangle_m(element),
+                float(worth),
+            )
+            for element, worth in zip(self.layout, worths, strict=True)
         ]
         return tuple(sorted(items, key=lambda each: -each.worth))
 
@@ -343,7 +351,7 @@ class _Work:
         bare = np.broadcast_to(impulses[0], impulses[1:].shape)
         gone = reductions(impulses[1:], bare).mean(axis=1)
         points = [
-            FrontPoint(layout, bill_of(self.scenario, layout).cost, float(share))
+            FrontPoint(layout, Placement.of(self.scenario, layout).cost, float(share))
             for layout, share in zip(layouts, gone, strict=True)
         ]
         return tuple(sorted(points, key=lambda each: (each.cost, each.reduction)))
@@ -370,18 +378,25 @@ def _front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
     try:
         table = pd.read_csv(path, dtype={"layout": str}, keep_default_na=False)
         texts = table["layout"].tolist()
-        layouts = [_layout_from(text) for text in texts]
-    except (OSError, KeyError, ValueError) as error:
+        layouts = [layout_from(text) for text in texts]
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise BlastEnvError(
-            f"{path}: is not the front.csv of a search (column `layout`, cells as row,column): "
-            f"{error}"
+            f"{path}: is not the front.csv of a search (column `layout`, cells as row,column or "
+            f"pieces as row,column,item): {error}"
         ) from error
     if len(layouts) > MOST_FRONT:
         raise BlastEnvError(f"{path}: has {len(layouts)} layouts, must have at most {MOST_FRONT}")
     return tuple(check_layout(scenario, layout) for layout in layouts if layout)
 
 
-def _layout_from(text: str) -> Layout:
-    """Return a layout from the text that searches write: `3,4 3,5`."""
-    cells = (cell.split(",") for cell in text.split())
-    return tuple((int(row), int(column)) for row, column in cells)
+def layout_from(text: str) -> Layout:
+    """Return a layout from what `layout_text` writes: `3,4 3,5`, `3,4,t_wall 7,4,t_wall,turned`."""
+    return tuple(_element_from(*element.split(",")) for element in text.split())
+
+
+def _element_from(row: str, column: str, item: str = "", turned: str = "") -> Element:
+    if turned not in ("", "turned"):
+        raise ValueError(f"{turned!r} must be 'turned'")
+    if not item:
+        return int(row), int(column)
+    return Piece(int(row), int(column), item, turned == "turned")

@@ -17,6 +17,7 @@ from blast_env.scenario import (
     Scenario,
     ScenarioError,
     SegmentSource,
+    VehicleSource,
 )
 
 _STEPS: Final = 400
@@ -135,6 +136,11 @@ def _spread(source: AnySource, count: int) -> Iterator[tuple[float, float]]:
         (x0, y0), (x1, y1) = source.segment_m
         for share in shares:
             yield x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+    elif isinstance(source, VehicleSource):
+        raise BlastEnvError(
+            "a charge is brought by a vehicle, whose place depends on the layout: the report "
+            "takes charges at places only; name one (--charge)"
+        )
     else:
         left, bottom, right, top = source.rectangle_m
         for across in shares:

@@ -1,4 +1,4 @@
-"""The parts of a report that need no blast: threats, limits, quantities, units, durations."""
+"""The parts of a report that need no blast: threats, limits, units, durations, fronts."""
 
 from math import hypot, inf
 
@@ -8,13 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.geometry import Piece
 from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Limit, StudyOptions, UnitSystem
 from blast_env.reporting.limits import check_limits
 from blast_env.reporting.loads import TargetLoad, first_phase_s, targets_of
-from blast_env.reporting.quantities import bill_of
+from blast_env.reporting.study import layout_from
 from blast_env.reporting.threats import asked_threats, chief_threats, other_masses, other_places
-from blast_env.scenario import Scenario, ScenarioError, load_scenario
+from blast_env.scenario import Scenario, ScenarioError
 from tests.gas_sites import site_document
 from tests.reporting.sites import small_hut
 
@@ -131,28 +132,7 @@ def test_limits_are_of_buildings_that_exist() -> None:
         check_limits([Limit("hut", 1.0), Limit("hut", 2.0)], targets)
 
 
-# Quantities, units, options, durations.
-
-
-def test_bill_adds_up_by_cost() -> None:
-    scenario = load_scenario("street_junction")  # with cost areas and a budget
-    from blast_env.scenario import Placement
-
-    placement = Placement.empty(scenario)
-    while len(placement.cells) < 6:
-        free = np.argwhere(placement.free)
-        row, column = free[len(placement.cells) * 7 % len(free)]
-        placement = placement.place((int(row), int(column)))
-    bill = bill_of(scenario, placement.cells)
-    assert sum(each.count for each in bill.positions) == 6
-    assert sum(each.cost for each in bill.positions) == pytest.approx(bill.cost)
-    assert bill.cost == pytest.approx(placement.cost)
-    assert (bill.budget, bill.ground_m2) == (scenario.zone.budget, 1.5)
-
-
-def test_volume_needs_a_height() -> None:
-    assert bill_of(small_hut(), ((0, 0), (1, 0))).volume_m3 == pytest.approx(2 * 0.25 * 1.5)
-    assert bill_of(load_scenario("courtyard"), ((0, 0),)).volume_m3 is None
+# Units, options, durations.
 
 
 def test_units() -> None:
@@ -191,3 +171,15 @@ def test_duration_of_what_never_comes_or_never_ends() -> None:
     time_s = np.linspace(0.0, 0.01, 11)
     assert np.isnan(first_phase_s(time_s, np.full(11, 900.0)))  # below 1 kPa
     assert np.isnan(first_phase_s(time_s, np.full(11, 2000.0)))
+
+
+def test_fronts_have_cells_or_pieces() -> None:
+    assert layout_from("") == ()
+    assert layout_from("3,4 3,5") == ((3, 4), (3, 5))
+    assert layout_from("3,4,t_wall 7,4,t_wall,turned") == (
+        Piece(3, 4, "t_wall"),
+        Piece(7, 4, "t_wall", True),
+    )
+    for text in ("3", "3;4", "a,4", "3,4,t_wall,left", "1,2,3,turned,5"):
+        with pytest.raises((TypeError, ValueError)):
+            layout_from(text)

@@ -12,14 +12,17 @@ from typer.testing import CliRunner
 import blast_env
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Layout
+from blast_env.geometry import Layout, layout_text
 from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Study, StudyOptions, run_study, write_report
 from blast_env.reporting.loads import Measured, measure, targets_of
 from blast_env.reporting.page import report_html
+from blast_env.reporting.study import Runs
+from blast_env.reporting.threats import chief_threats
 from blast_env.scenario import Scenario, save_scenario, write_layout
 from blast_env.simulation.gas import GasBlast
+from tests.catalogue_sites import WALL, yard
 from tests.reporting.sites import LAYOUT, small_hut
 
 
@@ -76,13 +79,14 @@ def test_worth_of_a_module_is_what_comes_back_without_it(study: Study) -> None:
         for layout in ((), LAYOUT, LAYOUT[1:])
     ]
     bare, whole, without = impulses
-    worths = {each.cell: each.worth for each in study.items}
-    assert worths.keys() == set(LAYOUT)
-    assert worths[LAYOUT[0]] == pytest.approx((without - whole) / bare)
+    worths = {each.name: each.worth for each in study.items}
+    first, second, third, last = (layout_text([each]) for each in LAYOUT)
+    assert worths.keys() == {first, second, third, last}
+    assert worths[first] == pytest.approx((without - whole) / bare)
     assert [each.worth for each in study.items] == sorted(worths.values(), reverse=True)
     # The charge is in the middle before the wall: its ends are worth alike, the middle more.
-    assert worths[LAYOUT[0]] == pytest.approx(worths[LAYOUT[-1]], rel=1e-3)
-    assert worths[LAYOUT[1]] > worths[LAYOUT[0]] > 0.0
+    assert worths[first] == pytest.approx(worths[last], rel=1e-3)
+    assert worths[second] > worths[first] > 0.0
 
 
 def test_more_mass_is_more_impulse_and_places_are_those_of_the_scenario(study: Study) -> None:
@@ -96,6 +100,16 @@ def test_more_mass_is_more_impulse_and_places_are_those_of_the_scenario(study: S
     assert point.layout == ((2, 0), (3, 0))
     assert point.cost == 2.0
     assert 0.0 < point.reduction < outcomes[1].reduction  # two modules of four
+
+
+def test_pieces_of_a_catalogue_are_the_items() -> None:
+    """Ranked one by one, each left out whole."""
+    scenario, threats = yard(), chief_threats(yard(), 1)
+    runs = Runs(scenario, WALL, StudyOptions(), targets_of(scenario), threats, lambda _, __: None)
+    worths = {each.name: each for each in runs.item_worths()}
+    assert worths.keys() == {"5,1,wall,turned", "8,1,wall,turned", "4,1,post"}
+    assert worths["5,1,wall,turned"].rectangle_m == (4.0, 5.0, 4.5, 6.5)
+    assert worths["5,1,wall,turned"].worth > worths["4,1,post"].worth
 
 
 def test_page_needs_nothing_else(page: str) -> None:
@@ -113,13 +127,13 @@ def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: 
     assert f"<td>{100 * fine.reduction:.1f} %</td>" in page
     assert small_hut().content_hash in page
     assert "<code>blast-env report &#34;a site.toml&#34;</code>" in page
-    assert "[[1, 0], [2, 0], [3, 0], [4, 0]]" in page
+    assert "&#34;cells&#34;: [[1, 0], [2, 0], [3, 0], [4, 0]]" in page
     assert "name = &#34;hut&#34;" in page
     for label, digest in study.digests:
         assert f'{label}</td><td class="l"><code>{digest[:16]}' in page
     titles = re.findall(r"<h2>(?:\d\. )?([^<]+)</h2>", page)
     assert titles == [
-        *("Site and threats", "Layout", "Loads", "The blast", "What each module is worth"),
+        *("Site and threats", "Layout", "Loads", "The blast", "What each item is worth"),
         *("Other masses and places", "Reduction against cost", "Validity and limits"),
         "To repeat it",
     ]
@@ -151,7 +165,7 @@ def test_pdf_has_the_same_pages_of_text_and_pictures(study: Study, tmp_path: Pat
     assert html.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     document = pypdfium2.PdfDocument(pdf)
     text = "".join(each.get_textpage().get_text_range() for each in document)
-    assert "What each module is worth" in text
+    assert "What each item is worth" in text
     assert small_hut().content_hash[:20] in text
     assert f"{len(document)} / {len(document)}" in text
     pictures = sum(1 for each in document for item in each.get_objects() if item.type == 3)
