@@ -1,16 +1,17 @@
 """Layouts by hand: rules of thumb, and random layouts."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell, Layout
+from blast_env.geometry import Element, Layout, Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
     AnyCharge,
@@ -20,6 +21,7 @@ from blast_env.scenario import (
     Scenario,
     VehicleSource,
 )
+from blast_env.scenario.catalogue import Variant
 from blast_env.scenario.sections import PointM
 from blast_env.scenario.vehicles import source_of
 from blast_env.scenario.zone import source_bounds_m
@@ -40,7 +42,13 @@ _LEAST_GAIN_M: Final = MODULE_SIDE_M / 2.0
 _TOLERANCE_M: Final = 1e-9
 
 
-def line_of_sight_wall(scenario: AnyScenario, charge: AnyCharge, share: float = 0.5) -> Layout:
+WallKind = Literal["high", "long"]
+"""What a wall of pieces is built of first: the highest items, or those that make most length."""
+
+
+def line_of_sight_wall(
+    scenario: AnyScenario, charge: AnyCharge, share: float = 0.5, kind: WallKind = "high"
+) -> Layout:
     """Return a wall across the line of sight from a charge to the protected structures.
 
     The wall stands at right angles to the line from the charge to the middle of the protected
@@ -48,6 +56,11 @@ def line_of_sight_wall(scenario: AnyScenario, charge: AnyCharge, share: float = 
     sides alike for as long as the stock lasts. Where the cells on its own line are not available,
     it bends, by up to some 60 degrees, or has a gap and goes on behind it. Modules that could only
     thicken the wall stay in stock.
+
+    With a catalogue the wall is of pieces that lie along it, more or less: first of the highest
+    item (`"high"`), or of the one that makes most length for its cost, or as a piece where there is
+    no budget (`"long"`), until its stock or what it may cost is used up; then of the next one.
+    Items of a single module, such as posts, are left in stock where there are others.
 
     Every module goes through `Placement`: budget, access way and all other conditions hold.
 
@@ -57,46 +70,83 @@ def line_of_sight_wall(scenario: AnyScenario, charge: AnyCharge, share: float = 
             place is not known, as that of a vehicle: the middle of its first entry stands for it.
         share: How far through the build zone: 0 as near to the charge as a module can stand on
             the line of sight (or, where none can, beside it), 1 as near to the structures.
+        kind: What is built first where there is a catalogue.
 
     Returns:
-        (row, column) of the modules, from the line of sight outwards; none if no cell between
-        charge and structures is available.
+        The modules or pieces, item by item from the line of sight outwards; none if no cell
+        between charge and structures is available.
 
     Raises:
         BlastEnvError: If the scenario has no build zone, `share` is not from 0 to 1, or the charge
             is in the middle of the protected structures.
     """
-    charge_m = expected_charge([source_of(charge)]).position_m
-    return wall_added_to(Placement.empty(scenario), charge_m, share).layout
+    return wall_added_to(Placement.empty(scenario), _place_m(charge), share, kind).layout
 
 
-def wall_added_to(placement: Placement, charge_m: PointM, share: float) -> Placement:
+def _place_m(charge: AnyCharge) -> PointM:
+    """Return where a charge is, of a vehicle the middle of its first entry."""
+    return expected_charge([source_of(charge)]).position_m
+
+
+def wall_added_to(
+    placement: Placement, charge_m: PointM, share: float, kind: WallKind = "high"
+) -> Placement:
     """Return a placement with a wall beside what stands already; see `line_of_sight_wall`.
 
     Args:
         placement: What stands already.
         charge_m: Where the charge is.
         share: As for `line_of_sight_wall`.
+        kind: As for `line_of_sight_wall`.
 
     Raises:
         BlastEnvError: As for `line_of_sight_wall`.
     """
     if not 0.0 <= share <= 1.0:
         raise BlastEnvError(f"share is {share:g}, must be from 0 to 1")
-    view = _View.of(placement.scenario, charge_m, placement.free)
-    if not view.between.any():
+    view = _View.of(placement, charge_m)
+    variants = _preferred(placement, view.lies_along, kind)
+    variants = [number for number in variants if view.between[number].any()]
+    if not variants:
         return placement
-    wall_m = view.wall_depth_m(share)
-    ends = [_End(side=1.0), _End(side=-1.0)]
-    while ends and not placement.is_full:
-        end = min(ends, key=lambda each: each.reach_m)
-        cell = view.next_cell(placement.free, wall_m, end)
-        if cell is None:
-            ends.remove(end)
-            continue
-        placement = placement.place(cell)
-        ends = [view.end_with(cell, wall_m, each) for each in ends]
+    wall_m = view.wall_depth_m(variants[0], share)
+    ends = {1.0: _End(side=1.0), -1.0: _End(side=-1.0)}
+    for number in variants:
+        growing = list(ends)
+        while growing and not placement.is_full:
+            end = ends[min(growing, key=lambda side: ends[side].reach_m)]
+            place = view.next_place(number, placement.legal[number], wall_m, end)
+            if place is None:
+                growing.remove(end.side)
+                continue
+            placement = placement.place(placement.catalogue.element_at(*place))
+            ends = {each.side: view.end_with(place, wall_m, each) for each in ends.values()}
     return placement
+
+
+def _preferred(placement: Placement, lies_along: BoolArray, kind: WallKind) -> list[int]:
+    """Return the numbers of the variants that a wall is built of, the first choice first.
+
+    Args:
+        placement: What stands already.
+        lies_along: Which variants lie along the wall rather than across it (variants,).
+        kind: What is built first.
+    """
+    variants = placement.catalogue.variants
+    of_item = Counter(each.item for each in variants)
+    numbers = [i for i, each in enumerate(variants) if lies_along[i] or of_item[each.item] == 1]
+    longer = [i for i in numbers if max(variants[i].rows, variants[i].columns) > 1]
+    has_budget = placement.scenario.zone.budget is not None
+
+    def rank(number: int) -> tuple[float, ...]:
+        variant = variants[number]
+        height_m = float("inf") if variant.height_m is None else variant.height_m
+        length = max(variant.rows, variant.columns)
+        if kind == "high":
+            return -height_m, -length / variant.cost, -length
+        return -length / (variant.cost if has_budget else 1.0), -height_m, -length
+
+    return sorted(longer or numbers, key=rank)
 
 
 def wall_near_charge(scenario: AnyScenario, charge: AnyCharge) -> Layout:
@@ -109,10 +159,69 @@ def wall_near_building(scenario: AnyScenario, charge: AnyCharge) -> Layout:
     return line_of_sight_wall(scenario, charge, NEAR_BUILDING)
 
 
-RULES: Final[Mapping[str, Callable[[AnyScenario, AnyCharge], Layout]]] = MappingProxyType(
+def long_wall_near_charge(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+    """Return `wall_near_charge` of the items that make most length for their cost."""
+    return line_of_sight_wall(scenario, charge, NEAR_CHARGE, "long")
+
+
+def long_wall_near_building(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+    """Return `wall_near_building` of the items that make most length for their cost."""
+    return line_of_sight_wall(scenario, charge, NEAR_BUILDING, "long")
+
+
+def ring_around_charge(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+    """Return a wall that bends around the charge, as near to it as the build zone lets it stand.
+
+    Raises:
+        BlastEnvError: As for `line_of_sight_wall`.
+    """
+    placement = Placement.empty(scenario)
+    (x_m, y_m), radius_m = _place_m(charge), placement.scenario.charge_radius_m
+    around = Rectangle(x_m, y_m, x_m, y_m).grown(radius_m)
+    return _ring(placement, around, _protected_middle_m(placement.scenario))
+
+
+def ring_around_building(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+    """Return a wall around the protected structure nearest to a charge, as near as it may stand.
+
+    It begins on the side of the charge and goes round both ways.
+
+    Raises:
+        BlastEnvError: As for `line_of_sight_wall`.
+    """
+    placement = Placement.empty(scenario)
+    protected = [each.rectangle_m for each in placement.scenario.structures if each.protected]
+    x_m, y_m = _place_m(charge)
+    here = Rectangle(x_m, y_m, x_m, y_m)
+    nearest = min(protected, key=lambda rectangle: _gap_m(rectangle, here))
+    return _ring(placement, nearest, (x_m, y_m))
+
+
+Rule = Callable[[AnyScenario, AnyCharge], Layout]
+"""Gives a layout for a charge, without a blast."""
+
+
+RULES: Final[Mapping[str, Rule]] = MappingProxyType(
     {"wall near the charge": wall_near_charge, "wall near the building": wall_near_building}
 )
 """The two rules that an engineer would try first, by name."""
+
+
+ITEM_RULES: Final[Mapping[str, Rule]] = MappingProxyType(
+    {
+        **RULES,
+        "long wall near the charge": long_wall_near_charge,
+        "long wall near the building": long_wall_near_building,
+        "ring around the charge": ring_around_charge,
+        "ring around the building": ring_around_building,
+    }
+)
+"""The rules where there is a catalogue: the walls of `RULES` are of the highest items there."""
+
+
+def rules_for(scenario: AnyScenario) -> Mapping[str, Rule]:
+    """Return the rules for a scenario by name: more of them where items can be chosen."""
+    return ITEM_RULES if Placement.empty(scenario).catalogue.has_items else RULES
 
 
 def expected_charge(sources: Sequence[AnySource]) -> Charge:
@@ -148,24 +257,35 @@ class _End:
     off_m: float = 0.0
 
 
+Place = tuple[int, int, int]
+"""Number of a variant, and row and column of its lower left cell."""
+
+
 @dataclass(frozen=True, eq=False)
 class _View:
-    """The cells of a build zone as seen from a charge along its line of sight.
+    """Where pieces can stand in a build zone, as seen from a charge along its line of sight.
+
+    A single module is a piece of one cell. Arrays are by variant and lower left cell.
 
     Attributes:
-        depth_m: Distance of each cell's centre from the charge along the line (rows, columns).
-        aside_m: Its distance from the line, positive to the left (rows, columns).
-        half_width_m: Half the width that a module covers across the line.
-        between: Which cells are available and lie between charge and structures (rows, columns).
+        depth_m: How far a piece's centre is from the charge along the line (variants, rows,
+            columns).
+        aside_m: How far it is from the line, positive to the left, likewise.
+        half_width_m: Half the width that each variant covers across the line (variants,).
+        lies_along: Which variants are at least as long across the line as along it (variants,).
+        between: Which pieces are available and lie between charge and structures (variants, rows,
+            columns).
     """
 
     depth_m: FloatArray
     aside_m: FloatArray
-    half_width_m: float
+    half_width_m: FloatArray
+    lies_along: BoolArray
     between: BoolArray
 
     @classmethod
-    def of(cls, scenario: Scenario, charge_m: PointM, free: BoolArray) -> "_View":
+    def of(cls, placement: Placement, charge_m: PointM) -> "_View":
+        scenario = placement.scenario
         x_m, y_m = scenario.zone.centres_m
         target_x_m, target_y_m = _protected_middle_m(scenario)
         along_x, along_y = target_x_m - charge_m[0], target_y_m - charge_m[1]
@@ -177,44 +297,54 @@ class _View:
             )
         along_x, along_y = along_x / distance_m, along_y / distance_m
         depth_m = (x_m - charge_m[0]) * along_x + (y_m - charge_m[1]) * along_y
-        between = free & (depth_m > 0.0) & (depth_m < distance_m)
+        between = placement.usable & (depth_m > 0.0) & (depth_m < distance_m)
         protected = [each.rectangle_m for each in scenario.structures if each.protected]
         for row, column in np.argwhere(between):
             cell_m = (float(x_m[row, column]), float(y_m[row, column]))
             between[row, column] = not any(
                 rectangle.meets_segment(charge_m, cell_m) for rectangle in protected
             )
+        aside_m = (y_m - charge_m[1]) * along_x - (x_m - charge_m[0]) * along_y
+        variants = placement.catalogue.variants
+        up_m, right_m = _centres_off_m(variants)
+        across_x, across_y = abs(along_y), abs(along_x)
+        columns_m = MODULE_SIDE_M / 2.0 * np.array([each.columns for each in variants])
+        rows_m = MODULE_SIDE_M / 2.0 * np.array([each.rows for each in variants])
+        half_width_m = columns_m * across_x + rows_m * across_y
         return cls(
-            depth_m=depth_m,
-            aside_m=(y_m - charge_m[1]) * along_x - (x_m - charge_m[0]) * along_y,
-            half_width_m=MODULE_SIDE_M / 2.0 * (abs(along_x) + abs(along_y)),
-            between=between,
+            depth_m=depth_m + (right_m * along_x + up_m * along_y),
+            aside_m=aside_m + (up_m * along_x - right_m * along_y),
+            half_width_m=half_width_m,
+            lies_along=half_width_m >= columns_m * across_y + rows_m * across_x - _TOLERANCE_M,
+            between=placement.legal & placement.places(between),
         )
 
-    def wall_depth_m(self, share: float) -> float:
-        """Return where the wall stands, at a share of the way along the line of sight."""
-        from_line_m = np.where(self.between, np.abs(self.aside_m), np.inf)
+    def wall_depth_m(self, number: int, share: float) -> float:
+        """Return where a wall of a variant stands, at a share of the way along the line."""
+        from_line_m = np.where(self.between[number], np.abs(self.aside_m[number]), np.inf)
         on_line = from_line_m <= from_line_m.min() + MODULE_SIDE_M / 2.0
-        depths_m = self.depth_m[on_line]
+        depths_m = self.depth_m[number][on_line]
         near_m, far_m = float(depths_m.min()), float(depths_m.max())
         return near_m + share * (far_m - near_m)
 
-    def next_cell(self, free: BoolArray, wall_m: float, end: _End) -> Cell | None:
-        """Return the cell with which a wall at a depth goes on, or `None` if it cannot.
+    def next_place(self, number: int, legal: BoolArray, wall_m: float, end: _End) -> Place | None:
+        """Return where a wall at a depth goes on with a variant, or `None` if it cannot.
 
         Args:
-            free: Which cells are available (rows, columns).
+            number: Of the variant.
+            legal: From which cells it is available (rows, columns).
             wall_m: Depth of the wall.
             end: The end of the wall.
         """
-        start_m = end.side * self.aside_m - self.half_width_m
-        gain_m = end.side * self.aside_m + self.half_width_m - end.reach_m
+        aside_m, half_width_m = self.aside_m[number], float(self.half_width_m[number])
+        start_m = end.side * aside_m - half_width_m
+        gain_m = end.side * aside_m + half_width_m - end.reach_m
         # Rounded, so that what is equal but for rounding counts as equal.
-        off_m = np.abs(self.depth_m - wall_m).round(9)
+        off_m = np.abs(self.depth_m[number] - wall_m).round(9)
         gap_m = np.abs(start_m - end.reach_m).round(9)
         wider = gain_m >= _LEAST_GAIN_M
         steep = off_m > end.off_m + gain_m + _LEAST_GAIN_M
-        possible = free & self.between & wider & ~steep
+        possible = legal & self.between[number] & wider & ~steep
         if not possible.any():
             return None
         # Without a gap if possible; else a little wider a gap, if that is nearer to the line.
@@ -223,14 +353,97 @@ class _View:
             latest_m = float(start_m[possible].min()) + MODULE_SIDE_M
         near = np.argwhere(possible & (start_m <= latest_m))
         cells = ((int(row), int(column)) for row, column in near)
-        return min(cells, key=lambda cell: (off_m[cell], gap_m[cell], cell))
+        return number, *min(cells, key=lambda cell: (off_m[cell], gap_m[cell], cell))
 
-    def end_with(self, cell: Cell, wall_m: float, end: _End) -> _End:
-        """Return an end of a wall at a depth after a module has been added to it."""
-        reach_m = end.side * float(self.aside_m[cell]) + self.half_width_m
-        if reach_m <= end.reach_m:  # the module is at the other end
+    def end_with(self, place: Place, wall_m: float, end: _End) -> _End:
+        """Return an end of a wall at a depth after a piece has been added to it."""
+        reach_m = end.side * float(self.aside_m[place]) + float(self.half_width_m[place[0]])
+        if reach_m <= end.reach_m:  # the piece is at the other end
             return end
-        return _End(end.side, reach_m, abs(float(self.depth_m[cell]) - wall_m))
+        return _End(end.side, reach_m, abs(float(self.depth_m[place]) - wall_m))
+
+
+def _centres_off_m(variants: Sequence[Variant]) -> tuple[FloatArray, FloatArray]:
+    """Return how far up and right of its lower left cell a variant is centred (variants, 1, 1)."""
+    up = np.array([each.rows - 1 for each in variants])[:, np.newaxis, np.newaxis]
+    right = np.array([each.columns - 1 for each in variants])[:, np.newaxis, np.newaxis]
+    return MODULE_SIDE_M / 2.0 * up, MODULE_SIDE_M / 2.0 * right
+
+
+_RING_START_RAD: Final = 0.2
+"""A ring begins with the nearest of the pieces that are so much off its first line at most."""
+
+
+def _ring(placement: Placement, around: Rectangle, start_m: PointM) -> Layout:
+    """Return a wall around a rectangle, as near to it as pieces can stand.
+
+    Pieces lie along the side of the rectangle that they stand at. The first one stands where the
+    line from the middle of the rectangle to `start_m` passes; each further one where it can as
+    near to that line as possible, seen from the middle. The highest items come first.
+
+    Args:
+        placement: Of nothing.
+        around: The rectangle.
+        start_m: A point outside of it.
+
+    Raises:
+        BlastEnvError: If the point is in the middle of the rectangle.
+    """
+    turn_rad, gap_m, lies_along = _around(placement, around, start_m)
+    variants = placement.catalogue.variants
+    order = _preferred(placement, np.ones(len(variants), dtype=bool), "high")
+    ring_m = None
+    for item in dict.fromkeys(variants[number].item for number in order):
+        own = np.array([each.item == item for each in variants])
+        stands = lies_along & own[:, np.newaxis, np.newaxis]
+        possible = placement.legal & stands
+        if ring_m is None and possible.any():
+            ahead = turn_rad <= turn_rad[possible].min() + _RING_START_RAD
+            ring_m = float(gap_m[possible & ahead].min())
+        while ring_m is not None:
+            possible = placement.legal & stands & (np.abs(gap_m - ring_m) < MODULE_SIDE_M)
+            if not possible.any():
+                break
+            nearest = np.where(possible, turn_rad, np.inf).argmin()
+            placement = placement.place(placement.catalogue.element(int(nearest)))
+    return placement.layout
+
+
+def _around(
+    placement: Placement, around: Rectangle, start_m: PointM
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return how pieces would stand around a rectangle (variants, rows, columns).
+
+    Returns:
+        By how much each one's centre is turned from the direction of a point, seen from the
+        middle; the gap between it and the rectangle; and whether it lies along the rectangle's
+        side that it stands at, as far as it can be turned.
+    """
+    x_m, y_m = placement.scenario.zone.centres_m
+    variants = placement.catalogue.variants
+    up_m, right_m = _centres_off_m(variants)
+    half_up_m, half_right_m = up_m + MODULE_SIDE_M / 2.0, right_m + MODULE_SIDE_M / 2.0
+    (middle_x_m, middle_y_m), (start_x_m, start_y_m) = around.centre, start_m
+    towards = complex(start_x_m - middle_x_m, start_y_m - middle_y_m)
+    if abs(towards) < _TOLERANCE_M:
+        raise BlastEnvError(
+            f"{placement.scenario.name}: a ring around {around.centre} cannot begin there"
+        )
+    from_x_m, from_y_m = x_m + right_m - middle_x_m, y_m + up_m - middle_y_m
+    turn_rad = np.abs(np.angle((from_x_m + 1j * from_y_m) * towards.conjugate())).round(9)
+    gap_x_m = np.abs(from_x_m) - half_right_m - (around.right - around.left) / 2.0
+    gap_y_m = np.abs(from_y_m) - half_up_m - (around.top - around.bottom) / 2.0
+    upright = gap_x_m >= gap_y_m  # at the west or east side, rather than the south or north one
+    of_item = Counter(each.item for each in variants)
+    fixed = np.array([of_item[each.item] == 1 for each in variants])[:, np.newaxis, np.newaxis]
+    lies_along = fixed | np.where(upright, up_m > right_m, right_m > up_m)
+    return turn_rad, np.maximum(gap_x_m, gap_y_m).round(9), lies_along
+
+
+def _gap_m(one: Rectangle, other: Rectangle) -> float:
+    """Return the distance between two rectangles."""
+    across = max(0.0, one.left - other.right, other.left - one.right)
+    return hypot(across, max(0.0, one.bottom - other.top, other.bottom - one.top))
 
 
 def _middle_m(source: AnySource) -> PointM:
@@ -249,22 +462,38 @@ def _protected_middle_m(scenario: Scenario) -> tuple[float, float]:
 
 
 def random_layout(scenario: AnyScenario, rng: np.random.Generator) -> Layout:
-    """Return a layout with every module on a random cell, as many as can be placed.
+    """Return a layout with everything in a random place, as much as can be placed.
 
-    One module after the other goes on a cell that is available then, all of them as likely. It
-    ends when none is left: as a rule with the whole stock, earlier where the budget is used up or
-    another module would close the access way.
+    One module after the other goes on a cell that is available then, all of them as likely. With a
+    catalogue an item is drawn first, of those of which a piece can be placed, and then one of its
+    places, turned or not. It ends when nothing can be placed: as a rule with the whole stock,
+    earlier where the budget is used up or anything more would close the access way.
 
     Args:
         scenario: The scenario, or its bundled name or path.
         rng: Decides everything.
 
     Returns:
-        (row, column) of the modules in the order of their placing; none without a build zone.
+        The modules or pieces in the order of their placing; none without a build zone.
     """
     placement = Placement.empty(scenario)
     while not placement.is_full:
-        cells = np.argwhere(placement.free)
-        row, column = cells[rng.integers(len(cells))].tolist()
-        placement = placement.place((row, column))
+        placement = placement.place(random_element(placement, rng))
     return placement.layout
+
+
+def random_element(placement: Placement, rng: np.random.Generator) -> Element:
+    """Return something that can be placed: a module, or a piece of an item that is drawn first.
+
+    Args:
+        placement: One that is not full.
+        rng: Decides it.
+    """
+    legal, catalogue = placement.legal, placement.catalogue
+    if catalogue.has_items:
+        numbers = np.array([each.item for each in catalogue.variants])
+        items = np.unique(numbers[legal.any(axis=(1, 2))])
+        chosen = items[rng.integers(len(items))]
+        legal = legal & (numbers == chosen)[:, np.newaxis, np.newaxis]
+    actions = np.flatnonzero(legal)
+    return catalogue.element(int(actions[rng.integers(len(actions))]))

@@ -196,8 +196,9 @@ def search(
     method: Annotated[
         str,
         typer.Option(
-            help="random, greedy, annealing, genetic, nsga2, exhaustive, wall_near_charge, "
-            "wall_near_building, line_of_posts or posts_and_wall."
+            help="random, greedy, annealing, genetic, nsga2, exhaustive, or a rule: "
+            "(long_)wall_near_charge, (long_)wall_near_building, ring_around_charge, "
+            "ring_around_building, line_of_posts or posts_and_wall."
         ),
     ] = "genetic",
     scenario: Annotated[str, typer.Option(help="Bundled name, or a scenario file.")] = "courtyard",

@@ -152,6 +152,17 @@ class Placement:
         ground.flags.writeable = False
         return ground
 
+    def places(self, cells: BoolArray) -> BoolArray:
+        """Return from which lower left cell each variant covers nothing but some cells.
+
+        Args:
+            cells: Which cells, shape (rows, columns).
+
+        Returns:
+            Shape (variants, rows, columns); what stands, stock and budget do not count.
+        """
+        return self._empty_zone.places(cells)
+
     @property
     def usable(self) -> BoolArray:
         """Which cells may ever take a module, as far as the site is concerned, read-only.

@@ -7,7 +7,14 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Layout
-from blast_env.scenario import AnyScenario, Placement, Scenario, find_scenario, usable_cells
+from blast_env.scenario import (
+    AnyScenario,
+    Catalogue,
+    Placement,
+    Scenario,
+    find_scenario,
+    usable_cells,
+)
 from blast_env.sites.visibility import Visibility
 
 
@@ -52,7 +59,8 @@ class SiteMeasures:
 def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
     """Return a layout of which each module cuts as many lines by its cost as one more can.
 
-    It keeps every condition of the build zone, and ends where no module would cut another line.
+    With a catalogue, each piece; the lines are in plan, so heights do not count. It keeps every
+    condition of the build zone, and ends where nothing more would cut another line.
 
     Args:
         scenario: The scenario, or its bundled name or path.
@@ -60,16 +68,26 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
     """
     placement = Placement.empty(scenario)
     left = lines.weight.copy()
-    cut = lines.cut.reshape(len(left), -1)
+    cut = _cut_by_variants(lines, placement.catalogue)
     while not placement.is_full:
-        gain = (left @ cut).reshape(placement.free.shape)
-        worth = np.where(placement.free, gain / placement.module_costs, 0.0)
-        row, column = (int(index) for index in np.unravel_index(worth.argmax(), worth.shape))
-        if not worth[row, column] > 0.0:
+        gain = (left @ cut).reshape(placement.legal.shape)
+        worth = np.where(placement.legal, gain / placement.costs, 0.0)
+        action = int(worth.argmax())
+        if not worth.flat[action] > 0.0:
             break
-        placement = placement.place((row, column))
-        left[lines.cut[:, row, column]] = 0.0
+        placement = placement.place(placement.catalogue.element(action))
+        left[cut[:, action]] = 0.0
     return placement.layout
+
+
+def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
+    """Return which lines each action would cut (lines, actions); those outside count in part."""
+    rows, columns = catalogue.shape
+    cut = np.zeros((len(lines.weight), len(catalogue.variants), rows, columns), dtype=bool)
+    for number, variant in enumerate(catalogue.variants):
+        for up, right in variant.cells_at(0, 0):
+            cut[:, number, : rows - up, : columns - right] |= lines.cut[:, up:, right:]
+    return cut.reshape(len(lines.weight), -1)
 
 
 def _wall_share(scenario: Scenario, lines: Visibility) -> float:

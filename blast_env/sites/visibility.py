@@ -73,15 +73,15 @@ class Visibility:
         cut = _cut(scenario, origin[free], direction[free], protected_m[free])
         return cls(weight[free], cut, float(weight[free].sum() / max(weight.sum(), 1e-300)))
 
-    def cut_share(self, layout: Sequence[Element]) -> float:
-        """Return the share of the lines, by weight, that a layout cuts.
+    def cut_share(self, cells: Sequence[Element]) -> float:
+        """Return the share of the lines, by weight, that modules cut.
 
         Args:
-            layout: (row, column) of the cells that hold a module.
+            cells: (row, column) of the cells that hold a module (`Placement.cells`).
         """
-        if not layout or not len(self.weight):
+        if not cells or not len(self.weight):
             return 0.0
-        rows, columns = np.array(layout).T
+        rows, columns = zip(*(each[:2] for each in cells), strict=True)
         return float(self.weight @ self.cut[:, rows, columns].any(axis=1) / self.weight.sum())
 
 

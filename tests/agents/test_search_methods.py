@@ -14,7 +14,7 @@ from blast_agents.search import (
     SearchResult,
     find_search_method,
 )
-from blast_agents.search.methods import every_layout
+from blast_agents.search.methods import RULE_SEARCHES, every_layout
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
@@ -259,10 +259,8 @@ def test_the_front_is_near_the_true_one(problem: LayoutProblem, optimum: SearchR
 
 def test_every_method_has_its_name() -> None:
     assert all(name == method.name for name, method in SEARCH_METHODS.items())
-    assert {
-        *(*DRAWN, "exhaustive", "wall_near_charge", "wall_near_building"),
-        *("line_of_posts", "posts_and_wall"),
-    } == set(SEARCH_METHODS)
+    rules = {rule.name for rule in RULE_SEARCHES}
+    assert {*DRAWN, "exhaustive", *rules} == set(SEARCH_METHODS)
 
 
 def test_genetic_search_beats_random_search_on_the_courtyard() -> None:

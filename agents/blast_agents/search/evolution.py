@@ -91,8 +91,9 @@ class GeneticSearch:
 class Nsga2Search:
     """pymoo's `NSGA2` with the operators of the genetic search, and two things to minimise.
 
-    The result carries the front: what each further module is worth. Its best layout is the end of
-    the front with the least impulse.
+    Those are the impulse and the number of modules or, with a catalogue, the cost. The result
+    carries the front: what each further module, or all further spending, is worth. Its best
+    layout is the end of the front with the least impulse.
 
     What is held back of the budget lets the front meet the other threats, and then, as far as it
     goes, the layouts that were just behind it.
@@ -129,7 +130,8 @@ class Nsga2Search:
         rng = np.random.default_rng(seed)
 
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
-            return np.column_stack([session.assess(layouts), [len(each) for each in layouts]])
+            prices = [problem.price(each) for each in layouts]
+            return np.column_stack([session.assess(layouts), prices])
 
         def explore() -> None:
             drawn = [self.draw(problem.scenario, rng) for _ in range(size)]

@@ -92,15 +92,17 @@ def _draw_history(axes: Axes, result: SearchResult, problem: LayoutProblem) -> N
 
 
 def _draw_front(axes: Axes, front: Sequence[Candidate], problem: LayoutProblem) -> None:
-    """Draw the reduction that can be had with so many modules."""
-    modules = [len(each.layout) for each in front]
+    """Draw the reduction that can be had with so many modules, or for what cost."""
+    prices = [problem.price(each.layout) for each in front]
     reduction = [problem.reduction(each) for each in front]
-    axes.step(modules, reduction, where="post", color=unit_interval(QUIET_INK), linewidth=1.0)
-    axes.plot(modules, reduction, "o", color=_BEST, markersize=6.0, zorder=3)
-    axes.set_xlabel("modules")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.step(prices, reduction, where="post", color=unit_interval(QUIET_INK), linewidth=1.0)
+    axes.plot(prices, reduction, "o", color=_BEST, markersize=6.0, zorder=3)
+    has_items = bool(problem.scenario.zone.items)
+    axes.set_xlabel("cost" if has_items else "modules")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=not has_items))
     threats = count_of("threat", front[0].threats)
-    axes.set_title(f"Front: what modules are worth, under {threats}", fontsize=11)
+    what = "spending is" if has_items else "modules are"
+    axes.set_title(f"Front: what {what} worth, under {threats}", fontsize=11)
     _set_reduction_axis(axes)
 
 

@@ -4,16 +4,26 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations, islice
 from math import comb, exp
+from typing import Final
 
 import numpy as np
 
 from blast_agents.posts import line_of_posts, posts_and_wall
-from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
+from blast_agents.rules import (
+    long_wall_near_building,
+    long_wall_near_charge,
+    random_layout,
+    ring_around_building,
+    ring_around_charge,
+    wall_near_building,
+    wall_near_charge,
+)
 from blast_agents.search.moves import Draw, Moves, random_walls
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
 from blast_agents.search.session import SearchSession
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.geometry import Cell, Layout
+from blast_env.geometry import Element, Layout, Piece
 from blast_env.scenario import AnyCharge, Placement, Scenario
 
 
@@ -85,21 +95,24 @@ class RuleSearch:
         )
 
 
-WALL_NEAR_CHARGE = RuleSearch(wall_near_charge, "wall_near_charge")
-
-
-WALL_NEAR_BUILDING = RuleSearch(wall_near_building, "wall_near_building")
-
-
-LINE_OF_POSTS = RuleSearch(line_of_posts, "line_of_posts")
-
-
-POSTS_AND_WALL = RuleSearch(posts_and_wall, "posts_and_wall")
+RULE_SEARCHES: Final = (
+    RuleSearch(wall_near_charge, "wall_near_charge"),
+    RuleSearch(wall_near_building, "wall_near_building"),
+    RuleSearch(long_wall_near_charge, "long_wall_near_charge"),
+    RuleSearch(long_wall_near_building, "long_wall_near_building"),
+    RuleSearch(ring_around_charge, "ring_around_charge"),
+    RuleSearch(ring_around_building, "ring_around_building"),
+    RuleSearch(line_of_posts, "line_of_posts"),
+    RuleSearch(posts_and_wall, "posts_and_wall"),
+)
+"""The rules as methods; without a catalogue the long walls are the others."""
 
 
 @dataclass(frozen=True)
 class GreedySearch:
     """Places every module on the best of the cells that it tries for it, and never moves one.
+
+    With a catalogue it tries pieces in places, and takes the one that takes off most for its cost.
 
     With enough blasts it tries every cell. With fewer it divides what is left evenly among the
     modules that are left to place. Half of the cells that it tries are those that took off most
@@ -127,32 +140,66 @@ class GreedySearch:
         def explore() -> None:
             placement = Placement.empty(problem.scenario)
             (impulse_pa_s,) = session.assess([()]).tolist()
-            gains_pa_s: dict[Cell, float] = {}
+            gains_pa_s: dict[Element, float] = {}
             while not placement.is_full:
-                blasts = session.exploring_left // placement.stock_left
-                tried = self._cells(placement, gains_pa_s, max(1, blasts // plan.threats), rng)
-                impulses = session.assess([(*placement.layout, cell) for cell in tried])
+                blasts = session.exploring_left // _still_to_place(placement)
+                tried = self._elements(placement, gains_pa_s, max(1, blasts // plan.threats), rng)
+                impulses = session.assess([(*placement.layout, each) for each in tried])
                 gains_pa_s.update(zip(tried, (impulse_pa_s - impulses).tolist(), strict=True))
                 best = int(np.argmin(impulses))
+                if placement.catalogue.has_items:
+                    worths = [self._worth(placement, each, gains_pa_s) for each in tried]
+                    best = int(np.argmax(worths))
                 placement = placement.place(tried[best])
                 impulse_pa_s = float(impulses[best])
 
         return session.result(self.name, seed, session.run(explore))
 
-    def _cells(
+    @staticmethod
+    def _worth(placement: Placement, element: Element, gains_pa_s: dict[Element, float]) -> float:
+        """Return what something took off when it was tried last; with a catalogue, for its cost."""
+        if not isinstance(element, Piece):
+            return gains_pa_s[element]
+        number = placement.catalogue.variant_number(element)
+        return gains_pa_s[element] / float(placement.costs[number, element.row, element.column])
+
+    def _elements(
         self,
         placement: Placement,
-        gains_pa_s: dict[Cell, float],
+        gains_pa_s: dict[Element, float],
         count: int,
         rng: np.random.Generator,
-    ) -> list[Cell]:
-        """Return cells to try for the next module, at least one and at most `count`."""
-        free = [(int(row), int(column)) for row, column in np.argwhere(placement.free)]
-        known = sorted((cell for cell in free if cell in gains_pa_s), key=lambda c: -gains_pa_s[c])
-        new = [cell for cell in free if cell not in gains_pa_s]
+    ) -> list[Element]:
+        """Return what to try next, at least one and at most `count`."""
+        catalogue = placement.catalogue
+        free = [catalogue.element(int(action)) for action in np.flatnonzero(placement.legal)]
+        known = sorted(
+            (each for each in free if each in gains_pa_s),
+            key=lambda each: -self._worth(placement, each, gains_pa_s),
+        )
+        new = [each for each in free if each not in gains_pa_s]
         promising = known[: max(round(count * self.promising_share), count - len(new))]
         fresh = rng.permutation(len(new))[: count - len(promising)]
         return [*promising, *(new[index] for index in fresh)]
+
+
+def _still_to_place(placement: Placement) -> int:
+    """Return how many modules or pieces may follow, as far as stock and budget tell; one at least.
+
+    Of a catalogue those count that the budget pays for if every item has as large a share of it.
+    """
+    left, budget = placement.stock_left, placement.budget_left
+    if placement.catalogue.has_items and budget is not None:
+        costs = [float(own[mask].mean()) for own, mask in _legal_costs(placement)]
+        left = min(left, max(1, round(budget / float(np.mean(costs)))))
+    return left
+
+
+def _legal_costs(placement: Placement) -> Iterator[tuple[FloatArray, BoolArray]]:
+    """Yield the costs of each variant that may be placed, and where it may."""
+    for costs, legal in zip(placement.costs, placement.legal, strict=True):
+        if legal.any():
+            yield costs, legal
 
 
 @dataclass(frozen=True)
@@ -247,22 +294,24 @@ class ExhaustiveSearch:
         return session.result(self.name, seed, session.run(explore))
 
     def _check(self, problem: LayoutProblem, budget: int) -> None:
-        cells = len(_usable(problem))
-        layouts = sum(comb(cells, modules) for modules in range(min(problem.stock, cells) + 1))
+        places = len(_placeable(problem))
+        counts = range(min(problem.stock, places) + 1)
+        layouts = sum(comb(places, count) for count in counts)
         blasts = layouts * len(problem.threats)
         if blasts > budget:
+            what = "places of pieces" if problem.scenario.zone.items else "usable cells"
             raise BlastEnvError(
-                f"{problem.scenario.name} has up to {_count_text(layouts)} layouts ({cells} usable "
-                f"cells, stock {problem.stock}), which take {_count_text(blasts)} blasts; the "
+                f"{problem.scenario.name} has up to {_count_text(layouts)} layouts ({places} "
+                f"{what}, stock {problem.stock}), which take {_count_text(blasts)} blasts; the "
                 f"budget is {budget}: exhaustive search is for small instances"
             )
 
 
 def every_layout(problem: LayoutProblem) -> Iterator[Layout]:
-    """Yield every legal layout, those with few modules first."""
-    cells = _usable(problem)
-    for modules in range(min(problem.stock, len(cells)) + 1):
-        for layout in combinations(cells, modules):
+    """Yield every legal layout, those with few modules or pieces first."""
+    places = _placeable(problem)
+    for count in range(min(problem.stock, len(places)) + 1):
+        for layout in combinations(places, count):
             if _is_legal(problem, layout):
                 yield layout
 
@@ -275,9 +324,11 @@ def _is_legal(problem: LayoutProblem, layout: Layout) -> bool:
     return True
 
 
-def _usable(problem: LayoutProblem) -> list[Cell]:
-    cells = np.argwhere(Placement.empty(problem.scenario).usable)
-    return [(int(row), int(column)) for row, column in cells]
+def _placeable(problem: LayoutProblem) -> list[Element]:
+    """Return everything that there is room for in the empty zone."""
+    empty = Placement.empty(problem.scenario)
+    actions = np.flatnonzero(empty.places(empty.usable))
+    return [empty.catalogue.element(int(action)) for action in actions]
 
 
 def _count_text(count: int) -> str:

@@ -1,15 +1,17 @@
 """Small changes of layouts, every one of them legal."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from math import cos, hypot, pi, sin
+from math import cos, pi, sin
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from blast_agents.rules import random_element
 from blast_env.arrays import BoolArray
-from blast_env.geometry import Cell, Element, Layout, Piece
-from blast_env.scenario import Placement, Scenario
+from blast_env.geometry import Element, Layout, Piece
+from blast_env.scenario import Catalogue, Placement, Scenario
 
 Draw = Callable[[Scenario, np.random.Generator], Layout]
 """Draws a legal layout to begin with."""
@@ -26,12 +28,8 @@ def legal_part(scenario: Scenario, layout: Iterable[Element]) -> Placement:
         layout: Modules or pieces, also of cells that do not exist.
     """
     placement = Placement.empty(scenario)
-    rows, columns = placement.usable.shape
     for element in layout:
-        row, column = element[:2]
-        if not (0 <= row < rows and 0 <= column < columns):
-            continue
-        if placement.legal[placement.catalogue.variant_number(element), row, column]:
+        if _is_legal(placement, element):
             placement = placement.place(element)
     return placement
 
@@ -40,24 +38,56 @@ def random_walls(scenario: Scenario, rng: np.random.Generator) -> Layout:
     """Return a layout of straight walls: where, in which direction and how long is random.
 
     It knows nothing of charge and structures, only that what stands in the way of a blast is a
-    wall rather than lone modules. A wall ends where a cell may not take a module; there are as
-    many walls as the stock lasts for.
+    wall rather than lone modules. A wall ends where nothing may be placed; there are as many walls
+    as the stock lasts for. With a catalogue each wall is of one item, drawn at random, in line.
     """
     placement = Placement.empty(scenario)
+    grow = _with_pieces if placement.catalogue.has_items else _with_modules
     while not placement.is_full:
-        row, column = _one_of(placement.free, rng)
-        angle = rng.uniform(0.0, pi)
-        length = int(rng.integers(_LEAST_WALL, max(placement.stock_left, _LEAST_WALL) + 1))
-        longest = max(abs(cos(angle)), abs(sin(angle)))
-        steps = np.arange(length)[:, np.newaxis] * (sin(angle) / longest, cos(angle) / longest)
-        for cell in (np.array((row, column)) + np.rint(steps).astype(int)).tolist():
-            inside = all(
-                0 <= at < size for at, size in zip(cell, placement.free.shape, strict=True)
-            )
-            if not inside or not placement.free[tuple(cell)]:
-                break
-            placement = placement.place((cell[0], cell[1]))
+        placement = grow(placement, rng)
     return placement.layout
+
+
+def _with_modules(placement: Placement, rng: np.random.Generator) -> Placement:
+    """Add a straight wall of modules in any direction."""
+    row, column = random_element(placement, rng)[:2]
+    angle = rng.uniform(0.0, pi)
+    length = int(rng.integers(_LEAST_WALL, max(placement.stock_left, _LEAST_WALL) + 1))
+    longest = max(abs(cos(angle)), abs(sin(angle)))
+    steps = np.arange(length)[:, np.newaxis] * (sin(angle) / longest, cos(angle) / longest)
+    cells = (np.array((row, column)) + np.rint(steps).astype(int)).tolist()
+    return _as_far_as_legal(placement, [(cell[0], cell[1]) for cell in cells])
+
+
+def _with_pieces(placement: Placement, rng: np.random.Generator) -> Placement:
+    """Add pieces of one item in line, from one end to the other."""
+    first = random_element(placement, rng)
+    variant = placement.catalogue.variant(first)
+    up, right = (variant.rows, 0) if variant.rows >= variant.columns else (0, variant.columns)
+    if variant.rows == variant.columns and rng.random() < 0.5:
+        up, right = right, up
+    left = placement.stocks_left[variant.item]
+    length = int(rng.integers(1, max(left, 1) + 1))
+    wall = [_shifted(first, step * up, step * right) for step in range(length)]
+    return _as_far_as_legal(placement, wall)
+
+
+def _as_far_as_legal(placement: Placement, wall: Iterable[Element]) -> Placement:
+    """Place the elements of a wall up to the first that may not stand."""
+    for element in wall:
+        if not _is_legal(placement, element):
+            break
+        placement = placement.place(element)
+    return placement
+
+
+def _is_legal(placement: Placement, element: Element) -> bool:
+    """Whether an element may be placed, also one outside of the zone."""
+    rows, columns = placement.usable.shape
+    row, column = element[:2]
+    if not (0 <= row < rows and 0 <= column < columns):
+        return False
+    return bool(placement.legal[placement.catalogue.variant_number(element), row, column])
 
 
 def random_part(scenario: Scenario, rng: np.random.Generator) -> Layout:
@@ -72,10 +102,12 @@ class Moves:
 
     Attributes:
         scenario: The scenario.
-        reach_cells: Standard deviation of the way that a module or a wall is moved.
-        far_share: Share of the moves in which a module goes anywhere.
-        wall_share: Share of the moves in which all modules near one of them move together.
-        count_share: Share of the moves that add a module or take one away.
+        reach_cells: Standard deviation of the way that a module, a piece or a wall is moved.
+        far_share: Share of the moves in which a module or piece goes anywhere.
+        wall_share: Share of the moves in which all that hangs together with one of them moves.
+        count_share: Share of the moves that add a module or piece, or take one away.
+        item_share: With a catalogue, share of the moves that put other items, or the same one
+            turned, in the place of a piece: as many as stock and budget allow.
     """
 
     scenario: Scenario
@@ -83,6 +115,7 @@ class Moves:
     far_share: float = 0.2
     wall_share: float = 0.25
     count_share: float = 0.1
+    item_share: float = 0.2
 
     def neighbour(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Return a layout that differs a little; all conditions of the build zone hold."""
@@ -95,58 +128,93 @@ class Moves:
             return self._wall_moved(layout, rng)
         if kind < self.count_share + self.wall_share + self.far_share:
             return self._swapped(layout, rng)
+        if isinstance(layout[0], Piece) and kind > 1.0 - self.item_share:
+            return self._exchanged(layout, rng)
         return self._moved(layout, rng)
 
     def _added(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Add a module beside another one; if nothing may be added, move one."""
+        """Add something beside what stands; if nothing may be added, move something."""
         placement = Placement(self.scenario, layout)
         if placement.is_full:
             return self._moved(layout, rng) if layout else layout
         if not layout:
-            return (_one_of(placement.free, rng),)
-        return placement.place(self._near(placement.free, _any_of(layout, rng), rng)).layout
+            return (random_element(placement, rng),)
+        return placement.place(self._near(placement, _any_of(layout, rng), rng)).layout
 
     def _removed(self, layout: Layout, rng: np.random.Generator) -> Layout:
         return _without(layout, int(rng.integers(len(layout))))
 
     def _moved(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Move one module a little way, from where it is or to beside another one."""
+        """Move one a little way, from where it is or to beside another one; it stays what it is."""
         index = int(rng.integers(len(layout)))
         rest = Placement(self.scenario, _without(layout, index))
         to_another = len(layout) > 1 and rng.random() < 0.5
         beside = _any_of(rest.layout, rng) if to_another else layout[index]
-        return rest.place(self._near(rest.free, beside, rng, layout[index])).layout
+        return rest.place(self._near(rest, beside, rng, layout[index], like=layout[index])).layout
 
     def _swapped(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Take one module away and put one on any cell."""
+        """Take one away and put something anywhere."""
         rest = Placement(self.scenario, _without(layout, int(rng.integers(len(layout)))))
-        return rest.place(_one_of(rest.free, rng)).layout
+        return rest.place(random_element(rest, rng)).layout
+
+    def _exchanged(self, layout: Layout, rng: np.random.Generator) -> Layout:
+        """Take a piece away, perhaps another one too, and put others there.
+
+        One dear piece can so become several cheap ones, and a long low wall a short high one.
+        """
+        index = int(rng.integers(len(layout)))
+        there, rest = layout[index], _without(layout, index)
+        if rest and rng.random() < 0.5:
+            rest = _without(rest, int(rng.integers(len(rest))))
+        placement = Placement(self.scenario, rest)
+        wanted = 1 + int(rng.integers(3))
+        while wanted and not placement.is_full:
+            placement = placement.place(self._near(placement, there, rng, there))
+            wanted -= 1
+        return placement.layout
 
     def _wall_moved(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Move the modules that hang together with one of them, or all, by the same way."""
-        wall = _connected(layout, _any_of(layout, rng))
+        """Move what hangs together with one of them, or all, by the same way."""
+        wall = self._connected(layout, _any_of(layout, rng))
         if rng.random() < 0.3:
             wall = set(layout)
         up, right = np.rint(rng.normal(0.0, self.reach_cells, 2)).astype(int).tolist()
         moved = [_shifted(each, up, right) for each in layout if each in wall]
-        stay = [cell for cell in layout if cell not in wall]
+        stay = [each for each in layout if each not in wall]
         placement = legal_part(self.scenario, [*stay, *moved])
         # What cannot go along is put beside what could.
         while len(placement.layout) < len(layout) and not placement.is_full:
             if not placement.layout:
                 return layout
             beside = _any_of(placement.layout, rng)
-            placement = placement.place(self._near(placement.free, beside, rng))
+            placement = placement.place(self._near(placement, beside, rng))
         return placement.layout
 
     def _near(
-        self, free: BoolArray, cell: Element, rng: np.random.Generator, but: Element | None = None
-    ) -> Cell:
-        """Return a free cell near another one; at least one cell besides `but` should be free."""
-        rows, columns = np.nonzero(free)
-        away = np.hypot(rows - cell[0], columns - cell[1])
+        self,
+        placement: Placement,
+        beside: Element,
+        rng: np.random.Generator,
+        but: Element | None = None,
+        like: Element | None = None,
+    ) -> Element:
+        """Return something that can be placed near an element.
+
+        Args:
+            placement: What stands; something besides `but` should be possible.
+            beside: What it is to be near.
+            rng: Decides it.
+            but: What it is not to be, unless nothing else is possible.
+            like: Of which item it is to be, if that is possible.
+        """
+        legal, catalogue = placement.legal, placement.catalogue
+        if catalogue.has_items:
+            legal = _of_one_item(placement, rng, like)
+        numbers, rows, columns = np.nonzero(legal)
+        away = np.hypot(*_gaps(catalogue, (numbers, rows, columns), beside))
         if but is not None:
-            away[(rows == but[0]) & (columns == but[1])] = np.inf
+            same = numbers == catalogue.variant_number(but)
+            away[same & (rows == but[0]) & (columns == but[1])] = np.inf
         weight = np.exp(-0.5 * (away / self.reach_cells) ** 2)
         total = float(weight.sum())
         if total < 1e-12:
@@ -154,19 +222,51 @@ class Moves:
         else:
             index = int(np.searchsorted(np.cumsum(weight), rng.random() * total))
             index = min(index, len(rows) - 1)
-        return int(rows[index]), int(columns[index])
+        return catalogue.element_at(int(numbers[index]), int(rows[index]), int(columns[index]))
+
+    def _connected(self, layout: Layout, start: Element) -> set[Element]:
+        """Return what hangs together with one element, corners included."""
+        catalogue = self.scenario.zone.catalogue
+        found, todo, left = {start}, [start], set(layout) - {start}
+        while todo and left:
+            others = sorted(left)
+            places = [(catalogue.variant_number(each), *each[:2]) for each in others]
+            gaps = _gaps(catalogue, np.array(places).T, todo.pop())
+            near = {each for each, gap in zip(others, np.hypot(*gaps), strict=True) if gap < 1.5}
+            left -= near
+            found |= near
+            todo += sorted(near)
+        return found
 
 
-def _connected(layout: Layout, start: Element) -> set[Element]:
-    """Return the modules that hang together with one, corners included."""
-    found, todo, left = {start}, [start], set(layout) - {start}
-    while todo:
-        row, column = todo.pop()[:2]
-        beside = {each for each in left if hypot(each[0] - row, each[1] - column) < 1.5}
-        left -= beside
-        found |= beside
-        todo += sorted(beside)
-    return found
+def _of_one_item(placement: Placement, rng: np.random.Generator, like: Element | None) -> BoolArray:
+    """Return where pieces of one item may be placed: of one that is wanted, or of a random one."""
+    items = np.array([each.item for each in placement.catalogue.variants])
+    possible = np.unique(items[placement.legal.any(axis=(1, 2))]).tolist()
+    wanted = None if like is None else placement.catalogue.variant(like).item
+    item = wanted if wanted in possible else possible[int(rng.integers(len(possible)))]
+    legal: BoolArray = placement.legal & (items == item)[:, np.newaxis, np.newaxis]
+    return legal
+
+
+def _gaps(
+    catalogue: Catalogue, places: Sequence[NDArray[np.int64]] | NDArray[np.int64], beside: Element
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return how many rows and columns lie between places and an element; 1 if they touch.
+
+    Args:
+        catalogue: Of the zone.
+        places: Numbers of variants, rows and columns of their lower left cells.
+        beside: The element.
+    """
+    numbers, rows, columns = places
+    sizes = np.array([(each.rows, each.columns) for each in catalogue.variants])[numbers]
+    own = catalogue.variant(beside)
+    up = np.maximum(rows - beside[0] - (own.rows - 1), beside[0] - rows - (sizes[:, 0] - 1))
+    right = np.maximum(
+        columns - beside[1] - (own.columns - 1), beside[1] - columns - (sizes[:, 1] - 1)
+    )
+    return np.maximum(up, 0), np.maximum(right, 0)
 
 
 def _shifted(element: Element, up: int, right: int) -> Element:
@@ -181,10 +281,3 @@ def _without(layout: Layout, index: int) -> Layout:
 
 def _any_of(layout: Layout, rng: np.random.Generator) -> Element:
     return layout[int(rng.integers(len(layout)))]
-
-
-def _one_of(cells: BoolArray, rng: np.random.Generator) -> Cell:
-    """Return one of the true cells (rows, columns), all as likely."""
-    chosen = np.flatnonzero(cells)
-    row, column = divmod(int(chosen[rng.integers(len(chosen))]), cells.shape[1])
-    return row, column

@@ -30,17 +30,17 @@ __all__ = ["GA", "NSGA2", "LayoutRepair", "MoveMutation", "SpatialCrossover", "e
 
 
 def individual(scenario: Scenario, layout: Layout) -> BoolArray:
-    """Return a layout as an individual (cells,)."""
-    cells = np.zeros(Placement.empty(scenario).usable.shape, dtype=bool)
-    if layout:
-        cells[tuple(zip(*layout, strict=True))] = True
-    return cells.ravel()
+    """Return a layout as an individual: what is placed, by the number of its action (actions,)."""
+    catalogue = scenario.zone.catalogue
+    actions = np.zeros(catalogue.finish, dtype=bool)
+    actions[[catalogue.action(element) for element in layout]] = True
+    return actions
 
 
-def layout_of(scenario: Scenario, cells: BoolArray) -> Layout:
-    """Return an individual (cells,) as a layout, its cells sorted."""
-    columns = Placement.empty(scenario).usable.shape[1]
-    return tuple(divmod(int(index), columns) for index in np.flatnonzero(cells))
+def layout_of(scenario: Scenario, actions: BoolArray) -> Layout:
+    """Return an individual (actions,) as a layout, sorted."""
+    catalogue = scenario.zone.catalogue
+    return tuple(sorted(catalogue.element(int(action)) for action in np.flatnonzero(actions)))
 
 
 class SpatialCrossover(Crossover):
@@ -64,14 +64,14 @@ class SpatialCrossover(Crossover):
     def _do(
         self,
         _problem: Any,
-        cells: BoolArray,
+        actions: BoolArray,
         *_: Any,
         random_state: np.random.Generator,
         **_options: Any,
     ) -> BoolArray:
-        children = np.empty_like(cells)
-        for pair in range(cells.shape[1]):
-            parents = [layout_of(self._scenario, cells[each, pair]) for each in (0, 1)]
+        children = np.empty_like(actions)
+        for pair in range(actions.shape[1]):
+            parents = [layout_of(self._scenario, actions[each, pair]) for each in (0, 1)]
             cross = mixed if random_state.random() < self._mixed_share else cut
             for child, (first, second) in enumerate((parents, parents[::-1])):
                 layout = cross(first, second, random_state)
@@ -80,7 +80,7 @@ class SpatialCrossover(Crossover):
 
 
 def cut(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
-    """Return the first modules of one layout and the last ones of another in some direction."""
+    """Return what comes first in one layout and last in another in some direction."""
     angle = rng.uniform(0.0, 2.0 * pi)
 
     def along(cell: Element) -> float:
@@ -92,7 +92,7 @@ def cut(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
 
 
 def mixed(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
-    """Return as many modules as the first layout has, drawn from those of both."""
+    """Return as many modules or pieces as the first layout has, drawn from those of both."""
     both = sorted({*first, *second})
     chosen = rng.choice(len(both), size=min(len(first), len(both)), replace=False)
     return tuple(both[index] for index in sorted(chosen))
@@ -113,17 +113,19 @@ class MoveMutation(Mutation):
     def _do(
         self,
         _problem: Any,
-        cells: BoolArray,
+        actions: BoolArray,
         *_: Any,
         random_state: np.random.Generator,
         **_options: Any,
     ) -> BoolArray:
         scenario = self._moves.scenario
-        return np.array([individual(scenario, self._changed(each, random_state)) for each in cells])
+        return np.array(
+            [individual(scenario, self._changed(each, random_state)) for each in actions]
+        )
 
-    def _changed(self, cells: BoolArray, rng: np.random.Generator) -> Layout:
+    def _changed(self, actions: BoolArray, rng: np.random.Generator) -> Layout:
         scenario = self._moves.scenario
-        layout = repaired(scenario, layout_of(scenario, cells), rng)
+        layout = repaired(scenario, layout_of(scenario, actions), rng)
         layout = self._moves.neighbour(layout, rng)
         while rng.random() < self._more:
             layout = self._moves.neighbour(layout, rng)
@@ -131,7 +133,7 @@ class MoveMutation(Mutation):
 
 
 class LayoutRepair(Repair):
-    """Leaves out modules of a child, chosen at random, until all conditions hold.
+    """Leaves out modules or pieces of a child, at random, until all conditions hold.
 
     Args:
         scenario: The scenario.
@@ -144,14 +146,14 @@ class LayoutRepair(Repair):
     def _do(
         self,
         _problem: Any,
-        cells: BoolArray,
+        actions: BoolArray,
         *_: Any,
         random_state: np.random.Generator,
         **_options: Any,
     ) -> BoolArray:
         layouts = (
             repaired(self._scenario, layout_of(self._scenario, each), random_state)
-            for each in cells
+            for each in actions
         )
         return np.array([individual(self._scenario, layout) for layout in layouts])
 
@@ -204,9 +206,8 @@ def evolve(session: SearchSession, algorithm: Any, objectives: Objectives, seed:
         seed: Decides everything that is drawn.
     """
     scenario = session.problem.scenario
-    cells = Placement.empty(scenario).usable.size
     count = objectives([]).shape[1]
-    problem = Problem(n_var=cells, n_obj=count, vtype=bool)
+    problem = Problem(n_var=scenario.zone.catalogue.finish, n_obj=count, vtype=bool)
     algorithm.setup(problem, termination=NoTermination(), seed=seed)
     while True:
         population = algorithm.ask()

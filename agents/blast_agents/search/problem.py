@@ -15,7 +15,7 @@ from blast_env.evaluation.cases import check_distinct
 from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Element, Layout, layout_text
 from blast_env.runner import check_workers
-from blast_env.scenario import AnyCharge, Scenario
+from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.statistics import reductions
 
 
@@ -57,8 +57,16 @@ class LayoutProblem:
 
     @property
     def stock(self) -> int:
-        """Most modules that a layout may have."""
+        """Most modules or pieces that a layout may have."""
         return self.scenario.zone.stock
+
+    def price(self, layout: Layout) -> float:
+        """Return what a layout takes: its modules or, with a catalogue, what its pieces cost."""
+        return self.cost(layout) if self.scenario.zone.items else len(layout)
+
+    def cost(self, layout: Layout) -> float:
+        """Return what a legal layout costs, in the unit of the zone's budget."""
+        return Placement(self.scenario, layout).cost
 
     @property
     def charge(self) -> AnyCharge:
@@ -110,12 +118,14 @@ class Candidate:
         layout: Its cells or pieces, sorted.
         impulse_pa_s: Impulse over the threats that it had met, Pa*s.
         threats: How many threats that were, counted from the first.
+        cost: What its modules or pieces cost, in the unit of the zone's budget.
     """
 
     blasts: int
     layout: Layout
     impulse_pa_s: float
     threats: int
+    cost: float
 
 
 @dataclass(frozen=True)
@@ -149,8 +159,8 @@ class SearchResult:
         seed: What decided everything that was drawn.
         history: The best layout each time that it changed.
         interrupted: Whether it was ended from outside (Ctrl-C) before it was through.
-        front: The layouts of which none has both less impulse and fewer modules, by number of
-            modules; only of methods that search for it.
+        front: The layouts of which none has both less impulse and fewer modules (or, with a
+            catalogue, a lower cost), by that number; only of methods that search for it.
     """
 
     method: str
@@ -190,11 +200,12 @@ def _table(candidates: tuple[Candidate, ...]) -> pd.DataFrame:
                 each.impulse_pa_s,
                 each.threats,
                 len(each.layout),
+                each.cost,
                 layout_text(each.layout),
             )
             for each in candidates
         ],
-        columns=["blasts", "impulse_pa_s", "threats", "modules", "layout"],
+        columns=["blasts", "impulse_pa_s", "threats", "modules", "cost", "layout"],
     )
 
 

@@ -7,10 +7,7 @@ from typing import Final
 
 from blast_agents.search.evolution import GeneticSearch, Nsga2Search
 from blast_agents.search.methods import (
-    LINE_OF_POSTS,
-    POSTS_AND_WALL,
-    WALL_NEAR_BUILDING,
-    WALL_NEAR_CHARGE,
+    RULE_SEARCHES,
     AnnealingSearch,
     ExhaustiveSearch,
     GreedySearch,
@@ -29,10 +26,7 @@ _FROM_LAYOUTS: Final[tuple[AnnealingSearch | GeneticSearch | Nsga2Search | Rando
 _OTHERS: Final[tuple[SearchMethod, ...]] = (
     GreedySearch(),
     ExhaustiveSearch(),
-    WALL_NEAR_CHARGE,
-    WALL_NEAR_BUILDING,
-    LINE_OF_POSTS,
-    POSTS_AND_WALL,
+    *RULE_SEARCHES,
 )
 
 SEARCH_METHODS: Final[Mapping[str, SearchMethod]] = MappingProxyType(

@@ -154,15 +154,13 @@ class SearchSession:
         return sorted(met, key=lambda key: self._impulse_pa_s(key, threats))
 
     def front(self) -> tuple[Candidate, ...]:
-        """Return the layouts of which none has both less impulse and fewer modules.
+        """Return the layouts of which none has both less impulse and a lower price.
 
-        Among those that have met as many threats as any has, by number of modules.
+        Among those that have met as many threats as any has, by price: the number of modules or,
+        with a catalogue, the cost.
         """
         most = max(map(len, self._known.values()), default=0)
-        return tuple(
-            Candidate(self.blasts, key, self._impulse_pa_s(key, most), most)
-            for key in self._front_of(self.ranked(most), most)
-        )
+        return tuple(self._candidate(key, most) for key in self._front_of(self.ranked(most), most))
 
     def result(self, method: str, seed: int, interrupted: bool) -> SearchResult:
         """Return what was found."""
@@ -180,9 +178,10 @@ class SearchSession:
         )
 
     def _front_of(self, ranked: Sequence[Layout], threats: int) -> list[Layout]:
-        """Return the front of layouts that come with the least impulse first, by modules."""
+        """Return the front of layouts that come with the least impulse first, by price."""
         front: list[Layout] = []
-        for key in sorted(ranked, key=len):  # stable: of as many modules, least impulse first
+        # Stable: of the same price, the least impulse first.
+        for key in sorted(ranked, key=self.problem.price):
             impulse_pa_s = self._impulse_pa_s(key, threats)
             if not front or impulse_pa_s < self._impulse_pa_s(front[-1], threats):
                 front.append(key)
@@ -226,12 +225,17 @@ class SearchSession:
     def _consider(self, key: Layout) -> None:
         """Make a layout the best one if it is."""
         threats = len(self._known[key])
-        candidate = Candidate(self.blasts, key, self._impulse_pa_s(key, threats), threats)
+        candidate = self._candidate(key, threats)
         best = self.best
         if best is None or (-threats, candidate.impulse_pa_s) < (-best.threats, best.impulse_pa_s):
             if best is not None and best.blasts == self.blasts:
                 self._history.pop()  # one entry a batch
             self._history.append(candidate)
+
+    def _candidate(self, key: Layout, threats: int) -> Candidate:
+        """Return what is known of a layout now."""
+        impulse_pa_s = self._impulse_pa_s(key, threats)
+        return Candidate(self.blasts, key, impulse_pa_s, threats, self.problem.cost(key))
 
     def _impulse_pa_s(self, key: Layout, threats: int) -> float:
         return self.problem.case.combined(self._known[key][:threats])
