@@ -117,6 +117,7 @@ def _draw_target(axes: Axes, target: Target) -> None:
         fontsize=8,
         fontweight="bold" if target.protected else "normal",
         zorder=6,
+        clip_on=True,
     )
     text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
 
