@@ -15,7 +15,7 @@ from time import time
 from typing import Any, Final
 
 from blast_env.app.design import Design, History, Step
-from blast_env.app.records import BlastRecord, check_key, read_record
+from blast_env.app.records import RECORD, BlastRecord, check_key, read_record
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
 from blast_env.scenario import Scenario
@@ -103,6 +103,10 @@ class DesignFolder:
     def blast_of(self, key: str) -> Path:
         """Return the folder of a blast, which need not be there."""
         return self.blasts / check_key(key)
+
+    def blasts_there(self) -> frozenset[str]:
+        """Return the keys of the blasts that were run to their end."""
+        return frozenset(path.parent.name for path in self.blasts.glob(f"*/{RECORD}"))
 
     def record_of(self, key: str) -> BlastRecord | None:
         """Return what is kept of a blast, or `None` if it was not run to its end."""
