@@ -53,6 +53,7 @@ class DesignFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._records: dict[str, BlastRecord] = {}
 
     @property
     def design_id(self) -> str:
@@ -110,7 +111,12 @@ class DesignFolder:
 
     def record_of(self, key: str) -> BlastRecord | None:
         """Return what is kept of a blast, or `None` if it was not run to its end."""
-        return read_record(self.blast_of(key))
+        if key not in self._records:
+            record = read_record(self.blast_of(key))
+            if record is None:
+                return None
+            self._records[key] = record  # it never changes any more
+        return self._records[key]
 
     def _content(self) -> Any:
         path = self.path / _DESIGN

@@ -357,7 +357,7 @@ def test_all_by_the_keyboard(page: Page) -> None:
         page.press(Keys.TAB)
         active = page.driver.switch_to.active_element
         reached.add(active.text.split("\n")[-1] or active.get_attribute("aria-label") or "")
-    wanted = {"Undo", "Results", "Blast", "Propose"}  # tabs go on by arrow keys
+    wanted = {"Redo", "Results", "Blast", "Propose"}  # tabs go on by arrow keys
     assert wanted <= reached, sorted(reached)
 
 
