@@ -74,11 +74,13 @@ class Scale(Kept):
 
     Attributes:
         film_kpa: End of the films' scale.
+        until_s: When the films end, so that all show the same moments.
         levels: Contours of the maps, by quantity.
         walls: Ends of the walls' scales, by structure and quantity.
     """
 
     film_kpa: float
+    until_s: float
     levels: dict[str, tuple[float, ...]]
     walls: dict[str, dict[str, float]]
 
@@ -216,7 +218,7 @@ def _gas(
     if not layout:
         write_kept(scale, folder / _SCALE)
     painter = PressurePainter([shot], scale.film_kpa, _FILM_PX)
-    times_s = np.linspace(0.0, result.time_s, FRAMES).tolist()
+    times_s = np.linspace(0.0, scale.until_s, FRAMES).tolist()
     frames = (painter.paint(time_s, "") for time_s in times_s)
     _write_film(frames, times_s, folder, share_of(tell, 60, 100, 25) or tell)
     pictures = tuple(_pictures(result, scale, folder))
@@ -237,6 +239,7 @@ def _scale(result: GasResult, kept: Path) -> Scale:
         names = _facades_of(result)
         return Scale(
             film_kpa=scale_end_kpa([result]),
+            until_s=result.time_s,
             levels={each: map_levels(result, each) for each in _QUANTITIES},
             walls={
                 name: {each: full_load(result, name, each) for each in _QUANTITIES}

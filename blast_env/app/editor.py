@@ -210,7 +210,7 @@ class Editor:
                 return
             new = placing.element(design.scenario, self.item, self.cursor, self.turned)
             self._keep_layout("place 1", (*design.layout, new))
-        self._show_at(self.cursor)
+        self.ghost = None
 
     def nudge(self, x_m: float, y_m: float) -> None:
         """Move what is selected by so much, if it can be there."""

@@ -15,7 +15,7 @@ from time import time
 from typing import Any, Final
 
 from blast_env.app.design import Design, History, Step
-from blast_env.app.records import BlastRecord, check_key, read_record
+from blast_env.app.records import RECORD, BlastRecord, check_key, read_record
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
 from blast_env.scenario import Scenario
@@ -53,6 +53,7 @@ class DesignFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._records: dict[str, BlastRecord] = {}
 
     @property
     def design_id(self) -> str:
@@ -104,9 +105,18 @@ class DesignFolder:
         """Return the folder of a blast, which need not be there."""
         return self.blasts / check_key(key)
 
+    def blasts_there(self) -> frozenset[str]:
+        """Return the keys of the blasts that were run to their end."""
+        return frozenset(path.parent.name for path in self.blasts.glob(f"*/{RECORD}"))
+
     def record_of(self, key: str) -> BlastRecord | None:
         """Return what is kept of a blast, or `None` if it was not run to its end."""
-        return read_record(self.blast_of(key))
+        if key not in self._records:
+            record = read_record(self.blast_of(key))
+            if record is None:
+                return None
+            self._records[key] = record  # it never changes any more
+        return self._records[key]
 
     def _content(self) -> Any:
         path = self.path / _DESIGN

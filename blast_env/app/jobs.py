@@ -176,10 +176,10 @@ class Workers:
             _put(process.folder, "stopped", "stopped")
 
 
-def jobs_of(folder: Path) -> list[tuple[Path, Status]]:
-    """Return all work that was asked for, the last first."""
+def jobs_of(folder: Path, most: int | None = None) -> list[tuple[Path, Status]]:
+    """Return the work that was asked for, the last first; the last few, if `most` says so."""
     folders = sorted((each for each in folder.iterdir() if each.is_dir()), reverse=True)
-    return [(each, read_status(each)) for each in folders]
+    return [(each, read_status(each)) for each in folders[:most]]
 
 
 def _put(folder: Path, state: str, text: str) -> None:

@@ -233,9 +233,9 @@ class Session:
         design = self.design.with_layout(layout, slot)
         self.put(f"{status.title} into {SLOTS[slot]}", design)
 
-    def jobs(self) -> list[tuple[Path, Status]]:
-        """Return all work that was asked for, the last first."""
-        return jobs_of(self.folder.jobs)
+    def jobs(self, most: int | None = None) -> list[tuple[Path, Status]]:
+        """Return the work that was asked for, the last first; the last few, if `most` says so."""
+        return jobs_of(self.folder.jobs, most)
 
     def _begin(self, task: Task, title: str) -> Path:
         return self.workers.begin(task, self.folder.jobs, title)

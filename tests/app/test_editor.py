@@ -217,7 +217,7 @@ def test_pieces_of_a_catalogue_are_placed_turned_moved_and_kept(tmp_path: Path) 
         Piece(6, 0, "t_wall", True),
     )
     stroke(editor, (16.2, 8.2))
-    assert "stock of 2 't_wall' is used up" in editor.message
+    assert "stock of 2 pieces is used up" in editor.message
     editor.choose(Tool.SELECT)
     stroke(editor, (13.7, 6.2), (15.0, 6.8), (16.2, 7.2))
     assert editor.session.design.layout[-1] == Piece(4, 6, "t_wall", False)

@@ -128,6 +128,8 @@ def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
         await user.should_see("take it")
         user.find("take it").click()
         assert session.design.layout != CELLS
+        shown = next(iter(user.find(kind=ui.table).elements)).rows
+        assert [row["layout"] for row in shown] == ["no barrier"] * 2  # A is another one now
         assert len(session.design.layout) == 16
 
     play(tmp_path, story)

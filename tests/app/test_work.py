@@ -117,6 +117,9 @@ def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Sessi
     assert load.impulse_pa_s == pytest.approx(result.impulse("hut").pa_s)
     assert load.peak_kpa == pytest.approx(float(result.structures["peak_pa"].iloc[0]) / 1e3)
     folder = gas.folder.blast_of(record.key)
+    films = [read_film(gas.folder.blast_of(each.key)) for each in gas.shown(threat)]
+    assert films[0] is not None
+    assert films[0] == films[1]  # the same moments
     assert {each.label for each in record.pictures} == {
         "peak over the ground",
         "impulse over the ground",

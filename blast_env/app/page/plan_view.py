@@ -62,14 +62,6 @@ class PlanView:
                 button = ui.button(words, icon=icon, on_click=lambda _, t=tool: self.choose(t))
                 button.props("dense flat no-caps size=sm").tooltip(f"{words} (key {key.upper()})")
                 self._buttons[tool] = button
-            ui.space()
-            for icon, words, act in (
-                ("zoom_in", "nearer (+)", lambda: self._zoom(_ZOOM)),
-                ("zoom_out", "farther (-)", lambda: self._zoom(1.0 / _ZOOM)),
-                ("fit_screen", "whole site (0)", self.fit),
-            ):
-                button = ui.button(icon=icon, on_click=act).props("dense flat size=sm")
-                button.props(f'aria-label="{words}"').tooltip(words)
         self._image = ui.interactive_image(
             size=(WIDTH_PX, HEIGHT_PX),
             events=["mousedown", "mousemove", "mouseup", "mouseleave"],
@@ -83,9 +75,17 @@ class PlanView:
             "wheel.prevent", self._wheel, ["deltaY", "offsetX", "offsetY"], throttle=0.05
         )
         self._overlay = self._image.add_layer()
-        with ui.column().classes("be-status").props('role="status" aria-live="polite"'):
-            self._words = ui.label()
-            self._reason = ui.label().classes("be-refused")
+        with ui.row().classes("be-status items-center no-wrap"):
+            with ui.column().classes("grow gap-0").props('role="status" aria-live="polite"'):
+                self._words = ui.label()
+                self._reason = ui.label().classes("be-refused")
+            for icon, words, act in (
+                ("zoom_in", "nearer (+)", lambda: self._zoom(_ZOOM)),
+                ("zoom_out", "farther (-)", lambda: self._zoom(1.0 / _ZOOM)),
+                ("fit_screen", "whole site (0)", self.fit),
+            ):
+                button = ui.button(icon=icon, on_click=act).props("dense flat size=sm")
+                button.props(f'aria-label="{words}"').tooltip(words)
         ui.keyboard(on_key=self._key)
 
     def choose(self, tool: Tool) -> None:

@@ -15,7 +15,7 @@ _COLUMNS: Final = (
     ("layout", "layout", "left"),
     ("threat", "threat", "left"),
     ("structure", "structure", "left"),
-    ("impulse", "impulse (Pa s)", "right"),
+    ("impulse", "impulse (Pa\N{NO-BREAK SPACE}s)", "right"),
     ("peak", "peak (kPa)", "right"),
     ("reduction", "reduction", "right"),
     ("cost", "cost", "right"),
@@ -45,6 +45,7 @@ class ResultsView:
         self._what = _FILM
         self._threat = ""
         self._with_bare = True
+        self._large = False
         self._state: object = None
         self._build()
 
@@ -55,12 +56,12 @@ class ResultsView:
             self._threats = ui.select([], label="threat")
             self._threats.on_value_change(lambda e: self._against(e.value))
             for element in (self._pictures, self._threats):
-                element.props("dense outlined options-dense").classes("w-56")
+                element.props("dense outlined options-dense").classes("w-52")
             bare = ui.switch("no barrier beside", value=True)
             bare.on_value_change(lambda e: self._beside(e.value))
-            ui.space()
-            self._engine = ui.label().classes("be-quiet")
-        with ui.scroll_area().classes("w-full grow").style("height: calc(100vh - 160px)"):
+            large = ui.switch("large", value=False)
+            large.on_value_change(lambda e: self._enlarge(e.value))
+        with ui.element("div").classes("be-results"):
             self._empty = ui.label(
                 "No blast yet for the layouts as they are now: press Blast on the right."
             ).classes("be-quiet")
@@ -68,7 +69,7 @@ class ResultsView:
             self._cards = ui.element("div").classes("be-cards")
             self._chart = ui.column().classes("w-full")
             columns = [
-                {"name": name, "field": name, "label": label, "align": align, "sortable": True}
+                {"name": name, "field": name, "label": label, "align": align}
                 for name, label, align in _COLUMNS
             ]
             self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full mt-2")
@@ -85,6 +86,10 @@ class ResultsView:
             self._threat = threat
             self.refresh()
 
+    def _enlarge(self, large: bool) -> None:
+        self._large = large
+        self.refresh()
+
     def _beside(self, beside: bool) -> None:
         self._with_bare = beside
         self.refresh()
@@ -97,11 +102,13 @@ class ResultsView:
             self._threat = next(iter(threats))
         self._threats.set_options([*threats], value=self._threat)
         found = self._found(threats[self._threat])
-        state = (self._what, self._threat, self._with_bare, session.engine, found, *threats)
+        # Not the records themselves: a number that does not exist is not even equal to itself.
+        there = tuple((name, key, record is None, frames) for name, key, record, frames in found)
+        options = (self._what, self._threat, self._with_bare, self._large)
+        state = (options, session.engine, there, tuple(threats), session.folder.blasts_there())
         if state == self._state:
             return
         self._state = state
-        self._engine.text = f"engine: {session.engine.label}"
         records = [record for _, _, record, _ in found if record is not None]
         self._offer(records)
         shown = [each for each in found if self._with_bare or each[0] != "no barrier"]
@@ -137,7 +144,7 @@ class ResultsView:
         self._bar.visible = self._what == _FILM and bool(found)
         self._cards.visible = self._what != _GAUGES
         wide = self._what.endswith("walls") or " on the walls of " in self._what
-        columns = 1 if wide or len(found) == 1 else 2
+        columns = 1 if wide or self._large or len(found) == 1 else 2
         self._cards.style(f"grid-template-columns: repeat({columns}, minmax(0, 1fr))")
         with self._cards:
             for name, key, record, frames in found:
@@ -213,9 +220,9 @@ def _chart(gauge: str, waves: Any) -> dict[str, Any]:
                 )
     return {
         "animation": False,
-        "title": {"text": f"gauge {gauge}", "textStyle": {"fontSize": 14}},
-        "legend": {"top": 24},
-        "grid": {"left": 60, "right": 20, "top": 64, "bottom": 46},
+        "title": {"text": f"gauge {gauge}", "left": 0, "textStyle": {"fontSize": 14}},
+        "legend": {"top": 28},
+        "grid": {"left": 60, "right": 20, "top": 74, "bottom": 46},
         "tooltip": {"trigger": "axis"},
         "xAxis": {"type": "value", "name": "time (ms)", "nameLocation": "middle", "nameGap": 28},
         "yAxis": {"type": "value", "name": "overpressure (kPa)"},

@@ -247,7 +247,7 @@ class WorkPanel:
 
     def follow(self) -> bool:
         """Show how far work has come; return whether anything is new."""
-        jobs = self._session.jobs()[:_SHOWN_JOBS]
+        jobs = self._session.jobs(_SHOWN_JOBS)
         if jobs == self._told:
             return False
         self._told = jobs

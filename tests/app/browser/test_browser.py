@@ -1,0 +1,382 @@
+"""The page in a real browser: `make test-browser`. Screenshots are in out/app, to be looked at.
+
+Chromium and its driver are Debian's packages chromium and chromium-driver. The server is the
+command itself, in a process of its own.
+"""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import pytest
+from selenium import webdriver
+from selenium.common.exceptions import StaleElementReferenceException
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+from blast_env.app.plan import View
+from blast_env.scenario import Scenario, load_scenario, save_scenario
+
+WIDTH, HEIGHT = 1280, 800
+PICTURES = Path(__file__).parents[3] / "out" / "app"
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None or DRIVER is None, reason="needs chromium and chromium-driver"
+)
+
+
+def high_courtyard() -> Scenario:
+    """The courtyard with heights and a gauge."""
+    document = load_scenario("courtyard").model_dump(mode="json", exclude_none=True)
+    document |= {"schema_version": 2, "name": "courtyard_high"}
+    document["structures"][0]["height_m"] = 6.0
+    document["build_zone"]["height_m"] = 3.0
+    document["gauges"] = [{"name": "door", "position_m": [26.75, 15.25, 1.25]}]
+    return Scenario.from_document(document, "courtyard_high")
+
+
+@dataclass
+class Server:
+    """The command, in a process of its own."""
+
+    folder: Path
+    port: int = 0
+    process: "subprocess.Popen[str] | None" = field(default=None, init=False)
+
+    def start(self) -> None:
+        if not self.port:
+            with socket.socket() as probe:
+                probe.bind(("127.0.0.1", 0))
+                self.port = probe.getsockname()[1]
+        command = [sys.executable, "-m", "blast_env", "app", "--port", str(self.port)]
+        # NiceGUI would take the server for one of its own tests.
+        own = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
+        command += ["--folder", str(self.folder)]
+        self.process = subprocess.Popen(command, text=True, env=own)
+        until_s = monotonic() + 60.0
+        while monotonic() < until_s:
+            with socket.socket() as probe:
+                if probe.connect_ex(("127.0.0.1", self.port)) == 0:
+                    return
+            sleep(0.2)
+        self.stop()
+        raise AssertionError("the server does not answer")
+
+    def stop(self, kind: signal.Signals = signal.SIGTERM) -> None:
+        if self.process is not None:
+            self.process.send_signal(kind)
+            self.process.wait(20)
+            self.process = None
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+
+@dataclass
+class Page:
+    """A browser, in the words of somebody who sits before it."""
+
+    driver: Any
+    server: Server
+
+    def open(self, path: str = "/") -> None:
+        self.driver.get(f"{self.server.url}{path}")
+        sleep(1.0)
+
+    def begin(self, name: str) -> None:
+        self.open()
+        self.button(name).click()
+        self.until(lambda: "/design/" in self.driver.current_url)
+        self.until(lambda: self.all(".be-plan svg text"))
+        sleep(0.5)
+
+    def all(self, css: str) -> list[Any]:
+        found: list[Any] = self.driver.find_elements(By.CSS_SELECTOR, css)
+        return found
+
+    def button(self, words: str) -> Any:
+        def find() -> Any:
+            for each in self.all("button, .q-tab, .q-item"):
+                if each.is_displayed() and words in each.text.split("\n"):
+                    return each
+            return None
+
+        return self.until(find)
+
+    def text(self) -> str:
+        return str(self.driver.find_element(By.TAG_NAME, "body").text)
+
+    def until(self, what: Callable[[], Any], most_s: float = 30.0) -> Any:
+        until_s = monotonic() + most_s
+        while monotonic() < until_s:
+            try:
+                found = what()
+            except StaleElementReferenceException:
+                found = None
+            if found:
+                return found
+            sleep(0.02)
+        self.shoot("failed")
+        raise AssertionError(f"did not come within {most_s:g} s")
+
+    def sees(self, words: str, most_s: float = 30.0) -> None:
+        self.until(lambda: words in self.text(), most_s)
+
+    def drag(self, scenario: Scenario, *places: tuple[float, float], hold: bool = True) -> None:
+        """Move the mouse over places of the site, its button down from the first to the last."""
+        plan = self.driver.find_element(By.CSS_SELECTOR, ".be-plan")
+        width, height = plan.rect["width"], plan.rect["height"]
+        view = View.of(scenario, 680, 560)
+        actions = ActionChains(self.driver, duration=30)
+        for number, place in enumerate(places):
+            x_px, y_px = view.pixel(*place)
+            right, down = x_px * width / 680 - width / 2, y_px * height / 560 - height / 2
+            actions.move_to_element_with_offset(plan, round(right), round(down))
+            if hold and number == 0:
+                actions.click_and_hold()
+        if hold:
+            actions.release()
+        actions.perform()
+        sleep(0.3)
+
+    def choose(self, label: str, option: str) -> None:
+        """Choose an option of a select by their words."""
+        for each in self.all(".q-select"):
+            if each.is_displayed() and label in each.text.split("\n"):
+                each.click()
+                break
+        sleep(0.4)
+        for item in self.all(".q-menu .q-item"):
+            if item.text.strip().startswith(option):
+                item.click()
+                break
+        else:
+            raise AssertionError(f"{label} does not offer {option}")
+        sleep(0.4)
+        self.press(Keys.ESCAPE)
+
+    def press(self, *keys: str) -> None:
+        ActionChains(self.driver).send_keys(*keys).perform()
+        sleep(0.15)
+
+    def shoot(self, name: str) -> None:
+        PICTURES.mkdir(parents=True, exist_ok=True)
+        self.driver.save_screenshot(str(PICTURES / f"{name}.png"))
+
+    def faults(self) -> list[str]:
+        """Return what the browser complained about."""
+        entries = self.driver.get_log("browser")
+        return [each["message"] for each in entries if each["level"] == "SEVERE"]
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    server = Server(tmp_path_factory.mktemp("designs"))
+    server.start()
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def page(server: Server, tmp_path: Path) -> Iterator[Page]:
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM or ""
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--enable-unsafe-swiftshader",
+        "--hide-scrollbars",
+        f"--window-size={WIDTH},{HEIGHT}",
+        f"--user-data-dir={tmp_path / 'profile'}",
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    downloads = {"download.default_directory": str(tmp_path / "downloads")}
+    options.add_experimental_option("prefs", downloads)
+    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+    size = {"width": WIDTH, "height": HEIGHT, "deviceScaleFactor": 1, "mobile": False}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        yield Page(driver, server)
+    finally:
+        driver.quit()
+
+
+WALL_NEAR = [(13.25, 16.25 + 0.5 * k) for k in range(8)]
+WALL_FAR = [(20.25, 16.25 + 0.5 * k) for k in range(8)]
+
+
+def test_place_blast_and_compare_by_particles(page: Page) -> None:
+    courtyard = load_scenario("courtyard")
+    page.open()
+    page.shoot("start")
+    page.begin("courtyard")
+    page.button("Place").click()
+    page.drag(courtyard, *WALL_NEAR)
+    page.sees("8 of 16 modules")
+    page.drag(courtyard, (15.25, 15.0), hold=False)
+    page.sees("the path from the road to the door must stay open")
+    page.shoot("plan")
+    page.button("B").click()
+    page.drag(courtyard, *WALL_FAR)
+    page.sees("8 of 16 modules")
+
+    began_s = monotonic()
+    page.button("Blast").click()
+    page.until(lambda: [each for each in page.all("img[data-film]") if each.get_attribute("src")])
+    seconds = monotonic() - began_s
+    (PICTURES / "film_seconds.txt").write_text(f"{seconds:.2f} s from Blast to the film\n")
+    assert seconds < 15.0  # with two quiet cores below 1 s; here anything may run beside
+    page.button("all").click()
+    page.until(lambda: len(page.all("img[data-film]")) == 3)
+    page.until(lambda: len(page.all(".q-table tbody tr")) == 6)
+    if "pause" in page.text():
+        page.all("[data-film-play]")[0].click()
+    slider = page.all("input[data-film-slider]")[0]
+    page.driver.execute_script(
+        "arguments[0].value = 14; arguments[0].dispatchEvent(new Event('input', {bubbles: true}))",
+        slider,
+    )
+    sleep(1.0)
+    widths = [each.get_property("naturalWidth") for each in page.all("img[data-film]")]
+    assert widths == [640, 640, 640]
+    frames = {each.get_attribute("src").rpartition("/")[2] for each in page.all("img[data-film]")}
+    assert frames == {"014.jpg"}  # all films at the same moment
+    page.shoot("results_particles")
+    assert not page.faults()
+
+
+def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -> None:
+    site = high_courtyard()
+    save_scenario(site, tmp_path / "courtyard_high.toml")
+    page.open()
+    (tmp_path / "broken.toml").write_text("schema_version = 1\nname = 3\n")
+    upload = page.all("input[type=file]")[0]
+    upload.send_keys(str(tmp_path / "broken.toml"))
+    page.sees("That does not work")
+    page.shoot("broken_file")
+    page.button("close").click()
+    sleep(0.5)
+    page.all("input[type=file]")[0].send_keys(str(tmp_path / "courtyard_high.toml"))
+    page.until(lambda: "/design/" in page.driver.current_url)
+    page.until(lambda: page.all(".be-plan svg text"))
+    page.button("Place").click()
+    page.drag(site, *[(13.25, 16.25 + 0.5 * k) for k in range(12)])
+    page.sees("12 of 16 modules")
+    page.button("3-D").click()
+    sleep(2.5)
+    page.shoot("solid")
+    page.choose("engine", "gas, cells of 0.5 m")
+    page.button("Blast").click()
+    sleep(4.0)
+    page.shoot("gas_running")
+    page.until(lambda: len(page.all(".q-table tbody tr")) == 4, 240.0)
+    sleep(1.0)
+    page.all("[data-film-play]")[0].click()
+    slider = page.all("input[data-film-slider]")[0]
+    page.driver.execute_script(
+        "arguments[0].value = 20; arguments[0].dispatchEvent(new Event('input', {bubbles: true}))",
+        slider,
+    )
+    sleep(0.7)
+    assert [each.get_property("naturalWidth") for each in page.all("img[data-film]")] == [640, 640]
+    page.shoot("results_gas_film")
+    for number, picture in enumerate(("peak over", "impulse on the walls", "gauges")):
+        page.choose("picture", picture)
+        sleep(1.5)
+        page.shoot(("results_gas_map", "results_gas_walls", "results_gas_gauges")[number])
+    assert "gas, cells of 0.5 m" in page.text()
+    assert not page.faults()
+
+
+def test_search_stop_keep_save_and_lose_nothing(page: Page, server: Server, tmp_path: Path) -> None:
+    page.begin("courtyard")
+    address = page.driver.current_url.removeprefix(server.url)
+    page.choose("by", "search: random")
+    budget = next(
+        each for each in page.all("input[type=number]") if each.get_attribute("value") == "100"
+    )
+    budget.send_keys(Keys.CONTROL, "a")
+    budget.send_keys("5000")
+    page.button("Propose").click()
+    page.sees("best so far", 120.0)
+    page.shoot("search")
+    page.button("stop").click()
+    page.sees("stopped")
+    page.button("take it").click()
+    page.sees("16 of 16 modules")
+    page.button("Save as").click()
+    sleep(0.5)
+    page.button("layout: .json").click()
+    saved = page.until(lambda: [*(tmp_path / "downloads").glob("*.json")])
+    assert len(json.loads(saved[0].read_text())["cells"]) == 16
+
+    page.driver.refresh()  # a reload
+    page.sees("16 of 16 modules")
+    server.stop(signal.SIGKILL)  # and the server killed, at once
+    server.start()
+    page.open(address)
+    page.sees("16 of 16 modules")
+    page.button("Undo").click()
+    page.sees("0 of 16 modules")
+
+
+def test_all_by_the_keyboard(page: Page) -> None:
+    page.begin("courtyard")
+    plan = page.driver.find_element(By.CSS_SELECTOR, ".be-plan")
+    page.driver.execute_script("arguments[0].focus()", plan)
+    page.press("p", Keys.ARROW_UP)
+    for _ in range(4):
+        page.press(Keys.ARROW_UP)
+    page.press(Keys.ENTER)
+    page.sees("1 of 16 modules")
+    page.shoot("keyboard")
+    page.press("b")
+    page.sees("blast of A", 10.0)
+    ActionChains(page.driver).key_down(Keys.CONTROL).send_keys("z").key_up(Keys.CONTROL).perform()
+    page.sees("0 of 16 modules")
+    reached: set[str] = set()
+    for _ in range(90):
+        page.press(Keys.TAB)
+        active = page.driver.switch_to.active_element
+        reached.add(active.text.split("\n")[-1] or active.get_attribute("aria-label") or "")
+    wanted = {"Redo", "Results", "Blast", "Propose"}  # tabs go on by arrow keys
+    assert wanted <= reached, sorted(reached)
+
+
+def test_two_tabs_do_not_mix_and_a_second_server_is_refused(page: Page, server: Server) -> None:
+    page.begin("courtyard")
+    first = page.driver.current_url
+    page.driver.switch_to.new_window("tab")
+    page.begin("perimeter_gate")
+    assert page.driver.current_url != first
+    page.sees("perimeter_gate")
+    page.driver.switch_to.window(page.driver.window_handles[0])
+    assert "perimeter_gate" not in page.text().split("\n")[:3]
+    for port, words in ((server.port, "cannot be used"), (server.port + 1, "is open already")):
+        command = [sys.executable, "-m", "blast_env", "app", "--port", str(port)]
+        done = subprocess.run(
+            [*command, "--folder", str(server.folder)],
+            capture_output=True,
+            text=True,
+            env={**os.environ, "COLUMNS": "300"},
+        )
+        assert done.returncode == 2
+        assert words in done.stderr
