@@ -22,8 +22,8 @@ from blast_env.physics.pymunk.space import (
     StepContacts,
     build_space,
 )
+from blast_env.physics.pymunk.walls import HALF, OUTWARD, WallSides, height_above
 from blast_env.physics.scene import Scene
-from blast_env.units import MODULE_SIDE_UNITS
 
 _TOO_FAST: Final = 2.0
 """Speeds above the one that the step was made for, up to which the step is kept.
@@ -126,9 +126,6 @@ class StepGuard:
             self._space.on_collision(one, other, pre_solve=callback)
 
 
-_HALF: Final = MODULE_SIDE_UNITS / 2.0
-
-
 _STEPS_BETWEEN_CHECKS: Final = 32
 
 
@@ -180,6 +177,8 @@ class PymunkRun:
         self._collisions = np.zeros(len(scene.balls), dtype=np.int64)
         self._next_check = 0
         self._touches: list[_Touch] = []
+        self._sides = WallSides()
+        self._stepped_s = 0.0
         self._touching: frozenset[int] = frozenset()  # balls on a module in the step before
         for kind in (CollisionType.ExplosionBall, CollisionType.AirBall):
             self._built.space.on_collision(
@@ -226,7 +225,8 @@ class PymunkRun:
 
     def _step(self) -> None:
         self._touches.clear()
-        time_step_s = self._guard.time_step_s
+        self._sides.begin_step()
+        self._stepped_s = time_step_s = self._guard.time_step_s
         self._built.space.step(time_step_s)
         self.steps += 1
         self.time_s += time_step_s
@@ -251,14 +251,19 @@ class PymunkRun:
         assert isinstance(module, ModuleShape)
         body = self._built.ball_bodies[ball.index]
         x, y = body.position
-        x, y = x - module.x, y - module.y
-        beside, above = abs(x) - _HALF, abs(y) - _HALF
-        if beside > 0.0 and above > 0.0 and module.covered_corners[(x > 0.0) + 2 * (y > 0.0)]:
+        centre = x - module.x, y - module.y
+        moved = body.velocity * self._stepped_s
+        before = centre[0] - moved.x, centre[1] - moved.y
+        contact = self._sides.meet(ball.index, module, centre, before)
+        if not contact.holds:
             arbiter.process_collision = False
             return
+        if contact.faces:
+            self._push_out(arbiter, contact.faces, centre)
         arbiter.process_collision = not self._guard.drops(arbiter)
         arbiter.restitution = self._contact.module_restitution
-        gap = hypot(max(beside, 0.0), max(above, 0.0)) - float(self._radius[ball.index])
+        beside, above = max(abs(centre[0]) - HALF, 0.0), max(abs(centre[1]) - HALF, 0.0)
+        gap = hypot(beside, above) - float(self._radius[ball.index])
         self._touches.append(
             _Touch(
                 ball.index,
@@ -269,6 +274,22 @@ class PymunkRun:
                 -arbiter.normal,
             )
         )
+
+    def _push_out(
+        self, arbiter: pymunk.Arbiter, faces: tuple[int, ...], centre: tuple[float, float]
+    ) -> None:
+        """Let a ball leave a module through the first of the faces, unless pymunk means another."""
+        normal = -arbiter.normal
+        if any(normal == OUTWARD[face] for face in faces):
+            return
+        ball, _ = arbiter.shapes
+        assert isinstance(ball, BallShape)
+        outward, height = pymunk.Vec2d(*OUTWARD[faces[0]]), height_above(faces[0], centre)
+        position = self._built.ball_bodies[ball.index].position
+        radius = float(self._radius[ball.index])
+        on_ball, on_face = position - outward * radius, position - outward * height
+        point = pymunk.ContactPoint(on_ball, on_face, height - radius)
+        arbiter.contact_point_set = pymunk.ContactPointSet(-outward, (point,))
 
     def _record_touches(self, contacts: StepContacts) -> list[int]:
         """Record what modules gave to balls in this step; return the balls that are new there."""

@@ -32,11 +32,12 @@ class BallShape(pymunk.Circle):
 
 
 class ModuleShape(pymunk.Poly):
-    """A module's square that knows its index and the corners where the wall goes on."""
+    """A module's square that knows its index, and the faces and corners where the wall goes on."""
 
     index: int
     x: float
     y: float
+    free_faces: tuple[bool, ...]
     covered_corners: tuple[bool, ...]
 
 
@@ -84,9 +85,10 @@ class PymunkSpace:
             body = self.module_bodies.pop(index)
             self.space.remove(body, *body.shapes)
         added = []
-        for index, exposed, corners in zip(
+        for index, exposed, faces, corners in zip(
             standing.tolist(),
             surface.exposed.tolist(),
+            surface.free_faces.tolist(),
             surface.covered_corners.tolist(),
             strict=True,
         ):
@@ -97,7 +99,7 @@ class PymunkSpace:
                 added.append(index)
             (shape,) = self.module_bodies[index].shapes
             assert isinstance(shape, ModuleShape)
-            shape.covered_corners = tuple(corners)
+            shape.free_faces, shape.covered_corners = tuple(faces), tuple(corners)
         return added
 
     def _add_module(self, index: int) -> None:
