@@ -43,7 +43,14 @@ EVENT_LIMIT: Final = 3
 MODULE_DESTROYED: Final = 4
 
 
+PAUSED: Final = 5
+
+
 _COLLISIONS_BETWEEN_CHECKS: Final = 512
+
+
+_EVENTS_PER_CALL: Final = 10_000
+"""After which the loop comes back, so that Ctrl-C is heard: an event takes 1 to 10 us."""
 
 
 @njit(error_model="numpy")
@@ -67,10 +74,16 @@ def run_until(
     """
     if progress.stage == NEW:
         _begin(balls, cells, heap, surfaces, rules)
-    elif progress.stage == CHANGED:
-        _look_again(balls, cells, heap, surfaces, rules)
+    elif progress.stage == CHANGED and not _look_again(
+        balls, cells, heap, surfaces, rules, progress
+    ):
+        return PAUSED
     progress.stage = RUNNING
+    events = 0
     while True:
+        if events == _EVENTS_PER_CALL:
+            return PAUSED
+        events += 1
         if progress.collisions >= progress.next_check:
             progress.next_check = progress.collisions + _COLLISIONS_BETWEEN_CHECKS
             if not _can_reach(balls, heap, targets, rules.time_limit_s, progress.time_s):
@@ -137,11 +150,19 @@ def _look_again(
     heap: RecordArray,
     surfaces: RecordArray,
     rules: Record,
-) -> None:
-    """Look ahead again for every ball that moves."""
-    for ball in range(len(balls)):
+    progress: Record,
+) -> bool:
+    """Look ahead again for balls that move; return whether none is left."""
+    looked = 0
+    for ball in range(progress.looked_again, len(balls)):
+        if looked == _EVENTS_PER_CALL:
+            progress.looked_again = ball
+            return False
         if heap[ball].place > 0:
             look_ahead(balls, cells, heap, surfaces, rules, ball)
+            looked += 1
+    progress.looked_again = 0
+    return True
 
 
 @njit(error_model="numpy")
@@ -268,9 +289,13 @@ def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
     """Go on until a time, or until something is to be done outside; see `loop.run_until`.
 
     The first call in a new installation compiles, and says so through the logger `blast_env`.
-    Other threads run meanwhile.
+    Other threads run meanwhile, and Ctrl-C is heard within half a second.
     """
-    if not _RUN.signatures:  # type: ignore[attr-defined]
-        with _FIRST_CALL, event.install_listener("numba:compile", _CompilationNotice()):
-            return int(_RUN(*world, record, until_s))
-    return int(_RUN(*world, record, until_s))
+    answer = PAUSED
+    while answer == PAUSED:
+        if _RUN.signatures:  # type: ignore[attr-defined]
+            answer = int(_RUN(*world, record, until_s))
+        else:
+            with _FIRST_CALL, event.install_listener("numba:compile", _CompilationNotice()):
+                answer = int(_RUN(*world, record, until_s))
+    return answer

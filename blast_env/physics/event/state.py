@@ -170,6 +170,7 @@ PROGRESS: Final = np.dtype(
         ("next_check", np.int64),  # collisions at which to look whether a structure is in reach
         ("records", np.int64),  # rows written
         ("stage", np.int64),  # NEW, RUNNING or CHANGED
+        ("looked_again", np.int64),  # with CHANGED: balls that it is done with
         ("source_digest", np.int64),  # of the compiled code
     ]
 )

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from math import expm1, sqrt
+from threading import Event
 from typing import Any, Final, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -23,6 +24,9 @@ COURANT: Final = 0.45
 _FIRST_STEPS: Final = 10
 _FIRST_SHARE: Final = 0.2
 """Share of the full step at the first one; grows evenly over the first steps."""
+
+_CELLS_PER_CALL: Final = 1_000_000
+"""That compiled code moves on before Python hears of signals: a tenth of a second."""
 
 _DTYPES: Final = {"single": np.float32, "double": np.float64}
 
@@ -224,8 +228,7 @@ class GasSolver:
             self._burn(self._burning, step_s)
         self._signal = max(float(self._notes[:, 0].max()), sqrt(GAMMA))
         self._lifted += int(self._notes[:, 1].sum())
-        z0, z1, y0, y1, x0, x1 = self.box.tolist()
-        self.cell_updates += (z1 - z0) * (y1 - y0) * (x1 - x0)
+        self.cell_updates += self._cells_in_box()
         self.steps += 1
         self.time_s = self.time_s + step_s
         for recorder in self.recorders:
@@ -330,18 +333,29 @@ class GasSolver:
 
     def _share_out(self, move: Callable[[int, int, int], None], first: int, end: int) -> None:
         """Give each thread its part of the layers from first to end, then leave still air out."""
-        count = self._threads
+        count, broken_off = self._threads, Event()
         bounds = [first + (end - first) * k // count for k in range(count + 1)]
-        others = [
-            self._pool.submit(move, k, bounds[k], bounds[k + 1])
-            for k in range(1, count)
-            if self._pool is not None
-        ]
-        move(0, bounds[0], bounds[1])
-        for other in others:
-            other.result()
+        layers = max(_CELLS_PER_CALL * max(end - first, 1) // max(self._cells_in_box(), 1), 1)
+
+        def in_parts(k: int) -> None:
+            for part in range(bounds[k], bounds[k + 1], layers):
+                if broken_off.is_set():
+                    return
+                move(k, part, min(part + layers, bounds[k + 1]))
+
+        others = [self._pool.submit(in_parts, k) for k in range(1, count) if self._pool is not None]
+        try:
+            in_parts(0)
+            for other in others:
+                other.result()
+        finally:  # of Ctrl-C too: the others need not go on
+            broken_off.set()
         if self._skip:
             kernels.tighten(self.state, self._still, self.box, 2)
+
+    def _cells_in_box(self) -> int:
+        z0, z1, y0, y1, x0, x1 = self.box.tolist()
+        return int((z1 - z0) * (y1 - y0) * (x1 - x0))
 
     def _widen(self, sides: tuple[int, ...]) -> None:
         """Let the box grow by as many cells as a pass can carry something."""

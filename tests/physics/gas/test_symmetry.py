@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from blast_env.physics.gas import kernels
+from blast_env.physics.gas import solver as solver_module
 from blast_env.physics.gas.faces import exposed_faces
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import FaceLoads
@@ -86,6 +87,28 @@ def test_threads_and_calls_change_no_bit(precision: str) -> None:
         stopped.advance(float(time_s))
     for state in (*states[1:], stopped.state):
         assert (state == states[0]).all()
+
+
+def test_compiled_code_comes_back_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Large grids were deaf to Ctrl-C for seconds; how a pass is cut into calls does not matter."""
+    whole = blast(street(), (6, 9, 0), threads=2)
+    whole.advance(TIME_S)
+    moved: list[int] = []
+    compiled = kernels.advance_planes
+
+    def advance_planes(*arguments: Any) -> None:
+        _, _, _, _, box, first, end, *_ = arguments
+        moved.append((end - first) * (box[3] - box[2]) * (box[5] - box[4]))
+        compiled(*arguments)
+
+    monkeypatch.setattr(kernels, "advance_planes", advance_planes)
+    monkeypatch.setattr(solver_module, "_CELLS_PER_CALL", 500)
+    cut = blast(street(), (6, 9, 0), threads=2)
+    cut.advance(TIME_S)
+    layer = street().shape[0] * street().shape[1]
+    assert len(moved) > 2 * whole.steps
+    assert max(moved) <= max(500, layer)
+    assert (cut.state == whole.state).all()
 
 
 def test_rows_longer_than_a_tile() -> None:
