@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
+from stat import S_ISREG
 from typing import Final, NamedTuple
 
 from blast_env.errors import BlastEnvError
@@ -178,14 +179,11 @@ class FolderStore:
         except OSError:
             return None
         content = _unpacked(stored, key)
-        try:
-            if content is None:
-                self.damaged += 1
-                path.unlink(missing_ok=True)
-            else:
+        if content is None:
+            self.discard(key)
+        else:
+            with suppress(OSError):
                 os.utime(path)
-        except OSError:  # a folder that may only be read
-            pass
         return content
 
     def put(self, key: str, content: bytes) -> None:
@@ -202,7 +200,16 @@ class FolderStore:
         self._unseen_bytes += len(packed)
         if self._unseen_bytes > _UNSEEN_SHARE * self.most_bytes:
             self._unseen_bytes = 0
-            self._tidy_up(self.most_bytes)
+            try:
+                self._tidy_up(self.most_bytes)
+            except OSError as error:  # a folder that may not be listed
+                raise _cannot_write(self.folder, error) from error
+
+    def discard(self, key: str) -> None:
+        """Count the content of a key as damaged, and delete it if that is allowed."""
+        self.damaged += 1
+        with suppress(OSError):  # a folder that may only be read
+            self._path(key).unlink(missing_ok=True)
 
     def __len__(self) -> int:
         return sum(1 for _ in self._entries())
@@ -219,6 +226,8 @@ class FolderStore:
                         status = item.stat()
                     except OSError:  # another process has deleted it
                         continue
+                    if not S_ISREG(status.st_mode):
+                        continue
                     yield _Entry(status.st_mtime_ns, status.st_size, item.path)
 
     def _tidy_up(self, most_bytes: int) -> None:
@@ -230,7 +239,10 @@ class FolderStore:
         for entry in entries:
             if size <= _KEPT_SHARE * most_bytes:
                 return
-            Path(entry.path).unlink(missing_ok=True)
+            try:
+                Path(entry.path).unlink(missing_ok=True)
+            except PermissionError:  # of somebody else, in a folder like /tmp
+                continue
             size -= entry.size
 
 
@@ -246,4 +258,4 @@ def _unpacked(stored: bytes, key: str) -> bytes | None:
     if sha256(body).digest() != checksum:
         return None
     line, _, content = body.partition(b"\n")
-    return content if json.loads(line) == key else None
+    return content if line == json.dumps(key).encode() else None

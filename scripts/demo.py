@@ -151,7 +151,7 @@ def _learning_curve(folder: RunFolder) -> Iterator[Callable[[float], None]]:
 def _evaluations(folder: RunFolder) -> list[EvaluationRow]:
     if not folder.evaluations.exists():
         return []
-    return read_rows(folder.evaluations, EvaluationRow, 10**10)
+    return read_rows(folder.evaluations, EvaluationRow)
 
 
 def _clear(run: Path) -> None:

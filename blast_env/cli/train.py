@@ -138,5 +138,5 @@ def _print_result(result: "TrainingResult") -> None:
                 f"best on held-out threats, after {row.steps:,} steps: reduction "
                 f"{row.reduction:.1%} (95 % interval {row.low:.1%} to {row.high:.1%})"
             )
-    for path in (folder.best, folder.last, folder.evaluations, folder.learning_curve):
+    for path in (folder.checkpoint, folder.evaluations, folder.learning_curve):
         print_line(f"wrote {path}")

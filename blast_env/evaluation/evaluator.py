@@ -161,6 +161,8 @@ class BlastEvaluator:
         loads = self._remembered.get(key)
         if loads is None and self._cache is not None:
             loads = self._cache.get(key)
+            if loads is not None and not loads.are_for(self.scenario):
+                return None  # a cache that anybody may write to
             if loads is not None:
                 self._remember(key, loads)
         return loads

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from blast_env.calibration.model import Calibration
 from blast_env.physics.structure import ModularObstacle
+from blast_env.scenario import Scenario
 from blast_env.simulation import BlastResult
 from blast_env.units import PA_PER_PSI
 
@@ -57,6 +58,17 @@ class BlastLoads:
 
     structures: tuple[StructureLoad, ...]
     module_impulse_sim: NDArray[np.float64]
+
+    def are_for(self, scenario: Scenario) -> bool:
+        """Return whether these can be loads of a scenario: finite, one a structure and module."""
+        names = [structure.name for structure in scenario.structures]
+        modules = sum(structure.rows * structure.columns for structure in scenario.structures)
+        impulses = np.array([load.impulse_psi_s for load in self.structures])
+        return (
+            [load.name for load in self.structures] == names
+            and self.module_impulse_sim.shape == (modules,)
+            and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse_sim).all())
+        )
 
     @property
     def protected(self) -> tuple[StructureLoad, ...]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from blast_env.calibration.model import Calibration
 from blast_env.errors import BlastEnvError
@@ -143,8 +144,15 @@ class DiskCache:
 
     def get(self, key: BlastKey) -> BlastLoads | None:
         """Return the loads of a blast, or `None` if they are not there in one piece."""
-        content = self._store.get(_key_text(key))
-        return None if content is None else _decoded(content)
+        text = _key_text(key)
+        content = self._store.get(text)
+        if content is None:
+            return None
+        try:
+            return _decoded(content)
+        except ValueError:  # what the checksum says is what was written, which is something else
+            self._store.discard(text)
+            return None
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast; the ones that were asked for longest ago may have to go."""
@@ -183,9 +191,15 @@ def _encoded(loads: BlastLoads) -> bytes:
     return json.dumps(header).encode() + b"\n" + loads.module_impulse_sim.astype("<f8").tobytes()
 
 
+_STRUCTURES: Final = TypeAdapter(tuple[StructureLoad, ...])
+
+
 def _decoded(content: bytes) -> BlastLoads:
+    """Return the loads.
+
+    Raises:
+        ValueError: If the content is anything else.
+    """
     line, _, impulses = content.partition(b"\n")
-    structures = tuple(
-        StructureLoad(**{**each, "notes": tuple(each["notes"])}) for each in json.loads(line)
-    )
+    structures = _STRUCTURES.validate_json(line)
     return BlastLoads(structures, np.frombuffer(impulses, dtype="<f8").astype(np.float64))

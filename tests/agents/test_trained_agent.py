@@ -11,7 +11,8 @@ import torch
 from blast_agents.policies.spatial import SpatialPolicy
 from blast_agents.proposal import LayoutAgent
 from blast_agents.training import TrainedAgent, load_agent, load_archive, train
-from blast_agents.training.agent import Checkpoint, logits_of, make_model, make_policy
+from blast_agents.training.agent import logits_of, make_model, make_policy
+from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.environments import make_environments, training_source
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from gymnasium import spaces
@@ -177,10 +178,10 @@ def test_a_scenario_of_another_size_is_refused(run: Path) -> None:
 
 def test_best_and_last_weights_can_be_told_apart(run: Path, tmp_path: Path) -> None:
     copy = RunFolder(Path(copytree(run, tmp_path / "run")))
-    last = Checkpoint.load(copy.last)
+    last = Checkpoint.load(copy.checkpoint)
     for values in last.policy.values():
         values.zero_()
-    last.save(copy.last)
+    last.save(copy.checkpoint)
     weights = load_agent(copy.path, "last").policy.state_dict()
     assert all(not values.any() for values in weights.values())
     assert any(values.any() for values in load_agent(copy.path).policy.state_dict().values())
@@ -201,7 +202,7 @@ def test_code_in_a_checkpoint_does_not_run(run: Path, tmp_path: Path) -> None:
     victim = tmp_path / "victim"
     stored = io.BytesIO()
     torch.save({"format": 1, "policy": _Exploit(victim)}, stored)
-    copy.best.write_bytes(stored.getvalue())
+    copy.checkpoint.write_bytes(stored.getvalue())
     with pytest.raises(BlastEnvError, match="damaged"):
         load_agent(copy.path)
     assert not victim.exists()
@@ -211,7 +212,7 @@ def test_weights_of_another_network_are_refused(run: Path, tmp_path: Path) -> No
     copy = Path(copytree(run, tmp_path / "run"))
     text = (copy / "config.yaml").read_text()
     (copy / "config.yaml").write_text(text.replace("width: 8", "width: 9"))
-    with pytest.raises(BlastEnvError, match="weights and configuration differ"):
+    with pytest.raises(BlastEnvError, match="width is 9 in the configuration, must be 8"):
         load_agent(copy)
 
 

@@ -16,7 +16,7 @@ import pytest
 import torch
 import yaml
 from blast_agents.training import resume, train
-from blast_agents.training.agent import Checkpoint
+from blast_agents.training.checkpoint import Checkpoint, Weights
 from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunFolder, read_rows
 from blast_agents.training.train import TrainingResult
 
@@ -33,11 +33,10 @@ from tests.agents.training_runs import (
 )
 
 FILES = {
-    "best.pt",
+    "checkpoint.pt",
     "command.txt",
     "config.yaml",
     "evaluations.csv",
-    "last.pt",
     "learning_curve.png",
     "rollouts.csv",
     "scenario.toml",
@@ -54,14 +53,14 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
-def outcome(run: Path) -> tuple[list[tuple], list[tuple], dict[str, torch.Tensor]]:
+def outcome(run: Path) -> tuple[list[tuple], list[tuple], Weights]:
     """Return all that a run has come to, but for the time it took and where blasts came from."""
-    rollouts = read_rows(run / "rollouts.csv", RolloutRow, STEPS)
-    evaluations = read_rows(run / "evaluations.csv", EvaluationRow, STEPS)
+    rollouts = read_rows(run / "rollouts.csv", RolloutRow)
+    evaluations = read_rows(run / "evaluations.csv", EvaluationRow)
     return (
         [astuple(replace(row, seconds=0.0, blasts=0, cache_hits=0)) for row in rollouts],
         [astuple(replace(row, seconds=0.0, blasts=0)) for row in evaluations],
-        Checkpoint.load(run / "last.pt").policy,
+        Checkpoint.load(run / "checkpoint.pt").policy,
     )
 
 
@@ -95,15 +94,17 @@ def test_a_run_folder_has_all_that_a_reader_asks_for(finished: Path) -> None:
     assert "torch" in json.loads((finished / "versions.json").read_text())
     rollouts, evaluations, _ = outcome(finished)
     assert [row[0] for row in rollouts] == [row[0] for row in evaluations] == [16, 32, 48]
-    assert all(row.blasts > 0 for row in read_rows(finished / "rollouts.csv", RolloutRow, STEPS))
+    assert all(row.blasts > 0 for row in read_rows(finished / "rollouts.csv", RolloutRow))
 
 
 def test_the_best_weights_are_those_of_the_best_evaluation(finished: Path) -> None:
-    evaluations = read_rows(finished / "evaluations.csv", EvaluationRow, STEPS)
+    evaluations = read_rows(finished / "evaluations.csv", EvaluationRow)
     best = max(evaluations, key=lambda row: row.reduction)
-    counters = Checkpoint.load(finished / "best.pt").counters
-    assert counters.best_reduction == best.reduction
-    assert counters.steps == best.steps
+    checkpoint = Checkpoint.load(finished / "checkpoint.pt")
+    assert checkpoint.counters.best_reduction == best.reduction
+    assert checkpoint.counters.best_steps == best.steps
+    same = [torch.equal(checkpoint.best_policy[n], v) for n, v in checkpoint.policy.items()]
+    assert all(same) == (best.steps == checkpoint.counters.steps)
 
 
 def test_tensorboard_has_what_there_is_to_watch(finished: Path) -> None:
@@ -160,12 +161,14 @@ def test_a_killed_run_loses_at_most_one_rollout(tmp_path: Path) -> None:
     command += [text for option in options for text in ("--set", option)]
     process = subprocess.Popen([str(part) for part in command], stderr=subprocess.PIPE)
     try:
-        wait_for(run / "last.pt", process)
+        wait_for(run / "rollouts.csv", process)
+        while len((run / "rollouts.csv").read_text().splitlines()) < 2:
+            time.sleep(0.02)
     finally:
         process.send_signal(signal.SIGKILL)
         process.communicate()
     folder = RunFolder(run)
-    before = Checkpoint.load(folder.last).counters.steps
+    before = Checkpoint.load(folder.checkpoint).counters.steps
     assert 0 < before < steps
     shorten(run, before + 4 * ROLLOUT)
     result = resume(run)

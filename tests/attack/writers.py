@@ -1,24 +1,25 @@
 """Every writer of the packages, with something small to write."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
 import torch
-from blast_agents.training.agent import Checkpoint, Counters
+from blast_agents.training.checkpoint import Checkpoint
+from blast_agents.training.run_folder import RunConfiguration
 
 from blast_env.calibration.model import load_calibration, save_calibration
 from blast_env.evaluation import evaluate_layout
 from blast_env.export import LayoutPlan, export_layout
-from blast_env.files import FolderStore
 from blast_env.rendering.figures import initial_velocities, save_figure
 from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
 from blast_env.scenario import save_scenario, write_layout
 from blast_env.simulation import Blast, BlastResult
-from blast_env.studies.calibration.study import FreeFieldRun, append_to_store
 from blast_env.tables import write_csv
+from tests.agents.training_runs import hyperparameters, settings
 from tests.rendering.scenes import LAYOUT, small_blast
 
 Writer = Callable[[Path], Any]
@@ -49,16 +50,11 @@ def _pair(path: Path) -> None:
 
 
 def _checkpoint(path: Path) -> None:
-    Checkpoint({"weight": torch.zeros(2000)}, {}, Counters()).save(path)
-
-
-def _blasts_of_a_study(path: Path) -> None:
-    for seed in range(40):
-        append_to_store(path, FreeFieldRun(f"key {seed}", 10.0, seed, 1.0, 1.0, None))
-
-
-def _stored_result(path: Path) -> None:
-    FolderStore(path.parent, path.suffix).put("key", bytes(10_000))
+    configuration = RunConfiguration(
+        settings=settings(path), hyperparameters=hyperparameters(), scenario_hash="0" * 64
+    )
+    start = Checkpoint.of_start(configuration)
+    replace(start, policy={"weight": torch.zeros(2000)}).save(path)
 
 
 WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
@@ -85,7 +81,7 @@ WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
         "film.gif": _mp4,
         "evaluation.json": lambda path: evaluate_layout("courtyard", (), (0, 1)).to_json(path),
         "calibration.json": lambda path: save_calibration(load_calibration("ballistic_ufc"), path),
-        "last.pt": _checkpoint,
+        "checkpoint.pt": _checkpoint,
     }
 )
 """By the name of a file that each of them writes."""

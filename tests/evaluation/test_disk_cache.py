@@ -1,9 +1,12 @@
 """The cache in a folder gives back what was put in, or nothing: never anything else."""
 
+import json
 import multiprocessing
 import os
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +21,12 @@ from blast_env.evaluation import (
     DiskCache,
     LoadsCache,
     StructureLoad,
+    draw_threats,
     evaluate_layout,
 )
+from blast_env.physics.engines import find_engine
 from tests.evaluation.cases import COURTYARD, FEW, THREATS
+from tests.gas_sites import hut
 
 PAIRS = [(FEW, threat) for threat in THREATS[:2]]
 
@@ -231,3 +237,92 @@ def test_what_is_no_cache_is_refused(
         BlastEvaluator(COURTYARD, "event", cache=cache)
     with pytest.raises(BlastEnvError, match="most_bytes is -1, must be at least 0"):
         DiskCache("folder", -1)
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b"not JSON\n", b'[{"name": 3}]\n', b"[]\n1234567"])
+def test_wrong_content_with_a_right_checksum_counts_as_damaged(
+    content: bytes, tmp_path: Path
+) -> None:
+    """As another program or version would write it under the same key."""
+    cache = DiskCache(tmp_path)
+    cache.add(key(0), loads(0))
+    (path,) = tmp_path.iterdir()
+    line, _, _ = path.read_bytes()[32:].partition(b"\n")
+    body = line + b"\n" + content
+    path.write_bytes(sha256(body).digest() + body)
+    if content == b"[]":  # no structure and no module: of some other scenario
+        assert cache.get(key(0)) is not None
+    else:
+        assert cache.get(key(0)) is None
+        assert cache.damaged == 1
+        assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda good: replace(good, module_impulse_sim=good.module_impulse_sim[1:]),
+        lambda good: replace(good, module_impulse_sim=good.module_impulse_sim * np.nan),
+        lambda good: replace(good, structures=good.structures[:0]),
+        lambda good: replace(
+            good, structures=tuple(replace(each, name="x") for each in good.structures)
+        ),
+        lambda good: replace(
+            good, structures=tuple(replace(each, impulse_psi_s=np.inf) for each in good.structures)
+        ),
+    ],
+)
+def test_loads_that_cannot_be_those_of_the_scenario_are_simulated_again(
+    wrong: Callable[[BlastLoads], BlastLoads],
+) -> None:
+    shared = LoadsCache(10)
+    first = BlastEvaluator(COURTYARD, "event", cache=shared)
+    good = first.loads(*PAIRS[0])
+    shared.add(first._key(*PAIRS[0]), wrong(good))
+    again = BlastEvaluator(COURTYARD, "event", cache=shared)
+    assert same(again.loads(*PAIRS[0]), good)
+    assert again.blasts == 1
+
+
+def test_entries_that_others_own_are_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a shared folder like /tmp, tidying may delete only what is one's own."""
+    cache = DiskCache(tmp_path, most_bytes=5_000)
+    cache.add(key(0), loads(0))
+    (foreign,) = tmp_path.iterdir()
+    os.utime(foreign, ns=(1, 1))
+    unlink = Path.unlink
+
+    def sticky(path: Path, missing_ok: bool = False) -> None:
+        if path == foreign:
+            raise PermissionError(1, "Operation not permitted")
+        unlink(path, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", sticky)
+    for seed in range(1, 40):
+        cache.add(key(seed), loads(seed))
+    assert foreign.exists()
+    assert 2 < len(cache) < 20
+    assert same(cache.get(key(39)), loads(39))
+
+
+def test_a_folder_in_the_place_of_an_entry_costs_a_warning(tmp_path: Path) -> None:
+    cache = DiskCache(tmp_path, most_bytes=0)
+    name = cache._store._path(json.dumps(key(0))).name
+    (tmp_path / name).mkdir()
+    with pytest.warns(RuntimeWarning, match="a blast is not kept: .* is a folder"):
+        cache.add(key(0), loads(0))
+    assert cache.get(key(0)) is None
+    cache.add(key(1), loads(1))  # tidies up, past the folder
+    assert (tmp_path / name).is_dir()
+
+
+def test_loads_of_gas_dynamics_are_kept_too(tmp_path: Path) -> None:
+    """They have no simulation units, which are NaN, and suction on walls is negative."""
+    site = hut()
+    threat = draw_threats(site, (0,))[0]
+    for blasts in (1, 0):
+        evaluator = BlastEvaluator(site, find_engine("gas", 0.5), cache=tmp_path)
+        evaluator.loads((), threat)
+        assert evaluator.blasts == blasts

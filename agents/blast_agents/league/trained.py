@@ -8,8 +8,8 @@ from typing import Final, Literal
 from blast_agents.league.entries import Agent, Training
 from blast_agents.league.tracks import Track
 from blast_agents.training import load_agent
-from blast_agents.training.agent import Checkpoint
-from blast_agents.training.run_folder import EvaluationRow, RunFolder, read_rows
+from blast_agents.training.checkpoint import Checkpoint
+from blast_agents.training.run_folder import RunFolder
 from blast_env.errors import BlastEnvError
 from blast_env.sites import SITES
 
@@ -80,7 +80,6 @@ def _training(folder: RunFolder, evaluation_cases: int) -> Training:
     Each evaluation counts with a blast a case, and the cases without a barrier once: the most that
     it can have been, because a layout that comes again needs no blast.
     """
-    counters = Checkpoint.load(folder.last).counters
-    evaluations = read_rows(folder.evaluations, EvaluationRow, counters.steps)
-    selection = (len(evaluations) + 1) * evaluation_cases
-    return Training(counters.blasts + selection, counters.seconds)
+    checkpoint = Checkpoint.load(folder.checkpoint)
+    selection = (len(checkpoint.evaluations) + 1) * evaluation_cases
+    return Training(checkpoint.counters.blasts + selection, checkpoint.counters.seconds)

@@ -2,12 +2,10 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
-from io import BytesIO
 from pathlib import Path
 from typing import Any, Final, Literal
-from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 import torch
@@ -21,9 +19,9 @@ from sb3_contrib.common.maskable.policies import (
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticCnnPolicy, ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecEnv
-from torch import nn
 
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
+from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import Hyperparameters, schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from blast_env.envs.arguments import check_names
@@ -37,7 +35,6 @@ from blast_env.envs.observations import (
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Evaluators
-from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.scenario import (
     AnyCharge,
@@ -48,119 +45,6 @@ from blast_env.scenario import (
     find_scenario,
 )
 from blast_env.scenario.vehicles import source_of
-
-CHECKPOINT_FORMAT: Final = 1
-
-
-@dataclass(frozen=True)
-class Counters:
-    """How far a training run is.
-
-    Attributes:
-        steps: Steps of all environments.
-        rollouts: Rollouts with their updates.
-        updates: Passes over rollouts.
-        episodes: Episodes that ended.
-        blasts: Blasts simulated.
-        cache_hits: Loads that needed no blast.
-        seconds: Time that the training has taken.
-        best_reduction: Of the best evaluation; minus infinity before the first.
-        best_steps: Steps at that evaluation.
-    """
-
-    steps: int = 0
-    rollouts: int = 0
-    updates: int = 0
-    episodes: int = 0
-    blasts: int = 0
-    cache_hits: int = 0
-    seconds: float = 0.0
-    best_reduction: float = float("-inf")
-    best_steps: int = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Checkpoint:
-    """What training goes on from.
-
-    There is no state of random numbers: each rollout has seeds of its own.
-
-    Attributes:
-        policy: Weights of the policy, by name.
-        optimizer: State of the optimiser.
-        counters: How far the run is.
-    """
-
-    policy: dict[str, Any]
-    optimizer: dict[str, Any]
-    counters: Counters
-
-    def save(self, path: Path) -> None:
-        """Write the checkpoint; the file is complete or as it was.
-
-        Raises:
-            BlastEnvError: If it cannot be written.
-        """
-        content = {
-            "format": CHECKPOINT_FORMAT,
-            "policy": self.policy,
-            "optimizer": self.optimizer,
-            "counters": asdict(self.counters),
-        }
-        # torch would say in an error of its own that the device is full.
-        buffer = BytesIO()
-        torch.save(content, buffer)
-        with write_atomically(path) as temporary:
-            temporary.write_bytes(buffer.getbuffer())
-
-    @classmethod
-    def load(cls, path: Path) -> "Checkpoint":
-        """Read a checkpoint; nothing but tensors and plain data is accepted.
-
-        Raises:
-            BlastEnvError: If there is none, or it is damaged.
-        """
-        if not path.is_file():
-            raise BlastEnvError(f"{path}: there is no such checkpoint")
-        try:
-            _check_sums(path)
-            content = torch.load(path, map_location="cpu", weights_only=True)
-            if content["format"] != CHECKPOINT_FORMAT:
-                raise BlastEnvError(
-                    f"{path}: is of format {content['format']}, must be {CHECKPOINT_FORMAT}"
-                )
-            return cls(content["policy"], content["optimizer"], Counters(**content["counters"]))
-        except BlastEnvError:
-            raise
-        # torch says what is wrong with a file in errors of many kinds.
-        except Exception as error:
-            first_line = str(error).partition("\n")[0]
-            raise BlastEnvError(f"{path}: is damaged, or no checkpoint: {first_line}") from error
-
-    def load_policy(self, policy: nn.Module, place: Path) -> None:
-        """Give a policy the weights.
-
-        Args:
-            policy: The policy.
-            place: Where they come from, for the error.
-
-        Raises:
-            BlastEnvError: If they are those of another policy.
-        """
-        try:
-            policy.load_state_dict(self.policy)
-        except RuntimeError as error:
-            problem = " ".join(str(error).split())
-            raise BlastEnvError(f"{place}: weights and configuration differ: {problem}") from error
-
-
-def _check_sums(path: Path) -> None:
-    """Refuse a file with wrong checksums, which torch itself does not look at."""
-    with ZipFile(path) as archive:
-        wrong = archive.testzip()
-    if wrong is not None:
-        raise BadZipFile(f"{wrong} has a wrong checksum")
-
 
 Model = PPO | MaskablePPO
 
@@ -205,6 +89,23 @@ def fitted(
         )
     arguments = hyperparameters.policy_kwargs.model_copy(update=changes)
     return hyperparameters.model_copy(update={"policy_kwargs": arguments})
+
+
+def check_fit(configuration: RunConfiguration, scenario: Scenario, folder: RunFolder) -> None:
+    """Refuse hyperparameters that are none for the scenario's build zone.
+
+    Raises:
+        BlastEnvError: If there are such.
+    """
+    found = configuration.hyperparameters
+    wanted = fitted(found, configuration.settings, scenario)
+    for name, value in found.policy_kwargs:
+        must_be = getattr(wanted.policy_kwargs, name)
+        if value != must_be:
+            raise BlastEnvError(
+                f"{folder.path}: policy_kwargs.{name} is {value}, must be {must_be}, as the "
+                "scenario's build zone says"
+            )
 
 
 def channels_of(observation: str) -> tuple[str, ...]:
@@ -413,7 +314,7 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
 
     Raises:
         BlastEnvError: If it is no run folder, or damaged; also for an archive of
-            stable-baselines3, which is for `load_archive`.
+            stable-baselines3, which is for `load_archive`, and if there are no such weights yet.
     """
     if Path(run).suffix == _ARCHIVE:
         raise BlastEnvError(
@@ -423,13 +324,15 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     folder = RunFolder(Path(run))
     configuration = folder.configuration()
     scenario = folder.scenario(configuration)
-    checkpoint = Checkpoint.load(folder.best if weights == "best" else folder.last)
+    check_fit(configuration, scenario, folder)
+    checkpoint = Checkpoint.load(folder.checkpoint)
+    checkpoint.check_configuration(configuration, folder.path)
     zone = scenario.zone
     actions = spaces.Discrete(zone.rows * zone.columns + 1)
     settings = configuration.settings
     space = OBSERVATIONS[settings.observation].space(scenario)
     policy = make_policy(configuration, space, actions)
-    checkpoint.load_policy(policy, folder.path)
+    checkpoint.load_policy(policy, folder.path, weights)
     policy.set_training_mode(False)
     return TrainedAgent(policy, scenario, settings.observation, settings.engine)
 

@@ -9,8 +9,11 @@ from typing import Annotated, Any, Final, Literal
 import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from blast_agents.training.yaml_text import parse_yaml
+from blast_env.documents import DocumentError
 from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.scenario.problems import shortened, value_text
 
 
 def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
@@ -28,7 +31,7 @@ def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any
     for option in options:
         key, separator, text = option.partition("=")
         if not separator:
-            raise BlastEnvError(f"--set {option}: must be key=value")
+            raise BlastEnvError(f"--set {shortened(option)!r}: must be key=value")
         if key not in known:
             raise UnknownNameError("setting", key, known)
         values[key] = _value(option, text)
@@ -53,7 +56,7 @@ def described(error: ValidationError, place: str) -> str:
     for each in error.errors():
         where = ".".join(str(part) for part in each["loc"])
         what = each["msg"].removeprefix("Value error, ")
-        clauses.append(f"{where} is {each['input']!r}: {what}" if where else what)
+        clauses.append(f"{where} is {value_text(each['input'])}: {what}" if where else what)
     return f"{place}: {'; '.join(clauses)}"
 
 
@@ -72,9 +75,9 @@ def option_names(model: type[BaseModel]) -> list[str]:
 def _value(option: str, text: str) -> Any:
     """Return a value; `3e-4` is a number, though YAML wants `3.0e-4`."""
     try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise BlastEnvError(f"--set {option}: the value is not YAML") from error
+        value = parse_yaml(text)
+    except DocumentError as error:
+        raise BlastEnvError(f"--set {shortened(option)!r}: the value {error.message}") from error
     if isinstance(value, str):
         try:
             return float(value)
@@ -176,8 +179,8 @@ class PolicyArguments(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    rows: Annotated[int, Field(ge=1)] = 1
-    columns: Annotated[int, Field(ge=1)] = 1
+    rows: Annotated[int, Field(ge=1, le=1000)] = 1
+    columns: Annotated[int, Field(ge=1, le=1000)] = 1
     places: Annotated[int, Field(ge=1, le=64)] | None = None
     width: Annotated[int, Field(ge=1, le=512)] = 24
     critic_width: Annotated[int, Field(ge=1, le=4096)] = 64
@@ -210,14 +213,14 @@ class Hyperparameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    n_timesteps: Annotated[int, Field(ge=1)]
+    n_timesteps: Annotated[int, Field(ge=1, le=10**10)]
     n_envs: Annotated[int, Field(ge=1, le=256)]
     policy: PolicyName
     policy_kwargs: PolicyArguments = PolicyArguments()
     env_wrapper: tuple[WrapperName | dict[WrapperName, dict[str, Any]], ...] = ()
     learning_rate: Amount
     n_steps: Annotated[int, Field(ge=2, le=100_000)]
-    batch_size: Annotated[int, Field(ge=2)]
+    batch_size: Annotated[int, Field(ge=2, le=10**8)]
     n_epochs: Annotated[int, Field(ge=1, le=100)]
     gamma: Share = 1.0
     gae_lambda: Share = 0.95
@@ -288,7 +291,7 @@ def load_hyperparameters(
         BlastEnvError: If a value is of no use; the message names its bound.
     """
     path = hyperparameter_file(algorithm)
-    sections = yaml.safe_load(path.read_text(encoding="utf-8"))
+    sections = yaml.safe_load(path.read_text(encoding="utf-8"))  # our own file, with aliases
     check_names("hyperparameter", changes, HYPERPARAMETER_KEYS)
     values = with_changes(sections.get(env_id, sections[DEFAULT_SECTION]), changes)
     if envs is not None:

@@ -9,18 +9,14 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import set_random_seed
 
-from blast_agents.training.agent import (
-    Checkpoint,
-    Counters,
-    Model,
-    TrainedAgent,
-)
+from blast_agents.training.agent import Model, TrainedAgent
 from blast_agents.training.cases import Selection
+from blast_agents.training.checkpoint import Checkpoint, Counters, Weights
 from blast_agents.training.run_folder import (
     EvaluationRow,
     RolloutRow,
+    RunConfiguration,
     RunFolder,
-    TrainingSettings,
     write_rows,
 )
 from blast_env.scenario import Scenario
@@ -49,11 +45,32 @@ class Progress:
         counters: How far it is.
         rollouts: A row each.
         evaluations: A row each.
+        best_policy: Weights of the best evaluation; none before the first one.
     """
 
     counters: Counters = field(default_factory=Counters)
     rollouts: list[RolloutRow] = field(default_factory=list)
     evaluations: list[EvaluationRow] = field(default_factory=list)
+    best_policy: Weights = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, checkpoint: Checkpoint) -> "Progress":
+        """Return what a run has come to at a checkpoint."""
+        return cls(
+            checkpoint.counters,
+            list(checkpoint.rollouts),
+            list(checkpoint.evaluations),
+            checkpoint.best_policy,
+        )
+
+    def write_tables(self, folder: RunFolder) -> None:
+        """Write the tables for people.
+
+        Raises:
+            BlastEnvError: If they cannot be written.
+        """
+        write_rows(folder.rollouts, RolloutRow, self.rollouts)
+        write_rows(folder.evaluations, EvaluationRow, self.evaluations)
 
 
 class Recorder(BaseCallback):
@@ -65,7 +82,7 @@ class Recorder(BaseCallback):
 
     Args:
         folder: Where everything is written.
-        settings: Of the run.
+        configuration: Of the run.
         scenario: A scenario of the size that the policy is for.
         selection: What the best weights are chosen by.
         progress: What the run has come to so far; goes on from here.
@@ -75,14 +92,15 @@ class Recorder(BaseCallback):
     def __init__(
         self,
         folder: RunFolder,
-        settings: TrainingSettings,
+        configuration: RunConfiguration,
         scenario: Scenario,
         selection: Selection,
         progress: Progress,
         show: Callable[[float], None],
     ) -> None:
         super().__init__()
-        self.folder, self.settings, self.scenario = folder, settings, scenario
+        self.folder, self.configuration, self.scenario = folder, configuration, scenario
+        self.settings = configuration.settings
         self.selection, self.progress, self.show = selection, progress, show
         self.algorithm: Model
         self._episodes = Episodes()
@@ -137,7 +155,7 @@ class Recorder(BaseCallback):
             self._finish_rollout()
 
     def _finish_rollout(self) -> None:
-        """Write down a rollout and its update; the checkpoint comes last."""
+        """Write down a rollout and its update: the checkpoint decides, the tables follow."""
         counters = self.progress.counters
         counters = replace(
             counters,
@@ -149,8 +167,8 @@ class Recorder(BaseCallback):
         is_last = counters.steps >= self.settings.steps
         if is_last or counters.rollouts % self.settings.evaluation_interval == 0:
             self._evaluate()
-        write_rows(self.folder.rollouts, RolloutRow, self.progress.rollouts)
-        self._checkpoint().save(self.folder.last)
+        self._checkpoint().save(self.folder.checkpoint)
+        self.progress.write_tables(self.folder)
         self._is_pending = False
 
     def _evaluate(self) -> None:
@@ -163,19 +181,25 @@ class Recorder(BaseCallback):
             counters.steps, counters.episodes, *reduction, counters.blasts, counters.seconds
         )
         self.progress.evaluations.append(row)
-        write_rows(self.folder.evaluations, EvaluationRow, self.progress.evaluations)
         self.logger.record("evaluation/reduction", reduction.value)
         self.logger.dump(counters.steps)
         if reduction.value > counters.best_reduction:
             self.progress.counters = replace(
                 counters, best_reduction=reduction.value, best_steps=counters.steps
             )
-            self._checkpoint().save(self.folder.best)
+            weights = self.algorithm.policy.state_dict()
+            self.progress.best_policy = {name: value.clone() for name, value in weights.items()}
 
     def _checkpoint(self) -> Checkpoint:
-        policy = self.algorithm.policy
+        policy, progress = self.algorithm.policy, self.progress
         return Checkpoint(
-            policy.state_dict(), policy.optimizer.state_dict(), self.progress.counters
+            configuration=self.configuration,
+            counters=progress.counters,
+            policy=policy.state_dict(),
+            optimizer=policy.optimizer.state_dict(),
+            best_policy=progress.best_policy,
+            rollouts=tuple(progress.rollouts),
+            evaluations=tuple(progress.evaluations),
         )
 
     def _counted(self) -> Counters:

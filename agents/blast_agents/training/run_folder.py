@@ -4,21 +4,26 @@ import csv
 import json
 import os
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
+from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from blast_agents.training.hyperparameters import ALGORITHMS, Hyperparameters, described
+from blast_agents.training.yaml_text import parse_yaml
+from blast_env.documents import DocumentError, read_text
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import OBSERVATIONS
 from blast_env.errors import BlastEnvError
-from blast_env.files import write_atomically
+from blast_env.files import is_temporary, make_folder, sync, write_atomically
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
+from blast_env.scenario.problems import value_text
 
 CONFIGURATION_FORMAT: Final = 1
 
@@ -66,7 +71,7 @@ class TrainingSettings(BaseModel):
     engine: str = "event"
     observation: Literal["grid", "grid_with_load", "features"] = "grid"
     hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
-    evaluation_interval: Annotated[int, Field(ge=1)] = 5
+    evaluation_interval: Annotated[int, Field(ge=1, le=10**6)] = 5
     evaluation_cases: Annotated[int, Field(ge=2, le=100)] = 16
     evaluation_first_seed: Annotated[int, Field(ge=0, lt=2**30)] = 0
     torch_threads: Annotated[int, Field(ge=1, le=256)] = 1
@@ -177,24 +182,20 @@ def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
         writer.writerows(asdict(row) for row in rows)
 
 
-def read_rows(path: Path, kind: type[Row], most_steps: int) -> list[Row]:
-    """Read rows up to a number of steps; those after it belong to what was lost.
+def read_rows(path: Path, kind: type[Row]) -> list[Row]:
+    """Read rows.
 
     Raises:
         BlastEnvError: If there is no such file, or it is damaged.
     """
-    types: dict[str, Callable[[str], Any]] = {
-        field.name: int if field.type is int else float for field in fields(kind)
-    }
+    adapter = TypeAdapter(kind)
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = [
-                kind(**{name: convert(row[name]) for name, convert in types.items()})
-                for row in csv.DictReader(file)
-            ]
-    except (OSError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+        rows = csv.DictReader(StringIO(read_text(path)), strict=True)
+        return [adapter.validate_python(row) for row in rows]
+    except ValidationError as error:
+        raise BlastEnvError(described(error, f"{path}: is damaged")) from error
+    except (DocumentError, csv.Error) as error:
         raise BlastEnvError(f"{path}: is missing or damaged: {error}") from error
-    return [row for row in rows if row.steps <= most_steps]
 
 
 _PACKAGES: Final = (
@@ -220,23 +221,18 @@ class RunFolder:
     path: Path
 
     @property
-    def last(self) -> Path:
-        """Checkpoint after the last rollout: weights, optimiser and counters."""
-        return self.path / "last.pt"
-
-    @property
-    def best(self) -> Path:
-        """Checkpoint of the best evaluation on held-out threats."""
-        return self.path / "best.pt"
+    def checkpoint(self) -> Path:
+        """All that changes in a run: weights, the best ones too, optimiser, counters, tables."""
+        return self.path / "checkpoint.pt"
 
     @property
     def rollouts(self) -> Path:
-        """What each rollout brought, a row each."""
+        """What each rollout brought, a row each, for people: the checkpoint has it too."""
         return self.path / "rollouts.csv"
 
     @property
     def evaluations(self) -> Path:
-        """The evaluations on held-out threats, a row each."""
+        """The evaluations on held-out threats, a row each, likewise."""
         return self.path / "evaluations.csv"
 
     @property
@@ -257,8 +253,19 @@ class RunFolder:
     def _scenario(self) -> Path:
         return self.path / "scenario.toml"
 
-    def create(self, configuration: RunConfiguration, scenario: Scenario, command: str) -> None:
-        """Make the folder and write what does not change.
+    @property
+    def _unfinished(self) -> Path:
+        """The configuration while the folder is made; renamed, it makes the folder a run's."""
+        return self.path / ".config.yaml"
+
+    @contextmanager
+    def making(
+        self, configuration: RunConfiguration, scenario: Scenario, command: str
+    ) -> Iterator[None]:
+        """Make the folder and write what does not change; the block writes what does.
+
+        The folder is a run's when the block has ended well, by one rename. If this was interrupted
+        before, it begins anew in what is there.
 
         Args:
             configuration: Of the run.
@@ -266,24 +273,39 @@ class RunFolder:
             command: What started the run.
 
         Raises:
-            BlastEnvError: If the folder cannot be made, or there is anything in it.
+            BlastEnvError: If the folder cannot be made, or anything else is in it.
         """
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-            taken = sorted(os.listdir(self.path))
-        except OSError as error:
-            raise BlastEnvError(
-                f"{self.path}: cannot be a folder: {error.strerror or error}"
-            ) from error
-        if taken:
-            raise BlastEnvError(
-                f"{self.path}: has {taken[0]!r} in it, must be empty; --resume goes on with a run"
-            )
+        make_folder(self.path)
+        self._check_empty()
+        _write(self._unfinished, yaml.safe_dump(configuration.document(), sort_keys=False))
+        self.clear_temporaries()
         save_scenario(scenario, self._scenario)
         _write(self.path / "command.txt", f"{command}\n")
         _write(self.path / "versions.json", json.dumps(_versions(), indent=2) + "\n")
-        text = yaml.safe_dump(configuration.document(), sort_keys=False)
-        _write(self._configuration, text)  # the last one: with it, the folder is a run's
+        yield
+        try:
+            os.replace(self._unfinished, self._configuration)
+            sync(self.path)
+        except OSError as error:
+            raise BlastEnvError(
+                f"{self._configuration}: cannot be written: {error.strerror or error}"
+            ) from error
+
+    def clear_temporaries(self) -> None:
+        """Remove what writers that were killed have left."""
+        for path in self.path.iterdir():
+            if is_temporary(path.name):
+                path.unlink(missing_ok=True)
+
+    def _check_empty(self) -> None:
+        """Refuse a folder with a run, or with anything but what an interrupted making leaves."""
+        if self._configuration.exists():
+            raise BlastEnvError(f"{self.path}: has a run in it already; --resume goes on with it")
+        if self._unfinished.exists():
+            return
+        taken = sorted(name for name in os.listdir(self.path) if not is_temporary(name))
+        if taken:
+            raise BlastEnvError(f"{self.path}: has {taken[0]!r} in it, must be empty")
 
     def configuration(self) -> RunConfiguration:
         """Return the configuration of the run.
@@ -291,23 +313,25 @@ class RunFolder:
         Raises:
             BlastEnvError: If there is none, or it is damaged.
         """
-        try:
-            document = yaml.safe_load(self._configuration.read_text(encoding="utf-8"))
-        except FileNotFoundError as error:
+        path = self._configuration
+        if not path.exists():
             raise BlastEnvError(
-                f"{self.path}: is no run folder: there is no {self._configuration.name} in it"
-            ) from error
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise BlastEnvError(f"{self._configuration}: is damaged: {error}") from error
+                f"{self.path}: is no run folder: there is no {path.name} in it"
+                + ("; its making was interrupted: train begins anew" * self._unfinished.exists())
+            )
+        try:
+            document = parse_yaml(read_text(path))
+        except DocumentError as error:
+            raise BlastEnvError(f"{path}: is damaged: {error}") from error
         found = document.get("format") if isinstance(document, dict) else None
         if found != CONFIGURATION_FORMAT:
             raise BlastEnvError(
-                f"{self._configuration}: format is {found!r}, must be {CONFIGURATION_FORMAT}"
+                f"{path}: format is {value_text(found)}, must be {CONFIGURATION_FORMAT}"
             )
         try:
             return RunConfiguration.model_validate(document)
         except ValidationError as error:
-            raise BlastEnvError(described(error, f"{self._configuration}: is damaged")) from error
+            raise BlastEnvError(described(error, f"{path}: is damaged")) from error
 
     def scenario(self, configuration: RunConfiguration) -> Scenario:
         """Return the scenario of the run.

@@ -10,26 +10,18 @@ from pathlib import Path
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv
 
-from blast_agents.training.agent import (
-    Checkpoint,
-    Model,
-    fitted,
-    make_model,
-    torch_threads,
-)
+from blast_agents.training.agent import Model, check_fit, fitted, make_model, torch_threads
 from blast_agents.training.cases import Selection
+from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.environments import make_environments, training_source
 from blast_agents.training.hyperparameters import Hyperparameters
 from blast_agents.training.learning_curve import save_learning_curve
 from blast_agents.training.recorder import Progress, Recorder
 from blast_agents.training.run_folder import (
-    EvaluationRow,
-    RolloutRow,
     RunConfiguration,
     RunFolder,
     TrainingSettings,
     check_scenario,
-    read_rows,
 )
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
@@ -79,8 +71,10 @@ def train(
         settings, source
     )  # refuses an unknown engine before anything is written
     folder = RunFolder(Path(run))
-    folder.create(configuration, scenario, shlex.join(sys.argv))
-    return _run(_Run(folder, configuration, source, selection), Progress(), None, progress)
+    start = Checkpoint.of_start(configuration)
+    with folder.making(configuration, scenario, shlex.join(sys.argv)):
+        start.save(folder.checkpoint)
+    return _run(_Run(folder, configuration, source, selection), start, progress)
 
 
 def resume(
@@ -105,20 +99,17 @@ def resume(
     if scenario is not None:
         check_scenario(training_source(scenario).representative, configuration, scenario)
     own = folder.scenario(configuration)
+    check_fit(configuration, own, folder)
     source: ScenarioSource = SingleScenario(own)
     if configuration.settings.scenario == SITES:
         source = training_source(SITES)
         check_scenario(source.representative, configuration, "generated sites")
     selection = Selection.of(configuration.settings, source)
     job = _Run(folder, configuration, source, selection)
-    if not folder.last.exists() and not folder.best.exists():  # ended in the first rollout
-        return _run(job, Progress(), None, progress)
-    checkpoint = Checkpoint.load(folder.last)
-    steps = checkpoint.counters.steps
-    so_far = Progress(checkpoint.counters, read_rows(folder.rollouts, RolloutRow, steps))
-    if so_far.counters.best_steps:
-        so_far.evaluations = read_rows(folder.evaluations, EvaluationRow, steps)
-    return _run(job, so_far, checkpoint, progress)
+    checkpoint = Checkpoint.load(folder.checkpoint)
+    checkpoint.check_configuration(configuration, folder.path)
+    folder.clear_temporaries()
+    return _run(job, checkpoint, progress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,14 +129,10 @@ class _Run:
     selection: Selection
 
 
-def _run(
-    job: _Run,
-    so_far: Progress,
-    checkpoint: Checkpoint | None,
-    show: Callable[[float], None],
-) -> TrainingResult:
-    """Train from a checkpoint, or from the start, to the end."""
-    settings = job.configuration.settings
+def _run(job: _Run, checkpoint: Checkpoint, show: Callable[[float], None]) -> TrainingResult:
+    """Train from a checkpoint to the end."""
+    settings, so_far = job.configuration.settings, Progress.of(checkpoint)
+    so_far.write_tables(job.folder)  # a killed run may not have come to it
     if so_far.counters.steps < settings.steps:
         environments = make_environments(job.configuration, job.source)
         try:
@@ -155,6 +142,10 @@ def _run(
             raise BlastEnvError(
                 f"{job.folder.path}: a process with an environment has ended, for want of memory "
                 "or because it was killed; --resume goes on"
+            ) from error
+        except OSError as error:
+            raise BlastEnvError(
+                f"{job.folder.path}: cannot be written: {error.strerror or error}; --resume goes on"
             ) from error
         finally:
             # After Ctrl-C the processes have ended already.
@@ -167,32 +158,33 @@ def _run(
 def _learn(
     job: _Run,
     so_far: Progress,
-    checkpoint: Checkpoint | None,
+    checkpoint: Checkpoint,
     environments: VecEnv,
     show: Callable[[float], None],
 ) -> None:
-    """Train from a checkpoint, or from the start, on environments that are open."""
+    """Train from a checkpoint on environments that are open."""
     settings = job.configuration.settings
     model = make_model(job.configuration, environments)
-    if checkpoint is not None:
+    if not checkpoint.is_start:
         _restore(model, checkpoint, job.folder)
     scenario = job.source.representative
-    recorder = Recorder(job.folder, settings, scenario, job.selection, so_far, show)
+    recorder = Recorder(job.folder, job.configuration, scenario, job.selection, so_far, show)
     recorder.algorithm = model
     model.set_logger(configure(str(job.folder.tensorboard), ["tensorboard"]))
     left = settings.steps - so_far.counters.steps
-    model.learn(left, callback=recorder, reset_num_timesteps=checkpoint is None)
+    model.learn(left, callback=recorder, reset_num_timesteps=checkpoint.is_start)
     model.logger.close()
 
 
 def _restore(model: Model, checkpoint: Checkpoint, folder: RunFolder) -> None:
     """Bring a model to a checkpoint."""
-    checkpoint.load_policy(model.policy, folder.last)
+    checkpoint.load_policy(model.policy, folder.checkpoint)
     try:
-        model.policy.optimizer.load_state_dict(checkpoint.optimizer)
-    except (ValueError, KeyError) as error:
+        model.policy.optimizer.load_state_dict(dict(checkpoint.optimizer))
+    # torch says in errors of many kinds what does not fit.
+    except Exception as error:
         raise BlastEnvError(
-            f"{folder.last}: the optimiser's state does not fit: {error}"
+            f"{folder.checkpoint}: the optimiser's state does not fit: {error}"
         ) from error
     model.num_timesteps = checkpoint.counters.steps
     model._n_updates = checkpoint.counters.updates

@@ -1,0 +1,236 @@
+"""What training goes on from: all of a run that changes, in one file."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Final, Literal
+from zipfile import ZIP_STORED, BadZipFile, ZipFile
+
+import torch
+from pydantic import BaseModel, ConfigDict, ValidationError
+from torch import nn
+
+from blast_agents.training.hyperparameters import described
+from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunConfiguration
+from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.scenario.problems import value_text
+
+CHECKPOINT_FORMAT: Final = 2
+
+Weights = Mapping[str, torch.Tensor]
+
+
+@dataclass(frozen=True)
+class Counters:
+    """How far a training run is.
+
+    Attributes:
+        steps: Steps of all environments.
+        rollouts: Rollouts with their updates.
+        updates: Passes over rollouts.
+        episodes: Episodes that ended.
+        blasts: Blasts simulated.
+        cache_hits: Loads that needed no blast.
+        seconds: Time that the training has taken.
+        best_reduction: Of the best evaluation; minus infinity before the first.
+        best_steps: Steps at that evaluation.
+    """
+
+    steps: int = 0
+    rollouts: int = 0
+    updates: int = 0
+    episodes: int = 0
+    blasts: int = 0
+    cache_hits: int = 0
+    seconds: float = 0.0
+    best_reduction: float = float("-inf")
+    best_steps: int = 0
+
+
+class _Content(BaseModel):
+    """What is in the file; see `Checkpoint`."""
+
+    model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+
+    format: Literal[2]
+    configuration: RunConfiguration
+    counters: Counters
+    policy: dict[str, torch.Tensor]
+    optimizer: dict[str, Any]
+    best_policy: dict[str, torch.Tensor]
+    rollouts: tuple[RolloutRow, ...]
+    evaluations: tuple[EvaluationRow, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """What training goes on from, and what it has come to.
+
+    It is one file, so that every moment of a run is before one rollout or after it. There is no
+    state of random numbers: each rollout has seeds of its own.
+
+    Attributes:
+        configuration: Of the run, which the weights belong to.
+        counters: How far the run is.
+        policy: Weights of the policy, by name; none before the first rollout.
+        optimizer: State of the optimiser.
+        best_policy: Weights of the best evaluation; none before the first one.
+        rollouts: What each rollout brought.
+        evaluations: The evaluations on held-out threats.
+    """
+
+    configuration: RunConfiguration
+    counters: Counters
+    policy: Weights
+    optimizer: Mapping[str, Any]
+    best_policy: Weights
+    rollouts: tuple[RolloutRow, ...]
+    evaluations: tuple[EvaluationRow, ...]
+
+    @classmethod
+    def of_start(cls, configuration: RunConfiguration) -> "Checkpoint":
+        """Return the checkpoint of a run that has not done anything."""
+        return cls(configuration, Counters(), {}, {}, {}, (), ())
+
+    @property
+    def is_start(self) -> bool:
+        """Whether there has not been a rollout."""
+        return self.counters.rollouts == 0
+
+    def save(self, path: Path) -> None:
+        """Write the checkpoint; the file is complete or as it was.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        content = {
+            "format": CHECKPOINT_FORMAT,
+            "configuration": self.configuration.document(),
+            "counters": asdict(self.counters),
+            "policy": dict(self.policy),
+            "optimizer": dict(self.optimizer),
+            "best_policy": dict(self.best_policy),
+            "rollouts": [asdict(row) for row in self.rollouts],
+            "evaluations": [asdict(row) for row in self.evaluations],
+        }
+        # torch would say in an error of its own that the device is full.
+        buffer = BytesIO()
+        torch.save(content, buffer)
+        with write_atomically(path) as temporary:
+            temporary.write_bytes(buffer.getbuffer())
+
+    @classmethod
+    def load(cls, path: Path) -> "Checkpoint":
+        """Read a checkpoint; nothing but tensors and plain data is accepted.
+
+        Raises:
+            BlastEnvError: If there is none, or it is damaged.
+        """
+        if not path.is_file():
+            raise BlastEnvError(f"{path}: there is no such checkpoint")
+        try:
+            _check_archive(path)
+            content = torch.load(path, map_location="cpu", weights_only=True)
+            _check_tensors(content)
+        # torch says what is wrong with a file in errors of many kinds.
+        except Exception as error:
+            first_line = str(error).partition("\n")[0]
+            raise BlastEnvError(f"{path}: is damaged, or no checkpoint: {first_line}") from error
+        found = content.get("format") if isinstance(content, dict) else None
+        if found != CHECKPOINT_FORMAT:
+            raise BlastEnvError(
+                f"{path}: is of format {value_text(found)}, must be {CHECKPOINT_FORMAT}"
+            )
+        try:
+            checked = _Content.model_validate(content)
+        except ValidationError as error:
+            raise BlastEnvError(
+                described(error, f"{path}: is damaged, or no checkpoint")
+            ) from error
+        values = {name: getattr(checked, name) for name in _Content.model_fields}
+        del values["format"]
+        return cls(**values)
+
+    def check_configuration(self, configuration: RunConfiguration, place: Path) -> None:
+        """Refuse the configuration of another run: with it the weights would say other things.
+
+        Only `steps` may differ, the steps to train for: a run may be made longer or shorter.
+
+        Args:
+            configuration: As the run folder has it.
+            place: The folder, for the error.
+
+        Raises:
+            BlastEnvError: If anything else differs.
+        """
+        own, given = dict(_flat(self.configuration.document())), _flat(configuration.document())
+        for name, value in given:
+            if name != "settings.steps" and value != own.get(name):
+                raise BlastEnvError(
+                    f"{place}: {name} is {value_text(value)} in the configuration, must be "
+                    f"{value_text(own.get(name))}, as the checkpoint was trained with"
+                )
+
+    def load_policy(
+        self, policy: nn.Module, place: Path, weights: Literal["best", "last"] = "last"
+    ) -> None:
+        """Give a policy the weights.
+
+        Args:
+            policy: The policy.
+            place: Where they come from, for the error.
+            weights: Those of the best evaluation, or the last ones.
+
+        Raises:
+            BlastEnvError: If there are none yet, or they are those of another policy.
+        """
+        values = self.best_policy if weights == "best" else self.policy
+        if not values:
+            what = "evaluation" if self.policy else "rollout"
+            raise BlastEnvError(
+                f"{place}: has no weights yet, before its first {what}; "
+                f"blast-env train --resume {place} goes on"
+            )
+        try:
+            policy.load_state_dict(values)
+        except RuntimeError as error:
+            problem = " ".join(str(error).split())
+            raise BlastEnvError(f"{place}: weights and configuration differ: {problem}") from error
+        for name, value in policy.state_dict().items():
+            if not torch.isfinite(value).all():
+                raise BlastEnvError(f"{place}: the weights {name} are not finite")
+
+
+def _check_archive(path: Path) -> None:
+    """Refuse a file with wrong checksums, which torch itself does not look at, or compressed."""
+    with ZipFile(path) as archive:
+        for member in archive.infolist():
+            if member.compress_type != ZIP_STORED:  # may take up any memory
+                raise BadZipFile(f"{member.filename} is compressed")
+        wrong = archive.testzip()
+    if wrong is not None:
+        raise BadZipFile(f"{wrong} has a wrong checksum")
+
+
+def _check_tensors(content: Any) -> None:
+    """Refuse tensors that are larger than what the file holds of them."""
+    if isinstance(content, torch.Tensor):
+        if content.numel() * content.element_size() > content.untyped_storage().nbytes():
+            raise ValueError(f"a tensor of {tuple(content.shape)} is not in the file")
+    elif isinstance(content, dict):
+        for value in content.values():
+            _check_tensors(value)
+    elif isinstance(content, list | tuple):
+        for value in content:
+            _check_tensors(value)
+
+
+def _flat(document: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield name and value of what is in nested tables."""
+    for key, value in document.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value

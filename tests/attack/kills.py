@@ -1,0 +1,188 @@
+"""Jobs that are killed (kill -9) at one step on the disk after the other, and begun again.
+
+A step is whatever changes names or opens a file to write: rename, mkdir, remove, open. Python tells
+of each before it happens, so that a kill at step k + 1 is also one right after step k.
+"""
+
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from blast_agents.league import Contest, NoBarrier, ResultStore, standard_entries
+from blast_agents.league.report import write_league
+from blast_agents.league.tracks import known_track
+from blast_agents.training import resume, train
+from blast_agents.training.checkpoint import Checkpoint
+from typer.testing import CliRunner
+
+from blast_env.cli import app
+from blast_env.errors import BlastEnvError
+from blast_env.files import FolderStore, is_temporary
+from blast_env.scenario import load_scenario
+from blast_env.studies.calibration.study import FreeFieldStudy, read_store
+from tests.agents.league_cases import road_scenario
+from tests.agents.training_runs import hyperparameters, scenario_file, settings
+
+_STEPS: Final = ("os.rename", "os.mkdir", "os.remove", "open")
+_WRITING: Final = os.O_WRONLY | os.O_RDWR
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is killed.
+
+    Attributes:
+        run: Does the work in a folder, and goes on with what is there already, as a user would:
+            the same command again, or the one that an error names.
+        outcome: What has come of it, without times.
+    """
+
+    run: Callable[[Path], None]
+    outcome: Callable[[Path], Any]
+
+
+def _train(folder: Path) -> None:
+    chosen = settings(scenario_file(folder), steps=32)
+    try:
+        train(chosen, hyperparameters(), folder / "run")
+    except BlastEnvError as error:
+        if "--resume goes on" not in str(error):
+            raise
+        resume(folder / "run")
+
+
+def _training_outcome(folder: Path) -> Any:
+    checkpoint = Checkpoint.load(folder / "run" / "checkpoint.pt")
+    rows = (folder / "run" / "rollouts.csv").read_text().count("\n")
+    evaluations = (folder / "run" / "evaluations.csv").read_text().count("\n")
+    weights = [each.numpy().tobytes() for each in checkpoint.policy.values()]
+    best = [each.numpy().tobytes() for each in checkpoint.best_policy.values()]
+    left = [path.name for path in (folder / "run").iterdir() if is_temporary(path.name)]
+    steps = [row.steps for row in checkpoint.rollouts]
+    reductions = [row.reduction for row in checkpoint.evaluations]
+    return weights, best, steps, reductions, rows, evaluations, left
+
+
+def _command(folder: Path, *arguments: str | Path) -> None:
+    result = CliRunner().invoke(app, [str(each) for each in arguments])
+    if result.exit_code != 0:
+        raise BlastEnvError(f"{folder}: {result.output}")
+
+
+def _search(folder: Path) -> None:
+    options = ("--method", "random", "--budget", "6", "--held-out", "2", "--seed", "1")
+    where = ("--cache", folder / "cache", "--out", folder / "out")
+    _command(folder, "search", *options, *where)
+
+
+def _evaluate(folder: Path) -> None:
+    layout = folder / "layout.json"
+    if not layout.exists():
+        layout.write_text("[[9, 0], [10, 0]]")
+    where = ("--cache", folder / "cache", "--out", folder / "out")
+    _command(folder, "evaluate", "--layout", layout, "--seeds", "2", *where)
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    """Return what is written for the reader; not JSON, which has the command in it."""
+    written = (folder / "out").iterdir()
+    return {
+        path.name: path.read_bytes()
+        for path in written
+        if path.suffix in (".csv", ".png") and not is_temporary(path.name)
+    }
+
+
+def _league(folder: Path) -> None:
+    track = known_track(road_scenario(), 2, 2)
+    entries = (*standard_entries(["random"], [4]), NoBarrier("nothing"))
+    contest = Contest(track, entries, ResultStore(folder / "results"))
+    write_league([contest.play()], folder, "command")
+
+
+def _league_outcome(folder: Path) -> Any:
+    store = FolderStore(folder / "results", ".result")
+    names = sorted(path.name for path in store.folder.iterdir() if not is_temporary(path.name))
+    return names, sorted(path.name for path in folder.iterdir() if not is_temporary(path.name))
+
+
+def _study(folder: Path) -> None:
+    FreeFieldStudy(load_scenario("free_field"), (10.0, 12.0), (0, 1), "event").run(
+        store=folder / "runs.jsonl"
+    )
+
+
+def _study_outcome(folder: Path) -> Any:
+    return sorted(map(str, read_store(folder / "runs.jsonl").values()))
+
+
+JOBS: Final = {
+    "train": Job(_train, _training_outcome),
+    "search": Job(_search, _files),
+    "evaluate": Job(_evaluate, _files),
+    "league": Job(_league, _league_outcome),
+    "calibrate": Job(_study, _study_outcome),
+}
+
+
+def _run_until(job: Callable[[Path], None], folder: Path, kill_at: int, steps: Any) -> None:
+    """Do the job in this process, and kill it at a step in the folder."""
+    place = str(folder)
+
+    def watch(event: str, arguments: tuple[Any, ...]) -> None:
+        if event not in _STEPS or not str(arguments[0]).startswith(place):
+            return
+        if event == "open" and not (isinstance(arguments[2], int) and arguments[2] & _WRITING):
+            return
+        if steps.value == kill_at:
+            os.kill(os.getpid(), signal.SIGKILL)
+        steps.value += 1
+
+    sys.addaudithook(watch)
+    job(folder)
+
+
+def in_process(job: Callable[[Path], None], folder: Path, kill_at: int = -1) -> tuple[int, int]:
+    """Do a job in a process of its own.
+
+    Returns:
+        The exit code of the process, and how many steps it came to.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([__name__])
+    steps = context.Value("i", 0, lock=False)
+    process = context.Process(target=_run_until, args=(job, folder, kill_at, steps))
+    process.start()
+    process.join()
+    return process.exitcode or 0, steps.value
+
+
+def outcome_after_kill(name: str, folder: Path, kill_at: int) -> Any:
+    """Kill a job at a step, begin it again as a user would, and return what came of it.
+
+    Raises:
+        RuntimeError: If it was not killed, or could not go on.
+    """
+    job = JOBS[name]
+    code, _ = in_process(job.run, folder, kill_at)
+    if code != -signal.SIGKILL:
+        raise RuntimeError(f"{name} was to be killed at step {kill_at}, ended with {code}")
+    code, _ = in_process(job.run, folder)
+    if code != 0:
+        raise RuntimeError(f"{name}, killed at step {kill_at}, cannot go on: exit code {code}")
+    return job.outcome(folder)
+
+
+def steps_and_outcome(name: str, folder: Path) -> tuple[int, Any]:
+    """Do a job that is not killed; return how many steps it takes and what comes of it."""
+    job = JOBS[name]
+    code, steps = in_process(job.run, folder)
+    if code != 0:
+        raise RuntimeError(f"{name} ended with exit code {code}")
+    return steps, job.outcome(folder)
