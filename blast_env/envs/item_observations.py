@@ -76,6 +76,8 @@ CHANGING_SITE: Final = ("barrier_height", "stops_vehicles")
 class ItemChannels:
     """Names of the planes that a zone with a catalogue has more than others.
 
+    Those of an item begin with its name and a colon, which no name has.
+
     Attributes:
         heights: Of the items' heights, one an item.
         costs: Of their costs, one an item.
@@ -94,11 +96,11 @@ class ItemChannels:
         names = catalogue.names
         variants = catalogue.variants if catalogue.has_items else ()
         return cls(
-            heights=tuple(f"{name}_height" for name in names),
-            costs=tuple(f"{name}_cost" for name in names),
-            left=tuple(f"{name}_left" for name in names),
+            heights=tuple(f"{name}:height" for name in names),
+            costs=tuple(f"{name}:cost" for name in names),
+            left=tuple(f"{name}:left" for name in names),
             legal=tuple(
-                f"{each.name}_turned_legal" if each.turned else f"{each.name}_legal"
+                f"{each.name}:turned:legal" if each.turned else f"{each.name}:legal"
                 for each in variants
             ),
         )

@@ -207,12 +207,12 @@ class GridObservation:
     | plane | value, from 0 to 1 |
     |---|---|
     | `structure_height` | height of the structure here, 1 where it is as high as the air |
-    | `<item>_height`, for each item | its height = |
-    | `<item>_cost`, for each item | its cost / the budget (or the dearest item's), at most 1 = |
+    | `<item>:height`, for each item | its height = |
+    | `<item>:cost`, for each item | its cost / the budget (or the dearest item's), at most 1 = |
     | `barrier_height` | height of the module that stands here |
     | `stops_vehicles` | 1 where a module stands that stops vehicles |
-    | `<item>_left`, for each item | pieces that may still be placed / pieces at first = |
-    | `<item>_legal`, `<item>_turned_legal` | 1 where a piece may have its lower left cell now |
+    | `<item>:left`, for each item | pieces that may still be placed / pieces at first = |
+    | `<item>:legal`, `<item>:turned:legal` | 1 where a piece may have its lower left cell now |
 
     Where the scenario has a vehicle, two planes come last. The plane `charge` shows where it
     enters, whether the threat is visible or hidden: where it goes off is up to the layout.

@@ -113,11 +113,11 @@ def test_planes_of_other_zones_stay_as_they_were() -> None:
     assert CHANNELS[:9] == GridObservation.channels
     assert CHANNELS[9:] == (
         "structure_height",
-        *("wall_height", "basket_height", "post_height"),
-        *("wall_cost", "basket_cost", "post_cost"),
+        *("wall:height", "basket:height", "post:height"),
+        *("wall:cost", "basket:cost", "post:cost"),
         *("barrier_height", "stops_vehicles"),
-        *("wall_left", "basket_left", "post_left"),
-        *("wall_legal", "wall_turned_legal", "basket_legal", "post_legal"),
+        *("wall:left", "basket:left", "post:left"),
+        *("wall:legal", "wall:turned:legal", "basket:legal", "post:legal"),
     )
 
 
@@ -131,9 +131,9 @@ def test_planes_show_heights_items_and_where_they_may_go() -> None:
     assert seen["barrier_height"][6, 1] == pytest.approx(2.0 / 12.0, abs=0.002)
     assert seen["barrier_height"][4, 1] == pytest.approx(1.0 / 12.0, abs=0.002)
     assert seen["barrier_height"][0, 0] == 0.0
-    assert seen["wall_height"] == pytest.approx(2.0 / 12.0, abs=0.002)
-    assert seen["wall_cost"] == pytest.approx(6.0 / 20.0, abs=0.002)
-    left = {name: seen[f"{name}_left"][0, 0] for name in ("wall", "basket", "post")}
+    assert seen["wall:height"] == pytest.approx(2.0 / 12.0, abs=0.002)
+    assert seen["wall:cost"] == pytest.approx(6.0 / 20.0, abs=0.002)
+    left = {name: seen[f"{name}:left"][0, 0] for name in ("wall", "basket", "post")}
     assert left == pytest.approx({"wall": 1 / 3, "basket": 1.0, "post": 0.75}, abs=0.002)
     shown = [seen[name] for name in CHANNELS[-4:]]
     assert np.array_equal(np.array(shown) == 1.0, placement.legal)

@@ -506,6 +506,10 @@ class ZoneGeometry(NamedTuple):
             site=torch.cat(_measures(planes, likely, target), dim=1),
         )
 
+    def crop(self, plane: Tensor) -> Tensor:
+        """Return the build zone's part of a plane, from 0 to 1 (batch, rows, columns)."""
+        return _crop(plane, self.row, self.column, self.rows, self.columns).float() / _LEVELS
+
     def view(self, planes: Planes) -> ZoneView:
         """Return what the policy sees now.
 
@@ -515,10 +519,7 @@ class ZoneGeometry(NamedTuple):
         Args:
             planes: Those of the observation of these sites.
         """
-        barrier, free = (
-            _crop(planes[name], self.row, self.column, self.rows, self.columns).float() / _LEVELS
-            for name in ("barrier", "free")
-        )
+        barrier, free = (self.crop(planes[name]) for name in ("barrier", "free"))
         seen = Occlusion.of(self.bearings, barrier.flatten(1))
         changing = ChangingCellFeatures(
             open_cut=seen.open_cut * _SHARE_GAIN,

@@ -22,8 +22,16 @@ from blast_env.envs.observations import GridObservation
 _LOGIT_GAIN: Final = 0.01
 
 
-_OVERVIEW: Final = ("protected", "other_structures", "charge", "barrier", "unprotected_load")
+_OVERVIEW: Final = (
+    *("protected", "other_structures", "charge", "barrier", "unprotected_load"),
+    *("structure_height", "barrier_height"),
+)
 """Channels of which the network sees the whole site, those of them that the observation has."""
+
+
+def variant_channels(channels: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the planes that say where each variant of a catalogue may be placed, in order."""
+    return tuple(each for each in channels if each.endswith(":legal"))
 
 
 class ZoneExtractor(BaseFeaturesExtractor):
@@ -32,6 +40,9 @@ class ZoneExtractor(BaseFeaturesExtractor):
     A cell's features come from where it lies on the line of sight (`features.ZoneGeometry`), from
     the 25 cells around it, and from an overview of the site. The result is flat: `width` features
     of each cell, cell by cell, then `width` features of the whole.
+
+    With a catalogue the cells around show heights and where each variant may be placed as well,
+    and the features of the whole have heights, costs and what is left of the items.
 
     Args:
         observation_space: Of an observation of planes.
@@ -56,7 +67,11 @@ class ZoneExtractor(BaseFeaturesExtractor):
         self.shown = tuple(name for name in _OVERVIEW if name in self.channels)
         self.rows, self.columns, self.places, self.width = rows, columns, places, width
         self._known: tuple[Tensor, ZoneGeometry] | None = None
-        self.near = nn.Conv2d(2, width, 5, padding=2)
+        values = (":height", ":cost", ":left")
+        self.items = tuple(each for each in self.channels if each.endswith(values))
+        variants = variant_channels(self.channels)
+        self.around = ("barrier_height", "stops_vehicles", *variants) if variants else ()
+        self.near = nn.Conv2d(2 + len(self.around), width, 5, padding=2)
         self.overview = nn.Sequential(
             nn.AvgPool2d(4, ceil_mode=True),
             nn.Conv2d(len(self.shown), 16, 3, stride=2, padding=1),
@@ -67,7 +82,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
             nn.Flatten(),
         )
         self.cells = nn.Linear(len(CELL_FEATURES), width)
-        self.site = nn.Linear(len(SITE_FEATURES) + width, width)
+        self.site = nn.Linear(len(SITE_FEATURES) + width + len(self.items), width)
         self.mixed = nn.Linear(width, width)
         self.whole = nn.Linear(3 * width, width)
 
@@ -79,10 +94,13 @@ class ZoneExtractor(BaseFeaturesExtractor):
         """
         with torch.no_grad():  # nothing in here has weights
             named = Planes(observations, self.channels)
-            view = self._geometry(named).view(named)
+            geometry = self._geometry(named)
+            view = geometry.view(named)
             planes = named.of(self.shown).float() / 255.0
-            around = torch.stack((view.barrier, view.free), dim=1)
-        site = self.site(torch.cat((view.site, self.overview(planes)), dim=1))
+            own = [geometry.crop(named[name]) for name in self.around]
+            around = torch.stack((view.barrier, view.free, *own), dim=1)
+            items = named.of(self.items)[:, :, 0, 0].float() / 255.0
+        site = self.site(torch.cat((view.site, self.overview(planes), items), dim=1))
         near = self.near(around).permute(0, 2, 3, 1)
         cells = torch.relu(self.cells(view.cells) + near + site[:, None, None, :])
         cells = torch.relu(self.mixed(cells)).flatten(1, 2)
@@ -120,17 +138,20 @@ class ZoneLatents(MlpExtractor):
 
 
 class CellLogits(nn.Module):
-    """A logit of each cell from its own features, and one of finishing from those of the whole.
+    """Logits of each cell from its own features, and one of finishing from those of the whole.
+
+    A cell has one logit for each variant that can be set down from there.
 
     Args:
         width: Number of features of a cell, and of the whole.
         finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
+        variants: How many variants there are; 1 without a catalogue.
     """
 
-    def __init__(self, width: int, finish_bias: float) -> None:
+    def __init__(self, width: int, finish_bias: float, variants: int = 1) -> None:
         super().__init__()
         self.width = width
-        self.cell = nn.Linear(width, 1)
+        self.cell = nn.Linear(width, variants)
         self.finish = nn.Linear(width, 1)
         nn.init.orthogonal_(self.cell.weight, gain=_LOGIT_GAIN)
         nn.init.orthogonal_(self.finish.weight, gain=_LOGIT_GAIN)
@@ -138,10 +159,10 @@ class CellLogits(nn.Module):
         nn.init.constant_(self.finish.bias, finish_bias)
 
     def forward(self, features: Tensor) -> Tensor:
-        """Return the logits (batch, cells + 1)."""
+        """Return the logits (batch, variants * cells + 1), variant by variant."""
         cells = features[:, : -self.width].reshape(len(features), -1, self.width)
         finish = self.finish(features[:, -self.width :])
-        return torch.cat((self.cell(cells).flatten(1), finish), dim=1)
+        return torch.cat((self.cell(cells).transpose(1, 2).flatten(1), finish), dim=1)
 
 
 class ZonePolicy(BasePolicy):
@@ -179,6 +200,7 @@ class ZonePolicy(BasePolicy):
         **others: Any,
     ) -> None:
         self.width, self.critic_width, self.finish_bias = width, critic_width, finish_bias
+        self.variants = max(len(variant_channels(tuple(channels))), 1)
         arguments: dict[str, Any] = {
             "lr_schedule": lr_schedule,
             "features_extractor_class": ZoneExtractor,
@@ -207,7 +229,7 @@ class ZonePolicy(BasePolicy):
 
     def _replace_action_net(self, learning_rate: float) -> None:
         """Put the logits by cell in the place of the dense layer; the optimizer has to know."""
-        self.action_net: nn.Module = CellLogits(self.width, self.finish_bias)
+        self.action_net: nn.Module = CellLogits(self.width, self.finish_bias, self.variants)
         arguments = {"lr": learning_rate} | self.optimizer_kwargs
         self.optimizer = self.optimizer_class(self.parameters(), **arguments)
 

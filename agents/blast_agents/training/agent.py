@@ -25,6 +25,7 @@ from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import Hyperparameters, schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from blast_env.envs.arguments import check_names
+from blast_env.envs.item_observations import ItemChannels
 from blast_env.envs.observations import (
     OBSERVATIONS,
     Array,
@@ -77,7 +78,12 @@ def fitted(
     """
     zone = scenario.zone
     places = hyperparameters.policy_kwargs.places or _PLACES[settings.threat]
-    changes = {"rows": zone.rows, "columns": zone.columns, "places": places}
+    changes = {
+        "rows": zone.rows,
+        "columns": zone.columns,
+        "item_channels": ItemChannels.of(zone.catalogue).all,
+        "places": places,
+    }
     spatial = _SPATIAL[settings.algorithm]
     names = ["MlpPolicy"]
     if channels_of(settings.observation):
@@ -109,7 +115,10 @@ def check_fit(configuration: RunConfiguration, scenario: Scenario, folder: RunFo
 
 
 def channels_of(observation: str) -> tuple[str, ...]:
-    """Return the names of an observation's planes; none for one that is no planes."""
+    """Return the names of an observation's planes, without those of a catalogue.
+
+    None for one that is no planes.
+    """
     channels: tuple[str, ...] = getattr(OBSERVATIONS[observation], "channels", ())
     return channels
 
@@ -166,7 +175,8 @@ def _policy_class(configuration: RunConfiguration) -> tuple[type[Any], dict[str,
     if plain is not None:
         return plain, {}
     arguments = hyperparameters.policy_kwargs.model_dump()
-    return _SPATIAL[settings.algorithm], arguments | {"channels": channels_of(settings.observation)}
+    channels = (*channels_of(settings.observation), *arguments.pop("item_channels"))
+    return _SPATIAL[settings.algorithm], arguments | {"channels": channels}
 
 
 _ARCHIVE: Final = ".zip"
@@ -328,7 +338,7 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     checkpoint = Checkpoint.load(folder.checkpoint)
     checkpoint.check_configuration(configuration, folder.path)
     zone = scenario.zone
-    actions = spaces.Discrete(zone.rows * zone.columns + 1)
+    actions = spaces.Discrete(zone.catalogue.finish + 1)
     settings = configuration.settings
     space = OBSERVATIONS[settings.observation].space(scenario)
     policy = make_policy(configuration, space, actions)

@@ -170,6 +170,7 @@ class PolicyArguments(BaseModel):
     Attributes:
         rows: Rows of the build zone; the scenario decides.
         columns: Its columns; likewise.
+        item_channels: Names of the planes that its catalogue adds to the observation; likewise.
         places: Places that stand for where the charge may be; unless given, 1 for a visible charge
             and 9 for a hidden one.
         width: Number of features of a cell.
@@ -181,6 +182,7 @@ class PolicyArguments(BaseModel):
 
     rows: Annotated[int, Field(ge=1, le=1000)] = 1
     columns: Annotated[int, Field(ge=1, le=1000)] = 1
+    item_channels: Annotated[tuple[str, ...], Field(max_length=1000)] = ()
     places: Annotated[int, Field(ge=1, le=64)] | None = None
     width: Annotated[int, Field(ge=1, le=512)] = 24
     critic_width: Annotated[int, Field(ge=1, le=4096)] = 64
