@@ -19,6 +19,7 @@ from blast_env.app.work import (
     BlastTask,
     FilmTask,
     ProposalTask,
+    ReportTask,
     SearchTask,
     Status,
     Task,
@@ -220,6 +221,29 @@ class Session:
             path=str(path),
         )
         return self._begin(task, f"film {path.name}")
+
+    def report(self, page: Path, pdf: Path | None = None) -> Path:
+        """Report on the layout that is edited, by gas dynamics, under the chosen threats.
+
+        Args:
+            page: The page to write, .html.
+            pdf: The same as PDF.
+
+        Raises:
+            BlastEnvError: If the layout is empty, or it cannot be begun.
+        """
+        if not self.design.layout:
+            raise BlastEnvError(
+                f"layout {SLOTS[self.design.active]} is empty: there is nothing to report on"
+            )
+        task = ReportTask(
+            **self._what(self.design.layout),
+            threats=self._threats_as_data(),
+            cache=str(self.work.cache),
+            path=str(page),
+            pdf=None if pdf is None else str(pdf),
+        )
+        return self._begin(task, f"report {page.name if pdf is None else pdf.name}")
 
     def take(self, status: Status, slot: int) -> None:
         """Take the layout of a proposal or a search as one of the design's.

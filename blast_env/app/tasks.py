@@ -24,6 +24,7 @@ from blast_env.app.work import (
     BlastTask,
     FilmTask,
     ProposalTask,
+    ReportTask,
     SearchTask,
     Status,
     ThreatOf,
@@ -99,6 +100,8 @@ def run_task(folder: Path) -> None:
         _search(task, teller)
     elif isinstance(task, FilmTask):
         _film(task, teller)
+    elif isinstance(task, ReportTask):
+        _report(task, teller)
     else:
         _propose(task, teller)
 
@@ -198,3 +201,20 @@ def _film(task: FilmTask, teller: Teller) -> None:
         else:
             write_film(own, path, progress=teller.share)
     teller.tell(state="done", share=1.0, text=f"wrote {path.name}", file=str(path))
+
+
+def _report(task: ReportTask, teller: Teller) -> None:
+    # Reports need an extra, and most work is no report.
+    from blast_env.reporting import StudyOptions, run_study, write_report
+
+    scenario, page = scenario_of(task.scenario), Path(task.path)
+
+    def tell(what: str, share: float) -> None:
+        if teller.is_due:
+            teller.tell(text=what, share=min(max(share, 0.0), 1.0))
+
+    options = StudyOptions(charges=tuple(_charges(task.threats)), cache=Path(task.cache))
+    study = run_study(scenario, placing.layout_from(scenario, task.layout), options, tell)
+    written = write_report(study, page, None if task.pdf is None else Path(task.pdf))
+    words = " and ".join(path.name for path in written)
+    teller.tell(state="done", share=1.0, text=f"wrote {words}", file=str(written[-1]))

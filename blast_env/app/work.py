@@ -105,7 +105,30 @@ class FilmTask(Kept):
     path: str
 
 
-Task = Annotated[BlastTask | SearchTask | ProposalTask | FilmTask, Field(discriminator="kind")]
+class ReportTask(Kept):
+    """A report on one layout by gas dynamics, with cells of two sizes.
+
+    Attributes:
+        scenario: The site as a document.
+        layout: The layout.
+        threats: Those that it is held against.
+        cache: Folder for the loads of blasts.
+        path: The page, .html.
+        pdf: The same as PDF; `None` for none.
+    """
+
+    kind: Literal["report"] = "report"
+    scenario: dict[str, Any]
+    layout: tuple[tuple[Any, ...], ...]
+    threats: tuple[ThreatOf, ...]
+    cache: str
+    path: str
+    pdf: str | None = None
+
+
+Task = Annotated[
+    BlastTask | SearchTask | ProposalTask | FilmTask | ReportTask, Field(discriminator="kind")
+]
 
 _TASK: Final[TypeAdapter[Task]] = TypeAdapter(Task)
 

@@ -2,12 +2,13 @@
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic, sleep
 
 import pytest
 
+from blast_env import reporting
 from blast_env.app import offers
 from blast_env.app.blasts import FRAMES
 from blast_env.app.design import SLOTS
@@ -21,6 +22,7 @@ from blast_env.app.worker import do
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.geometry import Layout
+from blast_env.reporting import StudyOptions
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.simulation.gas import GasBlast
 from tests.gas_sites import WALL, hut
@@ -307,3 +309,36 @@ def test_tabs_on_one_design_share_it_and_designs_are_apart(tmp_path: Path) -> No
     one.undo()
     assert heard == [6]
     assert Sessions(WorkFolder(tmp_path), Here()).of(one.folder.design_id).design == one.design
+
+
+def test_a_report_is_of_the_layout_and_the_chosen_threats(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: dict[str, object] = {}
+
+    def study(
+        scenario: Scenario, layout: Layout, options: StudyOptions, tell: Callable[..., None]
+    ) -> str:
+        asked.update(scenario=scenario, layout=layout, charges=options.charges)
+        tell("loads", 0.5)
+        return "study"
+
+    def write(found: object, page: Path, pdf: Path | None) -> list[Path]:
+        assert found == "study"
+        return [page] if pdf is None else [page, pdf]
+
+    monkeypatch.setattr(reporting, "run_study", study)
+    monkeypatch.setattr(reporting, "write_report", write)
+    session = session_on(tmp_path, hut())
+    with pytest.raises(BlastEnvError, match="layout A is empty"):
+        session.report(tmp_path / "r.html")
+    session.put("wall", session.design.with_layout(WALL))
+    session.report(tmp_path / "r.html", tmp_path / "r.pdf")
+    status = state_of(session)
+    assert (status.state, status.file) == ("done", str(tmp_path / "r.pdf"))
+    assert status.text == "wrote r.html and r.pdf"
+    assert asked == {
+        "scenario": session.scenario,
+        "layout": WALL,
+        "charges": tuple(each.charge for each in session.chosen_threats()),
+    }

@@ -85,6 +85,8 @@ class FilesMenu:
             for suffix in SUFFIXES:
                 ui.menu_item(f"layout: {suffix}", partial(self._save_layout, suffix))
             ui.menu_item("film of this layout (.mp4)", self._save_film)
+            ui.menu_item("report on this layout (.html)", partial(self._save_report, False))
+            ui.menu_item("report on this layout (.pdf)", partial(self._save_report, True))
 
     def _open_site(self) -> None:
         with ui.dialog(value=True) as dialog, ui.card().classes("w-[480px]"):
@@ -150,3 +152,17 @@ class FilesMenu:
             complain(error)
             return
         ui.notify("the film is on its way: it can be downloaded on the right when it is there")
+
+    def _save_report(self, as_pdf: bool) -> None:
+        session = self._session
+        name = f"{session.scenario.name}_{SLOTS[session.design.active]}"
+        page = session.folder.path / f"{name}.html"
+        try:
+            session.report(page, page.with_suffix(".pdf") if as_pdf else None)
+        except BlastEnvError as error:
+            complain(error)
+            return
+        ui.notify(
+            "the report is on its way, gas dynamics with cells of 0.5 and 0.25 m: it can be"
+            " downloaded on the right when it is there"
+        )
