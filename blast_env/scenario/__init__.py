@@ -3,6 +3,7 @@
 from blast_env.geometry import Cell, Element, Layout, Piece
 from blast_env.physics.scene import Charge
 from blast_env.scenario.access_way import AccessWay
+from blast_env.scenario.barriers import StockBarrier, stock_barriers
 from blast_env.scenario.catalogue import Catalogue, Item, PlacedModule
 from blast_env.scenario.files import (
     AnyScenario,
@@ -68,6 +69,7 @@ __all__ = [
     "SegmentSource",
     "SimulationSection",
     "Site",
+    "StockBarrier",
     "VehicleCharge",
     "VehicleSource",
     "bundled_scenarios",
@@ -79,6 +81,7 @@ __all__ = [
     "parse_scenario",
     "save_scenario",
     "scenario_hash",
+    "stock_barriers",
     "usable_cells",
     "write_layout",
 ]

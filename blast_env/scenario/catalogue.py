@@ -4,18 +4,25 @@ An item is a rectangle of modules that are placed together. Here, and nowhere el
 a piece covers, how high it is, and which number the action of placing it has.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import index
 from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
-from pydantic import Field, StrictBool, StrictFloat, StrictInt
+from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 
 from blast_env.errors import LayoutError, suggestion
 from blast_env.geometry import Cell, Element, Piece
-from blast_env.scenario.problems import type_word, value_text
+from blast_env.scenario.barriers import stock_barriers
+from blast_env.scenario.problems import (
+    Problem,
+    ScenarioError,
+    type_word,
+    unknown_name,
+    value_text,
+)
 from blast_env.scenario.sections import Count, Height, Name, Section
 
 Cost = Annotated[StrictFloat, Field(gt=0.0, le=1e9)]
@@ -25,8 +32,14 @@ MOST_ITEMS: Final = 20
 """Items of a catalogue; each has an action for every cell and orientation."""
 
 
+_SIZE_KEYS: Final = ("length_modules", "thickness_modules", "height_m")
+
+
 class Item(Section):
     """A barrier that comes in one piece: modules that are placed together.
+
+    In a file `from_catalogue` names a barrier of the stock list (`stock_barriers`) that the other
+    keys are taken from; its size cannot be changed. In the item everything is filled in.
 
     Attributes:
         name: Name in layouts, tables and drawings.
@@ -38,6 +51,7 @@ class Item(Section):
         stock: How many pieces there are.
         rotatable: Whether it may be turned by a right angle.
         stops_vehicles: Whether no vehicle gets past it, over it or through it.
+        from_catalogue: Always `None`: what it stood for is in the others.
     """
 
     name: Name
@@ -49,6 +63,31 @@ class Item(Section):
     stock: Annotated[StrictInt, Field(ge=0, le=10_000)]
     rotatable: StrictBool = True
     stops_vehicles: StrictBool = True
+    from_catalogue: Annotated[str | None, Field(exclude=True)] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_stock_list(cls, given: Any) -> Any:
+        """Fill in what the barrier that `from_catalogue` names is."""
+        if not isinstance(given, Mapping) or given.get("from_catalogue") is None:
+            return given
+        name, known = given["from_catalogue"], stock_barriers()
+        if not isinstance(name, str):
+            raise ScenarioError(
+                "item", [Problem("from_catalogue", f"is {type_word(name)}, must be a string")]
+            )
+        if name not in known:
+            problem = Problem("from_catalogue", unknown_name("barrier", name, known))
+            raise ScenarioError("item", [problem])
+        barrier = known[name].model_dump(exclude={"source"})
+        own = {key: value for key, value in given.items() if key != "from_catalogue"}
+        fixed = [key for key in _SIZE_KEYS if own.get(key, barrier[key]) != barrier[key]]
+        if fixed:
+            raise ScenarioError(
+                "item",
+                [Problem(key, f"must be left out: {name!r} has {barrier[key]:g}") for key in fixed],
+            )
+        return {"name": name, **barrier, **own}
 
     @property
     def orientations(self) -> tuple[bool, ...]:

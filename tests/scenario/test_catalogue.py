@@ -21,6 +21,7 @@ from blast_env.scenario import (
     load_layout,
     load_scenario,
     save_scenario,
+    stock_barriers,
     write_layout,
 )
 from blast_env.scenario.build_scene import build_scene, build_site
@@ -412,3 +413,59 @@ def test_the_air_is_high_enough_for_the_highest_item() -> None:
     document = yard_document(items=changed(0, height_m=9.0))
     del document["site"]["air_height_m"]
     assert Scenario.from_document(document, "yard").air_height_m == 15.0
+
+
+# --- The stock list.
+
+
+@pytest.mark.parametrize("name", stock_barriers())
+def test_every_barrier_of_the_stock_list_can_be_taken_by_name(name: str) -> None:
+    scenario = yard(items=[{"from_catalogue": name, "stock": 2}], budget=None)
+    (taken,), barrier = scenario.zone.items, stock_barriers()[name]
+    assert (taken.name, taken.stock, taken.from_catalogue) == (name, 2, None)
+    assert taken.model_dump(exclude={"name", "stock"}) == barrier.model_dump(exclude={"source"})
+    assert len(barrier.source) > 50
+    written = yard(items=[taken.model_dump()], budget=None)
+    assert written == scenario
+    assert written.content_hash == scenario.content_hash
+
+
+def test_cost_name_and_words_of_the_stock_list_can_be_changed(tmp_path: Path) -> None:
+    changes = {"name": "wall", "cost": 7.5, "rotatable": False, "description": "ours", "stock": 3}
+    scenario = yard(items=[{"from_catalogue": "t_wall_3_6", **changes}])
+    (taken,) = scenario.zone.items
+    assert taken.model_dump(include=set(changes)) == changes
+    assert (taken.length_modules, taken.height_m) == (3, 3.6)
+    save_scenario(scenario, tmp_path / "yard.toml")
+    assert load_scenario(tmp_path / "yard.toml") == scenario
+    assert "from_catalogue" not in (tmp_path / "yard.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        (
+            {"from_catalogue": "t_wall_36"},
+            "from_catalogue: is 't_wall_36', there is no such barrier, did you mean 't_wall_3_6'?",
+        ),
+        ({"from_catalogue": 3}, "from_catalogue: is 3, must be a string"),
+        ({"from_catalog": "planter"}, "from_catalog: unknown key, did you mean 'from_catalogue'?"),
+        (
+            {"from_catalogue": "planter", "height_m": 2.0},
+            "height_m: must be left out: 'planter' has 1",
+        ),
+        (
+            {"from_catalogue": "planter", "cost": 0.0},
+            "cost: is 0.0, must be greater than 0",
+        ),
+    ],
+)
+def test_bad_use_of_the_stock_list_is_named(keys: Document, words: str) -> None:
+    lines = lines_for(items=[{"stock": 1, **keys}])
+    assert f"yard: build_zone.items[0].{words}" in lines
+
+
+def test_what_the_stock_list_needs_beside_the_name_is_the_stock() -> None:
+    assert lines_for(items=[{"from_catalogue": "planter"}])[0] == (
+        "yard: build_zone.items[0].stock: missing"
+    )
