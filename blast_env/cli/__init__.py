@@ -11,6 +11,7 @@ from blast_env.cli.import_map import import_map
 from blast_env.cli.league import league
 from blast_env.cli.output import print_line
 from blast_env.cli.page import app as page
+from blast_env.cli.play import play
 from blast_env.cli.report import report
 from blast_env.cli.search import search
 from blast_env.cli.simulate import simulate
@@ -23,7 +24,19 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for _command in (simulate, validate, calibrate, evaluate, search, bench, train, league, report):
+_COMMANDS = (
+    simulate,
+    validate,
+    calibrate,
+    evaluate,
+    search,
+    bench,
+    train,
+    league,
+    report,
+    play,
+)
+for _command in _COMMANDS:
     app.command()(_command)
 app.command("import")(import_map)  # a word that Python keeps for itself
 app.command("app")(page)

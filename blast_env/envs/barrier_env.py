@@ -1,6 +1,7 @@
 """The environment `BlastBarrier-v0`: placing barriers to protect a structure."""
 
 from collections.abc import Iterator
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -36,10 +37,11 @@ from blast_env.envs.strategies import (
     ThreatModel,
     scenario_source,
 )
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.evaluation.store import BlastCache
-from blast_env.geometry import Element
+from blast_env.geometry import Cell, Element
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
 from blast_env.scenario import AnyScenario, Placement
@@ -158,6 +160,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     - `cache`: where blasts are remembered beside the memory of the environment: a folder, which
       other processes and later runs may use too, or a cache (`blast_env.evaluation.store`).
     - `render_mode`: `None`, `"human"`, `"rgb_array"` or `"ansi"`.
+    - `show_blast`: whether an episode goes on after the charge has gone off, for as many steps as
+      the film of the blast has frames (some 250), whatever the actions: for a window, and for
+      `gymnasium.wrappers.RecordVideo`. The reward is paid before.
 
     >>> import gymnasium as gym, blast_env
     >>> env = gym.make("BlastBarrier-v0", threat="visible", realisations=2)
@@ -229,6 +234,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         cell_m: float | None = None,
         cache: str | Path | BlastCache | None = None,
         render_mode: str | None = None,
+        show_blast: bool = False,
     ) -> None:
         found = find_engine(engine, cell_m)
         if render_mode is not None:
@@ -251,8 +257,15 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         self.task.evaluators.of(representative)  # so that a wrong engine fails here, not later
         self.action_space = spaces.Discrete(representative.zone.catalogue.finish + 1)
         self.observation_space = self.task.observation.space(representative)
+        self.show_blast = show_blast
+        if show_blast and render_mode not in ("human", "rgb_array"):
+            raise BlastEnvError(
+                f"show_blast is True, but render_mode {render_mode!r} shows nothing:"
+                " must be 'human' or 'rgb_array'"
+            )
         self._display = Display(render_mode, self.metadata["render_fps"])
         self._begun: Episode | None = None
+        self._film_info: dict[str, Any] | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -266,6 +279,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
                 another size than the first.
         """
         super().reset(seed=seed)
+        self._display.stop_film()
+        self._film_info = None
         episode = self.task.start(self.np_random, ResetOptions.from_mapping(options))
         self._begun = episode
         if self.render_mode == "human":
@@ -283,14 +298,31 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             raise gym.error.InvalidAction(f"action is {action!r}, must be in {self.action_space}")
         episode = self._episode
         if episode.ended:
-            raise gym.error.ResetNeeded("the episode has ended: call reset")
+            return self._show_blast()
         terms = episode.act(int(action), self.reward_strategy, self.illegal)
         info = episode.information() | {"reward_terms": terms}
         if episode.ended:
             info |= episode.final_information(self.task.evaluators)
+        self._film_info = info if episode.ended and self.show_blast else None
+        if self._film_info is not None:
+            self._display.begin_film(episode)
         if self.render_mode == "human":
             self._display.show(episode)
-        return episode.observe(), total(terms), episode.ended, False, info
+        ended = episode.ended and self._film_info is None
+        return episode.observe(), total(terms), ended, False, info
+
+    def _show_blast(self) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Go on to the next frame of the film, which pays nothing more."""
+        if self._film_info is None:
+            raise gym.error.ResetNeeded("the episode has ended: call reset")
+        terms = dict.fromkeys(self._film_info["reward_terms"], 0.0)
+        info = deepcopy(self._film_info) | {"reward_terms": terms}
+        ended = not self._display.go_on_with_film()
+        if ended:
+            self._film_info = None
+        if self.render_mode == "human":
+            self._display.show(self._episode)
+        return self._episode.observe(), 0.0, ended, False, info
 
     def blasts_due(self, action: np.int64 | int) -> tuple[BlastAsked, ...]:
         """Return the blasts that `step` asks for if this action ends the episode; else none.
@@ -352,6 +384,45 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         if not self._episode.ended:
             raise gym.error.ResetNeeded("the charge has not gone off: finish the episode first")
         return self._display.blast_frames(self._episode)
+
+    def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
+        """Tell those who call `gymnasium.utils.play` what has keys: an action a cell has none.
+
+        Raises:
+            BlastEnvError: Always; the message names the wrapper.
+        """
+        raise BlastEnvError(
+            "every cell is an action, which is too many for a keyboard: "
+            "from blast_env.envs.play import CursorControl; play(CursorControl(env))"
+        )
+
+    @property
+    def charge_has_gone_off(self) -> bool:
+        """Whether nothing more can be placed, and the layout has been assessed."""
+        return self._episode.ended
+
+    def mark(self, action: int | None) -> None:
+        """Outline in the frames of `render` what an action would place, or nothing.
+
+        A sentence beside it says why it may not be placed, if that is so.
+
+        Args:
+            action: The action; one that finishes is not shown.
+
+        Raises:
+            gymnasium.error.InvalidAction: If the action is not in the action space.
+        """
+        if action is not None and not self.action_space.contains(action):
+            raise gym.error.InvalidAction(f"action is {action!r}, must be in {self.action_space}")
+        self._display.marked = action
+
+    def cell_at(self, place_px: tuple[int, int]) -> Cell | None:
+        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If `reset` has not been called.
+        """
+        return self._display.cell_at(self._episode, place_px)
 
     def close(self) -> None:
         """Close the window, if there is one."""

@@ -9,15 +9,18 @@ from numpy.typing import NDArray
 
 from blast_env.envs.episode import Episode
 from blast_env.envs.vehicle_observations import VehicleView
-from blast_env.geometry import Rectangle
+from blast_env.evaluation.cases import Threat
+from blast_env.geometry import Cell, Layout, Rectangle
 from blast_env.physics.engines import is_gas
 from blast_env.scenario import AnySource, Placement, PointSource, Scenario
+from blast_env.scenario.catalogue import element_text
 from blast_env.scenario.zone import distances_m
 from blast_env.simulation import Blast
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:
     from blast_env.rendering.placing import BlastScreening, PlacingPainter
+    from blast_env.rendering.pressure_film import PressureScreening
     from blast_env.rendering.window import Window
 
 
@@ -103,44 +106,65 @@ class Display:
     Args:
         render_mode: `"human"`, `"rgb_array"`, `"ansi"`, or `None` for nothing.
         frames_per_s: Frames a second of the window and of films.
+
+    Attributes:
+        marked: The action that is marked in the frames, before the charge goes off.
     """
 
     def __init__(self, render_mode: str | None, frames_per_s: float) -> None:
+        self.marked: int | None = None
         self._render_mode = render_mode
         self._frames_per_s = frames_per_s
         self._episode: Episode | None = None
         self._painter: PlacingPainter | None = None
         self._last_frame: Frame | None = None
+        self._film: Iterator[Frame] | None = None
+        self._film_frame: Frame | None = None
         self._window: Window | None = None
 
     def show(self, episode: Episode) -> None:
-        """Show the present state in the window; the film of the blast when it goes off."""
-        if not episode.ended:
-            for _ in range(_FRAMES_PER_PLACEMENT):
-                self._show(self._placing_frame(episode))
-            return
-        if not is_gas(episode.objective.evaluator.engine):
-            for frame in self.blast_frames(episode):
-                self._show(frame)
-        self._show(self._final_frame(episode))
+        """Show the present state in the window, so long that a person can follow."""
+        in_film = self._film_frame is not None
+        for _ in range(1 if in_film or episode.ended else _FRAMES_PER_PLACEMENT):
+            self._show(self._frame(episode))
 
     def render(self, episode: Episode) -> Frame | str | None:
         """Return what `render` of an environment returns in the render mode."""
         if self._render_mode == "rgb_array":
-            return self._final_frame(episode) if episode.ended else self._placing_frame(episode)
+            return self._frame(episode).copy()
         if self._render_mode == "ansi":
             lines = [*_state_lines(episode), *([_outcome(episode)] if episode.ended else [])]
             return placing_text(episode.placement, episode.observable.sources, lines)
         if self._render_mode == "human":
-            self._show(
-                self._final_frame(episode) if episode.ended else self._placing_frame(episode)
-            )
+            self._show(self._frame(episode))
         return None
 
     def blast_frames(self, episode: Episode) -> Iterator[Frame]:
         """Yield the frames of the film of the blast that ended the episode."""
         painter = self._placing_painter(episode)
+        if is_gas(episode.objective.evaluator.engine):
+            return _gas_screening(episode, painter.size_px).frames(self._frames_per_s)
         return map(painter.padded, _screening(episode).frames(self._frames_per_s))
+
+    def begin_film(self, episode: Episode) -> None:
+        """Begin the film of the blast: from now on its frames are shown, one after the other."""
+        self._film = self.blast_frames(episode)
+        self.go_on_with_film()
+
+    def go_on_with_film(self) -> bool:
+        """Go on to the next frame of the film; return whether there was one."""
+        self._film_frame = None if self._film is None else next(self._film, None)
+        if self._film_frame is None:
+            self._film = None
+        return self._film_frame is not None
+
+    def stop_film(self) -> None:
+        """Leave the film, if one is on: a new episode begins."""
+        self._film = self._film_frame = None
+
+    def cell_at(self, episode: Episode, place_px: tuple[int, int]) -> Cell | None:
+        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one."""
+        return self._placing_painter(episode).cell_at(place_px)
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -150,18 +174,30 @@ class Display:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without drawing objects, which do not pickle."""
-        return {**self.__dict__, "_painter": None, "_window": None}
+        return {**self.__dict__, "_painter": None, "_window": None, "_film": None}
+
+    def _frame(self, episode: Episode) -> Frame:
+        """Return what is to be seen now."""
+        if self._film_frame is not None:
+            return self._film_frame
+        return self._final_frame(episode) if episode.ended else self._placing_frame(episode)
 
     def _placing_frame(self, episode: Episode) -> Frame:
-        return self._placing_painter(episode).paint(episode.placement, _state_lines(episode))
+        painter, placement = self._placing_painter(episode), episode.placement
+        lines = _state_lines(episode)
+        if self.marked is None or self.marked >= placement.catalogue.finish:
+            return painter.paint(placement, lines)
+        element = placement.catalogue.element(self.marked)
+        reason = placement.explain(element)
+        return painter.paint(placement, (lines[0], reason or element_text(element)), element)
 
     def _final_frame(self, episode: Episode) -> Frame:
         painter = self._placing_painter(episode)
         if is_gas(episode.objective.evaluator.engine):  # no balls that could be drawn
-            return painter.paint(episode.placement, [*_state_lines(episode), _outcome(episode)])
+            return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
         if self._last_frame is None:
             self._last_frame = painter.padded(_screening(episode).last_frame())
-        return self._last_frame.copy()
+        return self._last_frame
 
     def _placing_painter(self, episode: Episode) -> "PlacingPainter":
         """Return the painter of the episode; a new one with a new episode."""
@@ -184,19 +220,45 @@ class Display:
 
 
 def _screening(episode: Episode) -> "BlastScreening":
-    """Return the blast that is shown: of the worst threat, with its first realisation."""
+    """Return the blast of particles that is shown."""
     from blast_env.rendering.placing import BlastScreening
 
+    shown, engine = _shown_threat(episode), episode.objective.evaluator.engine
+    scenario, layout = episode.objective.evaluator.scenario, _sorted_layout(episode)
+    blast = Blast(scenario, layout, shown.seed, engine, shown.charge)
+    return BlastScreening(blast, _outcome(episode), _remark(episode))
+
+
+def _gas_screening(episode: Episode, size_px: tuple[int, int]) -> "PressureScreening":
+    """Return the blast of gas dynamics that is shown."""
+    from blast_env.rendering.pressure_film import PressureScreening
+    from blast_env.simulation.gas import GasBlast
+
+    shown, engine = _shown_threat(episode), episode.objective.evaluator.engine
+    assert is_gas(engine)
+    scenario, layout = episode.objective.evaluator.scenario, _sorted_layout(episode)
+    blast = GasBlast(scenario, layout, shown.seed, engine, shown.charge)
+    return PressureScreening(blast, size_px)
+
+
+def _shown_threat(episode: Episode) -> Threat:
+    """Return the worst threat, with its first realisation."""
     objective = episode.objective
-    case, evaluator = objective.case, objective.evaluator
+    case = objective.case
     impulses = np.array(objective.impulses_pa_s(episode.placement.layout))
     of_charges = impulses.reshape(case.realisations, -1).mean(axis=0)
-    threat = case.threats[int(of_charges.argmax())]
-    # Sorted, as for the assessment: the order of the layout may change the last bits.
-    layout = tuple(sorted(episode.placement.layout))
-    blast = Blast(evaluator.scenario, layout, threat.seed, evaluator.engine, threat.charge)
-    remark = f": the worst of {len(case.charges)} charges" if len(case.charges) > 1 else ""
-    return BlastScreening(blast, _outcome(episode), remark)
+    return case.threats[int(of_charges.argmax())]
+
+
+def _sorted_layout(episode: Episode) -> Layout:
+    """Return the layout as for the assessment: its order may change the last bits."""
+    return tuple(sorted(episode.placement.layout))
+
+
+def _remark(episode: Episode) -> str:
+    """Return which of several charges is shown."""
+    charges = len(episode.objective.case.charges)
+    return f": the worst of {charges} charges" if charges > 1 else ""
 
 
 def _outcome(episode: Episode) -> str:

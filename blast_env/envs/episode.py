@@ -83,8 +83,11 @@ class Episode:
     ended: bool = False
 
     def action_mask(self) -> NDArray[np.bool_]:
-        """Return which actions are legal (actions,); the last one, to finish, always is."""
-        return np.append(self.placement.legal.ravel(), True)
+        """Return which actions are legal (actions,); the last one, to finish, always is.
+
+        When the charge has gone off, it is the only one.
+        """
+        return np.append(self.placement.legal.ravel() & (not self.ended), True)
 
     def observe(self) -> Array:
         """Return the observation."""

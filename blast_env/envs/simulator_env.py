@@ -214,6 +214,10 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         self._window.show(frame)
         return None
 
+    def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
+        """Return the one key for `gymnasium.utils.play`: the space bar goes on, as nothing does."""
+        return {(ord(" "),): 0}
+
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._window is not None:

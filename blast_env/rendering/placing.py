@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import floor
 from typing import Final
 
 import numpy as np
 
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Cell, Element, Rectangle
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import Colour, load_colour
 from blast_env.rendering.canvas import (
@@ -200,6 +201,9 @@ def cell_rectangle(view: View, rectangle_m: Rectangle) -> pygame.Rect:
 _LEGEND_COLUMNS: Final = 2
 
 
+_SHARE_OF_LINES: Final = 0.6  # of the width
+
+
 class PlacingPainter:
     """Draws the layouts of one episode, all on the same ground.
 
@@ -230,12 +234,15 @@ class PlacingPainter:
         width, height = self._ground.get_size()
         return width, height
 
-    def paint(self, placement: Placement, lines: Sequence[str] = ()) -> Frame:
+    def paint(
+        self, placement: Placement, lines: Sequence[str] = (), marked: Element | None = None
+    ) -> Frame:
         """Return a frame, uint8 (height, width, 3).
 
         Args:
             placement: The modules placed so far.
             lines: At most two lines of text for the upper right corner.
+            marked: What may be placed next, outlined; in another colour where it may not be.
         """
         surface = self._ground.copy()
         if self._scenario.build_zone is not None:
@@ -248,12 +255,15 @@ class PlacingPainter:
         draw_charges(surface, self._view, self._sources, self._scenario.charge_radius_m)
         for plate, place in name_plates(self._small, self._view, scene.structures):
             surface.blit(plate, place)
+        if marked is not None:
+            self._mark(surface, placement, marked)
         pygame.draw.rect(surface, BORDER, _border(self._view), 3)
         right = self.size_px[0] - self._margin
         for line, top, lettering, colour in zip(
             lines, self._line_tops, (self._large, self._small), (INK, QUIET_INK), strict=False
         ):
-            text = lettering.write(line, colour, bold=lettering is self._large)
+            room_px = round(_SHARE_OF_LINES * self.size_px[0])
+            text = lettering.write_within(line, room_px, colour, bold=lettering is self._large)
             surface.blit(text, text.get_rect(topright=(right, top)))
         width, height = self.size_px
         pixels = np.frombuffer(pygame.image.tobytes(surface, "RGB"), dtype=np.uint8)
@@ -263,6 +273,26 @@ class PlacingPainter:
         """Return a frame of the blast with the height of the frames drawn here."""
         missing = self.size_px[1] - len(frame)
         return np.pad(frame, ((0, max(missing, 0)), (0, 0), (0, 0)), constant_values=PAGE[0])
+
+    def cell_at(self, place_px: tuple[int, int]) -> Cell | None:
+        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one."""
+        zone = self._scenario.build_zone
+        if zone is None:
+            return None
+        left_px, bottom_px = cell_rectangle(self._view, zone.rectangle_m).bottomleft
+        side_px = MODULE_SIDE_M * self._view.pixels_per_m
+        cell = floor((bottom_px - place_px[1]) / side_px), floor((place_px[0] - left_px) / side_px)
+        return cell if _is_in(zone, cell) else None
+
+    def _mark(self, surface: pygame.Surface, placement: Placement, element: Element) -> None:
+        """Outline what may be placed next."""
+        zone = placement.scenario.zone
+        colour = PROTECTED if placement.explain(element) is None else EXPLOSIVE
+        inside = [cell for cell in placement.catalogue.cells(element) if _is_in(zone, cell)]
+        places = [cell_rectangle(self._view, zone.cell_rectangle_m(cell)) for cell in inside]
+        if places:
+            around = places[0].unionall(places[1:]).inflate(4, 4)
+            pygame.draw.rect(surface, colour, around, 3)
 
     @property
     def _line_tops(self) -> tuple[int, int]:
@@ -324,6 +354,10 @@ class PlacingPainter:
             pygame.draw.line(surface, FAINT, place.topleft, (place.right - 1, place.top))
             pygame.draw.line(surface, FAINT, place.topleft, (place.left, place.bottom - 1))
         dashed_rectangle(surface, whole, QUIET_INK)
+
+
+def _is_in(zone: BuildZone, cell: Cell) -> bool:
+    return 0 <= cell[0] < zone.rows and 0 <= cell[1] < zone.columns
 
 
 def charge_text(charge: Charge) -> str:

@@ -1,6 +1,7 @@
 """Films of overpressure in the air, alone and side by side."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from math import cbrt
 from pathlib import Path
 from typing import Final
@@ -15,6 +16,7 @@ from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import Snapshots
 from blast_env.physics.gas.solver import Recorder
 from blast_env.rendering.film import FilmPlan, for_gif, known_suffix, open_film, plan_until
+from blast_env.rendering.frames import Frame
 from blast_env.rendering.gas import (
     PA_PER_KPA,
     check_comparable,
@@ -28,13 +30,14 @@ from blast_env.rendering.pressure_frames import (
     default_section,
 )
 from blast_env.rendering.site_plan import in_metres
-from blast_env.rendering.style import nice_ceiling
+from blast_env.rendering.style import PAGE, nice_ceiling
 from blast_env.simulation.gas import GasBlast, GasResult
 
 _EVERY_S: Final = 0.0002  # of 100 kg
 _LONGEST_S: Final = 4.0  # of 100 kg
 _SHARE_OF_RUNS: Final = 0.5  # of the progress
 _NARROWEST_PX, _WIDEST_PX = 480, 4096
+_PLAN_HEIGHT_M: Final = 1.5
 
 
 def write_pressure_film(
@@ -42,7 +45,7 @@ def write_pressure_film(
     path: str | Path,
     *,
     beside: GasBlast | None = None,
-    height_m: float = 1.5,
+    height_m: float = _PLAN_HEIGHT_M,
     section: Section | None = None,
     full_kpa: float | None = None,
     frames_per_s: float = 25.0,
@@ -101,6 +104,34 @@ def write_pressure_film(
                 drawn = (number + 1) / plan.frame_count
                 progress(_SHARE_OF_RUNS + (1.0 - _SHARE_OF_RUNS) * drawn)
     return tuple(shot.result for shot in shots)
+
+
+@dataclass(frozen=True)
+class PressureScreening:
+    """Shows a blast as overpressure, in frames of a size that something else sets.
+
+    Attributes:
+        blast: The blast.
+        size_px: Width and height of the frames, both even.
+    """
+
+    blast: GasBlast
+    size_px: tuple[int, int]
+
+    def frames(self, frames_per_s: float) -> Iterator[Frame]:
+        """Yield the frames of a film of 8 to 12 s, uint8 (height, width, 3) each.
+
+        Args:
+            frames_per_s: Frames in a second of the film.
+        """
+        shot = record_planes(self.blast, _PLAN_HEIGHT_M, default_section(self.blast.site))
+        plan = plan_until(shot.result.time_s, frames_per_s)
+        width_px, height_px = self.size_px
+        painter = PressurePainter([shot], scale_end_kpa([shot.result]), width_px, height_px)
+        for number in range(plan.frame_count):
+            frame = painter.paint(plan.time_s(number), plan.real_time_factor)
+            below = np.full((height_px - len(frame), width_px, 3), PAGE, dtype=np.uint8)
+            yield np.concatenate([frame, below])
 
 
 def _part(progress: Callable[[float], None], first: float, part: float) -> Callable[[float], None]:

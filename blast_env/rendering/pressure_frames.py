@@ -6,6 +6,7 @@ They begin at the detonation: until the grid takes a blast over, its spherical s
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -200,6 +201,7 @@ _HEADER_PX, _TITLE_PX, _TITLES_PX, _AXIS_PX, _BETWEEN_PX = 62, 22, 46, 48, 26
 _BAR_PX, _BAR_LABELS_PX, _LEGEND_PX = 14, 52, 30
 _LEGEND_ENTRY_PX: Final = 155
 _MOST_HIGH: Final = 0.8  # of a panel's width
+_SHARE_OF_TITLES: Final = 0.74  # of the width; the clock has the rest
 
 
 class PressurePainter:
@@ -209,13 +211,20 @@ class PressurePainter:
         shots: The blasts, from left to right.
         full_kpa: Overpressure at the end of the scale.
         width_px: Width of the frames, even.
+        most_high_px: Most height of the frames, for panels that would be higher otherwise.
 
     Attributes:
         figure: The figure; its moving parts show the last moment painted.
         scale: The colour scale, kPa.
     """
 
-    def __init__(self, shots: Sequence[PressureShot], full_kpa: float, width_px: int) -> None:
+    def __init__(
+        self,
+        shots: Sequence[PressureShot],
+        full_kpa: float,
+        width_px: int,
+        most_high_px: float = inf,
+    ) -> None:
         self.shots = tuple(shots)
         self.scale = AsinhNorm(_LINEAR_SHARE * full_kpa, -full_kpa, full_kpa)
         self._per_unit = 0.5 / float(np.arcsinh(1.0 / _LINEAR_SHARE))
@@ -229,7 +238,7 @@ class PressurePainter:
         self._moving: list[tuple[Axes, Artist]] = []
         self._images: list[_Picture] = []
         handles = self._handles()
-        figure = self._arrange(width_px, len(handles))
+        figure = self._arrange(width_px, most_high_px, len(handles))
         self.figure = figure
         canvas: Any = FigureCanvasAgg  # partly without types
         self._canvas = canvas(figure)
@@ -249,6 +258,11 @@ class PressurePainter:
         self._write_header()
         self._canvas.draw()
         self._ground = self._canvas.copy_from_bbox(figure.bbox)
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the frames."""
+        return self._size_px
 
     def paint(self, time_s: float, note: str = "") -> Frame:
         """Return a frame, uint8 (height, width, 3).
@@ -282,19 +296,25 @@ class PressurePainter:
         index = np.clip((share + 0.5) * (last + 1), 0.0, last).astype(np.intp)
         return self._colours[index]
 
-    def _arrange(self, width_px: int, legend_entries: int) -> Figure:
+    def _arrange(self, width_px: int, most_high_px: float, legend_entries: int) -> Figure:
         """Lay out the page in pixels: a plan above a section a blast, scale and legend below."""
         count = len(self.shots)
         plan, section = self._site_m, self._section_m
         panel_px = (width_px - _LEFT_PX - _RIGHT_PX - (count - 1) * _GAP_PX) / count
         widest_m = max(plan.right - plan.left, section.right - section.left)
-        per_m = min(panel_px / widest_m, _MOST_HIGH * width_px / (plan.top - plan.bottom))
         self._legend_columns = max(width_px // _LEGEND_ENTRY_PX, 2)
         lines = -(-legend_entries // self._legend_columns)
-        heights_px = [per_m * (each.top - each.bottom) for each in (plan, section)]
         below_px = round(_BAR_PX + _BAR_LABELS_PX + 12 + lines * _LEGEND_PX * 0.66)
         first_px = _HEADER_PX + (_TITLES_PX if count > 1 else _TITLE_PX)
-        height_px = round(first_px + sum(heights_px) + 2 * _AXIS_PX + _BETWEEN_PX + below_px)
+        around_px = first_px + 2 * _AXIS_PX + _BETWEEN_PX + below_px
+        heights_m = [each.top - each.bottom for each in (plan, section)]
+        per_m = min(
+            panel_px / widest_m,
+            _MOST_HIGH * width_px / heights_m[0],
+            (most_high_px - 2.0 - around_px) / sum(heights_m),
+        )
+        heights_px = [per_m * height_m for height_m in heights_m]
+        height_px = round(around_px + sum(heights_px))
         height_px += height_px % 2
         figure = Figure(figsize=((width_px + 0.5) / _DPI, (height_px + 0.5) / _DPI), dpi=_DPI)
         self._size_px = (width_px, height_px)
@@ -476,7 +496,7 @@ class PressurePainter:
             (title, 10, 12, unit_interval(INK), True),
             (gas_subtitle(blast), 36, 8.5, quiet, False),
         ):
-            self.figure.text(
+            line = self.figure.text(
                 12 / width,
                 1.0 - top_px / height,
                 text,
@@ -485,6 +505,8 @@ class PressurePainter:
                 color=colour,
                 fontweight="bold" if bold else "normal",
             )
+            wide_px = line.get_window_extent(self._canvas.get_renderer()).width
+            line.set_fontsize(size * min(1.0, _SHARE_OF_TITLES * width / wide_px))
         self._clock, self._note = (
             self.figure.text(
                 1.0 - 12 / width,

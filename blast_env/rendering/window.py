@@ -1,6 +1,8 @@
 """A window that shows frames, for `render_mode="human"`."""
 
 import os
+from dataclasses import dataclass
+from typing import Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.rendering.frames import Frame
@@ -10,6 +12,40 @@ with render_extra():
     import pygame
 
 _SHARE_OF_SCREEN = 0.9
+_KEYS_HELD_MS = (300, 60)  # until a key that is held counts again, and then each time
+
+KEY_NUMBERS: Final = {
+    "up": pygame.K_UP,
+    "down": pygame.K_DOWN,
+    "left": pygame.K_LEFT,
+    "right": pygame.K_RIGHT,
+    "w": pygame.K_w,
+    "a": pygame.K_a,
+    "s": pygame.K_s,
+    "d": pygame.K_d,
+    "space": pygame.K_SPACE,
+    "tab": pygame.K_TAB,
+    "return": pygame.K_RETURN,
+    "backspace": pygame.K_BACKSPACE,
+    "escape": pygame.K_ESCAPE,
+}
+"""The keys that mean anything, with pygame's numbers."""
+
+_KEY_NAMES: Final = {number: name for name, number in KEY_NUMBERS.items()}
+_BUTTON_NAMES: Final = {1: "left click", 3: "right click"}
+
+
+@dataclass(frozen=True)
+class Input:
+    """One thing that a user did.
+
+    Attributes:
+        name: A key of `KEY_NUMBERS`, `"move"`, `"left click"` or `"right click"`.
+        place_px: Where the mouse was, as a pixel (x, y) of the frame; `None` for a key.
+    """
+
+    name: str
+    place_px: tuple[int, int] | None = None
 
 
 class Window:
@@ -29,6 +65,8 @@ class Window:
         self._screen: pygame.Surface | None = None
         self._clock = pygame.time.Clock()
         self._closed = False
+        self._factor = 1.0
+        self._events: list[pygame.event.Event] = []
 
     @property
     def closed(self) -> bool:
@@ -53,10 +91,29 @@ class Window:
             image = pygame.transform.smoothscale(image.convert(24), screen.get_size())
         screen.blit(image, (0, 0))
         pygame.display.flip()
+        self._factor = width / screen.get_width()
         self._clock.tick(self._frames_per_s)
-        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+        self._events = pygame.event.get()
+        if any(event.type == pygame.QUIT for event in self._events):
             self.close()
         return not self._closed
+
+    def inputs(self) -> list[Input]:
+        """Return what the user did before the last frame was shown, in its order."""
+        return [done for event in self._events if (done := self._input(event)) is not None]
+
+    def _input(self, event: pygame.event.Event) -> Input | None:
+        if event.type == pygame.KEYDOWN and event.key in _KEY_NAMES:
+            return Input(_KEY_NAMES[event.key])
+        if event.type == pygame.MOUSEMOTION:
+            return Input("move", self._frame_pixel(event.pos))
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button in _BUTTON_NAMES:
+            return Input(_BUTTON_NAMES[event.button], self._frame_pixel(event.pos))
+        return None
+
+    def _frame_pixel(self, place_px: tuple[int, int]) -> tuple[int, int]:
+        """Return the pixel (x, y) of the frame that a pixel of the window shows."""
+        return int(self._factor * place_px[0]), int(self._factor * place_px[1])
 
     def close(self) -> None:
         """Close the window, if it is open."""
@@ -76,6 +133,7 @@ class Window:
             if self._screen is None or self._screen.get_size() != fitting:
                 pygame.display.set_caption(self._title)
                 self._screen = pygame.display.set_mode(fitting)
+                pygame.key.set_repeat(*_KEYS_HELD_MS)
         except pygame.error as error:
             raise BlastEnvError(
                 f'no window can be opened ({error}): use render_mode="rgb_array" or write a film'

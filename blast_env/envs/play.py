@@ -1,0 +1,333 @@
+"""Placing by hand: with keyboard and mouse, or with the keys of `gymnasium.utils.play`."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, Final
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.observations import Array
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Cell, Layout
+from blast_env.scenario.catalogue import Catalogue
+
+if TYPE_CHECKING:  # a window is an optional extra
+    from blast_env.rendering.window import Input, Window
+
+KEYS: Final = (
+    "arrow keys or mouse: choose a cell; space or left click: place; Tab or right click: next item"
+    " or turn it; Backspace: take the last one back; Return: set the charge off, and after the"
+    " blast a new episode; Escape: end"
+)
+"""What the keys of `play` do."""
+
+
+class Key(IntEnum):
+    """The actions of `CursorControl`."""
+
+    NOTHING = 0
+    UP = 1
+    DOWN = 2
+    LEFT = 3
+    RIGHT = 4
+    NEXT = 5
+    PLACE = 6
+    FINISH = 7
+
+
+_MOVES: Final = {
+    Key.UP: (1, 0),
+    Key.DOWN: (-1, 0),
+    Key.LEFT: (0, -1),
+    Key.RIGHT: (0, 1),
+}
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """What would be placed next, and where.
+
+    Attributes:
+        catalogue: What can be placed.
+        variant: Index of what is placed.
+        cell: Its lower left cell.
+    """
+
+    catalogue: Catalogue
+    variant: int = 0
+    cell: Cell = (0, 0)
+
+    @classmethod
+    def of(cls, env: BlastBarrierEnv) -> "Cursor":
+        """Return the cursor for a new episode: in the middle of the zone."""
+        catalogue = env.placement.catalogue
+        rows, columns = catalogue.shape
+        return cls(catalogue, 0, (rows // 2, columns // 2))
+
+    @property
+    def action(self) -> int:
+        """The action that places it."""
+        return self.catalogue.action(self.catalogue.element_at(self.variant, *self.cell))
+
+    def moved(self, up: int, right: int) -> "Cursor":
+        """Return the cursor so many cells further, or at the edge of the zone."""
+        rows, columns = self.catalogue.shape
+        row, column = self.cell[0] + up, self.cell[1] + right
+        return replace(self, cell=(min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)))
+
+    def with_next(self) -> "Cursor":
+        """Return the cursor with the next orientation or item."""
+        return replace(self, variant=(self.variant + 1) % len(self.catalogue.variants))
+
+
+def barrier_env(env: gym.Env[Any, Any]) -> BlastBarrierEnv:
+    """Return the barrier environment within wrappers.
+
+    Raises:
+        BlastEnvError: If it is another one, or does not give frames.
+    """
+    inner = env.unwrapped
+    if not isinstance(inner, BlastBarrierEnv):
+        raise BlastEnvError(f"env is {env}, must be a BlastBarrier environment: nothing is placed")
+    if inner.render_mode != "rgb_array":
+        raise BlastEnvError(f'render_mode is {inner.render_mode!r}, must be "rgb_array" to play')
+    return inner
+
+
+_FIRST_REPEAT: Final = 8  # steps that a key is held before it counts again
+_REPEAT_EVERY: Final = 2
+
+
+class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
+    """Few actions in the place of one a cell: they move a cursor, and place what it outlines.
+
+    The actions are those of `Key`. Those that move, and those that would place something where it
+    may not be, are no step of the environment: they pay nothing. An action that comes again and
+    again is a key that is held down: it counts at once, and after a while in every second step.
+    `get_keys_to_action` has the keys for `gymnasium.utils.play`:
+
+        play(CursorControl(gym.make("BlastBarrier-v0", render_mode="rgb_array", show_blast=True)))
+
+    Args:
+        env: A barrier environment with `render_mode="rgb_array"`.
+
+    Raises:
+        BlastEnvError: If it is another one.
+    """
+
+    def __init__(self, env: gym.Env[Array, np.int64]) -> None:
+        super().__init__(env)
+        self._inner = barrier_env(env)
+        self.action_space = spaces.Discrete(len(Key))
+        self._last: tuple[Array, dict[str, Any]] | None = None
+        self._cursor: Cursor | None = None
+        self._held = (Key.NOTHING, 0)
+
+    def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
+        """Return the keys, by their numbers in pygame, with their actions."""
+        from blast_env.rendering.window import KEY_NUMBERS
+
+        return {(KEY_NUMBERS[name],): int(key) for name, key in _PLAY_KEYS.items()}
+
+    def action_masks(self) -> Array:
+        """Return which actions do anything now, (actions,)."""
+        masks = np.ones(len(Key), dtype=np.bool_)
+        legal = self._inner.action_masks()
+        masks[Key.PLACE] = self._cursor is not None and legal[self._cursor.action]
+        return masks
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode, with the cursor in the middle of the zone."""
+        self._last = self.env.reset(seed=seed, options=options)
+        self._held = (Key.NOTHING, 0)
+        self._point(Cursor.of(self._inner))
+        return self._last[0], self._information(self._last[1])
+
+    def step(self, action: np.int64) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
+        """Move the cursor, or place what it outlines, or finish.
+
+        Raises:
+            gymnasium.error.InvalidAction: If the action is not in the action space.
+            gymnasium.error.ResetNeeded: If `reset` has not been called.
+        """
+        if not self.action_space.contains(action):
+            raise gym.error.InvalidAction(f"action is {action!r}, must be in {self.action_space}")
+        if self._cursor is None or self._last is None:
+            raise gym.error.ResetNeeded("there is no episode yet: call reset")
+        if self._inner.charge_has_gone_off:  # a film is on
+            return self._go(self._cursor.catalogue.finish)
+        key = self._counted(Key(int(action)))
+        if key == Key.FINISH:
+            return self._go(self._cursor.catalogue.finish)
+        if key == Key.PLACE and self._inner.action_masks()[self._cursor.action]:
+            return self._go(self._cursor.action)
+        if key == Key.NEXT:
+            self._point(self._cursor.with_next())
+        elif key in _MOVES:
+            self._point(self._cursor.moved(*_MOVES[key]))
+        return self._last[0], 0.0, False, False, self._information(self._last[1])
+
+    def _counted(self, key: Key) -> Key:
+        """Return the key, or nothing while it is held down and not to count again yet."""
+        held, steps = self._held
+        steps = steps + 1 if key == held else 0
+        self._held = (key, steps)
+        again = steps >= _FIRST_REPEAT and steps % _REPEAT_EVERY == 0 and key in _MOVES
+        return key if steps == 0 or again else Key.NOTHING
+
+    def _go(self, action: int) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
+        observation, reward, ended, truncated, info = self.env.step(np.int64(action))
+        self._last = observation, info
+        return observation, reward, ended, truncated, self._information(info)
+
+    def _point(self, cursor: Cursor) -> None:
+        self._cursor = cursor
+        self._inner.mark(cursor.action)
+
+    def _information(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Return information whose mask is that of the actions here."""
+        return info | {"action_mask": self.action_masks().astype(np.int8)}
+
+
+_PLAY_KEYS: Final = {
+    "up": Key.UP,
+    "w": Key.UP,
+    "down": Key.DOWN,
+    "s": Key.DOWN,
+    "left": Key.LEFT,
+    "a": Key.LEFT,
+    "right": Key.RIGHT,
+    "d": Key.RIGHT,
+    "tab": Key.NEXT,
+    "space": Key.PLACE,
+    "return": Key.FINISH,
+}
+
+
+@dataclass(frozen=True)
+class Played:
+    """An episode that has been played to its end.
+
+    Attributes:
+        seed: Its seed.
+        layout: What was placed.
+        reduction: The share that it takes off the impulse.
+        impulse_pa_s: The impulse with it.
+    """
+
+    seed: int
+    layout: Layout
+    reduction: float
+    impulse_pa_s: float
+
+
+def play(env: gym.Env[Any, Any], seed: int = 0) -> Iterator[Played]:
+    """Let a person place barriers with mouse and keyboard; yield what comes of each episode.
+
+    A window shows the site until it is closed; `KEYS` says what to do. The blast is shown if the
+    environment has `show_blast=True`.
+
+    Args:
+        env: A barrier environment with `render_mode="rgb_array"`.
+        seed: Of the first episode; the others have the following ones.
+
+    Raises:
+        BlastEnvError: If it is another environment, or there is no screen.
+    """
+    from blast_env.rendering.window import Window
+
+    inner = barrier_env(env)
+    window = Window("blast-env", inner.metadata["render_fps"])
+    try:
+        while not window.closed:
+            game = _Game(env, inner, window, seed)
+            for info in game.play():
+                yield Played(seed, info["layout"], info["reduction"], info["impulse_pa_s"])
+            seed += 1
+    finally:
+        window.close()
+
+
+class _Game:
+    """One episode in a window.
+
+    Args:
+        env: The environment, with wrappers.
+        inner: The same without.
+        window: Where it is shown, and what the person does.
+        seed: Of the episode.
+    """
+
+    def __init__(
+        self, env: gym.Env[Any, Any], inner: BlastBarrierEnv, window: "Window", seed: int
+    ) -> None:
+        self._env = env
+        self._inner = inner
+        self._window = window
+        self._seed = seed
+        self._actions: list[int] = []
+        self._ended = self._wants_next = False
+        self._info: dict[str, Any] = {}
+        self._env.reset(seed=seed)
+        self._point(Cursor.of(inner))
+
+    def play(self) -> Iterator[dict[str, Any]]:
+        """Play until the person wants another episode; yield the final information once."""
+        told = False
+        while not self._wants_next and self._window.show(self._env.render()):  # type: ignore[arg-type]
+            if self._inner.charge_has_gone_off and not told:
+                told = True
+                yield self._info
+            for done in self._window.inputs():
+                self._react(done)
+            if self._inner.charge_has_gone_off and not self._ended:  # the film is on
+                self._step(self._cursor.catalogue.finish)
+
+    def _react(self, done: "Input") -> None:
+        """Do what a key or the mouse asks for."""
+        if done.name == "escape":
+            self._window.close()
+        elif self._inner.charge_has_gone_off:
+            self._wants_next |= done.name == "return"
+        elif done.name == "backspace":
+            self._take_back()
+        elif done.name == "return":
+            self._step(self._cursor.catalogue.finish)
+        elif done.name in ("tab", "right click"):
+            self._point(self._cursor.with_next())
+        elif _PLAY_KEYS.get(done.name) in _MOVES:
+            self._point(self._cursor.moved(*_MOVES[_PLAY_KEYS[done.name]]))
+        else:
+            self._use_mouse(done)
+
+    def _use_mouse(self, done: "Input") -> None:
+        """Let the cursor follow the mouse; place with the left button, or the space bar."""
+        cell = None if done.place_px is None else self._inner.cell_at(done.place_px)
+        if cell is not None:
+            self._point(replace(self._cursor, cell=cell))
+        placing = done.name == "space" or (done.name == "left click" and cell is not None)
+        if placing and self._inner.action_masks()[self._cursor.action]:
+            self._step(self._cursor.action)
+
+    def _take_back(self) -> None:
+        """Begin again, with all but the last one."""
+        actions = self._actions[:-1]
+        self._actions = []
+        self._env.reset(seed=self._seed)
+        for action in actions:
+            self._step(action)
+
+    def _step(self, action: int) -> None:
+        _, _, ended, truncated, self._info = self._env.step(np.int64(action))
+        self._actions.append(action)
+        self._ended = ended or truncated
+
+    def _point(self, cursor: Cursor) -> None:
+        self._cursor = cursor
+        self._inner.mark(cursor.action)
