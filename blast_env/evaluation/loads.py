@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from blast_env.calibration.model import Calibration
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scenario import Scenario
+from blast_env.scenario import AnyScenario, find_scenario
 from blast_env.simulation import BlastResult
 from blast_env.units import PA_PER_PSI
 
@@ -59,10 +59,11 @@ class BlastLoads:
     structures: tuple[StructureLoad, ...]
     module_impulse_sim: NDArray[np.float64]
 
-    def are_for(self, scenario: Scenario) -> bool:
+    def are_for(self, scenario: AnyScenario) -> bool:
         """Return whether these can be loads of a scenario: finite, one a structure and module."""
-        names = [structure.name for structure in scenario.structures]
-        modules = sum(structure.rows * structure.columns for structure in scenario.structures)
+        structures = find_scenario(scenario).structures
+        names = [structure.name for structure in structures]
+        modules = sum(structure.rows * structure.columns for structure in structures)
         impulses = np.array([load.impulse_psi_s for load in self.structures])
         return (
             [load.name for load in self.structures] == names

@@ -25,12 +25,15 @@ def test_actions_place_pieces_and_the_charge_goes_off() -> None:
     catalogue = yard().zone.catalogue
     assert env.action_space == gym.spaces.Discrete(4 * 14 * 6 + 1)
     env.reset(seed=0)
+    rewards = []
     for piece in WALL:
         _, reward, ended, _, info = env.step(catalogue.action(piece))
-        assert (reward, ended, info["illegal_actions"]) == (0.0, False, 0)
+        assert (ended, info["illegal_actions"]) == (False, 0)
+        rewards.append(reward)
     _, reward, ended, _, info = env.step(catalogue.finish)
     assert (ended, info["layout"]) == (True, WALL)
-    assert reward == -info["impulse_psi_s"] < 0.0
+    assert rewards[0] < 0.0 == sum(rewards[1:])  # the deposit
+    assert sum(rewards) + reward == pytest.approx(-info["impulse_psi_s"], rel=1e-9)
     assert 0.1 < info["reduction"] < 1.0
 
 
