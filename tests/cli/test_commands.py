@@ -110,7 +110,7 @@ def test_simulate_writes_each_picture(
 
 
 def test_simulate_prints_json_that_can_be_read() -> None:
-    result = run("simulate", "free_field", "--stand-off", "20", "--json")
+    result = run("simulate", "free_field", "--stand-off", "20", "--json-all")
     assert result.exit_code == 0
     content = json.loads(result.stdout)
     expected = simulate(load_scenario("free_field").at_stand_off(20.0))

@@ -7,14 +7,12 @@ import numpy as np
 
 from blast_agents.posts import VEHICLE_RULES
 from blast_agents.proposal import LayoutAgent
-from blast_agents.rules import RULES, expected_charge, random_layout
+from blast_agents.rules import RULES, expected_charge, random_layout, sight_lines
 from blast_agents.search import SearchMethod, find_search_method
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Scenario
-from blast_env.scenario.vehicles import source_of
-from blast_env.sites import Visibility, visibility_layout
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class VisibilityLayout:
-    """Cuts as many lines of sight as it can; see `blast_env.sites.visibility_layout`.
+    """Cuts as many lines of sight as it can; see `sight_lines`.
 
     Attributes:
         name: In tables.
@@ -85,10 +83,7 @@ class VisibilityLayout:
 
     def propose(self, case: Case) -> Layout:
         """Return the layout for the charge, or for all the places where a hidden one may be."""
-        scenario = case.scenario
-        if case.charge is not None:
-            scenario = scenario.model_copy(update={"charge": (source_of(case.charge),)})
-        return visibility_layout(scenario, Visibility.of(scenario))
+        return sight_lines(case.scenario, case.charge)
 
 
 @dataclass(frozen=True)

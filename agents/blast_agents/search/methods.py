@@ -15,6 +15,7 @@ from blast_agents.rules import (
     random_layout,
     ring_around_building,
     ring_around_charge,
+    sight_lines,
     wall_near_building,
     wall_near_charge,
 )
@@ -95,6 +96,31 @@ class RuleSearch:
         )
 
 
+@dataclass(frozen=True)
+class SightLinesSearch:
+    """Proposes the layout that cuts most lines of sight; no blast is simulated.
+
+    Against a hidden charge it is one against all places where that may be.
+    """
+
+    name: str = "sight_lines"
+
+    def search(
+        self,
+        problem: LayoutProblem,
+        budget: int,
+        seed: int,
+        report: Report | None = None,
+    ) -> SearchResult:
+        """Return the rule's layout; budget and seed change nothing."""
+        known = problem.case.charge
+
+        def rule(scenario: Scenario, _: AnyCharge) -> Layout:
+            return sight_lines(scenario, known)
+
+        return RuleSearch(rule, self.name).search(problem, budget, seed, report)
+
+
 RULE_SEARCHES: Final = (
     RuleSearch(wall_near_charge, "wall_near_charge"),
     RuleSearch(wall_near_building, "wall_near_building"),
@@ -104,6 +130,7 @@ RULE_SEARCHES: Final = (
     RuleSearch(ring_around_building, "ring_around_building"),
     RuleSearch(line_of_posts, "line_of_posts"),
     RuleSearch(posts_and_wall, "posts_and_wall"),
+    SightLinesSearch(),
 )
 """The rules as methods; without a catalogue the long walls are the others."""
 

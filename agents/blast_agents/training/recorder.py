@@ -173,7 +173,10 @@ class Recorder(BaseCallback):
 
     def _evaluate(self) -> None:
         agent = TrainedAgent(
-            self.algorithm.policy, self.scenario, self.settings.observation, self.settings.engine
+            self.algorithm.policy,
+            self.scenario,
+            self.settings.observation,
+            self.settings.blast_engine,
         )
         reduction = self.selection.reduction(agent)
         counters = self.progress.counters
