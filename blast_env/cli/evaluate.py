@@ -12,11 +12,10 @@ from blast_env.cli.output import (
 )
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.export import LayoutPlan
 from blast_env.physics.engines import find_engine
 from blast_env.scenario import LayoutFile, load_layout, load_scenario
-from blast_env.statistics import check_cvar_level
+from blast_env.statistics import CVAR_LEVEL, check_cvar_level
 
 _SCENARIO = "courtyard"
 
