@@ -128,7 +128,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
         BlastEvaluator(scenario, engine, cache=task.cache), practice_case(scenario, task)
     )
     teller.tell(text="blasts without a barrier")
-    problem.unprotected_pa_s  # noqa: B018  # refuses a case in which nothing arrives
+    problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
 
     def report(progress: Progress) -> None:
         share = progress.blasts / progress.budget
@@ -144,11 +144,11 @@ def _search(task: SearchTask, teller: Teller) -> None:
             teller.tell(share=share, text=text)
 
     result = method.search(problem, task.budget, 0, report)
-    if result.impulse_pa_s is None:
+    if result.load is None:
         raise KeyboardInterrupt
     reduction = 100.0 * problem.reduction(result.history[-1])
     text = (
-        f"{reduction:.1f} % less impulse on the search's own blasts, after {result.blasts} of"
+        f"{reduction:.1f} % less on the search's own blasts, after {result.blasts} of"
         f" {result.budget} ({task.engine.label}); blast it for a judgement"
     )
     state = "stopped" if result.interrupted else "done"

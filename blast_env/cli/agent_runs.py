@@ -189,26 +189,22 @@ def _export(
 
 def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
     table, cases = make_table(title, _HEADERS), case_table(comparison)
+    objective = comparison.cases[0].scenario.objective
     for row in cases.to_dict("records"):
         table.add_row(
             row["scenario"],
             f"({row['charge_x_m']:.1f}, {row['charge_y_m']:.1f})",
             f"{row['tnt_kg']:g}",
             str(row["modules"]),
-            f"{row['unprotected_impulse_pa_s']:,.0f}",
-            f"{row['impulse_pa_s']:,.0f}",
+            objective.text(row["unprotected_load"]),
+            objective.text(row["load"]),
             percent(row["reduction"]) + ("" if row["in_range"] else " ~"),
         )
     result_console().print(table)
     outside = int((~cases["in_range"]).sum())
     if outside:
         print_line(f"note: {outside} threats are outside the range of the calibration (~)")
-    print_means(
-        comparison.reduction,
-        (comparison.unprotected_mean_pa_s, comparison.mean_pa_s),
-        (comparison.unprotected_cvar_pa_s, comparison.cvar_pa_s),
-        comparison.cvar_level,
-    )
+    print_means(comparison, objective)
     calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)
     words = engine_text(engine, [case.scenario for case in comparison.cases])
     print_line(f"{words}, calibration {', '.join(calibrations)}")
