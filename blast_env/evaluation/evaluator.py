@@ -70,6 +70,7 @@ class BlastEvaluator:
         self.engine = find_engine(engine)
         self.calibration: Calibration | None = None
         if not is_gas(self.engine):
+            self.scenario.check_for_particles()
             self.calibration = scenario_calibration(self.scenario, self.engine.name)
         self.blasts = 0
         self.cache_hits = 0
