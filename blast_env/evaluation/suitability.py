@@ -10,9 +10,9 @@ from blast_env.physics.engines import GAS, PARTICLE_ENGINES
 from blast_env.scenario import AnyScenario, PointSource, Scenario, find_scenario
 
 _PLACING: Final = "search, train, evaluate, league, play and BlastBarrier-v0"
-_REPORTED: Final = "report without --charge"
 _PRESETS_NOT_FOR_DESIGN: Final = {
-    "ballistic": "its air is so thin that next to nothing gets round a wall (docs/validity.md)"
+    "ballistic": "its air is so thin that next to nothing gets round a wall "
+    "(docs/engineers/validity.md)"
 }
 
 
@@ -110,8 +110,8 @@ def _height_limits(scenario: Scenario) -> Iterator[str]:
 def _charge_limits(scenario: Scenario) -> Iterator[str]:
     if scenario.vehicles:
         yield (
-            "a vehicle brings a charge, to where the layout lets it come: commands that take "
-            f"charges at places alone refuse it ({_REPORTED}, calibrate, simulate --stand-off)"
+            "a vehicle brings a charge, to where the layout lets it come: calibrate and simulate "
+            "--stand-off refuse it, and --charge puts the charge where no vehicle is"
         )
     if len(scenario.charge) == 1 and isinstance(scenario.charge[0], PointSource):
         yield (

@@ -52,7 +52,7 @@ def test_what_has_everything_is_limited_only_by_what_it_lacks() -> None:
 
 
 def test_a_vehicle_is_said_with_what_refuses_it() -> None:
-    assert "report without --charge" in limits_of(gate_site())
+    assert "calibrate and simulate --stand-off refuse it" in limits_of(gate_site())
 
 
 def test_a_wrong_calibration_is_said() -> None:
