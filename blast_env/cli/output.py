@@ -77,7 +77,8 @@ def engine_text(engine: Engine, scenarios: Iterable[Scenario] = ()) -> str:
         engine: The engine.
         scenarios: Those that it runs; gas dynamics has no parameters.
     """
-    text = f"engine {engine.name}, version {engine.version}"
+    known = engine.version.split()[0] == engine.name
+    text = f"engine {engine.version}" if known else f"engine {engine.name}, {engine.version}"
     if is_gas(engine):
         return f"{text}, cells of {engine.cell_m:g} m"
     presets = dict.fromkeys(_preset_text(each) for each in scenarios)

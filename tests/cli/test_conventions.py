@@ -90,7 +90,7 @@ def test_a_table_that_is_too_wide_goes_on_below_with_the_names_of_its_rows() -> 
 @pytest.mark.parametrize("engine", ["event", "gas"])
 def test_the_loads_of_a_blast_are_readable_in_80_columns(engine: str, hut_file: Path) -> None:
     shown = run("simulate", hut_file, "--engine", engine).stdout
-    table = shown[: shown.index(f"engine {engine}")].splitlines()
+    table = shown[: shown.index(f"engine {engine} 1")].splitlines()
     assert max(map(len, table)) <= NARROW
     assert {"structure", "protected", "hut"} <= set(shown.split())
     assert "…" not in shown
@@ -156,7 +156,7 @@ def test_each_command_says_engine_and_preset(site: Path, layout: Path) -> None:
         ("evaluate", *given, "--layout", layout, "--seeds", 1),
         ("search", *given, "--method", "wall_near_charge", "--held-out", 1),
     ):
-        assert "engine event, version" in run(*arguments).stdout
+        assert "engine event 1 (numba" in run(*arguments).stdout
         assert "preset ballistic" in " ".join(run(*arguments).stdout.split())
 
 
