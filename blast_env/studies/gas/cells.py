@@ -14,9 +14,8 @@ from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.runner import run_all
 from blast_env.scenario import Scenario
-from blast_env.simulation.gas import GasBlast
+from blast_env.simulation.gas import GasBlast, GasResult
 from blast_env.statistics import reductions
-from blast_env.studies.gas.ending import ending
 from blast_env.studies.gas.loads import protected_impulse_pa_s
 
 
@@ -92,7 +91,9 @@ def _load(
     if until_s is None:
         impulse = protected_impulse_pa_s(blast.run())
     else:
-        impulse = ending(blast, until_s).later_pa_s
+        run = engine.start_on(blast.site)
+        run.solver.advance(until_s)
+        impulse = protected_impulse_pa_s(GasResult(blast, run))
     return impulse, process_time() - start
 
 
