@@ -14,9 +14,9 @@ from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.runner import run_all
 from blast_env.scenario import Scenario
-from blast_env.simulation.gas import GasBlast, GasResult
+from blast_env.simulation.gas import GasBlast
 from blast_env.statistics import reductions
-from blast_env.studies.gas.loads import protected_impulse_pa_s
+from blast_env.studies.gas.loads import impulse_until, protected_impulse_pa_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +91,7 @@ def _load(
     if until_s is None:
         impulse = protected_impulse_pa_s(blast.run())
     else:
-        run = engine.start_on(blast.site)
-        run.solver.advance(until_s)
-        impulse = protected_impulse_pa_s(GasResult(blast, run))
+        impulse = impulse_until(blast, until_s)
     return impulse, process_time() - start
 
 
