@@ -17,7 +17,7 @@ from blast_agents.training.run_folder import RunConfiguration, TrainingSettings
 from blast_env.envs.arguments import real_number, whole_number
 from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
-from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
+from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.strategies import ScenarioSource, scenario_source
 from blast_env.evaluation import Evaluators
 from blast_env.evaluation.store import BlastCache, LoadsCache
@@ -117,7 +117,7 @@ def environment_id(scenario: str) -> str:
     """Return the section of the hyperparameters for a scenario's name or path."""
     if scenario == SITES:
         return SITES_ID
-    if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE:
+    if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE | FOR_GAS:
         return barrier_id(scenario)
     return DEFAULT_SECTION
 
