@@ -13,6 +13,7 @@ from blast_agents.proposal import propose
 from blast_agents.training import TrainedAgent, TrainingSettings, load_agent
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.environments import training_source
+from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import RunFolder
 
 from blast_env.cli.evaluation_report import (
@@ -50,9 +51,6 @@ _HEADERS: Final = (
     "with (Pa s)",
     "reduction",
 )
-
-
-_ALGORITHMS: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
 
 
 def evaluate_run(run: Path, options: EvaluateOptions) -> None:
@@ -129,7 +127,7 @@ def _report_cases(
         content = {**record, "cache": cache_record(evaluators), "files": files}
         print_line(json.dumps(content, indent=2))
         return
-    title = f"{_ALGORITHMS[settings.algorithm]} of {provenance['run']}, a layout a row"
+    title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
     _print_cases(comparison, evaluators.engine, f"{title}, {seeds_text(seeds)}")
     milliseconds = median(MS_PER_S * each.seconds for each in proposals)
     print_line(f"proposed in {milliseconds:.1f} ms each (median), no blast spent on any")
