@@ -1,4 +1,4 @@
-"""The tables and figures of docs/engines.md: what the engines agree on, and what they cost."""
+"""The tables and figures of docs/studies/engines.md: where the engines agree, what they cost."""
 
 from functools import partial
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The tables and figures of docs/gas.md: what was checked about the gas engine."""
+"""The tables and figures of docs/engineers/gas.md: what was checked about the gas engine."""
 
 from collections.abc import Callable
 from functools import partial

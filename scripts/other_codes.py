@@ -1,4 +1,4 @@
-"""The gas solver beside other codes, on the same cells and from the same state: docs/gas.md."""
+"""The gas solver beside other codes, same cells, same state: docs/engineers/gas.md."""
 
 from collections.abc import Sequence
 from pathlib import Path

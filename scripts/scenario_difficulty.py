@@ -1,4 +1,4 @@
-"""Whether it matters where the barrier stands, for docs/scenarios.md.
+"""Whether it matters where the barrier stands, for docs/studies/scenarios.md.
 
 For every bundled scenario with a build zone: no barrier, random layouts, a hand-made wall at three
 distances and the best of many random layouts, on held-out seeds; once with one layout for all
@@ -26,7 +26,7 @@ from scripts.difficulty_outcomes import Outcome, TaskResult
 from scripts.difficulty_study import Effort, Study
 from scripts.difficulty_verdict import Criterion, difficulty_criteria
 
-PAGE: Final = Path("docs/scenarios.md")
+PAGE: Final = Path("docs/studies/scenarios.md")
 PICTURES: Final = Path("docs/pictures")
 
 _HEADERS: Final = (

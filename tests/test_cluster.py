@@ -44,7 +44,7 @@ class Dask:
 
 @contextmanager
 def dask(folder: Path, workers: int) -> Iterator[tuple[Dask, subprocess.Popen[bytes]]]:
-    """Start them as docs/cluster.md does; give them with the scheduler's process."""
+    """Start them as docs/howto/cluster.md does; give them with the scheduler's process."""
     file = folder / "scheduler.json"
     at = ("--scheduler-file", str(file))
     scheduler = _start("scheduler", *at, "--port", "0", "--host", "127.0.0.1", "--no-dashboard")

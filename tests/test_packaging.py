@@ -104,7 +104,7 @@ def test_the_description_on_a_package_page_links_to_no_file(clean: Path) -> None
     links = re.findall(r"\]\(([^)]*)\)", description)
     assert links
     assert all(link.startswith("https://") for link in links)
-    assert "docs/validity.md" in description  # named, though not linked
+    assert "docs/engineers/validity.md" in description  # named, though not linked
 
 
 def test_the_source_archive_has_what_its_tests_read(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import typer
 
 from blast_env.cli.bench import bench
 from blast_env.cli.calibrate import calibrate
+from blast_env.cli.draw import draw
 from blast_env.cli.evaluate import evaluate
 from blast_env.cli.import_map import import_map
 from blast_env.cli.league import league
@@ -27,6 +28,7 @@ app = typer.Typer(
 _COMMANDS = (
     simulate,
     validate,
+    draw,
     calibrate,
     evaluate,
     search,

@@ -15,7 +15,7 @@ ClusterAddress = Annotated[
     typer.Option(
         "--cluster",
         help="Address or scheduler file of a Dask cluster, which then runs the blasts in the "
-        "place of worker processes (docs/cluster.md).",
+        "place of worker processes (docs/howto/cluster.md).",
     ),
 ]
 

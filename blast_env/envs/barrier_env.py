@@ -208,8 +208,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
     Two-dimensional: nothing flies over a wall. The calibration holds for the distances and the
     charge mass that it was made for (`calibration_in_range`) and for a facade in the open; how far
-    behind a barrier it can be believed, docs/validity.md says. The sum of impulses over several
-    protected structures is a score, not a load.
+    behind a barrier it can be believed, docs/engineers/validity.md says. The sum of impulses
+    over several protected structures is a score, not a load.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (Gymnasium's declaration)

@@ -113,30 +113,35 @@ def layout_words(blast: GasBlast) -> str:
     return f"barrier of {layout_counts(blast.layout)}" if blast.layout else "no barrier"
 
 
-def gas_subtitle(blast: GasBlast) -> str:
-    """Return charge and cells of a blast in words; the seed has nothing to say beside them."""
-    charge = blast.site.charge
-    x_m, y_m = charge.position_m
-    place = f"({x_m:.1f} m, {y_m:.1f} m)"
+def gas_subtitle(blasts: Sequence[GasBlast]) -> str:
+    """Return charge and cells of blasts in words; the seed has nothing to say beside them.
+
+    The charge of a vehicle goes off elsewhere with each layout; then its places are named from left
+    to right.
+    """
+    charge = blasts[-1].site.charge
+    places_m = dict.fromkeys(blast.site.charge.position_m for blast in blasts)
+    place = " and ".join(f"({x_m:.1f} m, {y_m:.1f} m)" for x_m, y_m in places_m)
     if charge.height_m > 0.0:
         place += f", {charge.height_m:g} m high"
-    return f"charge {charge.tnt_kg:g} kg TNT at {place}, gas in cells of {blast.engine.cell_m:g} m"
+    cell_m = blasts[-1].engine.cell_m
+    return f"charge {charge.tnt_kg:g} kg TNT at {place}, gas in cells of {cell_m:g} m"
 
 
 def check_comparable(blasts: Sequence[GasBlast]) -> None:
-    """Check that blasts can be drawn beside each other: one site, one charge.
+    """Check that blasts can be drawn beside each other: one site, one charge or vehicle.
 
     Raises:
         BlastEnvError: If they differ in one of them.
     """
-    first = blasts[0].site
+    first = blasts[0]
     for blast in blasts[1:]:
-        if blast.site.site != first.site:
+        if blast.site.site != first.site.site:
             raise BlastEnvError("the blasts to be compared have different sites")
-        if blast.site.charge != first.charge:
+        if blast.threat != first.threat:
             raise BlastEnvError(
-                f"the blasts to be compared have different charges, {first.charge} and "
-                f"{blast.site.charge}"
+                f"the blasts to be compared have different charges, {first.threat} and "
+                f"{blast.threat}"
             )
 
 
@@ -150,7 +155,7 @@ def both_results(result: GasResult, beside: GasResult | None) -> list[GasResult]
 def gas_heading(results: Sequence[GasResult], what: str) -> tuple[str, str]:
     """Return the heading of a figure of some results, and the line under it."""
     blast = results[-1].blast
-    subtitle = gas_subtitle(blast)
+    subtitle = gas_subtitle([each.blast for each in results])
     if len(results) == 1:
         subtitle += f", {layout_words(blast)}"
     return f"{blast.scenario.name}: {what}", subtitle

@@ -140,11 +140,11 @@ def _part(progress: Callable[[float], None], first: float, part: float) -> Calla
 
 
 def _comment(shots: Sequence["PressureShot"], plan: FilmPlan) -> str:
-    blast = shots[-1].result.blast
-    layouts = " | ".join(layout_words(shot.result.blast) for shot in shots)
+    blasts = [shot.result.blast for shot in shots]
+    scenario, layouts = blasts[-1].scenario, " | ".join(map(layout_words, blasts))
     return (
-        f"{blast.scenario.name}, {gas_subtitle(blast)}, {layouts}, {plan.real_time_factor}, "
-        f"scenario {blast.scenario.content_hash}"
+        f"{scenario.name}, {gas_subtitle(blasts)}, {layouts}, {plan.real_time_factor}, "
+        f"scenario {scenario.content_hash}"
     )
 
 

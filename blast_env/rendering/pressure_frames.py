@@ -494,7 +494,7 @@ class PressurePainter:
         quiet = unit_interval(QUIET_INK)
         for text, top_px, size, colour, bold in (
             (title, 10, 12, unit_interval(INK), True),
-            (gas_subtitle(blast), 36, 8.5, quiet, False),
+            (gas_subtitle([shot.result.blast for shot in self.shots]), 36, 8.5, quiet, False),
         ):
             line = self.figure.text(
                 12 / width,

@@ -20,7 +20,7 @@ with render_extra():
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-_REACHED_ALPHA: Final = 0.16
+REACHED_ALPHA: Final = 0.16
 _ENTRY_WIDTH: Final = 4.0
 _LINE_WIDTH: Final = 1.4
 
@@ -63,7 +63,7 @@ def vehicle_legend(scenario: Scenario) -> list[Artist]:
         return []
     colour = unit_interval(EXPLOSIVE)
     return [
-        Patch(facecolor=(*colour, _REACHED_ALPHA), label="ground that a vehicle reaches"),
+        Patch(facecolor=(*colour, REACHED_ALPHA), label="ground that a vehicle reaches"),
         _entry(),
         _stand_off(),
     ]
@@ -101,7 +101,7 @@ def _draw_ground(
     rows, columns = squares_of(scenario.site)
     ground = vehicle_reach(scenario, source, layout).ground(rows, columns)
     shades = np.zeros((rows, columns, 4))
-    shades[ground] = (*unit_interval(EXPLOSIVE), _REACHED_ALPHA)
+    shades[ground] = (*unit_interval(EXPLOSIVE), REACHED_ALPHA)
     extent_m = (0.0, columns * MODULE_SIDE_M, 0.0, rows * MODULE_SIDE_M)
     view = axes.axis()
     axes.imshow(

@@ -7,8 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Layout
 from blast_env.physics.gas.engine import ROOF
+from blast_env.physics.scene import Charge
 from blast_env.rendering.gas import KINDS, Kind, facades
 from blast_env.rendering.pressure_film import record_planes, scale_end_kpa
 from blast_env.rendering.pressure_frames import PressurePainter, default_section
@@ -24,16 +25,18 @@ from blast_env.rendering.style import (
     render_extra,
     unit_interval,
 )
+from blast_env.rendering.vehicle_plan import draw_vehicles, vehicle_legend
 from blast_env.reporting.loads import Measured, Target
 from blast_env.reporting.outcomes import FrontPoint, ItemWorth, Outcome
 from blast_env.reporting.threats import NamedCharge
 from blast_env.reporting.units import UnitSystem
-from blast_env.scenario import PointSource, RectangleSource, Scenario, VehicleSource
+from blast_env.scenario import RectangleSource, Scenario, SegmentSource
 from blast_env.simulation.gas import GasBlast
 from blast_env.units import MODULE_SIDE_M, MS_PER_S
 
 with render_extra():
     from matplotlib import patheffects
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import PatchCollection
@@ -71,9 +74,12 @@ def site_plan(
     scenario: Scenario,
     targets: Sequence[Target],
     threats: Sequence[NamedCharge],
-    modules_m: Sequence[Rectangle],
+    layout: Layout,
 ) -> bytes:
-    """Return the plan of a site with buildings, heights, threats and the layout."""
+    """Return the plan of a site with buildings, heights, threats and the layout.
+
+    Vehicles and their charges are where the layout lets them come.
+    """
     figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.9), layout="constrained")
     axes = figure.subplots()
     draw_site(axes, scenario.site.rectangle_m)
@@ -82,10 +88,11 @@ def site_plan(
     if scenario.build_zone is not None:
         draw_zone(axes, scenario.build_zone)
     _draw_sources(axes, scenario)
-    patches = [rectangle_patch(each) for each in modules_m]
+    draw_vehicles(axes, scenario, layout)
+    patches = [rectangle_patch(scenario.zone.element_rectangle_m(each)) for each in layout]
     axes.add_collection(PatchCollection(patches, color=unit_interval(BARRIER), zorder=4))
     for threat in threats:
-        _draw_threat(axes, threat)
+        _draw_threat(axes, threat.name, threat.against(scenario, layout))
     figure.legend(
         handles=_site_legend(scenario),
         loc="outside lower center",
@@ -129,14 +136,13 @@ def _draw_sources(axes: Axes, scenario: Scenario) -> None:
             add_outline(
                 axes, source.rectangle_m, facecolor=(*colour, 0.2), edgecolor=colour, fill=True
             )
-        elif not isinstance(source, PointSource):
-            lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
-            for line_m in lines_m:
-                axes.plot(*np.transpose(line_m), color=(*colour, 0.5), linewidth=2.5, zorder=2)
+        elif isinstance(source, SegmentSource):
+            line_m = np.transpose(source.segment_m)
+            axes.plot(*line_m, color=(*colour, 0.5), linewidth=2.5, zorder=2)
 
 
-def _draw_threat(axes: Axes, threat: NamedCharge) -> None:
-    x_m, y_m = threat.charge.position_m
+def _draw_threat(axes: Axes, name: str, charge: Charge) -> None:
+    x_m, y_m = charge.position_m
     axes.plot(
         x_m,
         y_m,
@@ -148,7 +154,7 @@ def _draw_threat(axes: Axes, threat: NamedCharge) -> None:
         markeredgewidth=0.6,
     )
     text = axes.annotate(
-        f"{threat.name}: {threat.charge.tnt_kg:g} kg",
+        f"{name}: {charge.tnt_kg:g} kg",
         (x_m, y_m),
         xytext=(8, 8),
         textcoords="offset points",
@@ -160,16 +166,21 @@ def _draw_threat(axes: Axes, threat: NamedCharge) -> None:
     text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
 
 
-def _site_legend(scenario: Scenario) -> list[Patch | Line2D]:
+def _site_legend(scenario: Scenario) -> list[Artist]:
     protected, other = unit_interval(PROTECTED), unit_interval(STRUCTURE)
     quiet, red = unit_interval(QUIET_INK), unit_interval(EXPLOSIVE)
-    handles: list[Patch | Line2D] = [
+    handles: list[Artist] = [
         Patch(facecolor=(*protected, 0.35), edgecolor=protected, label="protected"),
-        Patch(facecolor=(*other, 0.35), edgecolor=other, label="other building"),
         Patch(facecolor=unit_interval(BARRIER), label="layout"),
         Line2D([], [], marker="*", linestyle="none", markersize=12, color=red, label="threat"),
-        Line2D([], [], color=(*red, 0.5), linewidth=2.5, label="where charges may be"),
     ]
+    if not all(each.protected for each in scenario.structures):
+        handles.insert(1, Patch(facecolor=(*other, 0.35), edgecolor=other, label="other building"))
+    if any(isinstance(each, SegmentSource | RectangleSource) for each in scenario.charge):
+        handles.append(
+            Line2D([], [], color=(*red, 0.5), linewidth=2.5, label="where charges may be")
+        )
+    handles += vehicle_legend(scenario)
     zone = scenario.build_zone
     if zone is not None:
         handles.append(Patch(fill=False, edgecolor=quiet, linestyle="--", label="build zone"))
@@ -294,8 +305,9 @@ def worth_map(scenario: Scenario, targets: Sequence[Target], items: Sequence[Ite
     sides = np.array([each.rectangle_m for each in items])
     low, high = sides[:, :2].min(axis=0), sides[:, 2:].max(axis=0)
     reach_m = max(8.0 * MODULE_SIDE_M, 0.6 * float((high - low).max()))
-    axes.set_xlim(low[0] - reach_m, high[0] + reach_m)
-    axes.set_ylim(low[1] - reach_m, high[1] + reach_m)
+    (left, bottom), (right, top) = low - reach_m, high + reach_m
+    axes.set_xlim(max(left, 0.0), min(right, scenario.site.width_m))
+    axes.set_ylim(max(bottom, 0.0), min(top, scenario.site.height_m))
     bar = figure.colorbar(ScalarMappable(scale, modules.get_cmap()), ax=axes, shrink=0.8)
     bar.set_label("worth: percentage points of reduction lost without it")
     return png(figure)
@@ -329,17 +341,24 @@ def _bars(axes: Axes, outcomes: Sequence[Outcome], units: UnitSystem) -> None:
 def place_figure(
     scenario: Scenario,
     targets: Sequence[Target],
-    charges: Sequence[NamedCharge],
+    charges: Sequence[Charge],
     outcomes: Sequence[Outcome],
 ) -> bytes:
-    """Return the plan with the reduction for charges at other places."""
+    """Return the plan with the reduction for charges at other places.
+
+    Args:
+        scenario: The scenario.
+        targets: Its buildings.
+        charges: Where they go off with the layout.
+        outcomes: One a charge.
+    """
     figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.3), layout="constrained")
     axes = figure.subplots()
     draw_site(axes, scenario.site.rectangle_m)
     for target in targets:
         _draw_target(axes, target)
     _draw_sources(axes, scenario)
-    places = np.array([each.charge.position_m for each in charges])
+    places = np.array([each.position_m for each in charges])
     shares = 100.0 * np.array([each.reduction for each in outcomes])
     reach = max(float(np.nanmax(np.abs(shares))), 1e-6)
     x_m, y_m = places.T

@@ -8,6 +8,7 @@ from math import isfinite, isnan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
+from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 import tomli_w
@@ -17,6 +18,7 @@ from blast_env.files import write_atomically
 from blast_env.geometry import layout_counts, layout_text
 from blast_env.physics.gas.engine import CHECKED_SCALED_DISTANCE
 from blast_env.provenance import code_version, command, versions
+from blast_env.rendering.vehicle_plan import stand_off_text
 from blast_env.reporting.figures import (
     front_figure,
     mass_figure,
@@ -66,7 +68,9 @@ def write_report(
         temporary.write_text(page, encoding="utf-8")
     if pdf is None:
         return [Path(html)]
-    with write_atomically(pdf) as temporary:
+    with write_atomically(pdf) as temporary, catch_warnings():
+        # WeasyPrint's hint to whoever packages it; without that library fonts are larger, no more.
+        filterwarnings("ignore", "HarfBuzz-Subset", DeprecationWarning)
         _weasyprint().HTML(string=page).write_pdf(str(temporary))
     return [Path(html), Path(pdf)]
 
@@ -135,10 +139,10 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
     scenario, options = study.scenario, study.options
     coarse, fine = options.cells_m
     protected = [each for each in study.targets if each.protected]
-    zone = scenario.zone
-    modules_m = [zone.element_rectangle_m(each) for each in study.layout]
     layout_json = _layout_file(study)
-    places = other_places(scenario, options.places)
+    places = [
+        each.against(scenario, study.layout) for each in other_places(scenario, options.places)
+    ]
     return {
         "study": study,
         "scenario": scenario,
@@ -147,7 +151,11 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "fine": fine,
         "protected": protected,
         "others": [each for each in study.targets if not each.protected],
-        "plan": site_plan(scenario, study.targets, study.threats, modules_m),
+        "plan": site_plan(scenario, study.targets, study.threats, study.layout),
+        "place_texts": {
+            each.name: each.place_text(scenario, study.layout) for each in study.threats
+        },
+        "stand_off": stand_off_text(scenario, study.layout),
         "summary": _summary(study),
         "verdicts": _verdicts(study),
         "grid_error": study.grid_error,

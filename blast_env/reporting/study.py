@@ -29,7 +29,7 @@ from blast_env.reporting.threats import (
     other_places,
 )
 from blast_env.reporting.units import UNITS, UnitSystem
-from blast_env.scenario import Placement, Scenario, check_layout
+from blast_env.scenario import AnyCharge, Placement, Scenario, check_layout
 from blast_env.simulation.gas import GasBlast
 from blast_env.statistics import reductions
 
@@ -357,7 +357,7 @@ class Runs:
         return tuple(sorted(points, key=lambda each: (each.cost, each.reduction)))
 
     def _impulses_pa_s(
-        self, label: str, layouts: Sequence[Layout], charges: Sequence[Charge]
+        self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
     ) -> FloatArray:
         """Return the weighted impulses on what is protected (layouts, charges)."""
         pairs = [(layout, Threat(charge, 0)) for layout in layouts for charge in charges]

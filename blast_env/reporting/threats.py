@@ -8,17 +8,20 @@ from typing import Final
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Layout, Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
+    AnyCharge,
     AnySource,
     PointSource,
     RectangleSource,
     Scenario,
     ScenarioError,
     SegmentSource,
+    VehicleCharge,
     VehicleSource,
 )
+from blast_env.scenario.build_scene import charge_against
 
 _STEPS: Final = 400
 """Into how many parts a segment is cut to find its place nearest to a building."""
@@ -30,36 +33,42 @@ class NamedCharge:
 
     Attributes:
         name: `T1`, or what it stands for.
-        charge: The charge.
+        charge: The charge, at its place or on its vehicle.
         why: Why it is there.
     """
 
     name: str
-    charge: Charge
+    charge: AnyCharge
     why: str
+
+    def against(self, scenario: Scenario, layout: Layout = ()) -> Charge:
+        """Return the charge where it goes off: that of a vehicle depends on the layout."""
+        return charge_against(scenario, layout, self.charge)
+
+    def place_text(self, scenario: Scenario, layout: Layout) -> str:
+        """Return where it goes off, with a layout and without if that makes a difference."""
+        bare, walled = (_place_text(self.against(scenario, each)) for each in ((), layout))
+        return walled if bare == walled else f"{bare} without the layout, {walled} with it"
 
 
 def chief_threats(scenario: Scenario, most: int) -> tuple[NamedCharge, ...]:
     """Return the charges that can do most: of each source the place nearest to what is protected.
 
+    That of a vehicle comes as near as the layout lets it, whatever the layout is.
+
     Args:
         scenario: The scenario.
-        most: How many at most; those of the smallest scaled distance are taken.
+        most: How many at most; those of the smallest scaled distance without a barrier are taken.
     """
-    found: dict[Charge, tuple[float, int]] = {}
+    found: dict[AnyCharge, tuple[float, int]] = {}
     for index, source in enumerate(scenario.charge):
-        place = min(_candidates(scenario, source), key=lambda each: _distance_m(scenario, each))
-        charge = Charge(place, source.tnt_kg, source.height_m)
-        scaled = hypot(_distance_m(scenario, place), charge.height_m) / cbrt(charge.tnt_kg)
-        found.setdefault(charge, (scaled, index))
+        charge = _worst(scenario, source)
+        place_m = charge_against(scenario, (), charge).position_m
+        away_m = hypot(_distance_m(scenario, place_m), charge.height_m)
+        found.setdefault(charge, (away_m / cbrt(charge.tnt_kg), index))
     ranked = sorted(found.items(), key=lambda item: item[1])[:most]
     return tuple(
-        NamedCharge(
-            f"T{number}",
-            charge,
-            f"the place of charge source {index + 1} nearest to what is protected, "
-            f"{scaled:.2f} m/kg^(1/3) away",
-        )
+        NamedCharge(f"T{number}", charge, _why(charge, index, scaled))
         for number, (charge, (scaled, index)) in enumerate(ranked, start=1)
     )
 
@@ -81,31 +90,37 @@ def asked_threats(scenario: Scenario, charges: tuple[Charge, ...]) -> tuple[Name
 def other_places(scenario: Scenario, count: int) -> tuple[NamedCharge, ...]:
     """Return charges at even steps along segments, over areas, and at points; each only once.
 
+    Those of a vehicle are at its worst place, its second worst, and so on.
+
     Args:
         scenario: The scenario.
-        count: How many of each segment, and along each side of an area.
+        count: How many of each segment and vehicle, and along each side of an area.
     """
-    found: dict[Charge, NamedCharge] = {}
+    found: dict[AnyCharge, NamedCharge] = {}
     for index, source in enumerate(scenario.charge):
+        why = f"charge source {index + 1}"
+        if isinstance(source, VehicleSource):
+            for rank in range(min(count, source.places)):
+                vehicle = VehicleCharge(source, rank)
+                name = f"vehicle, place {rank + 1} by distance"
+                found.setdefault(vehicle, NamedCharge(name, vehicle, why))
+            continue
         for place in _spread(source, count):
             charge = Charge(place, source.tnt_kg, source.height_m)
-            why = f"charge source {index + 1}"
-            found.setdefault(
-                charge, NamedCharge(f"({place[0]:.1f}, {place[1]:.1f}) m", charge, why)
-            )
+            found.setdefault(charge, NamedCharge(_place_text(charge), charge, why))
     return tuple(found.values())
 
 
 def other_masses(
-    scenario: Scenario, charge: Charge, factors: tuple[float, ...]
+    scenario: Scenario, charge: AnyCharge, factors: tuple[float, ...]
 ) -> tuple[tuple[NamedCharge, ...], tuple[str, ...]]:
     """Return the same charge with other masses, and why some are not possible."""
     possible, notes = [], []
     for factor in factors:
-        other = charge._replace(tnt_kg=factor * charge.tnt_kg)
+        other = _with_mass(charge, factor * charge.tnt_kg)
         name = f"{other.tnt_kg:g} kg"
         try:
-            scenario.with_charge(other)
+            scenario.with_possible_charges([other])
         except (ScenarioError, BlastEnvError) as error:
             notes.append(f"{name} was left out: {error}")
         else:
@@ -113,7 +128,43 @@ def other_masses(
     return tuple(possible), tuple(notes)
 
 
-def _candidates(scenario: Scenario, source: AnySource) -> Iterator[tuple[float, float]]:
+def _worst(scenario: Scenario, source: AnySource) -> AnyCharge:
+    """Return the charge of a source at the place nearest to what is protected."""
+    if isinstance(source, VehicleSource):
+        return VehicleCharge(source)
+    place = min(_candidates(scenario, source), key=lambda each: _distance_m(scenario, each))
+    return Charge(place, source.tnt_kg, source.height_m)
+
+
+def _why(charge: AnyCharge, index: int, scaled: float) -> str:
+    """Return why a charge is among the chief threats."""
+    if isinstance(charge, VehicleCharge):
+        return (
+            f"charge source {index + 1}, a vehicle {charge.source.width_m:g} m wide, as near to "
+            f"what is protected as it can drive: {scaled:.2f} m/kg^(1/3) without a barrier"
+        )
+    return (
+        f"the place of charge source {index + 1} nearest to what is protected, "
+        f"{scaled:.2f} m/kg^(1/3) away"
+    )
+
+
+def _with_mass(charge: AnyCharge, tnt_kg: float) -> AnyCharge:
+    if isinstance(charge, VehicleCharge):
+        return charge.with_charge(tnt_kg)
+    return charge._replace(tnt_kg=tnt_kg)
+
+
+def _place_text(charge: Charge) -> str:
+    x_m, y_m = charge.position_m
+    return f"({x_m:.1f}, {y_m:.1f}) m"
+
+
+Placed = PointSource | SegmentSource | RectangleSource
+"""Sources whose places do not depend on the layout."""
+
+
+def _candidates(scenario: Scenario, source: Placed) -> Iterator[tuple[float, float]]:
     """Yield places of a source of which one is the nearest, or nearly."""
     if isinstance(source, RectangleSource):
         left, bottom, right, top = source.rectangle_m
@@ -128,7 +179,7 @@ def _candidates(scenario: Scenario, source: AnySource) -> Iterator[tuple[float, 
     yield from _spread(source, _STEPS + 1)
 
 
-def _spread(source: AnySource, count: int) -> Iterator[tuple[float, float]]:
+def _spread(source: Placed, count: int) -> Iterator[tuple[float, float]]:
     shares = np.linspace(0.0, 1.0, count).tolist() if count > 1 else [0.5]
     if isinstance(source, PointSource):
         yield source.position_m
@@ -136,11 +187,6 @@ def _spread(source: AnySource, count: int) -> Iterator[tuple[float, float]]:
         (x0, y0), (x1, y1) = source.segment_m
         for share in shares:
             yield x0 + share * (x1 - x0), y0 + share * (y1 - y0)
-    elif isinstance(source, VehicleSource):
-        raise BlastEnvError(
-            "a charge is brought by a vehicle, whose place depends on the layout: the report "
-            "takes charges at places only; name one (--charge)"
-        )
     else:
         left, bottom, right, top = source.rectangle_m
         for across in shares:

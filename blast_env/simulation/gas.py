@@ -37,7 +37,7 @@ from blast_env.recording.excel import SheetTable, write_tables
 from blast_env.recording.parquet import write_table
 from blast_env.recording.tables import RunRecord
 from blast_env.scenario import AnyCharge, ScenarioField
-from blast_env.scenario.build_scene import build_site
+from blast_env.scenario.build_scene import build_site, draw_threat
 from blast_env.tables import Column, table_of
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
@@ -125,6 +125,11 @@ class GasBlast:
     def site(self) -> BlastSite:
         """What stands where."""
         return build_site(self.scenario, self.layout, self.seed, self.charge)
+
+    @property
+    def threat(self) -> AnyCharge:
+        """The charge before there is a layout: a vehicle brings it as near as that lets it."""
+        return draw_threat(self.scenario, self.seed) if self.charge is None else self.charge
 
     def run(
         self,

@@ -138,7 +138,7 @@ def deviations(table: pd.DataFrame, decimals: tuple[int, int, int]) -> NDArray[n
 
 
 CONTRADICTIONS: Final = """\
-Where the paper contradicts itself (more in docs/paper.md):
+Where the paper contradicts itself (more in docs/paper/reading.md):
 - k: the text prints 4.343e-05; Table 1 and the first row of Table 4 come from 4.2707e-05, which is
   what equation (6) gives.
 - A and B: the text's "final conversion formula" has them rounded to three digits, which gives

@@ -170,9 +170,9 @@ def test_a_killed_run_loses_at_most_one_rollout(tmp_path: Path) -> None:
     folder = RunFolder(run)
     before = Checkpoint.load(folder.checkpoint).counters.steps
     assert 0 < before < steps
-    shorten(run, before + 4 * ROLLOUT)
+    shorten(run, before + 2 * ROLLOUT)
     result = resume(run)
-    assert result.progress.counters.steps == before + 4 * ROLLOUT
+    assert result.progress.counters.steps == before + 2 * ROLLOUT
     assert [row.steps for row in result.progress.rollouts] == [
         2 * ROLLOUT * number for number in range(1, len(result.progress.rollouts) + 1)
     ]

@@ -280,11 +280,11 @@ def test_the_simulator_still_gives_what_the_calibration_was_made_from(
 ) -> None:
     """A digest of parameters does not see a change of the code; the blasts do.
 
-    Some seeds for all, fewer where a blast takes seconds. 1.5 half-widths of their own mean are
+    Some seeds for all, one where a blast takes seconds. 1.5 half-widths of their own mean are
     about three standard errors.
     """
     stored = load_calibration(name, engine)
-    seeds = stored.seeds[: 2 if (stored.preset, engine) in SLOW else 3]
+    seeds = stored.seeds[: 1 if (stored.preset, engine) in SLOW else 3]
     scenario = free_field(stored.tnt_kg).with_simulation(stored.preset)
     study = FreeFieldStudy(scenario, stored.distances_m[:1], seeds, engine)
     mean = study.run()[f"{stored.simulated}_sim"].mean()

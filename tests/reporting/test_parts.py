@@ -13,11 +13,13 @@ from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Limit, StudyOptions, UnitSystem
 from blast_env.reporting.limits import check_limits
 from blast_env.reporting.loads import TargetLoad, first_phase_s, targets_of
-from blast_env.reporting.study import layout_from
+from blast_env.reporting.study import Runs, layout_from
 from blast_env.reporting.threats import asked_threats, chief_threats, other_masses, other_places
 from blast_env.scenario import Scenario, ScenarioError
+from blast_env.simulation.gas import GasBlast
 from tests.gas_sites import site_document
 from tests.reporting.sites import small_hut
+from tests.vehicle_sites import POSTS, gate_site, vehicle_document
 
 SI, PSI = UNITS["si"], UNITS["psi"]
 
@@ -34,8 +36,8 @@ def test_threats_are_the_nearest_places_the_worst_first() -> None:
     scenario = site_with(ROAD, YARD)
     first, second = chief_threats(scenario, 6)
     # The road passes the hut 5 m away: 2.5 m/kg^(1/3); the yard's corner is sqrt(3^2 + 1^2) m away.
-    assert first.charge.position_m[0] == 1.0
-    assert 3.0 <= first.charge.position_m[1] <= 5.0
+    assert first.against(scenario).position_m[0] == 1.0
+    assert 3.0 <= first.against(scenario).position_m[1] <= 5.0
     assert second.charge == Charge((3.0, 2.0), 1.0)
     assert (first.name, second.name) == ("T1", "T2")
     assert "source 1" in first.why
@@ -56,14 +58,45 @@ def test_no_place_of_a_street_is_nearer(x0: float, y0: float, x1: float, y1: flo
     (threat,) = chief_threats(scenario, 1)
     shares = np.linspace(0.0, 1.0, 1000)
     nearest = min(away_m(x0 + s * (x1 - x0), y0 + s * (y1 - y0)) for s in shares)
-    assert away_m(*threat.charge.position_m) == pytest.approx(nearest, abs=0.01)
+    assert away_m(*threat.against(scenario).position_m) == pytest.approx(nearest, abs=0.01)
 
 
 def test_other_places_are_spread_over_every_source() -> None:
-    places = other_places(site_with(ROAD, YARD, ROAD), 3)
-    assert [each.charge.position_m for each in places[:3]] == [(1.0, 1.0), (1.0, 4.0), (1.0, 7.0)]
+    site = site_with(ROAD, YARD, ROAD)
+    places = other_places(site, 3)
+    along_m = [each.against(site).position_m for each in places[:3]]
+    assert along_m == [(1.0, 1.0), (1.0, 4.0), (1.0, 7.0)]
     assert len(places) == 3 + 9  # the second road has the same places
     assert {each.charge.tnt_kg for each in places[3:]} == {1.0}
+
+
+def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
+    site = gate_site(vehicle_document(places=3, apart_m=2.0))
+    (threat,) = chief_threats(site, 6)
+    # Its square of 2 m touches the hut at x = 10 m, or the posts at x = 4 m.
+    assert threat.against(site) == Charge((9.0, 4.0), 5.0)
+    assert threat.against(site, POSTS) == Charge((3.0, 4.0), 5.0)
+    assert threat.place_text(site, POSTS) == (
+        "(9.0, 4.0) m without the layout, (3.0, 4.0) m with it"
+    )
+    places = other_places(site, 5)
+    assert len({each.against(site, POSTS) for each in places}) == len(places) == 3
+    masses, notes = other_masses(site, threat.charge, (2.0, 1e9))
+    assert [each.against(site, POSTS) for each in masses] == [Charge((3.0, 4.0), 10.0)]
+    assert "5e+09 kg was left out" in notes[0]
+
+
+def test_vehicles_outcomes_are_those_of_the_places_that_it_reaches() -> None:
+    site = gate_site()
+    threats = chief_threats(site, 1)
+    runs = Runs(site, POSTS, StudyOptions(), targets_of(site), threats, lambda _, __: None)
+    (outcome,) = runs.other_places()[:1]
+    near, far = (
+        GasBlast(site, layout, charge=Charge((x_m, 4.0), 5.0)).run().impulse("hut").pa_s
+        for layout, x_m in (((), 9.0), (POSTS, 3.0))
+    )
+    assert outcome.bare_pa_s == pytest.approx(near)
+    assert outcome.walled_pa_s == pytest.approx(far)
 
 
 def test_masses_that_the_scenario_cannot_have_are_left_out_by_name() -> None:

@@ -264,15 +264,15 @@ def test_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_example_of_the_format_description_loads() -> None:
-    text = (REPOSITORY / "docs" / "scenario_format.md").read_text(encoding="utf-8")
+    text = (REPOSITORY / "docs" / "reference" / "scenario_format.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```toml\n(# A complete example.*?)```", text, re.S)
-    scenario = parse_scenario(example, "docs/scenario_format.md")
+    scenario = parse_scenario(example, "docs/reference/scenario_format.md")
     assert scenario.build_zone is not None
     assert scenario.simulation.overrides
 
 
 def test_example_of_heights_fits_into_the_whole_example() -> None:
-    text = (REPOSITORY / "docs" / "scenario_format.md").read_text(encoding="utf-8")
+    text = (REPOSITORY / "docs" / "reference" / "scenario_format.md").read_text(encoding="utf-8")
     whole, heights = (tomllib.loads(each) for each in re.findall(r"```toml\n(.*?)```", text, re.S))
     scenario = Scenario.from_document({**whole, **heights, "schema_version": 2}, "example")
     assert (scenario.schema_version, scenario.air_height_m) == (2, 12.0)
@@ -282,7 +282,7 @@ def test_example_of_heights_fits_into_the_whole_example() -> None:
 
 
 def test_format_description_names_every_key() -> None:
-    text = (REPOSITORY / "docs" / "scenario_format.md").read_text(encoding="utf-8")
+    text = (REPOSITORY / "docs" / "reference" / "scenario_format.md").read_text(encoding="utf-8")
     document = tall_document()
     keys = {
         *document,

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 NAMED = sorted(
     {
         tuple(match.split())
-        for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+        for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
         for match in re.findall(
             r"python -m\s+(scripts\.\w+(?:[ \n]+[a-z][\w-]+)?)", path.read_text("utf-8")
         )

@@ -1,4 +1,4 @@
-"""The study behind docs/scenarios.md: figures, criteria, and that the page is up to date."""
+"""The study behind docs/studies/scenarios.md: figures, criteria, and a page that is up to date."""
 
 from dataclasses import replace
 from pathlib import Path

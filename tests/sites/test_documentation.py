@@ -1,4 +1,4 @@
-"""docs/sites.md says what the code says."""
+"""docs/researchers/sites.md says what the code says."""
 
 import re
 from dataclasses import fields
@@ -10,7 +10,8 @@ from blast_env.sites import HELD_OUT_SITES, SiteRanges, VisibilityCriterion
 from blast_env.sites.generate import MOST_TRIES
 from blast_env.sites.visibility import DIRECTIONS
 
-DOCUMENT = (Path(__file__).parents[2] / "docs" / "sites.md").read_text(encoding="utf-8")
+PAGE = Path(__file__).parents[2] / "docs" / "researchers" / "sites.md"
+DOCUMENT = PAGE.read_text(encoding="utf-8")
 ROWS = dict(re.findall(r"^\| `(\w+)` \| (.*?) \|", DOCUMENT, re.MULTILINE))
 
 
@@ -47,4 +48,4 @@ def test_bounds_are_those_of_the_criterion() -> None:
 @pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", DOCUMENT, re.DOTALL))
 def test_its_code_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    exec(compile(block, "docs/sites.md", "exec"), {})
+    exec(compile(block, "docs/researchers/sites.md", "exec"), {})

@@ -38,7 +38,7 @@ FACE_NAMES: Final = (*WALLS, ROOF)
 """The faces of a structure; those of `FaceTable.face` count through them."""
 
 CHECKED_SCALED_DISTANCE: Final = (1.7, 8.6)
-"""Where the source was checked, m/kg^(1/3) (docs/gas.md)."""
+"""Where the source was checked, m/kg^(1/3) (docs/engineers/gas.md)."""
 CHECKED_CELLS: Final = 9.2
 """Least cells per cube root of the charge's mass in kg with which it was checked, times 1 m."""
 

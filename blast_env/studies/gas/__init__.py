@@ -1,1 +1,1 @@
-"""What was checked about the gas engine: docs/gas.md has the results."""
+"""What was checked about the gas engine: docs/engineers/gas.md has the results."""
