@@ -14,6 +14,7 @@ from blast_agents.proposal import propose
 from blast_agents.training import TrainedAgent, TrainingSettings, load_agent, newest_weights
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.environments import training_source
+from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import RunFolder
 
 from blast_env.cli.evaluation_report import (
@@ -71,9 +72,6 @@ _HEADERS: Final = (
 _NO_BEST: Final = (
     "the run has no evaluation yet, so there are no best weights: the last ones propose"
 )
-
-
-_ALGORITHMS: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
 
 
 def evaluate_run(run: Path, options: EvaluateOptions) -> None:
@@ -148,7 +146,7 @@ def _report_cases(
         files = [str(path) for path in [*written, *exported]]
         print_record({**record, "cache": cache_record(evaluators), "files": files}, options)
         return
-    title = f"{_ALGORITHMS[settings.algorithm]} of {provenance['run']}, a layout a row"
+    title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
     _print_cases(comparison, evaluators.engine, f"{title}, {threats_text(len(cases), seeds)}")
     milliseconds = median(MS_PER_S * each.seconds for each in proposals)
     print_line(f"proposed in {milliseconds:.1f} ms each (median), no blast spent on any")

@@ -207,7 +207,7 @@ class EnvironmentMaker:
             cache=LoadsCache(_LOADS) if self.cache is None else self.cache,
             **_threat_arguments(settings),
         )
-        for name, arguments in self.configuration.hyperparameters.wrappers():
+        for name, arguments in self.configuration.ppo.wrappers():
             if name.endswith(RelativeReward.__name__):
                 env = RelativeReward(env, **arguments)
             else:
@@ -225,7 +225,7 @@ def make_environments(configuration: RunConfiguration, source: ScenarioSource) -
 
     Within `on_cluster`, in this process, and their blasts on the cluster.
     """
-    count = configuration.hyperparameters.n_envs
+    count = configuration.ppo.n_envs
     if workers_told() > 1:
         shared = LoadsCache(_LOADS * count)
         actors = [EnvironmentMaker(configuration, source, index, shared) for index in range(count)]
