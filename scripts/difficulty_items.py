@@ -32,6 +32,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Layout, Piece
+from blast_env.physics.engine import Engine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
     AnyCharge,
@@ -45,11 +46,12 @@ from scripts.difficulty_outcomes import Outcome, TaskResult
 from scripts.difficulty_study import STAND_OFFS
 
 METHOD: Final = "annealing"
-"""The search; it begins with the best of the rules and of random walls."""
+"""The search; it begins with the best of rules, random layouts and random walls."""
 
 _BARE: Final = "no barrier"
 _RANDOM: Final = "random layouts (mean)"
 _CACHE_SIZE: Final = 100_000
+_BEST_RANDOM: Final = 3  # random layouts that the search begins with
 
 
 class Purchase(Enum):
@@ -268,7 +270,7 @@ class ItemStudy:
         self,
         scenario: Scenario,
         effort: ItemEffort,
-        engine: str = "gas",
+        engine: str | Engine = "gas",
         processes: int = 2,
         progress: Callable[[float], None] | None = None,
         cache: Path | None = None,
@@ -295,7 +297,9 @@ class ItemStudy:
         hidden = expected_charge(scenario.charge)
         rules = {name: each.rule(scenario, hidden) for name, each in self._rules.items()}
         task_rules = tuple(outcome(name, [layout]) for name, layout in rules.items())
-        found, blasts = self._searched(tuple(rules.values()))
+        best_random = np.argsort(random.impulse_pa_s.mean(axis=1), kind="stable")[:_BEST_RANDOM]
+        starts = (*rules.values(), *(random.layouts[index] for index in best_random))
+        found, blasts = self._searched(starts)
         finalists = outcome("finalists", found)
         best = int(finalists.impulse_pa_s.mean(axis=1).argmin())
         of_places = [self._for_place(place) for place in self.places]

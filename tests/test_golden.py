@@ -131,7 +131,7 @@ def test_a_blast_is_what_it_was(scene: str, engine: str) -> None:
 
 
 CONTENT_HASHES: Final = {
-    "control_room": "8280b8efbaa2d48b0cf5328c944afa4267de9b1d19e875088ad63b04bd726990",
+    "control_room": "f0b4d497dccfd3fb5c7fa88a4d7442000a78207db5b421985695c92a320c52d6",
     "courtyard": "76c48339ea3f457b906e152fbc0abd85ec13b276c4ecda0be3a9c6dcc0131cb7",
     "free_field": "2356d490bee5e2af05f7c80a219c16f8ceb886210f1e0a53aa86954cd4b1ac54",
     "hotel_forecourt": "9b5360183b00680dc721c96579e47652bc6abe59af04289e67d32bae9f932c69",
