@@ -35,6 +35,7 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_copy_source = False
+smartquotes = False  # they make dashes of --options
 
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 4
