@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import gymnasium as gym
 import pytest
 import typer
 from typer import Typer
@@ -177,6 +178,12 @@ def test_pages_that_code_and_texts_name_exist() -> None:
     }
     assert len(named) > 20
     assert {(where, page) for where, page in named if not (ROOT / page).exists()} == set()
+
+
+def test_the_page_of_the_environments_names_every_id() -> None:
+    page = TEXTS["docs/researchers/environment.md"]
+    ids = [name for name, spec in gym.registry.items() if "blast_env" in str(spec.entry_point)]
+    assert [name for name in ids if f"`{name}`" not in page] == []
 
 
 @pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
