@@ -179,7 +179,7 @@ def test_a_search_says_how_good_its_layout_is(tmp_path: Path) -> None:
     session.search("random", 12)
     status = state_of(session)
     assert (status.state, status.share) == ("done", 1.0)
-    assert "% less impulse" in status.text
+    assert "% less on the search's own blasts" in status.text
     session.take(status, 0)
     assert len(session.design.layout) == 16
 
@@ -294,7 +294,7 @@ def test_a_search_is_stopped_and_keeps_its_best_and_its_process_goes_on(
     workers.stop(first)
     stopped = wait(workers, first, "stopped")
     assert stopped.layout is not None
-    assert "% less impulse" in stopped.text
+    assert "% less on the search's own blasts" in stopped.text
     session.take(stopped, 0)
     assert wait(workers, second, "done").layout is not None
     assert workers._processes[0].popen.pid == process
