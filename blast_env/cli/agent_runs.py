@@ -14,6 +14,7 @@ from blast_agents.proposal import propose
 from blast_agents.training import TrainedAgent, TrainingSettings, load_agent, newest_weights
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.environments import training_source
+from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import RunFolder
 
 from blast_env.cli.evaluation_report import (
@@ -71,9 +72,6 @@ _HEADERS: Final = (
 _NO_BEST: Final = (
     "the run has no evaluation yet, so there are no best weights: the last ones propose"
 )
-
-
-_ALGORITHMS: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
 
 
 def evaluate_run(run: Path, options: EvaluateOptions) -> None:
@@ -148,7 +146,7 @@ def _report_cases(
         files = [str(path) for path in [*written, *exported]]
         print_record({**record, "cache": cache_record(evaluators), "files": files}, options)
         return
-    title = f"{_ALGORITHMS[settings.algorithm]} of {provenance['run']}, a layout a row"
+    title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
     _print_cases(comparison, evaluators.engine, f"{title}, {threats_text(len(cases), seeds)}")
     milliseconds = median(MS_PER_S * each.seconds for each in proposals)
     print_line(f"proposed in {milliseconds:.1f} ms each (median), no blast spent on any")
@@ -189,26 +187,22 @@ def _export(
 
 def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
     table, cases = make_table(title, _HEADERS), case_table(comparison)
+    objective = comparison.cases[0].scenario.objective
     for row in cases.to_dict("records"):
         table.add_row(
             row["scenario"],
             f"({row['charge_x_m']:.1f}, {row['charge_y_m']:.1f})",
             f"{row['tnt_kg']:g}",
             str(row["modules"]),
-            f"{row['unprotected_impulse_pa_s']:,.0f}",
-            f"{row['impulse_pa_s']:,.0f}",
+            objective.text(row["unprotected_load"]),
+            objective.text(row["load"]),
             percent(row["reduction"]) + ("" if row["in_range"] else " ~"),
         )
     result_console().print(table)
     outside = int((~cases["in_range"]).sum())
     if outside:
         print_line(f"note: {outside} threats are outside the range of the calibration (~)")
-    print_means(
-        comparison.reduction,
-        (comparison.unprotected_mean_pa_s, comparison.mean_pa_s),
-        (comparison.unprotected_cvar_pa_s, comparison.cvar_pa_s),
-        comparison.cvar_level,
-    )
+    print_means(comparison, objective)
     calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)
     words = engine_text(engine, [case.scenario for case in comparison.cases])
     print_line(f"{words}, calibration {', '.join(calibrations)}")

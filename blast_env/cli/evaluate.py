@@ -21,11 +21,10 @@ from blast_env.cli.output import check_json, resume_with_cache, user_errors
 from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.export import LayoutPlan
 from blast_env.physics.engines import find_engine
 from blast_env.scenario import LayoutFile, load_layout, load_scenario
-from blast_env.statistics import check_cvar_level
+from blast_env.statistics import CVAR_LEVEL, check_cvar_level
 
 _SCENARIO = "courtyard"
 

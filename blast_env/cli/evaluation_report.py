@@ -1,6 +1,6 @@
 """The options of `blast-env evaluate`, and what it prints and writes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -28,12 +28,13 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_against,
 )
+from blast_env.evaluation.comparison import Comparison
 from blast_env.export import LayoutPlan, check_target, export_layouts, is_file
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import is_gas
-from blast_env.scenario import AnyCharge, Scenario
+from blast_env.scenario import AnyCharge, ObjectiveSection, Scenario
 from blast_env.statistics import Estimate
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
@@ -255,18 +256,20 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine
 
 def _print_totals(evaluation: LayoutEvaluation, engine: Engine) -> None:
     """Print what there is to say about the protected structures together."""
-    worst = evaluation.worst
-    print_means(
-        evaluation.reduction,
-        (evaluation.unprotected_impulse_pa_s, evaluation.impulse_pa_s),
-        (evaluation.unprotected_cvar, evaluation.cvar),
-        evaluation.cvar_level,
-    )
+    worst, objective = evaluation.worst, evaluation.scenario.objective
+    comparison = evaluation.comparison
+    print_means(comparison, objective)
+    if objective != ObjectiveSection():
+        print_line(
+            f"objective ({_objective_text(objective)}): "
+            f"{objective.text(evaluation.unprotected_load)} without barrier, "
+            f"{objective.text(evaluation.load)} with"
+        )
     charge = worst.charge
     print_line(
         f"worst threat: {charge.tnt_kg:g} kg TNT at ({charge.position_m[0]:.2f}, "
-        f"{charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: {worst.impulse_pa_s:,.0f} Pa s, "
-        f"reduction {percent(worst.reduction)}"
+        f"{charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: "
+        f"{objective.text(worst.load)}, reduction {percent(worst.reduction)}"
     )
     print_line(
         f"{engine_text(engine, [evaluation.scenario])}, calibration {evaluation.calibration}, "
@@ -274,29 +277,35 @@ def _print_totals(evaluation: LayoutEvaluation, engine: Engine) -> None:
     )
 
 
-def print_means(
-    reduction: Estimate,
-    impulses_pa_s: Sequence[Estimate],
-    cvars_pa_s: Sequence[float],
-    cvar_level: float,
-) -> None:
-    """Print the reduction, and the mean impulses without and with barrier.
+def _objective_text(objective: ObjectiveSection) -> str:
+    """Return what a scenario counts, and over which charges: `peak overpressure, worst charge`."""
+    over = {"mean": "mean over", "cvar": "mean of the worst", "worst": "worst of"}
+    noun = "impulse and peak" if objective.quantity == "both" else objective.noun
+    return f"{noun}, {over[objective.charges]} the charges"
+
+
+def print_means(comparison: Comparison, objective: ObjectiveSection) -> None:
+    """Print the reduction, and the mean loads without and with barrier.
 
     Args:
-        reduction: Of the protected structures, by weight.
-        impulses_pa_s: Without, with.
-        cvars_pa_s: Without, with.
-        cvar_level: Of these.
+        comparison: The loads.
+        objective: What they are.
     """
+    reduction = comparison.reduction
     print_line(
         f"protected structures, by weight: mean reduction {percent(reduction.value)} "
         f"(95 % interval {interval(reduction)})"
     )
-    names = ("without barrier", "with barrier")
-    for words, impulse, cvar in zip(names, impulses_pa_s, cvars_pa_s, strict=True):
-        half_width = "" if isnan(impulse.low) else f" +- {impulse.high - impulse.value:,.0f}"
+    share = f"{100.0 * (1.0 - comparison.cvar_level):.3g} %"
+    for words, load, cvar in (
+        ("without barrier", comparison.unprotected_mean, comparison.unprotected_cvar),
+        ("with barrier", comparison.mean, comparison.cvar),
+    ):
+        half_width = ""
+        if not isnan(load.low):
+            half_width = f" +- {objective.text(load.high - load.value)}"
+        psi_s = "" if objective.needs_peaks else f" ({load.value / PA_PER_PSI:.4f} psi s)"
         print_line(
-            f"{words}: mean {impulse.value:,.0f}{half_width} Pa s "
-            f"({impulse.value / PA_PER_PSI:.4f} psi s), mean of the worst "
-            f"{100.0 * (1.0 - cvar_level):.3g} % {cvar:,.0f} Pa s"
+            f"{words}: mean {objective.text(load.value)}{half_width}{psi_s}, "
+            f"mean of the worst {share} {objective.text(cvar)}"
         )

@@ -53,14 +53,13 @@ from blast_env.evaluation import (
     evaluate_against,
 )
 from blast_env.evaluation.cases import practice_hidden, practice_visible
-from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
 from blast_env.provenance import command, versions
 from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario, write_layout
-from blast_env.statistics import reductions
+from blast_env.statistics import CVAR_LEVEL, ConditionalValueAtRisk, WorstRisk, reductions
 from blast_env.tables import write_csv
 
 ThreatName = Literal["visible", "hidden"]
@@ -82,7 +81,7 @@ class SearchOptions:
     realisations: int | None
     charge_position_m: tuple[float, float] | None
     tnt_kg: float | None
-    risk: str
+    risk: str | None
     cvar_level: float
     engine: str
     cell_m: float | None
@@ -106,29 +105,29 @@ class SearchRun:
     cache_hits: int
 
 
-def print_search(run: SearchRun, options: SearchOptions, checked: LayoutEvaluation) -> None:
+def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
     """Print what the layout does against the search's threats and against others, and the cost."""
     result, problem = run.result, run.problem
     table = make_table(
-        f"{problem.scenario.name}: {result.method} search, {_risk_text(options)}",
-        ("threats", "number", "without (Pa s)", "with (Pa s)", "reduction", "95 % interval"),
+        f"{problem.scenario.name}: {result.method} search, {_risk_text(problem)}",
+        ("threats", "number", "without", "with", "reduction", "95 % interval"),
     )
-    bare_pa_s = problem.case.combined(problem.unprotected_pa_s)
-    impulse_pa_s = problem.impulse_pa_s(result.layout)
+    bare, load = problem.case.combined(problem.unprotected), problem.load(result.layout)
+    counts = problem.scenario.objective
     table.add_row(
         "of the search",
         str(len(problem.threats)),
-        f"{bare_pa_s:,.0f}",
-        f"{impulse_pa_s:,.0f}",
-        percent(reductions(impulse_pa_s, bare_pa_s).item()),
+        counts.text(bare),
+        counts.text(load),
+        percent(reductions(load, bare).item()),
         "-",
     )
     low, high = checked.ci95
     table.add_row(
-        "held out, mean",
+        "held out",
         str(len(checked.threats)),
-        f"{checked.unprotected_impulse_pa_s.value:,.0f}",
-        f"{checked.impulse_pa_s.value:,.0f}",
+        counts.text(checked.unprotected_load),
+        counts.text(checked.load),
         percent(checked.mean_reduction),
         "-" if np.isnan(low) else f"{percent(low)} to {percent(high)}",
     )
@@ -190,7 +189,8 @@ def _provenance(
         "result": {
             "blasts": result.blasts,
             "interrupted": result.interrupted,
-            "impulse_pa_s": result.impulse_pa_s,
+            "load": result.load,
+            "unit": problem.scenario.objective.unit,
             "threats_met": result.threats,
             "held_out_threats": len(checked.threats),
             "held_out_reduction": checked.mean_reduction,
@@ -199,12 +199,16 @@ def _provenance(
     }
 
 
-def _risk_text(options: SearchOptions) -> str:
-    """Return what the impulses under the search's threats are."""
-    if options.risk == "mean":
-        return "mean impulse on the protected structures"
-    share = f"{100.0 * (1.0 - options.cvar_level):.3g} %"
-    return f"impulse on the protected structures, mean of the worst {share}"
+def _risk_text(problem: LayoutProblem) -> str:
+    """Return what the loads under the search's threats are."""
+    noun = problem.scenario.objective.noun
+    words = f"{noun} of the protected structures"
+    risk = problem.case.risk or problem.scenario.objective.risk
+    if isinstance(risk, WorstRisk):
+        return f"largest {words}"
+    if isinstance(risk, ConditionalValueAtRisk):
+        return f"{words}, mean of the worst {100.0 * (1.0 - risk.level):.3g} %"
+    return f"mean {words}"
 
 
 def percent(share: float) -> str:
@@ -237,7 +241,13 @@ def search(
     ] = None,
     charge: ChargePlace = None,
     tnt_kg: TntMass = None,
-    risk: Annotated[str, typer.Option(help="mean or cvar, over the charges.")] = "mean",
+    risk: Annotated[
+        str | None,
+        typer.Option(
+            help="mean, cvar or worst, over the charges.",
+            show_default="as the scenario's objective says",
+        ),
+    ] = None,
     cvar_level: CvarLevel = CVAR_LEVEL,
     engine: Annotated[
         str, typer.Option(help="event or pymunk (particles), or gas (gas dynamics).")
@@ -289,7 +299,7 @@ def search(
         if run.result.interrupted and not run.result.history:
             raise KeyboardInterrupt  # nothing was found that could be kept
         checked = _check(run, options, held_out)
-        print_search(run, options, checked)
+        print_search(run, checked)
         if out is not None:
             write_search(run, options, checked, out)
     if run.result.interrupted:
@@ -307,7 +317,7 @@ def _run(options: SearchOptions, evaluator: BlastEvaluator, processes: int) -> S
     initial = tuple(load_layout(path, scenario) for path in options.start_from)
     method = find_search_method(options.method, initial)
     problem = LayoutProblem(evaluator, _practice(scenario, options, evaluator.engine), processes)
-    problem.unprotected_pa_s  # noqa: B018  # refuses a case in which nothing arrives
+    problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
     hits, begun_s = evaluator.cache_hits, perf_counter()
     result = _with_progress(method, problem, options)
     return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)

@@ -26,7 +26,8 @@ _DEFAULT_SCENARIO: Final = "courtyard"
 
 def train(
     algo: Annotated[
-        str | None, typer.Option(help="ppo or maskable_ppo.", show_default=_DEFAULT_ALGORITHM)
+        str | None,
+        typer.Option(help="ppo, maskable_ppo or self_labelling.", show_default=_DEFAULT_ALGORITHM),
     ] = None,
     scenario: Annotated[
         str | None,
@@ -36,13 +37,23 @@ def train(
         ),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(min=1, help="Steps, a module each; else as the YAML file says.")
+        int | None,
+        typer.Option(
+            min=1,
+            help="Steps, a module each (of self_labelling, a layout that meets a threat each); "
+            "else as the YAML file says.",
+        ),
     ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Decides everything.", show_default="0")
     ] = None,
     envs: Annotated[
-        int | None, typer.Option(min=1, help="Parallel environments; else as the YAML file says.")
+        int | None,
+        typer.Option(
+            min=1,
+            help="Parallel environments (of self_labelling, worker processes); "
+            "else as the YAML file says.",
+        ),
     ] = None,
     run: Annotated[Path | None, typer.Option(help="Folder for the run; new or empty.")] = None,
     threat: Annotated[
@@ -66,6 +77,12 @@ def train(
         list[str] | None,
         typer.Option("--set", help="key=value, e.g. ent_coef=0.01; may be given again."),
     ] = None,
+    start_from: Annotated[
+        Path | None,
+        typer.Option(
+            help="Run folder whose best weights to begin with, of a scenario of this size."
+        ),
+    ] = None,
     resume: Annotated[
         Path | None,
         typer.Option(help="Go on with the run of this folder; no other option but --cluster."),
@@ -84,6 +101,7 @@ def train(
         "cell": cell,
         "observation": observation,
         "set": set_ or None,
+        "start-from": None if start_from is None else str(start_from),
     }
     given = {name: value for name, value in fresh.items() if value is not None}
     with (
@@ -132,15 +150,16 @@ def _train(
     with import_extra("agents,render", "training"):
         from blast_agents.training import load_hyperparameters, train
         from blast_agents.training.environments import environment_id
-        from blast_agents.training.hyperparameters import HYPERPARAMETER_KEYS, parse_options
+        from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
         from blast_agents.training.run_folder import SETTING_KEYS, settings_from
 
     algorithm = str(given.get("algo", _DEFAULT_ALGORITHM))
-    changes = parse_options(options, [*HYPERPARAMETER_KEYS, *SETTING_KEYS])
+    changes = parse_options(options, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
     names = ("steps", "seed", "threat", "engine", "observation")
     values = {name: given[name] for name in names if name in given}
     if "cell" in given:
         values["cell_m"] = given["cell"]
+    values["start_from"] = given.get("start-from")
     if given.get("observation") == "features":  # no planes, which the YAML file's policy looks at
         changes.setdefault("policy", "MlpPolicy")
     values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}

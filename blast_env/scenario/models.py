@@ -36,6 +36,7 @@ from blast_env.scenario.checks import (
 )
 from blast_env.scenario.georeference import AnyGeoreference
 from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
+from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, ScenarioError, problems_from
 from blast_env.scenario.sections import (
     AnySource,
@@ -79,6 +80,7 @@ __all__ = [
     "GaugeSection",
     "KeepOut",
     "ModularObstacleSection",
+    "ObjectiveSection",
     "PointM",
     "PointSource",
     "RectangleSource",
@@ -122,6 +124,7 @@ class Scenario(Section):
         simulation: Parameters of the blast model.
         calibration: Name of the calibration that turns impulses into pascal seconds.
         gauges: Where overpressure is recorded, by engines that know it.
+        objective: Which load counts, and how those of several charges become one.
         georeference: Where on a map or drawing the site lies; no result depends on it.
     """
 
@@ -135,6 +138,7 @@ class Scenario(Section):
     simulation: SimulationSection = SimulationSection()
     calibration: Name | None = None
     gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100)] = ()
+    objective: ObjectiveSection = ObjectiveSection()
     georeference: AnyGeoreference | None = None
 
     @property

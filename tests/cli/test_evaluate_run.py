@@ -52,7 +52,7 @@ def test_a_visible_threat_gets_a_layout_for_each_charge(visible: Path, tmp_path:
         layout = load_layout(path, scenario)
         assert layout == agent.propose(scenario, threat.charge)
         expected = evaluate_layout(scenario, layout, threats=[threat])
-        assert table["impulse_pa_s"][number - 1] == pytest.approx(expected.impulse_pa_s.value)
+        assert table["load"][number - 1] == pytest.approx(expected.load)
         provenance = LayoutFile.load(path).provenance
         assert provenance["charge"]["position_m"] == list(
             threat.charge_against(scenario, layout).position_m

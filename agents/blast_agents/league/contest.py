@@ -82,9 +82,9 @@ class EvaluationJob:
         return len(self.case.threats)
 
     def __call__(self) -> tuple[float, ...]:
-        """Return the impulses on the protected structures, Pa*s, one a held-out threat."""
+        """Return the loads that count, in the unit of the objective, one a held-out threat."""
         evaluator = BlastEvaluator(self.case.scenario, self.engine)
-        return Objective(evaluator, self.case).impulses_pa_s(self.layout)
+        return Objective(evaluator, self.case).counted_loads(self.layout)
 
 
 def propose_at_once(entry: Instant, cases: Sequence[Case]) -> tuple[Proposal, ...]:
@@ -131,7 +131,7 @@ class Contest:
     """Entries on a track.
 
     Proposals that take no blast are made first, in this process, where nothing disturbs their
-    time; then the searches; then all layouts meet the held-out threats. Searches and impulses are
+    time; then the searches; then all layouts meet the held-out threats. Searches and loads are
     kept as soon as they are there, and not done again.
 
     Attributes:
@@ -203,10 +203,10 @@ class Contest:
             self.store.keep_proposal(search_key(job.case, job.search, self.engine), proposal)
             meter.add(job.blasts)
         evaluations = self._missing_evaluations()
-        for index, impulses_pa_s in as_completed(_done, evaluations, processes):
+        for index, loads in as_completed(_done, evaluations, processes):
             asked = evaluations[index]
             key = evaluation_key(asked.case, asked.layout, self.engine)
-            self.store.keep_impulses(key, impulses_pa_s)
+            self.store.keep_loads(key, loads)
             meter.add(asked.blasts)
         return self._standings()
 
@@ -222,7 +222,7 @@ class Contest:
         return sorted(jobs, key=lambda job: -job.blasts)
 
     def _missing_evaluations(self) -> list[EvaluationJob]:
-        """Return the layouts proposed so far whose impulses are not known, each once."""
+        """Return the layouts proposed so far whose loads are not known, each once."""
         asked = dict.fromkeys(
             (index, proposal.layout)
             for entry in self.entries
@@ -233,7 +233,7 @@ class Contest:
         return [
             EvaluationJob(cases[index], layout, self.engine)
             for index, layout in asked
-            if self._impulses_pa_s(cases[index], layout) is None
+            if self._loads(cases[index], layout) is None
         ]
 
     def _proposals(self, entry: Entry) -> Sequence[Proposal | None]:
@@ -243,8 +243,8 @@ class Contest:
         cases = self.track.cases
         return [self.store.proposal(search_key(case, entry, self.engine)) for case in cases]
 
-    def _impulses_pa_s(self, case: Case, layout: Layout) -> tuple[float, ...] | None:
-        return self.store.impulses_pa_s(evaluation_key(case, layout, self.engine))
+    def _loads(self, case: Case, layout: Layout) -> tuple[float, ...] | None:
+        return self.store.loads(evaluation_key(case, layout, self.engine))
 
     def _standings(self) -> Standings:
         results = tuple(self._results())
@@ -253,13 +253,13 @@ class Contest:
             for entry, result in zip(self.entries, results, strict=True)
             if isinstance(entry, NoBarrier)
         )
-        return Standings(self.track, results, bare.impulse_pa_s, _engine_words(self.engine))
+        return Standings(self.track, results, bare.loads, _engine_words(self.engine))
 
     def _results(self) -> Iterator[Result]:
         for entry in self.entries:
             proposals = tuple(each for each in self._proposals(entry) if each is not None)
-            impulses_pa_s = [
-                self._impulses_pa_s(case, proposal.layout)
+            loads = [
+                self._loads(case, proposal.layout)
                 for case, proposal in zip(self.track.cases, proposals, strict=True)
             ]
             yield Result(
@@ -268,7 +268,7 @@ class Contest:
                 budget=entry.budget if isinstance(entry, Search) else 0,
                 training=entry.training if isinstance(entry, Agent) else None,
                 proposals=proposals,
-                impulse_pa_s=np.array(impulses_pa_s, dtype=np.float64),
+                loads=np.array(loads, dtype=np.float64),
             )
 
 

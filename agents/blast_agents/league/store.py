@@ -101,7 +101,7 @@ def search_key(case: Case, search: Search, engine: str | Engine) -> SearchKey:
 
 
 def evaluation_key(case: Case, layout: Layout, engine: str | Engine) -> EvaluationKey:
-    """Return the key of the impulses with a layout on a case's held-out threats.
+    """Return the key of the loads with a layout on a case's held-out threats.
 
     Raises:
         CalibrationError: If the scenario has no calibration for the engine.
@@ -111,7 +111,7 @@ def evaluation_key(case: Case, layout: Layout, engine: str | Engine) -> Evaluati
 
 
 _PROPOSAL: Final = TypeAdapter(Proposal)
-_IMPULSES: Final = TypeAdapter(tuple[float, ...])
+_LOADS: Final = TypeAdapter(tuple[float, ...])
 
 
 class ResultStore:
@@ -145,18 +145,18 @@ class ResultStore:
         """
         self._store.put(_text(key), _PROPOSAL.dump_json(proposal))
 
-    def impulses_pa_s(self, key: EvaluationKey) -> tuple[float, ...] | None:
-        """Return the impulses under the threats, Pa*s, or `None` if they are not known."""
+    def loads(self, key: EvaluationKey) -> tuple[float, ...] | None:
+        """Return the loads under the threats, in the objective's unit, or `None` if not known."""
         content = self._store.get(_text(key))
-        return None if content is None else _IMPULSES.validate_json(content)
+        return None if content is None else _LOADS.validate_json(content)
 
-    def keep_impulses(self, key: EvaluationKey, impulses_pa_s: tuple[float, ...]) -> None:
-        """Keep the impulses under the threats, Pa*s.
+    def keep_loads(self, key: EvaluationKey, loads: tuple[float, ...]) -> None:
+        """Keep the loads under the threats, in the unit of the objective.
 
         Raises:
             BlastEnvError: If they cannot be written.
         """
-        self._store.put(_text(key), _IMPULSES.dump_json(impulses_pa_s))
+        self._store.put(_text(key), _LOADS.dump_json(loads))
 
 
 def _text(key: SearchKey | EvaluationKey) -> str:

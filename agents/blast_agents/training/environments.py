@@ -17,7 +17,7 @@ from blast_agents.training.run_folder import RunConfiguration, TrainingSettings
 from blast_env.envs.arguments import real_number, whole_number
 from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
-from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
+from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.strategies import ScenarioSource, scenario_source
 from blast_env.evaluation import Evaluators
 from blast_env.evaluation.store import BlastCache, LoadsCache
@@ -117,7 +117,7 @@ def environment_id(scenario: str) -> str:
     """Return the section of the hyperparameters for a scenario's name or path."""
     if scenario == SITES:
         return SITES_ID
-    if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE:
+    if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE | FOR_GAS:
         return barrier_id(scenario)
     return DEFAULT_SECTION
 
@@ -207,7 +207,7 @@ class EnvironmentMaker:
             cache=LoadsCache(_LOADS) if self.cache is None else self.cache,
             **_threat_arguments(settings),
         )
-        for name, arguments in self.configuration.hyperparameters.wrappers():
+        for name, arguments in self.configuration.ppo.wrappers():
             if name.endswith(RelativeReward.__name__):
                 env = RelativeReward(env, **arguments)
             else:
@@ -225,7 +225,7 @@ def make_environments(configuration: RunConfiguration, source: ScenarioSource) -
 
     Within `on_cluster`, in this process, and their blasts on the cluster.
     """
-    count = configuration.hyperparameters.n_envs
+    count = configuration.ppo.n_envs
     if workers_told() > 1:
         shared = LoadsCache(_LOADS * count)
         actors = [EnvironmentMaker(configuration, source, index, shared) for index in range(count)]
