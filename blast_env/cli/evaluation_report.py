@@ -17,6 +17,7 @@ from blast_env.cli.output import (
     save_pictures,
     without,
 )
+from blast_env.cli.pictures import save_layout_picture
 from blast_env.cli.targets import FileTarget
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -213,15 +214,18 @@ def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
         "threats.csv": evaluation.threat_table,
     }
     written += [write_csv(table, out / name) for name, table in tables.items()]
-    return written + save_pictures(lambda: _save_figure(evaluation, out))
+    return written + save_pictures(lambda: _save_figures(evaluation, out))
 
 
-def _save_figure(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
+def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
     # Here, because pictures need the extra `render`.
     from blast_env.rendering.evaluation_figures import evaluation_figure
     from blast_env.rendering.figures import save_figure
 
-    return [save_figure(evaluation_figure(evaluation), out / "evaluation.png")]
+    return [
+        save_figure(evaluation_figure(evaluation), out / "evaluation.png"),
+        save_layout_picture(evaluation.scenario, evaluation.layout, out),
+    ]
 
 
 def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine) -> None:

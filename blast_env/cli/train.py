@@ -4,15 +4,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
+import numpy as np
 import typer
 
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.options import CellSide
 from blast_env.cli.output import engine_text, print_line, progress_bar, user_errors
+from blast_env.cli.pictures import save_layout_picture
 from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario
 
 if TYPE_CHECKING:
+    from blast_agents.training.run_folder import RunFolder
     from blast_agents.training.train import TrainingResult
 
 _DEFAULT_ALGORITHM: Final = "maskable_ppo"
@@ -184,3 +189,14 @@ def _print_result(result: "TrainingResult") -> None:
             )
     for path in (folder.checkpoint, folder.evaluations, folder.learning_curve):
         print_line(f"wrote {path}")
+    print_line(f"wrote {_draw_proposal(folder, scenario, settings.threat)}")
+
+
+def _draw_proposal(folder: "RunFolder", scenario: Scenario, threat: str) -> Path:
+    """Draw what the agent proposes on the run's scenario, a known charge drawn; return the file."""
+    from blast_agents.training import load_agent, newest_weights
+
+    agent = load_agent(folder.path, newest_weights(folder.path))
+    charge = None if threat == "hidden" else scenario.sample_charge(np.random.default_rng(0))
+    shown = scenario.with_charge(charge) if isinstance(charge, Charge) else scenario
+    return save_layout_picture(shown, agent.propose(scenario, charge), folder.path)

@@ -30,6 +30,10 @@ LONGEST_VALUE: Final = 400
 """The most characters of the run record in one cell; the rest goes on in the next row."""
 
 
+MOST_PRINTED_ROWS: Final = 400
+"""The most rows of a sheet that are printed, some ten pages; the print area can be lifted."""
+
+
 _EXACT_INTEGER: Final = 10**15  # Excel rounds greater ones
 
 
@@ -553,6 +557,9 @@ class _WorkbookWriter:
             if column.meaning:
                 sheet.write_comment(0, index, column.meaning, {"y_scale": 0.6})
         sheet.autofilter(0, 0, len(table), len(columns) - 1)
+        if len(table) > MOST_PRINTED_ROWS:
+            sheet.print_area(0, 0, MOST_PRINTED_ROWS, len(columns) - 1)
+            sheet.set_header(f"&RPrinted: the first {MOST_PRINTED_ROWS} of {len(table):,} rows")
         writers = [
             (index, getattr(sheet, style.method), self._format(style.number_format))
             for index, style in enumerate(styles)

@@ -13,14 +13,15 @@ from blast_env.physics.structure import Colour, ModularObstacle, ModularPart, lo
 from blast_env.rendering.style import (
     AIR,
     BARRIER,
+    BORDER,
     EXPLOSIVE,
     FAINT,
     INK,
-    LOAD_LABEL,
     PROTECTED,
     QUIET_INK,
     SITE,
     STRUCTURE,
+    LoadUnit,
     nice_floor,
     render_extra,
     short_number,
@@ -172,10 +173,13 @@ def scale_bar(lettering: Lettering, pixels_per_m: float, longest_px: int) -> pyg
     return surface
 
 
-def colour_bar(lettering: Lettering, full_impulse: float, length: int) -> pygame.Surface:
+def colour_bar(
+    lettering: Lettering, full_impulse: float, length: int, unit: LoadUnit
+) -> pygame.Surface:
     """Return the colours from no load to the full load, with three numbers and the unit."""
-    line, thickness = lettering.write(LOAD_LABEL), lettering.size_px
-    texts = ("0", short_number(full_impulse / 2.0, 4), f"≥ {short_number(full_impulse, 4)}")
+    line, thickness = lettering.write(unit.label), lettering.size_px
+    full = unit.factor * full_impulse
+    texts = ("0", short_number(full / 2.0, 3), f"≥ {short_number(full, 3)}")
     numbers = [lettering.write(text) for text in texts]
     margin = numbers[-1].get_width() // 2 + 1
     width = max(line.get_width(), length + 2 * margin)
@@ -194,14 +198,17 @@ def colour_bar(lettering: Lettering, full_impulse: float, length: int) -> pygame
     return surface
 
 
+_LEGEND_ROWS = 3
+
+
 def legend(
-    lettering: Lettering, scene: Scene, build_zone: Rectangle | None, widest_px: int
+    lettering: Lettering, scene: Scene, build_zone: BuildZone | None, widest_px: int
 ) -> pygame.Surface:
     """Return what the signs of the site mean, in as many columns as `widest_px` allows."""
     entries = [(lettering.write(text), draw) for text, draw in _legend_entries(scene, build_zone)]
     sign, gap = lettering.size_px, lettering.size_px // 2
     cell_width = sign + gap + max(text.get_width() for text, _ in entries) + 2 * gap
-    columns = max(1, min(widest_px // cell_width, 2 if len(entries) > 3 else 1))
+    columns = max(1, min(widest_px // cell_width, -(-len(entries) // _LEGEND_ROWS)))
     rows = -(-len(entries) // columns)
     pitch = round(1.45 * lettering.size_px)
     surface = empty_surface(columns * cell_width - 2 * gap, rows * pitch)
@@ -215,10 +222,13 @@ def legend(
 Draw = Callable[[pygame.Surface, pygame.Rect], None]
 
 
-def _legend_entries(scene: Scene, build_zone: Rectangle | None) -> list[tuple[str, Draw]]:
+def _legend_entries(scene: Scene, build_zone: BuildZone | None) -> list[tuple[str, Draw]]:
     """Return the text and the sign of everything that the scene has."""
     outlines = scene.structures
-    entries: list[tuple[str, Draw]] = [("explosive ball", _ball_sign(EXPLOSIVE))]
+    entries: list[tuple[str, Draw]] = [
+        ("charge", lambda s, r: draw_star(s, r.center, 0.5 * r.width)),
+        ("explosive ball", _ball_sign(EXPLOSIVE)),
+    ]
     if scene.parameters.air.spacing_units > 0.0:
         entries.append(("air ball", _ball_sign(AIR)))
     if any(outline.protected for outline in outlines):
@@ -231,6 +241,9 @@ def _legend_entries(scene: Scene, build_zone: Rectangle | None) -> list[tuple[st
         entries.append(("destroyed module", draw_destroyed))
     if build_zone is not None:
         entries.append(("build zone", lambda s, r: dashed_rectangle(s, r, QUIET_INK, 3)))
+        if build_zone.keep_outs:
+            entries.append(("keep-out", lambda s, r: hatch(s, r, FAINT)))
+    entries.append(("site border", _border_sign))
     return entries
 
 
@@ -240,6 +253,10 @@ def draw_destroyed(surface: pygame.Surface, place: pygame.Rect) -> None:
     pygame.draw.rect(surface, SITE, place)
     pygame.draw.line(surface, INK, place.topleft, (right, bottom))
     pygame.draw.line(surface, INK, (right, place.top), (place.left, bottom))
+
+
+def _border_sign(surface: pygame.Surface, place: pygame.Rect) -> None:
+    pygame.draw.rect(surface, BORDER, place, 2)
 
 
 def _ball_sign(colour: Colour) -> Draw:
@@ -287,6 +304,7 @@ def flow(
 
 
 _SMALLEST_GRID_PX = 6
+_STAR_INNER = 0.38  # of the radius; as matplotlib's star
 
 
 def draw_obstacle(
@@ -351,11 +369,23 @@ def draw_build_zone(surface: pygame.Surface, view: View, zone: BuildZone) -> Non
     dashed_rectangle(surface, whole, QUIET_INK)
 
 
-def draw_charge_mark(surface: pygame.Surface, view: View, scene: Scene) -> None:
-    """Draw a cross where the charge is."""
-    x, y = view.pixel(*scene.charge_centre)
-    for slope in (-1, 1):
-        pygame.draw.line(surface, QUIET_INK, (x - 6, y - 6 * slope), (x + 6, y + 6 * slope), 2)
+def draw_charge_mark(
+    surface: pygame.Surface, view: View, scene: Scene, radius_px: float = 9.0
+) -> None:
+    """Draw the star where the charge is that marks it in all pictures."""
+    draw_star(surface, view.pixel(*scene.charge_centre), radius_px)
+
+
+def draw_star(surface: pygame.Surface, centre: Point, radius_px: float) -> None:
+    """Draw the star of a charge."""
+    turns = np.pi * np.arange(10) / 5.0
+    lengths = radius_px * np.where(np.arange(10) % 2, _STAR_INNER, 1.0)
+    points = [
+        (centre[0] + length * float(np.sin(turn)), centre[1] - length * float(np.cos(turn)))
+        for turn, length in zip(turns, lengths, strict=True)
+    ]
+    pygame.draw.polygon(surface, EXPLOSIVE, points)
+    pygame.draw.aalines(surface, INK, True, points)
 
 
 def name_plates(

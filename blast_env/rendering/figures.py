@@ -17,12 +17,13 @@ from blast_env.physics.particles import CollisionType, explosion_fan
 from blast_env.physics.scene import Scene, StructureOutline
 from blast_env.physics.structure import Colour, ModularObstacle, load_colour
 from blast_env.recording.tables import faces_hit
-from blast_env.rendering.heat_map import common_scale, heat_map
+from blast_env.rendering.heat_map import LoadScale, common_scale, heat_map
 from blast_env.rendering.site_plan import (
     draw_outline,
     draw_site,
     in_metres,
     rectangle_patch,
+    what_stands,
     write_heading,
     write_names,
 )
@@ -33,6 +34,7 @@ from blast_env.rendering.style import (
     INK,
     QUIET_INK,
     STRUCTURE,
+    LoadUnit,
     blast_title,
     count_of,
     number_on_axis,
@@ -82,7 +84,7 @@ def model_scheme(scene: Scene) -> Figure:
         frameon=False,
     )
     figure.suptitle("Model scheme: the state at the detonation", fontsize=14, fontweight="bold")
-    write_names(plan, scene.structures, below=True)
+    write_names(plan, what_stands(scene.structures), below=True)
     return figure
 
 
@@ -266,9 +268,10 @@ def impulse_over_time(result: BlastResult) -> Figure:
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     table = result.collisions.assign(facade=faces_hit(result.collisions))
     end_ms = shown_until_s(result) * MS_PER_S
+    unit = LoadUnit.of(result)
     for axes, obstacle in zip(panels, shown, strict=False):
         hits = table[table["structure"] == obstacle.name]
-        _draw_structure(axes, obstacle, hits, end_ms)
+        _draw_structure(axes, obstacle, hits, end_ms, unit.of_structures.get(obstacle.name))
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
     title, subtitle = blast_title(result.blast)
@@ -285,13 +288,18 @@ def impulse_over_time(result: BlastResult) -> Figure:
 
 
 def _draw_structure(
-    axes: Axes, obstacle: ModularObstacle, hits: pd.DataFrame, end_ms: float
+    axes: Axes,
+    obstacle: ModularObstacle,
+    hits: pd.DataFrame,
+    end_ms: float,
+    factor: float | None,
 ) -> None:
+    """Draw the impulse on each facade; `factor` takes it to Pa s, where there is a calibration."""
     for facade, colour, style in _FACADES:
         own = hits[hits["facade"] == facade]
         if not len(own):
             continue
-        arrived = own["impulse_sim"].cumsum().to_numpy()
+        arrived = (factor or 1.0) * own["impulse_sim"].cumsum().to_numpy()
         time_ms = own["time_s"].to_numpy() * MS_PER_S
         axes.step(
             np.concatenate(([0.0], time_ms, [max(end_ms, time_ms[-1])])),
@@ -314,7 +322,7 @@ def _draw_structure(
     axes.set_title(f"{obstacle.name}{role}", fontsize=11)
     axes.set_xlabel("time (ms)")
     axes.xaxis.set_tick_params(labelbottom=True)
-    axes.set_ylabel("cumulative impulse (simulation units)")
+    axes.set_ylabel(f"cumulative impulse ({'simulation units' if factor is None else 'Pa s'})")
     axes.yaxis.set_major_formatter(FuncFormatter(number_on_axis))
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
@@ -323,6 +331,7 @@ def _draw_structure(
 __all__ = [
     "FIGURE_SUFFIXES",
     "Figure",
+    "LoadScale",
     "common_scale",
     "heat_map",
     "impulse_over_time",

@@ -15,8 +15,14 @@ import numpy as np
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.engine import BlastRun
-from blast_env.rendering.frames import Frame, FramePainter
-from blast_env.rendering.style import PAGE, nice_ceiling, nice_numbers, render_extra, shown_until_s
+from blast_env.rendering.frames import ONE_SEED, SIMULATION_UNITS, Frame, FramePainter
+from blast_env.rendering.style import (
+    PAGE,
+    LoadUnit,
+    nice_numbers,
+    render_extra,
+    shown_until_s,
+)
 from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MS_PER_S
 
@@ -339,9 +345,13 @@ def write_film(
         plan = plan_film(result, frames_per_s, slow_motion)
         if suffix == ".gif":
             plan, width_px = for_gif(plan, width_px)
-        full_impulse = largest_load(result) if full_impulse is None else full_impulse
+        unit = LoadUnit.of(result)
+        if full_impulse is None:
+            full_impulse = largest_load(result, unit)
         even_px = width_px - width_px % 2
-        painter = FramePainter.for_blast(blast, width_px=even_px, full_impulse=full_impulse)
+        painter = FramePainter.for_blast(
+            blast, width_px=even_px, full_impulse=full_impulse, unit=unit
+        )
         with open_film(suffix, temporary, plan, blast.scenario.name, _comment(plan, blast)) as film:
             _draw(blast.start(), painter, plan, film, tell)
     tell(1.0)
@@ -436,15 +446,18 @@ def _usual_slow_motion(end_s: float) -> float:
     return min(factors, key=lambda factor: abs(factor * end_s - _USUAL_S))
 
 
-def largest_load(result: BlastResult) -> float | None:
-    """Return the largest load of a protected module, of any one if these have none, or None."""
+def largest_load(result: BlastResult, unit: LoadUnit = SIMULATION_UNITS) -> float | None:
+    """Return the largest load of a protected module, of any one if these have none, or None.
+
+    It is rounded up to few digits in the unit.
+    """
     for obstacles in (
         [obstacle for obstacle in result.obstacles if obstacle.protected],
         list(result.obstacles),
     ):
         loads = [part.impulse for obstacle in obstacles for part in obstacle.parts]
         if max(loads, default=0.0) > 0.0:
-            return nice_ceiling(max(loads))
+            return unit.nice_ceiling(max(loads))
     return None
 
 
@@ -538,15 +551,20 @@ def _painters(
     panels: Sequence[FilmPanel], results: Sequence[BlastResult], width_px: int
 ) -> list[FramePainter]:
     """Return a painter a panel, all with the colours of the largest load on what is protected."""
-    largest = max((largest_load(result) or 0.0 for result in results), default=0.0)
+    loads = [largest_load(result) or 0.0 for result in results]
+    largest = max(loads)
+    unit = LoadUnit.of(results[loads.index(largest)])  # one for all, so that they compare
+    full_impulse = unit.nice_ceiling(largest) if largest > 0.0 else None
     return [
         FramePainter(
             panel.blast.scene,
             title=panel.title,
             subtitle=panel.subtitle,
             width_px=width_px - width_px % 2,
-            full_impulse=largest or None,
+            full_impulse=full_impulse,
             build_zone=panel.blast.scenario.build_zone,
+            unit=unit,
+            remark=ONE_SEED,
         )
         for panel in panels
     ]

@@ -1,7 +1,7 @@
 """Frames of a blast after the paper's Figure 4, drawn in memory: no display is needed."""
 
 from collections.abc import Sequence
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from blast_env.rendering.style import (
     PAGE,
     QUIET_INK,
     SITE,
+    LoadUnit,
     blast_title,
     free_flight_impulse,
     nice_ceiling,
@@ -39,7 +40,7 @@ from blast_env.rendering.style import (
 )
 from blast_env.scenario.models import BuildZone
 from blast_env.simulation import Blast
-from blast_env.units import MS_PER_S, UNITS_PER_M
+from blast_env.units import MS_PER_S
 
 with render_extra():
     import pygame
@@ -49,6 +50,12 @@ Frame = NDArray[np.uint8]
 _NARROWEST_PX = 320
 _WIDEST_PX = 4096
 _SMALLEST_RADIUS_PX = 2.0
+
+SIMULATION_UNITS: Final = LoadUnit()
+"""Loads without a calibration."""
+
+ONE_SEED: Final = "one draw of fan and air of many: judge by the mean over seeds"
+"""What a film of one seed does not say."""
 
 
 class FramePainter:
@@ -63,6 +70,8 @@ class FramePainter:
             scale. Without it a bound from the scene alone is used, so that all layouts of one
             scenario and charge have the same scale.
         build_zone: Where barrier modules may stand; drawn as a dashed grid.
+        unit: In what loads are shown.
+        remark: A third line, quiet as the second.
 
     Raises:
         BlastEnvError: If the width is out of bounds.
@@ -77,24 +86,32 @@ class FramePainter:
         width_px: int = 960,
         full_impulse: float | None = None,
         build_zone: BuildZone | None = None,
+        unit: LoadUnit = SIMULATION_UNITS,
+        remark: str = "",
     ) -> None:
         if not _NARROWEST_PX <= width_px <= _WIDEST_PX:
             raise BlastEnvError(f"width_px is {width_px}, must be {_NARROWEST_PX} to {_WIDEST_PX}")
         if full_impulse is None or full_impulse <= 0.0:
             full_impulse = nice_ceiling(free_flight_impulse(scene))
         self.full_impulse = full_impulse
+        self._unit = unit
         self._scene = scene
         self._small = Lettering(max(round(width_px / 68), 10))
         self._large = Lettering(max(round(width_px / 52), 13))
         self._margin = max(round(width_px / 48), 8)
         self.view = self._arrange(width_px)
-        self._ground = self._draw_ground(width_px, title, subtitle, build_zone)
+        self._ground = self._draw_ground(width_px, (title, subtitle, remark), build_zone)
         self._plates = name_plates(self._small, self.view, scene.structures)
         self._discs: dict[tuple[int, int], pygame.Surface] = {}
 
     @classmethod
     def for_blast(
-        cls, blast: Blast, *, width_px: int = 960, full_impulse: float | None = None
+        cls,
+        blast: Blast,
+        *,
+        width_px: int = 960,
+        full_impulse: float | None = None,
+        unit: LoadUnit = SIMULATION_UNITS,
     ) -> Self:
         """Return a painter that names scenario, charge, layout and seed in every frame."""
         title, subtitle = blast_title(blast)
@@ -105,6 +122,8 @@ class FramePainter:
             width_px=width_px,
             full_impulse=full_impulse,
             build_zone=blast.scenario.build_zone,
+            unit=unit,
+            remark=ONE_SEED,
         )
 
     @property
@@ -137,11 +156,18 @@ class FramePainter:
         clock = self._large.write(f"{time_s * MS_PER_S:.2f} ms", bold=True)
         right = self._size_px[0] - self._margin
         surface.blit(clock, clock.get_rect(topright=(right, self._line_tops[0])))
-        remark = self._small.write(note, QUIET_INK)
-        surface.blit(remark, remark.get_rect(topright=(right, self._line_tops[1])))
+        for text, top in zip((note, self._so_far(obstacles)), self._line_tops[1:], strict=True):
+            remark = self._small.write_within(text, round(0.45 * right), QUIET_INK, bold=False)
+            surface.blit(remark, remark.get_rect(topright=(right, top)))
         width, height = self._size_px
         pixels = np.frombuffer(pygame.image.tobytes(surface, "RGB"), dtype=np.uint8)
         return pixels.reshape(height, width, 3).copy()
+
+    def _so_far(self, obstacles: Sequence[ModularObstacle]) -> str:
+        """Return the loads on what is protected at this moment."""
+        protected = [each for each in obstacles if each.protected]
+        loads = [f"{each.name} {self._unit.of_structure(each)}" for each in protected]
+        return f"so far: {', '.join(loads)}" if loads else ""
 
     @property
     def _border(self) -> pygame.Rect:
@@ -152,8 +178,9 @@ class FramePainter:
         """Find the scale, so that neither width nor height gets out of hand."""
         first = self._margin // 2
         second = first + round(1.3 * self._large.size_px)
-        self._line_tops = (first, second)
-        header_px = second + round(1.6 * self._small.size_px) + self._margin // 3
+        third = second + round(1.4 * self._small.size_px)
+        self._line_tops = (first, second, third)
+        header_px = third + round(1.6 * self._small.size_px) + self._margin // 3
         site = self._scene.site
         width, height = site.right - site.left, site.top - site.bottom
         room_px = width_px - 2 * self._margin
@@ -163,15 +190,16 @@ class FramePainter:
         return View(site, left_px, header_px, scale)
 
     def _draw_ground(
-        self, width_px: int, title: str, subtitle: str, build_zone: BuildZone | None
+        self, width_px: int, lines: tuple[str, str, str], build_zone: BuildZone | None
     ) -> pygame.Surface:
         """Draw everything that is the same in all frames."""
         room_px = width_px - 2 * self._margin
-        zone = None if build_zone is None else build_zone.rectangle_m.scaled(UNITS_PER_M)
         blocks = [
             scale_bar(self._small, self.view.pixels_per_m, round(0.16 * width_px)),
-            legend(self._small, self._scene, zone, round(0.5 * width_px)),
-            colour_bar(self._small, self.full_impulse, min(round(0.28 * width_px), room_px)),
+            legend(self._small, self._scene, build_zone, round(0.55 * width_px)),
+            colour_bar(
+                self._small, self.full_impulse, min(round(0.28 * width_px), room_px), self._unit
+            ),
         ]
         placed, footer_px = flow(blocks, room_px, self._margin)
         height_px = self._footer_top_px + footer_px + self._margin // 2
@@ -180,9 +208,9 @@ class FramePainter:
         ground.fill(PAGE)
         for block, (left, top) in placed:
             ground.blit(block, (self._margin + left, self._footer_top_px + top))
-        for text, lettering, top, bold in (
-            (title, self._large, self._line_tops[0], True),
-            (subtitle, self._small, self._line_tops[1], False),
+        letterings = (self._large, self._small, self._small)
+        for text, lettering, top, bold in zip(
+            lines, letterings, self._line_tops, (True, False, False), strict=True
         ):
             colour = INK if bold else QUIET_INK
             line = lettering.write_within(text, round(0.55 * room_px), colour, bold)

@@ -1,8 +1,10 @@
 """The impulse on every module, in its place on the site."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import isqrt
 
+from blast_env.errors import BlastEnvError
 from blast_env.physics.structure import ModularObstacle
 from blast_env.rendering.site_plan import (
     draw_charge,
@@ -13,13 +15,14 @@ from blast_env.rendering.site_plan import (
     in_metres,
     legend_handles,
     load_colours,
+    what_stands,
     write_heading,
     write_names,
 )
 from blast_env.rendering.style import (
     INK,
-    LOAD_LABEL,
     PROTECTED,
+    LoadUnit,
     blast_title,
     count_of,
     nice_ceiling,
@@ -49,8 +52,26 @@ _LARGEST_NUMBER_PT, _SMALLEST_NUMBER_PT = 9.0, 5.5
 _DARK_SHARE = 0.55  # of the scale; numbers turn white there
 
 
+@dataclass(frozen=True)
+class LoadScale:
+    """The colour scale of a heat map.
+
+    Attributes:
+        full: The load of a module that has the last colour, in the unit.
+        unit: In what the loads are shown.
+    """
+
+    full: float
+    unit: LoadUnit
+
+    @property
+    def norm(self) -> Normalize:
+        """The scale for matplotlib."""
+        return Normalize(0.0, self.full)
+
+
 def heat_map(
-    result: BlastResult, structure: str | None = None, scale: Normalize | None = None
+    result: BlastResult, structure: str | None = None, scale: LoadScale | None = None
 ) -> Figure:
     """Return the impulse on every module, on the site plan and enlarged.
 
@@ -82,32 +103,32 @@ def heat_map(
         _PANELS_HEIGHT_IN / rows,
     )
     for axes, obstacle in zip(panels, chosen, strict=True):
-        _draw_panel(axes, obstacle, scale, room_in)
+        _draw_panel(axes, result, obstacle, scale, room_in)
     _add_colour_bar(figure, panels, scale, result)
     _add_legend(figure, result)
     title, subtitle = blast_title(result.blast)
     write_heading(figure, f"{title}: impulse per module", subtitle)
-    write_names(overview, result.obstacles)
+    write_names(overview, what_stands(result.blast.scene.structures))
     return figure
 
 
-def common_scale(results: Sequence[BlastResult], structure: str | None = None) -> Normalize:
+def common_scale(results: Sequence[BlastResult], structure: str | None = None) -> LoadScale:
     """Return one colour scale for the heat maps of several results, say without and with a barrier.
 
     Args:
-        results: The results.
+        results: The results; the calibration is applied to the one with the largest load.
         structure: As for `heat_map`.
 
     Raises:
         UnknownNameError: If there is no structure of that name.
     """
-    largest = max(
-        part.impulse
+    loads = [
+        max(part.impulse for obstacle in _chosen(result, structure) for part in obstacle.parts)
         for result in results
-        for obstacle in _chosen(result, structure)
-        for part in obstacle.parts
-    )
-    return Normalize(0.0, nice_ceiling(largest) if largest > 0.0 else 1.0)
+    ]
+    largest = max(loads)
+    unit = LoadUnit.of(results[loads.index(largest)])
+    return LoadScale(nice_ceiling(unit.factor * largest) if largest > 0.0 else 1.0, unit)
 
 
 def _chosen(result: BlastResult, structure: str | None) -> list[ModularObstacle]:
@@ -134,24 +155,36 @@ def _widths_in(
     return plan + _PLAN_LABELS_IN, panels + columns * _PANEL_LABELS_IN + _COLOUR_BAR_IN
 
 
-def _draw_overview(axes: Axes, result: BlastResult, scale: Normalize) -> None:
+def _draw_overview(axes: Axes, result: BlastResult, scale: LoadScale) -> None:
     blast = result.blast
     zone = blast.scenario.build_zone
     draw_site(axes, in_metres(blast.scene.site))
     if zone is not None:
         draw_zone(axes, zone)
     for obstacle in result.obstacles:
-        draw_loads(axes, obstacle, scale, linewidth=0.25)
+        draw_loads(axes, obstacle, scale.norm, 0.25, scale.unit.factor)
         draw_outline(axes, obstacle)
     draw_charge(axes, blast.scene.charge.position_m)
     axes.set_title("Site", fontsize=11)
 
 
+def _total(result: BlastResult, obstacle: ModularObstacle) -> str:
+    """Return the load on a structure in words: its own in Pa s, where the calibration has one."""
+    try:
+        return f"{result.impulse(obstacle.name).pa_s:,.0f} Pa s"
+    except BlastEnvError:
+        return f"{obstacle.impulse:,.0f} in all"
+
+
 def _draw_panel(
-    axes: Axes, obstacle: ModularObstacle, scale: Normalize, room_in: tuple[float, float]
+    axes: Axes,
+    result: BlastResult,
+    obstacle: ModularObstacle,
+    scale: LoadScale,
+    room_in: tuple[float, float],
 ) -> None:
     rectangle = in_metres(obstacle.rectangle)
-    draw_loads(axes, obstacle, scale, linewidth=0.6)
+    draw_loads(axes, obstacle, scale.norm, 0.6, scale.unit.factor)
     draw_outline(axes, obstacle)
     reach = 0.25
     axes.set_xlim(rectangle.left - reach, rectangle.right + reach)
@@ -163,7 +196,7 @@ def _draw_panel(
     hits = sum(part.hits for part in obstacle.parts)
     axes.set_title(
         f"{obstacle.name}{' (protected)' if obstacle.protected else ''}\n"
-        f"{obstacle.impulse:,.0f} in all from {count_of('hit', hits)}",
+        f"{_total(result, obstacle)} from {count_of('hit', hits)}",
         fontsize=11,
         color=unit_interval(PROTECTED if obstacle.protected else INK),
     )
@@ -173,17 +206,18 @@ def _draw_panel(
     _write_numbers(axes, obstacle, scale, min(0.34 * cell_pt, _LARGEST_NUMBER_PT))
 
 
-def _write_numbers(axes: Axes, obstacle: ModularObstacle, scale: Normalize, size_pt: float) -> None:
+def _write_numbers(axes: Axes, obstacle: ModularObstacle, scale: LoadScale, size_pt: float) -> None:
     """Write the impulse into every module that was hit, if there is room."""
     if size_pt < _SMALLEST_NUMBER_PT:
         return
     for part in obstacle.parts:
         if part.hits:
-            dark = part.impulse > _DARK_SHARE * float(scale.vmax or 0.0)
+            load = scale.unit.factor * part.impulse
+            dark = load > _DARK_SHARE * scale.full
             centre = in_metres(part.rectangle).centre
             number = axes.text(
                 *centre,
-                short_number(part.impulse),
+                short_number(load),
                 ha="center",
                 va="center",
                 fontsize=size_pt,
@@ -191,7 +225,7 @@ def _write_numbers(axes: Axes, obstacle: ModularObstacle, scale: Normalize, size
                 zorder=4,
             )
             if part.destroyed:  # keep the cross off the number
-                ground = load_colours()(scale(part.impulse))
+                ground = load_colours()(scale.norm(load))
                 number.set_bbox({"facecolor": ground, "edgecolor": "none", "pad": 1.5})
 
 
@@ -204,19 +238,19 @@ def _add_legend(figure: Figure, result: BlastResult) -> None:
 
 
 def _add_colour_bar(
-    figure: Figure, panels: list[Axes], scale: Normalize, result: BlastResult
+    figure: Figure, panels: list[Axes], scale: LoadScale, result: BlastResult
 ) -> None:
     beyond = any(
-        part.impulse > float(scale.vmax or 0.0)
+        scale.unit.factor * part.impulse > scale.full
         for obstacle in result.obstacles
         for part in obstacle.parts
     )
     bar = figure.colorbar(
-        ScalarMappable(scale, load_colours()),
+        ScalarMappable(scale.norm, load_colours()),
         ax=panels,
         extend="max" if beyond else "neither",
         shrink=0.85,
         pad=0.03,
         format=FuncFormatter(number_on_axis),
     )
-    bar.set_label(f"{LOAD_LABEL}; white: not hit")
+    bar.set_label(f"{scale.unit.label}; white: not hit")

@@ -28,7 +28,13 @@ from blast_env.rendering.gas import (
     gas_subtitle,
     layout_words,
 )
-from blast_env.rendering.site_plan import draw_charge, in_metres, layout_legend, rectangle_patch
+from blast_env.rendering.site_plan import (
+    draw_charge,
+    draw_zone,
+    in_metres,
+    layout_legend,
+    rectangle_patch,
+)
 from blast_env.rendering.style import (
     BARRIER,
     BORDER,
@@ -391,6 +397,11 @@ class PressurePainter:
             top_m = site.air_height_m if outline.height_m is None else outline.height_m
             for rectangle in _parts(outline):
                 self._add_solid(axes, rectangle, outline, is_cut=top_m > height_m)
+        zone = shot.result.blast.scenario.build_zone
+        if zone is not None:
+            drawn = len(axes.patches)
+            draw_zone(axes, zone)
+            self._let_move(axes, axes.patches[drawn:])
         before = len(axes.lines)
         draw_charge(axes, site.charge.position_m)
         line = axes.axhline if shot.section.axis == "y" else axes.axvline
@@ -508,7 +519,7 @@ class PressurePainter:
 
     def _handles(self) -> list[Artist]:
         structures = [each for shot in self.shots for each in shot.result.run.site.structures]
-        handles = [h for h in layout_legend(structures, None) if h.get_label() != "site border"]
+        handles = layout_legend(structures, self.shots[0].result.blast.scenario.build_zone)
         for handle in handles:
             if isinstance(handle, Line2D):
                 handle.set_markersize(10.0)

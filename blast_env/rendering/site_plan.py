@@ -137,15 +137,27 @@ def _shade(height_m: float | None, highest_m: float | None) -> tuple[float, floa
 
 
 def draw_loads(
-    axes: Axes, obstacle: ModularObstacle, scale: Normalize, linewidth: float = 0.4
+    axes: Axes,
+    obstacle: ModularObstacle,
+    scale: Normalize,
+    linewidth: float = 0.4,
+    factor: float = 1.0,
 ) -> PatchCollection:
     """Draw the modules in the colours of their loads; one that was not hit stays white.
 
+    Args:
+        axes: The axes.
+        obstacle: The structure or barrier.
+        scale: The colour scale.
+        linewidth: Of the modules' edges.
+        factor: From the impulses to the unit of the scale.
+
     Returns:
-        The modules; its array has their impulses in their order, masked where nothing hit.
+        The modules; its array has their loads in their order, masked where nothing hit.
     """
     impulse = np.ma.masked_array(
-        [part.impulse for part in obstacle.parts], [part.hits == 0 for part in obstacle.parts]
+        [factor * part.impulse for part in obstacle.parts],
+        [part.hits == 0 for part in obstacle.parts],
     )
     is_barrier = obstacle.cells is not None
     modules = PatchCollection(
@@ -236,6 +248,7 @@ def _star(*position_m: float) -> Line2D:
 
 
 _GAP_PT = 4.0
+_TALL: Final = 3.0  # a structure so many times as high as wide has its name beside it
 
 
 def write_heading(figure: Figure, title: str, subtitle: str) -> None:
@@ -318,10 +331,15 @@ def _settle(text: Annotation, own: Bbox, taken: Sequence[Bbox], site: Bbox, belo
     first = ((own.height + box.height) / 2.0 + gap) * (-1.0 if below else 1.0)
     side = (own.width + box.width) / 2.0 + gap
     low = own.height / 2.0 - box.height
+    over_or_under = [(0.0, first), (0.0, -first)]
+    beside = [(sign * side, shift) for shift in (0.0, low, -low) for sign in (1.0, -1.0)]
+    if own.height > _TALL * own.width:
+        over_or_under, beside = beside, over_or_under
     for across, along in (
-        (0.0, first),
-        (0.0, -first),
-        *((sign * side, shift) for shift in (0.0, low, -low) for sign in (1.0, -1.0)),
+        *over_or_under,
+        *beside,
+        *((sign * side, shift) for shift in (first, -first) for sign in (1.0, -1.0)),
+        *((shift, 2.0 * far) for far in (first, -first) for shift in (0.0, side, -side)),
     ):
         place = box.translated(across, along)
         inside = Bbox.intersection(place, site)

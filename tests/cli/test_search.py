@@ -53,7 +53,7 @@ def test_it_finds_what_the_library_finds_and_writes_all_files(site: Path, tmp_pa
     for name, table in (("history", expected.history_table()), ("front", expected.front_table())):
         written = pd.read_csv(out / f"{name}.csv").fillna("")  # the empty layout is an empty field
         pd.testing.assert_frame_equal(written, table, check_dtype=False, rtol=1e-9)
-    for name in ("layout.json", "history.csv", "front.csv", "search.png"):
+    for name in ("layout.json", "layout.png", "history.csv", "front.csv", "search.png"):
         assert f"wrote {out / name}" in result.stdout
     assert (out / "search.png").stat().st_size > 10_000
 
@@ -93,7 +93,7 @@ def test_a_rule_spends_nothing(site: Path, tmp_path: Path) -> None:
     result = search("--method", "wall_near_charge", *options)
     assert result.exit_code == 0, result.output
     assert "0 of 200 blasts spent" in result.stdout
-    assert [path.name for path in out.iterdir()] == ["layout.json"]
+    assert sorted(path.name for path in out.iterdir()) == ["layout.json", "layout.png"]
 
 
 def test_it_begins_with_given_layouts_and_keeps_blasts(site: Path, tmp_path: Path) -> None:

@@ -3,12 +3,26 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
+import pandas as pd
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.recording.excel import EXCEL_ROWS, record_cells, write_workbook
-from blast_env.recording.tables import COLLISION_COLUMNS, MODULE_COLUMNS, STRUCTURE_COLUMNS
+from blast_env.recording.excel import (
+    EXCEL_ROWS,
+    MOST_PRINTED_ROWS,
+    SheetTable,
+    record_cells,
+    write_tables,
+    write_workbook,
+)
+from blast_env.recording.tables import (
+    COLLISION_COLUMNS,
+    MODULE_COLUMNS,
+    STRUCTURE_COLUMNS,
+    RunRecord,
+)
 from blast_env.simulation import BlastResult
+from blast_env.tables import Column
 from tests.recording import workbooks
 from tests.recording.conftest import SEED
 
@@ -290,3 +304,20 @@ def test_a_folder_that_cannot_be_written_to_is_named(
 def test_a_folder_closed_to_everybody(blast: BlastResult) -> None:
     with pytest.raises(BlastEnvError, match=r"/proc/blast\.xlsx: cannot be written"):
         write_workbook(blast, Path("/proc/blast.xlsx"))
+
+
+def test_a_long_table_prints_on_few_pages(tmp_path: Path) -> None:
+    """Thousands of collisions would be hundreds of pages; the sheet has them all the same."""
+    table = pd.DataFrame({"number": range(3000)})
+    record: RunRecord = {"scenario": "a", "engine": "b", "blast-env version": "c"}
+    columns = (Column("number", "", "a number"),)
+    path = write_tables(record, [SheetTable("Long", table, columns)], tmp_path / "a.xlsx")
+    with ZipFile(path) as file:
+        names = file.read("xl/workbook.xml").decode()
+        sheet = file.read("xl/worksheets/sheet2.xml").decode()
+    assert f"Long!$A$1:$A${MOST_PRINTED_ROWS + 1}" in names
+    assert "Long!$1:$1" in names  # the headings come again on every page
+    assert 'orientation="landscape"' in sheet
+    assert 'fitToHeight="0"' in sheet
+    assert sheet.count("<row ") == 3001
+    assert "of 3,000 rows" in sheet
