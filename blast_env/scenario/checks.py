@@ -9,11 +9,9 @@ from typing import Any, Final, TypeVar
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Rectangle
 from blast_env.physics.parameters import AirParameters, SimulationParameters
 from blast_env.physics.particles import lattice_capacity
-from blast_env.physics.presets import for_charge
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.scenario.heights import air_height_m, depth_inside_m, is_over
 from blast_env.scenario.problems import Problem, extent
@@ -146,10 +144,7 @@ def check_sources(parts: Parts) -> tuple[Problem, ...]:
 
     Those are what `check_parts` finds if the other sections fit each other.
     """
-    problems = (*_charge_problems(parts), *_build_zone_problems(parts))
-    if parts.parameters is None:
-        return problems
-    return (*problems, *_charge_scaling_problems(parts.parameters, parts.sources))
+    return (*_charge_problems(parts), *_build_zone_problems(parts))
 
 
 def _sound(adapter: TypeAdapter[Checked], value: object) -> Checked | None:
@@ -408,7 +403,6 @@ def _simulation_problems(parts: Parts) -> Iterator[Problem]:
     """Check that no balls overlap at the start."""
     if parts.parameters is None:
         return
-    yield from _charge_scaling_problems(parts.parameters, parts.sources)
     air, explosive = parts.parameters.air, parts.parameters.explosive
     if 0.0 < air.spacing_units < 2.0 * air.radius_units:
         yield Problem(
@@ -428,17 +422,6 @@ def _simulation_problems(parts: Parts) -> Iterator[Problem]:
                 f" {explosive.ball_count} balls of one charge that collide with each other"
                 " (collide_within_charge): they would overlap",
             )
-
-
-def _charge_scaling_problems(
-    parameters: SimulationParameters, sources: Mapping[int, AnySource]
-) -> Iterator[Problem]:
-    """Check that the parameters reach to the mass of every charge."""
-    for index, source in sources.items():
-        try:
-            for_charge(parameters, source.tnt_kg)
-        except BlastEnvError as error:
-            yield Problem(f"charge[{index}].tnt_kg", str(error).removeprefix("tnt_kg "))
 
 
 def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:
