@@ -5,7 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout, Rectangle
+from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.presets import for_charge
 from blast_env.physics.scene import BlastSite, Charge, Gauge, Scene, StructureOutline
@@ -170,7 +172,7 @@ def build_scene(
     """
     base = build_site(scenario, layout, seed, charge)
     _check_not_over_a_roof(scenario, base.charge)
-    parameters = for_charge(scenario.parameters, base.charge.tnt_kg)
+    parameters = _parameters_for(scenario, base.charge)
     _, fan_rng, air_rng = random_streams(seed)
     air = air_lattice(
         parameters.air,
@@ -203,6 +205,16 @@ def _check_clear(scenario: Scenario, placement: Placement) -> None:
     usable = usable_cells(scenario)
     if not all(usable[cell] for cell in placement.cells):
         check_layout(scenario, placement.layout)
+
+
+def _parameters_for(scenario: Scenario, charge: AnyCharge) -> SimulationParameters:
+    """Return the parameters of a charge; only particles have bounds on its mass."""
+    try:
+        return for_charge(scenario.parameters, charge.tnt_kg)
+    except BlastEnvError as error:
+        raise BlastEnvError(
+            f"{scenario.name}: charge: {error}; engine 'gas' takes this charge"
+        ) from error
 
 
 def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:

@@ -272,6 +272,7 @@ class BlastResult:
             "seed": blast.seed,
             "charge x (m)": charge.position_m[0],
             "charge y (m)": charge.position_m[1],
+            "charge height (m)": charge.height_m,
             "charge TNT equivalent (kg)": charge.tnt_kg,
             "engine": self.engine_name,
             "engine version": known["engine"],

@@ -363,6 +363,7 @@ class GasResult:
             "engine": self.engine_name,
             "cell (m)": blast.engine.cell_m,
             "margin (m)": blast.engine.margin_m,
+            "border (m)": blast.engine.border_m,
             "engine version": known["engine"],
             "blast-env version": known["blast_env"],
             "python version": known["python"],

@@ -258,7 +258,7 @@ def test_other_parameters_are_added_to_the_scenario_s_own() -> None:
         Charge((0.0, 15.0), 50.0),  # on the border
         Charge((10.0, 8.0), 50.0),  # in the build zone: fewer usable cells than modules
         Charge((8.0, 15.0), -1.0),
-        Charge((8.0, 15.0), 1e-6),  # the parameters do not reach so far
+        Charge((8.0, 15.0), 1e-6),
         Charge((float("nan"), 15.0), 50.0),
         Charge((20.5, 8.5), float("inf")),
     ],
