@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation import CVAR_LEVEL
 from blast_env.geometry import Layout
 from blast_env.statistics import (
+    CVAR_LEVEL,
     Estimate,
     conditional_value_at_risk,
     mean_estimate,

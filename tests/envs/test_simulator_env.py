@@ -17,6 +17,7 @@ from blast_env.envs.registration import FOR_GAS
 from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.scenario import Scenario, ScenarioError
+from blast_env.simulation import BlastResult
 from tests.scenarios import BALLISTIC_COURTYARD
 
 pytestmark = pytest.mark.slow
@@ -222,6 +223,7 @@ def test_weights_count_in_the_reward() -> None:
     env = make(scenario="street_junction", engine="event", step_s=10.0)
     _, rewards, _ = play(env, 2)
     result = env.result()
+    assert isinstance(result, BlastResult)
     assert fsum(rewards) == -2.0 * result.impulse_sim("block_north_east")
 
 

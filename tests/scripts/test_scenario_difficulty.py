@@ -88,7 +88,7 @@ def test_one_layout_for_all_is_judged_as_evaluate_layout_judges_it(
         assert row.reduction == pytest.approx(expected.reduction)
         assert row.mean_pa_s == pytest.approx(expected.impulse_pa_s)
         assert row.worst_pa_s == pytest.approx(expected.worst.impulse_pa_s)
-        assert row.cvar_pa_s == pytest.approx(expected.cvar)
+        assert row.cvar_pa_s == pytest.approx(expected.cvar_pa_s)
         assert row.modules == len(row.layouts[0])
     assert hidden.bare.reduction == (0.0, 0.0, 0.0)
 
