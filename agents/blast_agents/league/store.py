@@ -21,7 +21,7 @@ from blast_env.evaluation import Case, Threat
 from blast_env.evaluation.store import calibration_digest, engine_text
 from blast_env.files import FolderStore
 from blast_env.geometry import Layout
-from blast_env.physics.engines import find_engine
+from blast_env.physics.engines import find_engine, is_gas
 from blast_env.provenance import code_version, versions
 from blast_env.scenario import AnyCharge, VehicleCharge
 
@@ -37,7 +37,7 @@ class Model(NamedTuple):
     Attributes:
         scenario_hash: Content hash of the scenario.
         engine: The engine with its version.
-        calibration: Digest of the calibration.
+        calibration: Digest of the calibration; `"none"` for gas dynamics.
         code: Version of the package.
     """
 
@@ -88,11 +88,14 @@ def search_key(case: Case, search: Search, engine: str) -> SearchKey:
         CalibrationError: If the scenario has no calibration for the engine.
         UnknownNameError: If there is no such engine.
     """
+    method = repr(search.method)
+    if search.first_engine is not None:
+        method += f" by {engine_text(find_engine(search.first_engine))}, {search.finalists} judged"
     return SearchKey(
         model=_model(case, engine),
         threats=practice_of(case).threats,
         # Functions among the settings: their names, and not where this process has them.
-        method=_ADDRESS.sub("", repr(search.method)),
+        method=_ADDRESS.sub("", method),
         budget=search.budget,
         seed=case.seed,
         code=_search_code(),
@@ -186,10 +189,7 @@ def _search_code() -> str:
 
 def _model(case: Case, engine: str) -> Model:
     found = find_engine(engine)
-    calibration = scenario_calibration(case.scenario, found.name)
-    return Model(
-        case.scenario.content_hash,
-        engine_text(found),
-        calibration_digest(calibration),
-        code_version(),
-    )
+    calibration = "none"  # gas dynamics needs none
+    if not is_gas(found):
+        calibration = calibration_digest(scenario_calibration(case.scenario, found.name))
+    return Model(case.scenario.content_hash, engine_text(found), calibration, code_version())
