@@ -50,13 +50,13 @@ class Comparison:
     def best_rule_each(self) -> Result:
         """The best rule for each case, which only blasts with all of them can tell."""
         rules = self.standings.rules
-        means = np.array([rule.impulse_pa_s.mean(axis=1) for rule in rules])
+        means = np.array([rule.loads.mean(axis=1) for rule in rules])
         chosen = [rules[number] for number in means.argmin(axis=0).tolist()]
         return replace(
             self.best_rule,
             name="best rule for each case",
             proposals=tuple(rule.proposals[case] for case, rule in enumerate(chosen)),
-            impulse_pa_s=np.array([rule.impulse_pa_s[case] for case, rule in enumerate(chosen)]),
+            loads=np.array([rule.loads[case] for case, rule in enumerate(chosen)]),
         )
 
     @property
@@ -97,7 +97,7 @@ class Comparison:
         ahead = self.standings.difference(self.agent, result)
         return (
             result.name,
-            f"{result.impulse_pa_s.mean():,.0f}",
+            f"{result.loads.mean():,.0f}",
             percent(reduction.value),
             interval(reduction),
             *(("-", "-") if result is self.agent else (percent(ahead.value), interval(ahead))),

@@ -18,14 +18,18 @@ from blast_agents.league import (
 )
 
 from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import CellSide, Processes
 from blast_env.cli.output import (
+    engine_text,
     make_table,
     print_line,
     progress_bar,
     result_console,
     user_errors,
 )
+from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine, is_gas
 from blast_env.provenance import command
 
@@ -78,18 +82,24 @@ def league(
     agent_search: Annotated[
         str, typer.Option(help="Blasts that a search from an agent may spend on a case.")
     ] = "",
-    processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
+    cell: CellSide = None,
+    processes: Processes = 1,
     cluster: ClusterAddress = None,
 ) -> None:
     """Compare searches, rules and trained agents on the same held-out cases and seeds.
 
     An interrupted league goes on when it is called again with the same folder.
     """
-    with user_errors(), running_on(cluster):
+    with (
+        user_errors(lambda: "the same command goes on with what is through"),
+        checked_targets(folders={"--out": out}),
+        running_on(cluster),
+    ):
         # Here, because its figures need the extra `render`.
         from blast_agents.league.report import write_league
 
-        noisy = not is_gas(find_engine(engine))
+        chosen = find_engine(engine, cell)
+        noisy = not is_gas(chosen)
         tracks = find_tracks(track, cases, seeds, seed, scenario or (), noisy=noisy)
         runs = _load_runs(run or (), tracks)
         store = ResultStore(out / "results")
@@ -99,7 +109,9 @@ def league(
             first_engine,
             tuple(_numbers(agent_search, "--agent-search")),
         )
-        contests = [_contest(each, runs, searches, store, engine) for each in tracks]
+        contests = [_contest(each, runs, searches, store, chosen) for each in tracks]
+        scenarios = [case.scenario for each in tracks for case in each.cases]
+        print_line(engine_text(chosen, scenarios))
         _print_outlook(contests)
         all_standings = [_play(contest, processes) for contest in contests]
         written = write_league(all_standings, out, shlex.join(command()))
@@ -134,7 +146,7 @@ def _contest(
     runs: "Sequence[TrainedRun]",
     searches: _Searches,
     store: ResultStore,
-    engine: str,
+    engine: Engine,
 ) -> Contest:
     vehicles = all(case.scenario.vehicles for case in track.cases)
     items = all(case.scenario.zone.items for case in track.cases)

@@ -35,7 +35,6 @@ _HIDDEN_THREATS: Final = 8
 
 _PROPOSAL: Final = "this proposal"
 _NOTHING: Final = "no barrier"
-_HEADERS: Final = ("layout", "impulse (Pa s)", "reduction")
 
 
 def propose(
@@ -68,7 +67,7 @@ def propose(
         began_s = perf_counter()
         found = _by_agent(chosen, told)
         if found is None:
-            loads = _loads_pa_s(case, {_NOTHING: (), **rules}, processes)
+            loads = _loads(case, {_NOTHING: (), **rules}, processes)
             name = min(rules, key=lambda rule: loads[rule])
             layout, how = rules[name], f"the best rule by gas dynamics: {name}"
             provenance: dict[str, object] = {"rule": name}
@@ -82,7 +81,7 @@ def propose(
         cost = "" if chosen.zone.budget is None else f", cost {placement.cost:g}"
         print_line(f"{chosen.name}: {layout_counts(layout)}{cost}, by {how}")
         if verify:
-            loads = _loads_pa_s(case, {_NOTHING: (), **rules, _PROPOSAL: layout}, processes)
+            loads = _loads(case, {_NOTHING: (), **rules, _PROPOSAL: layout}, processes)
             _print_verdict(loads, case)
         if out is not None:
             provenance |= {"command": command(), "versions": versions()}
@@ -154,22 +153,24 @@ def _why_not(scenario: Scenario, charge: Charge | None) -> str:
     return f"no weights come with the package for {scenario.name}"
 
 
-def _loads_pa_s(case: Case, layouts: Mapping[str, Layout], processes: int) -> dict[str, float]:
-    """Return the impulse on the protected structures with each layout, by gas dynamics, Pa*s."""
+def _loads(case: Case, layouts: Mapping[str, Layout], processes: int) -> dict[str, float]:
+    """Return the load that counts with each layout, by gas dynamics, in the objective's unit."""
     evaluator = BlastEvaluator(case.scenario, GAS)
+    objective = case.scenario.objective
     pairs = [(layout, threat) for layout in layouts.values() for threat in case.threats]
     with progress_bar(f"{len(set(pairs))} blasts of gas dynamics") as progress:
         loads = iter(evaluator.loads_of_many(pairs, processes, progress))
     return {
-        name: case.combined([next(loads).protected_impulse_pa_s for _ in case.threats])
-        for name in layouts
+        name: case.combined([next(loads).load(objective) for _ in case.threats]) for name in layouts
     }
 
 
 def _print_verdict(loads: Mapping[str, float], case: Case) -> None:
     """Print a row a layout, the best last but for the proposal."""
     charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
-    table = make_table(f"{case.scenario.name}: judged by gas dynamics on {charges}", _HEADERS)
+    objective = case.scenario.objective
+    headers = ("layout", f"load ({objective.unit})", "reduction")
+    table = make_table(f"{case.scenario.name}: judged by gas dynamics on {charges}", headers)
     rules = sorted(loads.keys() - {_NOTHING, _PROPOSAL}, key=lambda name: -loads[name])
     for name in (_NOTHING, *rules, _PROPOSAL):
         share = reductions(loads[name], loads[_NOTHING]).item()

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from blast_env.cli.cluster import ClusterAddress, running_on
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.cli.options import CellSide
+from blast_env.cli.output import engine_text, print_line, progress_bar, user_errors
+from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 
 if TYPE_CHECKING:
@@ -58,6 +60,7 @@ def train(
     engine: Annotated[
         str | None, typer.Option(help="Engine that runs the blasts.", show_default="event")
     ] = None,
+    cell: CellSide = None,
     observation: Annotated[
         str | None,
         typer.Option(
@@ -90,12 +93,17 @@ def train(
         "run": run,
         "threat": threat,
         "engine": engine,
+        "cell": cell,
         "observation": observation,
         "set": set_ or None,
         "start-from": None if start_from is None else str(start_from),
     }
     given = {name: value for name, value in fresh.items() if value is not None}
-    with user_errors(), running_on(cluster):
+    with (
+        user_errors(lambda: _how_to_resume(resume or run)),
+        checked_targets(folders={"--run": run}),
+        running_on(cluster),
+    ):
         if resume is not None:
             result = _resume(resume, scenario, given)
         elif run is None:
@@ -103,6 +111,18 @@ def train(
         else:
             result = _train(run, scenario or _DEFAULT_SCENARIO, given, set_ or [], envs)
     _print_result(result)
+
+
+def _how_to_resume(folder: Path | None) -> str:
+    """Return how an interrupted training goes on."""
+    if folder is None:
+        return ""
+    # Here, because torch takes seconds to start, and is an extra.
+    from blast_agents.training.run_folder import RunFolder
+
+    if RunFolder(folder).is_run:
+        return f"blast-env train --resume {folder} goes on"
+    return "the run had not begun: the same command begins anew"
 
 
 def _resume(folder: Path, scenario: str | None, given: Mapping[str, object]) -> "TrainingResult":
@@ -132,6 +152,8 @@ def _train(
     changes = parse_options(options, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
     names = ("steps", "seed", "threat", "engine", "observation")
     values = {name: given[name] for name in names if name in given}
+    if "cell" in given:
+        values["cell_m"] = given["cell"]
     values["start_from"] = given.get("start-from")
     if given.get("observation") == "features":  # no planes, which the YAML file's policy looks at
         changes.setdefault("policy", "MlpPolicy")
@@ -151,6 +173,9 @@ def _print_result(result: "TrainingResult") -> None:
         f"{counters.steps:,} steps, {counters.episodes:,} episodes, {counters.blasts:,} blasts "
         f"in {counters.seconds:,.0f} s"
     )
+    settings = result.configuration.settings
+    scenario = folder.scenario(result.configuration)
+    print_line(engine_text(settings.blast_engine, [scenario]))
     for row in result.progress.evaluations:
         if row.steps == counters.best_steps:
             print_line(

@@ -161,7 +161,7 @@ def test_the_tables_hold_what_was_found() -> None:
     agent = cases[cases["entry"] == "agent"]
     assert list(agent["reduction"]) == pytest.approx([0.6, 0.4, 0.2])
     assert list(agent["case"]) == ["road 0", "road 1", "road 2"]
-    assert list(agent["unprotected_impulse_pa_s"]) == [200.0, 20.0, 400.0]
+    assert list(agent["unprotected_load"]) == [200.0, 20.0, 400.0]
     told = [case.charge for case in it.track.cases if isinstance(case.charge, Charge)]
     charges = [charge.position_m for charge in told]
     assert list(zip(agent["charge_x_m"], agent["charge_y_m"], strict=True)) == charges

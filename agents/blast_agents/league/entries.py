@@ -7,9 +7,9 @@ import numpy as np
 
 from blast_agents.posts import VEHICLE_RULES
 from blast_agents.proposal import LayoutAgent
-from blast_agents.rules import ITEM_RULES, RULES, expected_charge, random_layout
+from blast_agents.rules import ITEM_RULES, RULES, expected_charge, random_layout, sight_lines
 from blast_agents.search import SearchMethod, find_search_method
-from blast_agents.search.by_rule import MOST_SIGHT_LINES, sight_lines_layout
+from blast_agents.search.by_rule import MOST_SIGHT_LINES
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case
 from blast_env.geometry import Layout
@@ -74,7 +74,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class VisibilityLayout:
-    """Cuts as many lines of sight as it can; see `sight_lines_layout`.
+    """Cuts as many lines of sight as it can; see `sight_lines`.
 
     Attributes:
         name: In tables.
@@ -84,7 +84,7 @@ class VisibilityLayout:
 
     def propose(self, case: Case) -> Layout:
         """Return the layout for the charge, or for all the places where a hidden one may be."""
-        return sight_lines_layout(case.scenario, case.charge)
+        return sight_lines(case.scenario, case.charge)
 
 
 @dataclass(frozen=True)

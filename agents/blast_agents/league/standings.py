@@ -11,8 +11,8 @@ from blast_agents.league.entries import Training, search_name
 from blast_agents.league.tracks import Track
 from blast_agents.proposal import Proposal
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.comparison import CVAR_LEVEL, Comparison, check_something_arrives
-from blast_env.statistics import Estimate, conditional_value_at_risk, reductions
+from blast_env.evaluation.comparison import Comparison, check_something_arrives
+from blast_env.statistics import CVAR_LEVEL, Estimate, conditional_value_at_risk, reductions
 
 REFERENCE_METHOD: Final = "genetic"
 """Agents are held against this search."""
@@ -29,7 +29,7 @@ class Result:
         training: What an agent cost before; `None` for all others.
         is_rule: Whether it is a rule, which takes neither training nor a blast.
         proposals: One a case; the cells are sorted.
-        impulse_pa_s: With the layouts, Pa*s (cases, held-out threats).
+        loads: With the layouts, in the unit of the objective (cases, held-out threats).
     """
 
     name: str
@@ -37,7 +37,7 @@ class Result:
     budget: int
     training: Training | None
     proposals: tuple[Proposal, ...]
-    impulse_pa_s: FloatArray
+    loads: FloatArray
     is_rule: bool = False
 
     @property
@@ -82,8 +82,8 @@ class Standings:
     Attributes:
         track: The track.
         results: One an entry.
-        unprotected_pa_s: Impulse without a barrier, Pa*s (cases, held-out threats).
-        engine: Name of the engine.
+        unprotected: Load without a barrier, likewise (cases, held-out threats).
+        engine: Name of the engine, with the cells that it has.
 
     Raises:
         BlastEnvError: If nothing arrives at the protected structures of a case without a barrier.
@@ -91,12 +91,12 @@ class Standings:
 
     track: Track
     results: tuple[Result, ...]
-    unprotected_pa_s: FloatArray
+    unprotected: FloatArray
     engine: str
 
     def __post_init__(self) -> None:
         """Check that there is something to reduce."""
-        check_something_arrives(self.track.cases, self.unprotected_pa_s)
+        check_something_arrives(self.track.cases, self.unprotected)
 
     @property
     def has_one_case(self) -> bool:
@@ -114,9 +114,9 @@ class Standings:
         return Comparison(
             cases=self.track.cases,
             layouts=tuple(proposal.layout for proposal in result.proposals),
-            impulse_pa_s=result.impulse_pa_s,
-            unprotected_pa_s=self.unprotected_pa_s,
-            in_range=np.ones(self.unprotected_pa_s.shape, dtype=bool),
+            loads=result.loads,
+            unprotected=self.unprotected,
+            in_range=np.ones(self.unprotected.shape, dtype=bool),
         )
 
     def reduction(self, result: Result) -> Estimate:
@@ -132,7 +132,7 @@ class Standings:
         """Return the reduction of each case, or under each threat of a single one (samples,)."""
         if not self.has_one_case:
             return self.comparison(result).case_reductions
-        return reductions(result.impulse_pa_s[0], self.unprotected_pa_s[0])
+        return reductions(result.loads[0], self.unprotected[0])
 
     def cvar_reduction(self, result: Result) -> float:
         """Return the mean reduction of the worst 20 % of the cases, or threats of a single one."""
@@ -197,7 +197,7 @@ def verdicts(standings: Standings) -> tuple[Verdict, ...]:
     count = len(standings.track.cases)
     sample = f"{count} cases"
     if standings.has_one_case:
-        sample = f"{standings.unprotected_pa_s.shape[1]} held-out threats of one case"
+        sample = f"{standings.unprotected.shape[1]} held-out threats of one case"
     return tuple(
         Verdict(
             agent=result.name,

@@ -13,6 +13,7 @@ from blast_agents.rules import (
     ring_around_building,
     ring_around_charge,
     rules_for,
+    sight_lines,
     wall_near_building,
     wall_near_charge,
 )
@@ -24,23 +25,9 @@ from blast_agents.search.winners import WinnersSearch
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Scenario
-from blast_env.scenario.vehicles import source_of
-from blast_env.sites import Visibility, visibility_layout
 
 MOST_SIGHT_LINES: Final = "most sight lines cut"
 """Name of the layout that cuts as many lines of sight as it can."""
-
-
-def sight_lines_layout(scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
-    """Return the layout that cuts as many lines of sight as it can; see `visibility_layout`.
-
-    Args:
-        scenario: The scenario; it has a build zone.
-        charge: Where the charge is; unless given, all the places count where one may be.
-    """
-    if charge is not None:
-        scenario = scenario.model_copy(update={"charge": (source_of(charge),)})
-    return visibility_layout(scenario, Visibility.of(scenario))
 
 
 def layouts_by_rule(scenario: Scenario, charge: AnyCharge | None = None) -> Mapping[str, Layout]:
@@ -55,7 +42,7 @@ def layouts_by_rule(scenario: Scenario, charge: AnyCharge | None = None) -> Mapp
     met = charge or expected_charge(scenario.charge)
     rules = {**rules_for(scenario), **(VEHICLE_RULES if scenario.vehicles else {})}
     proposals = {name: partial(rule, scenario, met) for name, rule in rules.items()}
-    proposals[MOST_SIGHT_LINES] = partial(sight_lines_layout, scenario, charge)
+    proposals[MOST_SIGHT_LINES] = partial(sight_lines, scenario, charge)
     layouts = {}
     for name, propose in proposals.items():
         try:
@@ -94,7 +81,7 @@ class RuleSearch:
         return SearchResult(
             method=self.name,
             layout=tuple(sorted(self.rule(problem.scenario, problem.charge))),
-            impulse_pa_s=None,
+            load=None,
             threats=0,
             blasts=0,
             budget=budget,
@@ -102,6 +89,30 @@ class RuleSearch:
             history=(),
             interrupted=False,
         )
+
+
+@dataclass(frozen=True)
+class SightLinesSearch:
+    """Proposes the layout that cuts most lines of sight; no blast is simulated.
+
+    Against a hidden charge it is one against all places where that may be.
+    """
+
+    name: str = "sight_lines"
+
+    def search(
+        self,
+        problem: LayoutProblem,
+        budget: int,
+        seed: int,
+        report: Report | None = None,
+    ) -> SearchResult:
+        """Return the rule's layout; budget and seed change nothing."""
+
+        def rule(scenario: Scenario, _: AnyCharge) -> Layout:
+            return sight_lines(scenario, problem.told)
+
+        return RuleSearch(rule, self.name).search(problem, budget, seed, report)
 
 
 RULE_SEARCHES: Final = (
@@ -113,6 +124,7 @@ RULE_SEARCHES: Final = (
     RuleSearch(ring_around_building, "ring_around_building"),
     RuleSearch(line_of_posts, "line_of_posts"),
     RuleSearch(posts_and_wall, "posts_and_wall"),
+    SightLinesSearch(),
 )
 """The rules as methods; without a catalogue the long walls are the others."""
 

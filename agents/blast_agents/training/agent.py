@@ -42,6 +42,7 @@ from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout
+from blast_env.physics.engine import Engine
 from blast_env.scenario import (
     AnyCharge,
     AnyScenario,
@@ -225,7 +226,7 @@ class TrainedAgent:
     policy: Policy
     representative: Scenario
     observation: str = "grid"
-    engine: str = "event"
+    engine: str | Engine = "event"
 
     def __post_init__(self) -> None:
         """Refuse an observation that there is none of."""
@@ -338,6 +339,16 @@ class TrainedAgent:
         return actions
 
 
+def newest_weights(run: str | Path) -> Literal["best", "last"]:
+    """Return which weights of a run folder to use: the best, or the last before any evaluation.
+
+    Raises:
+        BlastEnvError: If it is no run folder, or damaged.
+    """
+    checkpoint = Checkpoint.load(RunFolder(Path(run)).checkpoint)
+    return "best" if checkpoint.best_policy else "last"
+
+
 def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> TrainedAgent:
     """Return the agent of a run folder.
 
@@ -367,7 +378,7 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     policy = policy_for(configuration, scenario)
     checkpoint.load_policy(policy, folder.path, weights)
     policy.set_training_mode(False)
-    return TrainedAgent(policy, scenario, settings.observation, settings.engine)
+    return TrainedAgent(policy, scenario, settings.observation, settings.blast_engine)
 
 
 def load_archive(
@@ -377,7 +388,7 @@ def load_archive(
     *,
     trust_archive: bool = False,
     observation: str = "grid",
-    engine: str = "event",
+    engine: str | Engine = "event",
 ) -> TrainedAgent:
     """Return the agent of an archive that stable-baselines3 or RL Zoo wrote.
 

@@ -53,7 +53,7 @@ class Selection:
             scenarios: Sequence[Scenario] = (source.scenario,) * count
         else:
             scenarios = tuple(SiteSource(HELD_OUT_SITES - count, count))
-        evaluators = Evaluators(settings.engine, most=count)
+        evaluators = Evaluators(settings.blast_engine, most=count)
         evaluators.of(scenarios[0])  # refuses an unknown engine before anything is written
         return cls(_cases(settings, scenarios, seeds), evaluators, processes)
 

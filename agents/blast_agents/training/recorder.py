@@ -204,7 +204,10 @@ class Recorder(BaseCallback):
 
     def _evaluate(self) -> None:
         agent = TrainedAgent(
-            self.algorithm.policy, self.scenario, self.settings.observation, self.settings.engine
+            self.algorithm.policy,
+            self.scenario,
+            self.settings.observation,
+            self.settings.blast_engine,
         )
         row = self.progress.evaluate(agent, self.selection)
         self.logger.record("evaluation/reduction", row.reduction)

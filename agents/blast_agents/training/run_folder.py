@@ -28,6 +28,8 @@ from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import OBSERVATIONS
 from blast_env.errors import BlastEnvError
 from blast_env.files import is_temporary, make_folder, sync, write_atomically
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
 from blast_env.scenario.problems import value_text
@@ -58,6 +60,7 @@ class TrainingSettings(BaseModel):
         seed: Decides everything: weights, episodes, actions, minibatches.
         threat: `"visible"`: the agent sees the charge; `"hidden"`: it sees where it may be.
         engine: Engine that runs the blasts.
+        cell_m: Side of the cells of gas dynamics; that of the engine unless given.
         observation: Name of what the agent sees of the site; see `BlastBarrier-v0`.
         hidden_threats: Charges in an episode where they are hidden. The mean over episodes is the
             same for any number; with few, more layouts are tried for the same number of blasts.
@@ -77,6 +80,7 @@ class TrainingSettings(BaseModel):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     threat: Literal["visible", "hidden"] = "visible"
     engine: str = "event"
+    cell_m: Annotated[float, Field(gt=0.0)] | None = None
     observation: Literal["grid", "grid_with_load", "features"] = "grid"
     hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
     evaluation_interval: Annotated[int, Field(ge=1, le=10**6)] = 5
@@ -84,6 +88,16 @@ class TrainingSettings(BaseModel):
     evaluation_first_seed: Annotated[int, Field(ge=0, lt=2**30)] = 0
     torch_threads: Annotated[int, Field(ge=1, le=256)] = 1
     start_from: str | None = None
+
+    @property
+    def blast_engine(self) -> Engine:
+        """The engine itself.
+
+        Raises:
+            UnknownNameError: If there is no engine of that name.
+            BlastEnvError: If it has no such cells.
+        """
+        return find_engine(self.engine, self.cell_m)
 
 
 class RunConfiguration(BaseModel):
@@ -278,6 +292,11 @@ class RunFolder:
         return self.path / "tensorboard"
 
     @property
+    def is_run(self) -> bool:
+        """Whether a run has begun in the folder."""
+        return self._configuration.exists()
+
+    @property
     def command(self) -> str:
         """What started the run.
 
@@ -363,7 +382,7 @@ class RunFolder:
 
     def _check_empty(self) -> None:
         """Refuse a folder with a run, or with anything but what an interrupted making leaves."""
-        if self._configuration.exists():
+        if self.is_run:
             raise BlastEnvError(f"{self.path}: has a run in it already; --resume goes on with it")
         if self._unfinished.exists():
             return
