@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Protocol
 
 from blast_env.geometry import Layout
@@ -17,12 +17,16 @@ class Proposal:
     Attributes:
         layout: (row, column) of the modules.
         seconds: Time until the layout was there.
-        blasts: Blasts spent on it.
+        blasts: Blasts spent on it, of the engine that judges.
+        other_blasts: Blasts of another engine spent on it, for a method's own purposes.
+        cpu_s: Processor time that it took, of this process.
     """
 
     layout: Layout
     seconds: float
     blasts: int = 0
+    other_blasts: int = 0
+    cpu_s: float = 0.0
 
 
 class LayoutAgent(Protocol):
@@ -40,9 +44,10 @@ class LayoutAgent(Protocol):
 
 def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
     """Return a layout that takes no blast, and how long it took."""
-    began_s = perf_counter()
+    began_s, began_cpu_s = perf_counter(), process_time()
     layout = propose()
-    return Proposal(layout, perf_counter() - began_s)
+    seconds, cpu_s = perf_counter() - began_s, process_time() - began_cpu_s
+    return Proposal(layout, seconds, cpu_s=cpu_s)
 
 
 def propose(agent: LayoutAgent, scenario: AnyScenario, charge: AnyCharge | None) -> Proposal:

@@ -13,6 +13,7 @@ from blast_env.cli.league import league
 from blast_env.cli.output import print_line
 from blast_env.cli.page import app as page
 from blast_env.cli.play import play
+from blast_env.cli.propose import propose
 from blast_env.cli.report import report
 from blast_env.cli.search import search
 from blast_env.cli.simulate import simulate
@@ -36,6 +37,7 @@ _COMMANDS = (
     bench,
     train,
     league,
+    propose,
     report,
     play,
 )

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +10,7 @@ import typer
 from blast_agents.league import (
     Contest,
     ResultStore,
+    Search,
     Standings,
     Track,
     find_tracks,
@@ -28,7 +30,7 @@ from blast_env.cli.output import (
 from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine
+from blast_env.physics.engines import find_engine, is_gas
 from blast_env.provenance import command
 
 if TYPE_CHECKING:
@@ -39,7 +41,7 @@ def league(
     out: Annotated[
         Path, typer.Option(help="Folder for tables, figures and results; goes on with what it has.")
     ],
-    track: Annotated[str, typer.Option(help="known, hidden, sites or all.")] = "known",
+    track: Annotated[str, typer.Option(help="known, hidden, vehicle, sites or all.")] = "known",
     cases: Annotated[
         int, typer.Option(help="Cases of a track; a hidden threat on a known site is one.")
     ] = 16,
@@ -67,7 +69,19 @@ def league(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Decides cases, threats and searches.")] = 0,
-    engine: Annotated[str, typer.Option(help="event or pymunk (particles), or gas.")] = "event",
+    engine: Annotated[
+        str, typer.Option(help="Engine that judges, and that searches spend blasts of.")
+    ] = "event",
+    first_engine: Annotated[
+        str | None,
+        typer.Option(
+            help="Cheaper engine: every search enters once more with blasts of this one; the judge "
+            "then decides among its best layouts."
+        ),
+    ] = None,
+    agent_search: Annotated[
+        str, typer.Option(help="Blasts that a search from an agent may spend on a case.")
+    ] = "",
     cell: CellSide = None,
     processes: Processes = 1,
     cluster: ClusterAddress = None,
@@ -85,13 +99,17 @@ def league(
         from blast_agents.league.report import write_league
 
         chosen = find_engine(engine, cell)
-        tracks = find_tracks(track, cases, seeds, seed, scenario or ())
+        noisy = not is_gas(chosen)
+        tracks = find_tracks(track, cases, seeds, seed, scenario or (), noisy=noisy)
         runs = _load_runs(run or (), tracks)
         store = ResultStore(out / "results")
-        contests = [
-            _contest(each, runs, _names(methods), _numbers(budgets), store, chosen)
-            for each in tracks
-        ]
+        searches = _Searches(
+            tuple(_names(methods)),
+            tuple(_numbers(budgets)),
+            first_engine,
+            tuple(_numbers(agent_search, "--agent-search")),
+        )
+        contests = [_contest(each, runs, searches, store, chosen) for each in tracks]
         scenarios = [case.scenario for each in tracks for case in each.cases]
         print_line(engine_text(chosen, scenarios))
         _print_outlook(contests)
@@ -99,6 +117,16 @@ def league(
         written = write_league(all_standings, out, shlex.join(command()))
     for path in written:
         print_line(f"wrote {path}")
+
+
+@dataclass(frozen=True)
+class _Searches:
+    """What searches enter: each method with each budget, and those from agents."""
+
+    methods: tuple[str, ...]
+    budgets: tuple[int, ...]
+    first_engine: str | None
+    agent_budgets: tuple[int, ...]
 
 
 def _load_runs(runs: Sequence[Path], tracks: Sequence[Track]) -> "list[TrainedRun]":
@@ -116,15 +144,20 @@ def _load_runs(runs: Sequence[Path], tracks: Sequence[Track]) -> "list[TrainedRu
 def _contest(
     track: Track,
     runs: "Sequence[TrainedRun]",
-    methods: Sequence[str],
-    budgets: Sequence[int],
+    searches: _Searches,
     store: ResultStore,
     engine: Engine,
 ) -> Contest:
-    agents = tuple(run.entry for run in runs if run.is_for(track))
     vehicles = all(case.scenario.vehicles for case in track.cases)
-    entries = standard_entries(methods, budgets, vehicles)
-    return Contest(track, (*entries, *agents), store, engine)
+    items = all(case.scenario.zone.items for case in track.cases)
+    entries = standard_entries(searches.methods, searches.budgets, vehicles, items)
+    if searches.first_engine is not None:
+        asked = [each for each in entries if isinstance(each, Search)]
+        entries += tuple(replace(each, first_engine=searches.first_engine) for each in asked)
+    for run in runs:
+        if run.is_for(track):
+            entries += (run.entry, *map(run.search, searches.agent_budgets))
+    return Contest(track, entries, store, engine)
 
 
 def _print_outlook(contests: Sequence[Contest]) -> None:
@@ -164,7 +197,7 @@ def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def _numbers(text: str) -> list[int]:
+def _numbers(text: str, option: str = "--budgets") -> list[int]:
     """Return the numbers of a list with commas.
 
     Raises:
@@ -174,5 +207,5 @@ def _numbers(text: str) -> list[int]:
         return [int(number) for number in _names(text)]
     except ValueError:
         raise BlastEnvError(
-            f"--budgets is {text!r}, must be whole numbers with commas between, e.g. 50,200"
+            f"{option} is {text!r}, must be whole numbers with commas between, e.g. 50,200"
         ) from None

@@ -38,6 +38,7 @@ def result(
     blasts: int = 0,
     seconds: Sequence[float] | None = None,
     training: Training | None = None,
+    is_rule: bool = False,
 ) -> Result:
     """Return a result with a module in each layout, unless it is that of no barrier."""
     layout = () if name == "no barrier" else ((0, 0),)
@@ -49,6 +50,7 @@ def result(
         training=training,
         proposals=tuple(Proposal(layout, each, blasts) for each in times),
         loads=np.array(impulse_pa_s, dtype=np.float64),
+        is_rule=is_rule,
     )
 
 

@@ -239,3 +239,22 @@ def test_bad_input_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(BlastEnvError, match="cannot be a folder"):
         ResultStore(tmp_path / "file")
+
+
+def test_a_cheaper_engine_s_best_layouts_are_judged_by_the_judge(tmp_path: Path) -> None:
+    search = Search(find_search_method("random"), BUDGET, first_engine="pymunk", finalists=2)
+    assert search.name == "random, 6 blasts of pymunk, the best 2 judged"
+    entries = (NoBarrier(), search, Search(find_search_method("random"), BUDGET))
+    _, staged, plain = Contest(TRACK, entries, store(tmp_path)).play().results
+    for case, proposal in zip(TRACK.cases, staged.proposals, strict=True):
+        practice = practice_of(case)
+        first = LayoutProblem(BlastEvaluator(SCENARIO, "pymunk"), practice)
+        found = find_search_method("random").search(first, BUDGET, case.seed)
+        finalists = {each.layout for each in found.history[-2:]}
+        assert proposal.layout in finalists
+        judge = LayoutProblem(BlastEvaluator(SCENARIO), practice)
+        assert judge.load(proposal.layout) == min(map(judge.load, finalists))
+        assert proposal.other_blasts == found.blasts
+        assert proposal.blasts == len(finalists) * len(practice.threats)
+        assert proposal.cpu_s > 0.0
+    assert all(each.other_blasts == 0 for each in plain.proposals)

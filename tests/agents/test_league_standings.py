@@ -182,7 +182,9 @@ def test_all_is_written_and_the_page_shows_it(tmp_path: Path) -> None:
     page = (tmp_path / "league.md").read_text()
     assert "## Known threat at an unseen position: road" in page
     assert "3 cases, 2 held-out threats each" in page
-    agent = "| agent | 40.0 % | -9.7 to 89.7 % | 20.0 % | 0 | 5,000 | 60.1 | 20.0 |"
+    agent = (
+        "| agent | 40.0 % | -9.7 to 89.7 % | 20.0 % | 20.0 % | 0 | 0 | 0.00 | 5,000 | 60.1 | 20.0 |"
+    )
     assert agent in page.splitlines()
     assert "+5.0 percentage points" in page
     assert "![Reduction over blasts spent](known_road.png)" in page
@@ -239,3 +241,18 @@ def test_methods_at_one_budget_stand_side_by_side() -> None:
     places = [float(each[0].get_xdata()[0]) for each in axes.containers]
     assert len(set(places)) == 4
     assert all(0.8 < place / 50.0 < 1.25 for place in places)
+
+
+def test_the_worst_fifth_and_who_wins_how_often() -> None:
+    """Reductions of 60, 40 and 20 % against 50, 40 and 30 %: a win, a tie and a loss."""
+    rule = result("wall", [[50.0, 150.0], [8.0, 16.0], [280.0, 280.0]], is_rule=True)
+    agent = result("agent", AGENT, training=TRAINING)
+    it = standings(BARE, rule, agent)
+    assert it.rules == (rule,)
+    assert it.cvar_reduction(agent) == pytest.approx(0.2)  # the worst of three
+    assert it.win_share(agent, rule) == 0.5
+    assert it.win_share(rule, it.results[0]) == 1.0
+    rows = summary_table(it).set_index("entry")
+    assert rows["wins_wall"].to_dict() == {"no barrier": 0.0, "wall": 0.5, "agent": 0.5}
+    assert rows["is_rule"].to_dict() == {"no barrier": False, "wall": True, "agent": False}
+    assert "| agent | 50 % |" in markdown([it], "x")

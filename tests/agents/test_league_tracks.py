@@ -3,7 +3,14 @@
 from pathlib import Path
 
 import pytest
-from blast_agents.league import Track, find_tracks, hidden_track, known_track, sites_track
+from blast_agents.league import (
+    Track,
+    find_tracks,
+    hidden_track,
+    known_track,
+    sites_track,
+    vehicle_track,
+)
 from blast_agents.league.tracks import MOST_CASES, MOST_LEAGUE_SEED, MOST_SEEDS, practice_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,9 +18,10 @@ from hypothesis import strategies as st
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange
 from blast_env.physics.scene import Charge
-from blast_env.scenario import save_scenario
+from blast_env.scenario import VehicleCharge, save_scenario
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.agents.league_cases import ROAD, road_scenario
+from tests.vehicle_sites import gate_site
 
 SCENARIO = road_scenario()
 
@@ -123,3 +131,22 @@ def test_bad_input_is_refused(arguments: tuple, words: str) -> None:
 def test_no_sites_are_refused() -> None:
     with pytest.raises(BlastEnvError, match="cases is 0"):
         sites_track([], 1)
+
+
+def test_without_noise_a_known_charge_is_one_blast() -> None:
+    for case in known_track(SCENARIO, 3, 16, noisy=False).cases:
+        assert (len(case.threats), len(practice_of(case).threats)) == (1, 1)
+        assert practice_of(case).threats[0].charge == case.threats[0].charge == case.charge
+
+
+def test_a_vehicle_is_a_hidden_threat_of_a_site_that_has_one(tmp_path: Path) -> None:
+    track = vehicle_track(gate_site(), 2)
+    assert (track.name, track.threat) == ("vehicle_gate", "hidden")
+    (case,) = track.cases
+    assert all(isinstance(charge, VehicleCharge) for charge in case.charges)
+    with pytest.raises(BlastEnvError, match="has no vehicle"):
+        vehicle_track(SCENARIO, 2)
+    path = tmp_path / "gate.toml"
+    save_scenario(gate_site(), path)
+    (found,) = find_tracks("vehicle", 1, 2, scenarios=[str(path)])
+    assert found.name == track.name

@@ -180,7 +180,7 @@ def test_no_label_is_worse_than_a_rule_s_layout(finished: Path) -> None:
     for case, label in zip(cases, checkpoint.labels, strict=True):
         (threat,) = case.threats
         best = evaluator.loads(label.layout, threat).protected_impulse_pa_s
-        assert label.impulse_pa_s == (best,)
+        assert label.load == (best,)
         for layout in layouts_by_rule(scenario, case.charge).values():
             assert best <= evaluator.loads(layout, threat).protected_impulse_pa_s
     rows = read_rows(finished / "rollouts.csv", RolloutRow)

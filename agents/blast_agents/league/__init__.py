@@ -21,6 +21,7 @@ from blast_agents.league.tracks import (
     hidden_track,
     known_track,
     sites_track,
+    vehicle_track,
 )
 
 __all__ = [
@@ -45,5 +46,6 @@ __all__ = [
     "known_track",
     "sites_track",
     "standard_entries",
+    "vehicle_track",
     "verdicts",
 ]

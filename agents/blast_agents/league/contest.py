@@ -3,17 +3,25 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import TypeVar
 
 import numpy as np
 
-from blast_agents.league.entries import Agent, Entry, Instant, NoBarrier, Search
+from blast_agents.league.entries import (
+    Agent,
+    Entry,
+    Instant,
+    NoBarrier,
+    Rule,
+    Search,
+    VisibilityLayout,
+)
 from blast_agents.league.standings import Result, Standings
 from blast_agents.league.store import ResultStore, evaluation_key, search_key
 from blast_agents.league.tracks import Track, practice_of
 from blast_agents.proposal import Proposal, timed_proposal
-from blast_agents.search import LayoutProblem
+from blast_agents.search import LayoutProblem, SearchResult
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Objective
 from blast_env.geometry import Layout
@@ -51,15 +59,34 @@ class SearchJob:
                 answer.
         """
         practice = practice_of(self.case)
+        engine = self.search.first_engine or self.engine
         # What the first blast of a process has to load is no part of the search's time.
-        BlastEvaluator(practice.scenario, self.engine).loads((), practice.threats[0])
-        began_s = perf_counter()
-        problem = LayoutProblem(BlastEvaluator(practice.scenario, self.engine), practice)
+        for each in {engine, self.engine}:
+            BlastEvaluator(practice.scenario, each).loads((), practice.threats[0])
+        began_s, began_cpu_s = perf_counter(), process_time()
+        problem = LayoutProblem(BlastEvaluator(practice.scenario, engine), practice)
         result = self.search.method.search(problem, self.search.budget, self.case.seed)
-        seconds = perf_counter() - began_s
         if result.interrupted:
             raise KeyboardInterrupt
-        return Proposal(tuple(sorted(result.layout)), seconds, result.blasts)
+        layout, blasts, other_blasts = result.layout, result.blasts, 0
+        if self.search.first_engine is not None:
+            layout, blasts, other_blasts = *self._judged(result), result.blasts
+        return Proposal(
+            layout=tuple(sorted(layout)),
+            seconds=perf_counter() - began_s,
+            blasts=blasts,
+            other_blasts=other_blasts,
+            cpu_s=process_time() - began_cpu_s,
+        )
+
+    def _judged(self, result: SearchResult) -> tuple[Layout, int]:
+        """Return the best of a search's last best layouts by the judge, and its blasts for that."""
+        practice = practice_of(self.case)
+        latest = [each.layout for each in reversed(result.history)]
+        finalists = list(dict.fromkeys(latest))[: self.search.finalists]
+        judge = LayoutProblem(BlastEvaluator(practice.scenario, self.engine), practice)
+        best = min(finalists, key=judge.load)
+        return best, judge.evaluator.blasts
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,6 +294,7 @@ class Contest:
                 method=entry.method.name if isinstance(entry, Search) else entry.name,
                 budget=entry.budget if isinstance(entry, Search) else 0,
                 training=entry.training if isinstance(entry, Agent) else None,
+                is_rule=isinstance(entry, Rule | VisibilityLayout),
                 proposals=proposals,
                 loads=np.array(loads, dtype=np.float64),
             )

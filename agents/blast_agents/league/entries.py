@@ -113,10 +113,15 @@ class Search:
     Attributes:
         method: The method.
         budget: Most blasts a case.
+        first_engine: Engine for these blasts, a cheaper one; the engine that judges then decides
+            among the best few layouts, by one more blast for each threat. `None` for the judge's.
+        finalists: How many these are.
     """
 
     method: SearchMethod
     budget: int
+    first_engine: str | None = None
+    finalists: int = 8
 
     def __post_init__(self) -> None:
         """Check the budget.
@@ -130,7 +135,10 @@ class Search:
     @property
     def name(self) -> str:
         """Name in tables."""
-        return search_name(self.method.name, self.budget)
+        name = search_name(self.method.name, self.budget)
+        if self.first_engine is None:
+            return name
+        return f"{name} of {self.first_engine}, the best {self.finalists} judged"
 
 
 Instant = NoBarrier | RandomLayout | Rule | VisibilityLayout | Agent

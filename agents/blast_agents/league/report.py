@@ -53,6 +53,7 @@ def case_table(standings: Standings) -> pd.DataFrame:
 
 def _summary(standings: Standings, result: Result) -> dict[str, Any]:
     reduction, training = standings.reduction(result), result.training or Training(0, 0.0)
+    wins = {f"wins_{rule.name}": standings.win_share(result, rule) for rule in standings.rules}
     row = {
         "entry": result.name,
         "method": result.method,
@@ -63,12 +64,17 @@ def _summary(standings: Standings, result: Result) -> dict[str, Any]:
         "reduction_low": reduction.low,
         "reduction_high": reduction.high,
         "worst_reduction": standings.comparison(result).worst_reduction,
+        "cvar_reduction": standings.cvar_reduction(result),
+        "is_rule": result.is_rule,
         "blasts": result.blasts,
         "blasts_per_case": result.blasts_per_case,
+        "other_blasts_per_case": result.other_blasts_per_case,
+        "cpu_s_per_case": result.cpu_s_per_case,
         "training_blasts": training.blasts,
         "wall_time_s": result.seconds,
         "training_time_s": training.seconds,
         "proposal_ms": result.proposal_ms,
+        **wins,
     }
     if standings.reference is None:
         return row
@@ -94,6 +100,8 @@ def _case(case: Case, proposal: Proposal, loads: FloatArray, bare: FloatArray) -
         "unit": case.scenario.objective.unit,
         "reduction": reductions(case.combined(loads), case.combined(bare)).item(),
         "blasts": proposal.blasts,
+        "other_blasts": proposal.other_blasts,
+        "cpu_s": proposal.cpu_s,
         "seconds": proposal.seconds,
         "modules": len(proposal.layout),
         "layout": layout_text(proposal.layout),
@@ -105,7 +113,10 @@ HEADERS: Final = (
     "reduction",
     "95 % interval",
     "worst case",
+    "worst 20 %",
     "blasts a case",
+    "other blasts",
+    "CPU s a case",
     "blasts in total",
     "wall time (s)",
     "proposal (ms)",
@@ -176,15 +187,30 @@ def markdown(all_standings: Sequence[Standings], command: str) -> str:
         lines += [_line(HEADERS), "|---|" + "---:|" * (len(HEADERS) - 1)]
         lines += [_line(row) for row in table_rows(standings)]
         lines += ["", *(f"- {line}" for line in verdict_lines(standings)), ""]
+        lines += _wins(standings)
         lines += [f"![Reduction over blasts spent]({standings.track.name}.png)", ""]
     engines = ", ".join(dict.fromkeys(standings.engine for standings in all_standings))
     lines += [
-        "Blasts in total and wall time include the training of an agent; blasts on held-out "
-        "threats count nowhere. Wall time adds up what each search took in one process.",
+        "Blasts are those of the engine that judges, other blasts those of another one. Blasts in "
+        "total and wall time include the training of an agent; blasts on held-out threats count "
+        "nowhere. Wall time adds up what each search took in one process.",
         "",
         f"Engine {engines}, blast-env {package_version()}: `{command}`",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _wins(standings: Standings) -> list[str]:
+    """Return a table of how often each entry is better than each rule."""
+    rules = standings.rules
+    if not rules:
+        return []
+    lines = ["Share of the cases in which it is better than a rule (a tie is half a case):", ""]
+    lines += [_line(("method", *(rule.name for rule in rules))), "|---|" + "---:|" * len(rules)]
+    for result in standings.results:
+        shares = (f"{100.0 * standings.win_share(result, rule):.0f} %" for rule in rules)
+        lines.append(_line((result.name, *shares)))
+    return [*lines, ""]
 
 
 def _row(standings: Standings, result: Result) -> tuple[str, ...]:
@@ -194,7 +220,10 @@ def _row(standings: Standings, result: Result) -> tuple[str, ...]:
         _percent(value),
         "-" if isnan(low) else f"{100.0 * low:.1f} to {_percent(high)}",
         _percent(standings.comparison(result).worst_reduction),
+        _percent(standings.cvar_reduction(result)),
         f"{result.blasts_per_case:,.0f}",
+        f"{result.other_blasts_per_case:,.0f}",
+        f"{result.cpu_s_per_case:,.2f}",
         f"{result.blasts:,}",
         f"{result.seconds:,.1f}",
         f"{result.proposal_ms:,.1f}",

@@ -12,7 +12,7 @@ from blast_agents.league.tracks import Track
 from blast_agents.proposal import Proposal
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.comparison import Comparison, check_something_arrives
-from blast_env.statistics import Estimate
+from blast_env.statistics import CVAR_LEVEL, Estimate, conditional_value_at_risk, reductions
 
 REFERENCE_METHOD: Final = "genetic"
 """Agents are held against this search."""
@@ -27,6 +27,7 @@ class Result:
         method: Of the search; else the name.
         budget: Most blasts of a search for a case; else 0.
         training: What an agent cost before; `None` for all others.
+        is_rule: Whether it is a rule, which takes neither training nor a blast.
         proposals: One a case; the cells are sorted.
         loads: With the layouts, in the unit of the objective (cases, held-out threats).
     """
@@ -37,6 +38,17 @@ class Result:
     training: Training | None
     proposals: tuple[Proposal, ...]
     loads: FloatArray
+    is_rule: bool = False
+
+    @property
+    def other_blasts_per_case(self) -> float:
+        """Blasts of another engine than the judge's spent on a case, mean."""
+        return sum(each.other_blasts for each in self.proposals) / len(self.proposals)
+
+    @property
+    def cpu_s_per_case(self) -> float:
+        """Processor time spent on a case, mean."""
+        return sum(each.cpu_s for each in self.proposals) / len(self.proposals)
 
     @property
     def blasts_per_case(self) -> float:
@@ -110,6 +122,26 @@ class Standings:
     def reduction(self, result: Result) -> Estimate:
         """Return the mean reduction with its 95 % interval."""
         return self.comparison(result).reduction
+
+    @property
+    def rules(self) -> tuple[Result, ...]:
+        """The rules among the entries."""
+        return tuple(result for result in self.results if result.is_rule)
+
+    def samples(self, result: Result) -> FloatArray:
+        """Return the reduction of each case, or under each threat of a single one (samples,)."""
+        if not self.has_one_case:
+            return self.comparison(result).case_reductions
+        return reductions(result.loads[0], self.unprotected[0])
+
+    def cvar_reduction(self, result: Result) -> float:
+        """Return the mean reduction of the worst 20 % of the cases, or threats of a single one."""
+        return -conditional_value_at_risk(-self.samples(result), CVAR_LEVEL)
+
+    def win_share(self, result: Result, other: Result) -> float:
+        """Return in which share of the cases an entry is better than another; a tie is half one."""
+        ahead = self.samples(result) - self.samples(other)
+        return float(((ahead > 0.0) + 0.5 * (ahead == 0.0)).mean())
 
     def difference(self, result: Result, other: Result) -> Estimate:
         """Return by how much the mean reduction is above another's, with its paired interval."""

@@ -89,11 +89,14 @@ def search_key(case: Case, search: Search, engine: str | Engine) -> SearchKey:
         CalibrationError: If the scenario has no calibration for the engine.
         UnknownNameError: If there is no such engine.
     """
+    method = repr(search.method)
+    if search.first_engine is not None:
+        method += f" by {engine_text(find_engine(search.first_engine))}, {search.finalists} judged"
     return SearchKey(
         model=_model(case, engine),
         threats=practice_of(case).threats,
         # Functions among the settings: their names, and not where this process has them.
-        method=_ADDRESS.sub("", repr(search.method)),
+        method=_ADDRESS.sub("", method),
         budget=search.budget,
         seed=case.seed,
         code=_search_code(),

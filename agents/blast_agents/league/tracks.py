@@ -9,11 +9,17 @@ from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, SeedRange, draw_threats
 from blast_env.evaluation.cases import practice_hidden, practice_visible, visible_case
-from blast_env.scenario import AnyScenario, Scenario, find_scenario, load_scenario
+from blast_env.scenario import (
+    AnyScenario,
+    Scenario,
+    bundled_scenarios,
+    find_scenario,
+    load_scenario,
+)
 from blast_env.scenario.build_scene import draw_threat
 from blast_env.sites import SiteSource
 
-TRACKS: Final = ("known", "hidden", "sites")
+TRACKS: Final = ("known", "hidden", "vehicle", "sites")
 """The tracks by name."""
 
 KNOWN_SCENARIOS: Final = ("courtyard", "perimeter_gate")
@@ -122,6 +128,30 @@ def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
     )
 
 
+def vehicle_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
+    """Return the track of a vehicle on a known site: one case, a hidden threat.
+
+    Args:
+        scenario: As for `known_track`; it has a vehicle.
+        seeds: As for `hidden_track`.
+        seed: As for `known_track`.
+
+    Raises:
+        BlastEnvError: As for `known_track`, or if there is no vehicle.
+    """
+    scenario = find_scenario(scenario)
+    if not scenario.vehicles:
+        raise BlastEnvError(
+            f"{scenario.name} has no vehicle (a source of kind 'vehicle'), which the track "
+            "'vehicle' is about"
+        )
+    return replace(
+        hidden_track(scenario, seeds, seed),
+        name=f"vehicle_{scenario.name}",
+        title=f"A vehicle on a known site: {scenario.name}",
+    )
+
+
 def sites_track(sites: Sequence[Scenario], seeds: int, seed: int = 0) -> Track:
     """Return the track of a hidden threat on generated sites, each of them a case.
 
@@ -159,7 +189,13 @@ def practice_of(case: Case) -> Case:
 
 
 def find_tracks(
-    name: str, cases: int, seeds: int, seed: int = 0, scenarios: Sequence[str] = ()
+    name: str,
+    cases: int,
+    seeds: int,
+    seed: int = 0,
+    scenarios: Sequence[str] = (),
+    *,
+    noisy: bool = True,
 ) -> tuple[Track, ...]:
     """Return the tracks of a name.
 
@@ -168,8 +204,10 @@ def find_tracks(
         cases: Cases of each track; the hidden threat on a known site is one.
         seeds: Held-out seeds of each case.
         seed: Decides everything.
-        scenarios: Bundled names or files for the tracks with a known site; `KNOWN_SCENARIOS` and
-            `HIDDEN_SCENARIOS` unless given.
+        scenarios: Bundled names or files for the tracks with a known site; `KNOWN_SCENARIOS`,
+            `HIDDEN_SCENARIOS` and the bundled ones with a vehicle unless given. Of those that are
+            given, the track `"vehicle"` has the ones with a vehicle if others are asked for too.
+        noisy: As for `known_track`.
 
     Raises:
         UnknownNameError: If there is no such track; the message names the nearest one.
@@ -182,10 +220,17 @@ def find_tracks(
     tracks: list[Track] = []
     if name in ("known", "all"):
         known = [load_scenario(each) for each in scenarios or KNOWN_SCENARIOS]
-        tracks += [known_track(scenario, cases, seeds, seed) for scenario in known]
+        tracks += [known_track(scenario, cases, seeds, seed, noisy=noisy) for scenario in known]
     if name in ("hidden", "all"):
         known = [load_scenario(each) for each in scenarios or HIDDEN_SCENARIOS]
         tracks += [hidden_track(scenario, seeds, seed) for scenario in known]
+    if name in ("vehicle", "all"):
+        known = [load_scenario(each) for each in scenarios or bundled_scenarios()]
+        if not scenarios or name == "all":
+            known = [scenario for scenario in known if scenario.vehicles]
+        if name == "vehicle" and not known:
+            raise BlastEnvError("scenario is missing: no bundled one has a vehicle")
+        tracks += [vehicle_track(scenario, seeds, seed) for scenario in known]
     if name in ("sites", "all"):
         count = whole_number("cases", cases, 1, MOST_CASES)
         tracks.append(sites_track(tuple(SiteSource.held_out(count)), seeds, seed))

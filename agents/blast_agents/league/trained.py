@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from blast_agents.league.entries import Agent, Training
+from blast_agents.league.entries import Agent, Search, Training
 from blast_agents.league.tracks import Track
-from blast_agents.training import load_agent
+from blast_agents.search.from_policy import PolicySearch
+from blast_agents.training import TrainedAgent, load_agent
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import RunFolder
@@ -51,6 +52,14 @@ class TrainedRun:
             scenario=settings.scenario,
             scenario_hash=None if settings.scenario == SITES else configuration.scenario_hash,
         )
+
+    def search(self, budget: int) -> Search:
+        """Return the agent with a search at test time: what it draws, and changes of the best."""
+        agent = self.entry.agent
+        if not isinstance(agent, TrainedAgent):
+            raise TypeError(f"{agent!r} draws no layouts")
+        method = PolicySearch(agent, agent.digest, name=f"{self.entry.name} with search")
+        return Search(method, budget)
 
     def is_for(self, track: Track) -> bool:
         """Return whether a track asks what the agent was trained for."""

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final, Literal, TypeVar
 
@@ -230,6 +231,14 @@ class TrainedAgent:
     def __post_init__(self) -> None:
         """Refuse an observation that there is none of."""
         check_names("observation", [self.observation], OBSERVATIONS)
+
+    @cached_property
+    def digest(self) -> str:
+        """16 hexadecimal digits of a hash of the weights."""
+        digest = sha256()
+        for name, values in self.policy.state_dict().items():
+            digest.update(name.encode() + values.numpy().tobytes())
+        return digest.hexdigest()[:16]
 
     @cached_property
     def _evaluators(self) -> Evaluators:

@@ -57,13 +57,13 @@ class Label:
 
     Attributes:
         layout: The layout, sorted; empty where nothing is better than nothing.
-        impulse_pa_s: With it, Pa*s, one a threat of the case.
-        unprotected_pa_s: Without a barrier, likewise.
+        load: With it, in the unit of the scenario's objective, one a threat of the case.
+        unprotected: Without a barrier, likewise.
     """
 
     layout: Layout
-    impulse_pa_s: tuple[float, ...]
-    unprotected_pa_s: tuple[float, ...]
+    load: tuple[float, ...]
+    unprotected: tuple[float, ...]
 
 
 _LABELS: Final = TypeAdapter(tuple[Label, ...])

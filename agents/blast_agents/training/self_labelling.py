@@ -64,10 +64,10 @@ class Judge:
         scenarios = {case.scenario.content_hash for case in cases}
         return cls(Evaluators(engine, cache, most=len(scenarios)), processes)
 
-    def impulses_pa_s(
+    def loads(
         self, asked: Sequence[tuple[Case, Layout]], threats: slice
     ) -> list[tuple[float, ...]]:
-        """Return the impulses on the protected structures, Pa*s, one a threat, for each pair.
+        """Return the loads that count, one a threat, for each pair.
 
         Args:
             asked: Layouts with their cases.
@@ -80,22 +80,20 @@ class Judge:
         ]
         self.asked += len(blasts)
         self.evaluators.run_ahead(blasts, self.processes)
-        impulses = []
+        of_pairs = []
         for case, layout in asked:
             evaluator = self.evaluators.of(case.scenario)
             pairs = [(layout, threat) for threat in case.threats[threats]]
             loads = evaluator.loads_of_many(pairs)
-            impulses.append(tuple(each.protected_impulse_pa_s for each in loads))
-        return impulses
+            of_pairs.append(tuple(each.load(case.scenario.objective) for each in loads))
+        return of_pairs
 
 
-Impulses = Mapping[Layout, tuple[float, ...]]
-"""Layouts and the impulses under the threats that they have met, Pa*s."""
+Loads = Mapping[Layout, tuple[float, ...]]
+"""Layouts and the loads under the threats that they have met, in the objective's unit."""
 
 
-def race(
-    judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]]
-) -> list[Impulses]:
+def race(judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]]) -> list[Loads]:
     """Let the layouts of each case race on its threats, by successive halving.
 
     All meet the first threat, the better half of them the second, the better quarter the next two,
@@ -115,9 +113,9 @@ def race(
     for upto in [min(2**index, most) for index in range(ceil(log2(most)) + 1)]:
         asked = [(number, each) for number, own in enumerate(alive) for each in own]
         pairs = [(cases[number], each) for number, each in asked]
-        blasts = judge.impulses_pa_s(pairs, slice(met, upto))
-        for (number, layout), impulses_pa_s in zip(asked, blasts, strict=True):
-            known[number][layout] += impulses_pa_s
+        blasts = judge.loads(pairs, slice(met, upto))
+        for (number, layout), of_layout in zip(asked, blasts, strict=True):
+            known[number][layout] += of_layout
         for number, case in enumerate(cases):
             own = known[number]
             alive[number].sort(key=lambda each: case.combined(own[each]))
@@ -139,9 +137,9 @@ class Lessons:
     labels: list[Label] = field(default_factory=list)
 
     def reduction(self, index: int) -> float:
-        """Return by which share a case's label lowers the impulse; 0 where nothing arrives."""
+        """Return by which share a case's label lowers the load; 0 where nothing arrives."""
         label, case = self.labels[index], self.cases[index]
-        return _reduction(case, label.impulse_pa_s, label.unprotected_pa_s)
+        return _reduction(case, label.load, label.unprotected)
 
     @property
     def demonstrations(self) -> list[int]:
@@ -155,7 +153,7 @@ class Lessons:
             for case in self.cases
         ]
         whole = slice(None)
-        bare = judge.impulses_pa_s([(case, ()) for case in self.cases], whole)
+        bare = judge.loads([(case, ()) for case in self.cases], whole)
         self.labels = [Label((), each, each) for each in bare]
         return self.improve(judge, range(len(self.cases)), by_rule)
 
@@ -175,15 +173,15 @@ class Lessons:
         ]
         tried = []
         raced = race(judge, [self.cases[index] for index in indices], fresh)
-        for index, impulses in zip(indices, raced, strict=True):
+        for index, met in zip(indices, raced, strict=True):
             case, label = self.cases[index], self.labels[index]
-            for layout, impulse_pa_s in impulses.items():
-                bare_pa_s = label.unprotected_pa_s[: len(impulse_pa_s)]
-                tried.append(_reduction(case, impulse_pa_s, bare_pa_s))
-                whole = len(impulse_pa_s) == len(case.threats)
-                best_pa_s = case.combined(self.labels[index].impulse_pa_s)
-                if whole and case.combined(impulse_pa_s) < best_pa_s:
-                    self.labels[index] = replace(label, layout=layout, impulse_pa_s=impulse_pa_s)
+            for layout, load in met.items():
+                bare = label.unprotected[: len(load)]
+                tried.append(_reduction(case, load, bare))
+                whole = len(load) == len(case.threats)
+                best = case.combined(self.labels[index].load)
+                if whole and case.combined(load) < best:
+                    self.labels[index] = replace(label, layout=layout, load=load)
         return tried
 
     def nearest(self, index: int, count: int) -> list[Layout]:
@@ -391,9 +389,7 @@ def _sorted(layout: Layout) -> Layout:
     return tuple(sorted(layout))
 
 
-def _reduction(
-    case: Case, impulse_pa_s: tuple[float, ...], unprotected_pa_s: tuple[float, ...]
-) -> float:
+def _reduction(case: Case, load: tuple[float, ...], unprotected: tuple[float, ...]) -> float:
     """Return a reduction; 0 where nothing arrives without a barrier."""
-    share = reductions(case.combined(impulse_pa_s), case.combined(unprotected_pa_s))
+    share = reductions(case.combined(load), case.combined(unprotected))
     return float(np.nan_to_num(share))

@@ -1,0 +1,176 @@
+"""Trained weights that come with the package: weights only, and beside them what they are."""
+
+import json
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+import torch
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from blast_agents.training.agent import TrainedAgent, policy_for
+from blast_agents.training.checkpoint import Checkpoint
+from blast_agents.training.hyperparameters import described
+from blast_agents.training.run_folder import RunConfiguration, RunFolder
+from blast_env.documents import DocumentError, read_text
+from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.scenario import Scenario
+
+WEIGHTS: Final = Path(__file__).parents[1] / "weights"
+"""The folder of the weights that come with the package."""
+
+
+class LeagueResult(BaseModel):
+    """What the weights did where nothing was chosen by: a row of a league.
+
+    Attributes:
+        command: What played the league.
+        engine: The judge.
+        track: Name of the track.
+        cases: Cases of it.
+        reduction: Mean reduction of the load.
+        low: Lower end of its 95 % interval.
+        high: Upper end.
+        best_rule: Name of the rule that was best on the mean.
+        best_rule_reduction: Its mean reduction.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    command: str
+    engine: str
+    track: str
+    cases: Annotated[int, Field(ge=1)]
+    reduction: float
+    low: float
+    high: float
+    best_rule: str
+    best_rule_reduction: float
+
+
+class Record(BaseModel):
+    """What belongs to weights, a JSON file beside them.
+
+    Attributes:
+        format: Version of this form.
+        configuration: Of the run that they come from, with the scenario's hash.
+        scenario: Name of the scenario.
+        command: What trained them.
+        versions: With what.
+        steps: Steps of training at the evaluation that they were chosen by.
+        blasts: Blasts of the training.
+        seconds: Time that it took.
+        league: What they did in a league.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: Literal[1] = 1
+    configuration: RunConfiguration
+    scenario: str
+    command: str
+    versions: dict[str, str]
+    steps: int
+    blasts: int
+    seconds: float
+    league: LeagueResult | None = None
+
+
+def pack(
+    run: str | Path, name: str, league: LeagueResult | None = None, folder: Path = WEIGHTS
+) -> list[Path]:
+    """Write the best weights of a run, and what belongs to them.
+
+    Args:
+        run: The run folder.
+        name: Of the files.
+        league: What they did in a league.
+        folder: It exists.
+
+    Returns:
+        The files.
+
+    Raises:
+        BlastEnvError: If it is no run folder, or damaged, or a file cannot be written.
+    """
+    source = RunFolder(Path(run))
+    configuration, checkpoint = source.configuration(), Checkpoint.load(source.checkpoint)
+    checkpoint.check_configuration(configuration, source.path)
+    if not checkpoint.best_policy:
+        raise BlastEnvError(f"{source.path}: has no weights yet, before its first evaluation")
+    counters = checkpoint.counters
+    record = Record(
+        configuration=configuration,
+        scenario=source.scenario(configuration).name,
+        command=source.command,
+        versions=source.versions,
+        steps=counters.best_steps,
+        blasts=counters.blasts,
+        seconds=round(counters.seconds, 1),
+        league=league,
+    )
+    buffer = BytesIO()
+    torch.save(dict(checkpoint.best_policy), buffer)
+    paths = [folder / f"{name}.pt", folder / f"{name}.json"]
+    with write_atomically(paths[0]) as temporary:
+        temporary.write_bytes(buffer.getbuffer())
+    with write_atomically(paths[1]) as temporary:
+        text = json.dumps(record.model_dump(mode="json"), indent=2)
+        temporary.write_text(f"{text}\n", encoding="utf-8")
+    return paths
+
+
+def records(folder: Path | None = None) -> Iterator[tuple[Path, Record]]:
+    """Yield each file of weights with what belongs to it, by name.
+
+    Args:
+        folder: Where they are; `WEIGHTS` unless given.
+
+    Raises:
+        BlastEnvError: If a record is damaged.
+    """
+    for path in sorted((folder or WEIGHTS).glob("*.json")):
+        try:
+            yield path.with_suffix(".pt"), Record.model_validate_json(read_text(path))
+        except (ValidationError, DocumentError) as error:
+            what = described(error, "") if isinstance(error, ValidationError) else str(error)
+            raise BlastEnvError(f"{path}: is damaged: {what}") from error
+
+
+def packaged_agent(
+    scenario: Scenario, threat: Literal["visible", "hidden"], folder: Path | None = None
+) -> tuple[TrainedAgent, Record] | None:
+    """Return the agent that comes with the package for a scenario, or `None` if there is none.
+
+    Nothing but weights is read: no file can hold code.
+
+    Args:
+        scenario: The scenario; its content decides, not its name.
+        threat: Whether the agent is to be told the charge.
+        folder: Where the weights are; `WEIGHTS` unless given.
+
+    Raises:
+        BlastEnvError: If a file is damaged.
+    """
+    for path, record in records(folder):
+        configuration = record.configuration
+        fits = configuration.scenario_hash == scenario.content_hash
+        if fits and configuration.settings.threat == threat:
+            return _agent(path, configuration, scenario), record
+    return None
+
+
+def _agent(path: Path, configuration: RunConfiguration, scenario: Scenario) -> TrainedAgent:
+    policy = policy_for(configuration, scenario)
+    try:
+        weights: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
+        policy.load_state_dict(weights)
+    # torch says what is wrong with a file in errors of many kinds.
+    except Exception as error:
+        first_line = str(error).partition("\n")[0]
+        raise BlastEnvError(f"{path}: is damaged, or no weights: {first_line}") from error
+    policy.set_training_mode(False)
+    settings = configuration.settings
+    return TrainedAgent(policy, scenario, settings.observation, settings.engine)

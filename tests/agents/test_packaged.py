@@ -1,0 +1,139 @@
+"""Weights that come with the package propose as their run does; nothing else is read."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from blast_agents.training import load_agent, packaged, train
+from blast_agents.training.packaged import LeagueResult, pack, packaged_agent, records
+from typer.testing import CliRunner, Result
+
+from blast_env.cli import app
+from blast_env.errors import BlastEnvError
+from blast_env.physics.scene import Charge
+from blast_env.scenario import LayoutFile, load_scenario, save_scenario
+from tests.agents.test_self_labelling import own, run_settings, wide_yard
+from tests.catalogue_sites import yard as yard_with_a_point
+
+LEAGUE = LeagueResult(
+    command="blast-env league",
+    engine="gas",
+    track="known_walled_yard",
+    cases=2,
+    reduction=0.4,
+    low=0.3,
+    high=0.5,
+    best_rule="wall near the charge",
+    best_rule_reduction=0.35,
+)
+CHARGE = Charge((1.7, 5.2), 5.0)
+
+
+@pytest.fixture(scope="module")
+def yard(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("site") / "yard.toml"
+    save_scenario(wide_yard(), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(yard: Path) -> Path:
+    """A run on the yard that has hardly learnt anything."""
+    small = own(cases=1, first_updates=2)
+    train(run_settings(yard, engine="gas", steps=1), small, yard.parent / "run")
+    return yard.parent / "run"
+
+
+@pytest.fixture(scope="module")
+def folder(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of weights, as the package's."""
+    folder = tmp_path_factory.mktemp("weights")
+    pack(run, "yard", LEAGUE, folder)
+    return folder
+
+
+def proposed(folder: Path, monkeypatch: pytest.MonkeyPatch, *arguments: Any) -> Result:
+    monkeypatch.setattr(packaged, "WEIGHTS", folder)
+    return CliRunner().invoke(app, ["propose", *map(str, arguments)])
+
+
+def test_the_weights_propose_what_their_run_does(run: Path, folder: Path) -> None:
+    found = packaged_agent(wide_yard(), "visible", folder)
+    assert found is not None
+    agent, record = found
+    assert agent.propose(wide_yard(), CHARGE) == load_agent(run).propose(wide_yard(), CHARGE)
+    assert (record.league, record.scenario) == (LEAGUE, "walled_yard")
+    assert record.command == (run / "command.txt").read_text().strip()
+    assert "torch" in record.versions
+    assert packaged_agent(wide_yard(), "hidden", folder) is None
+    assert packaged_agent(yard_with_a_point(), "visible", folder) is None  # of the same name
+
+
+def test_the_weights_of_the_package_are_for_its_scenarios_as_they_are() -> None:
+    for path, record in records():
+        scenario = load_scenario(record.scenario)
+        assert record.configuration.scenario_hash == scenario.content_hash, path.name
+        found = packaged_agent(scenario, record.configuration.settings.threat)
+        assert found is not None
+        assert record.league is not None
+        assert path.stat().st_size < 500_000
+
+
+def test_a_damaged_file_is_told(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "yard.json").write_bytes((folder / "yard.json").read_bytes())
+    with pytest.raises(BlastEnvError, match=r"yard.pt: is damaged, or no weights"):
+        packaged_agent(wide_yard(), "visible", tmp_path)
+    torch.save({"cell": Path("code")}, tmp_path / "yard.pt")  # an object that is no weights
+    with pytest.raises(BlastEnvError, match=r"yard.pt: is damaged, or no weights"):
+        packaged_agent(wide_yard(), "visible", tmp_path)
+    (tmp_path / "yard.json").write_text("{}")
+    with pytest.raises(BlastEnvError, match=r"yard.json: is damaged"):
+        packaged_agent(wide_yard(), "visible", tmp_path)
+
+
+def test_a_proposal_is_verified_and_written(
+    yard: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "layout.json"
+    charge = ("--charge", *CHARGE.position_m)
+    done = proposed(folder, monkeypatch, yard, *charge, "--verify", "--out", out)
+    assert done.exit_code == 0, done.output
+    assert "by the weights of walled_yard" in done.output
+    for row in ("no barrier", "wall near the charge", "most sight lines cut", "this proposal"):
+        assert row in done.output
+    layout = LayoutFile.load(out)
+    agent = packaged_agent(wide_yard(), "visible", folder)
+    assert agent is not None
+    wanted = agent[0].propose(wide_yard(), CHARGE)
+    assert layout.layout_for(wide_yard()) == tuple(sorted(wanted))
+    assert layout.provenance["weights"] == wide_yard().content_hash[:12]
+
+
+def test_without_weights_the_best_rule_is_proposed_and_that_is_said(
+    yard: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    charge = ("--charge", *CHARGE.position_m)
+    done = proposed(tmp_path, monkeypatch, yard, *charge)
+    assert done.exit_code == 0, done.output
+    assert "note: no weights come with the package for walled_yard; the best rule" in done.output
+    assert "by the best rule by gas dynamics:" in done.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["free_field"], "no build zone"),
+        (["yard", "--tnt-kg", 5], "--tnt-kg is given without --charge"),
+        (["yard", "--charge", 9.0, 6.0], "charge"),
+        (["courtyrd"], "did you mean 'courtyard'"),
+    ],
+)
+def test_what_is_of_no_use_is_refused_with_the_reason(
+    yard: Path, folder: Path, arguments: list[Any], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen = [yard if each == "yard" else each for each in arguments]
+    done = proposed(folder, monkeypatch, *chosen, "--verify")
+    assert done.exit_code == 2
+    assert words in done.output
+    assert "Traceback" not in done.output
