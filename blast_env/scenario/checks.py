@@ -9,9 +9,11 @@ from typing import Any, Final, TypeVar
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Rectangle
 from blast_env.physics.parameters import AirParameters, SimulationParameters
 from blast_env.physics.particles import lattice_capacity
+from blast_env.physics.presets import for_charge
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.scenario.heights import air_height_m, depth_inside_m, is_over
 from blast_env.scenario.problems import Problem, extent
