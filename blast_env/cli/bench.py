@@ -1,12 +1,15 @@
 """`blast-env bench`: how fast blasts are on this machine."""
 
 from importlib.util import find_spec
+from math import log
+from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 from rich.table import Table
 
 from blast_env.cli.output import make_table, print_line, result_console, user_errors
+from blast_env.physics.gas.benchmark import measure
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import build_scene
 from blast_env.studies.benchmark.engines import (
@@ -21,6 +24,12 @@ from blast_env.studies.benchmark.environment import (
     FRAME_BALLS,
     measure_environment,
     measure_frame_ms,
+)
+from blast_env.studies.benchmark.gas import (
+    beside_foam,
+    beside_pyclaw,
+    gas_blasts,
+    measure_crowd,
 )
 from blast_env.studies.benchmark.parallel import measure_fleets, measure_threads
 
@@ -65,6 +74,14 @@ _ENVIRONMENT_HEADERS: Final = (
     "mask (ms)",
     "observation (ms)",
 )
+_GAS_HEADERS: Final = (
+    "cell (m)",
+    "cells",
+    "steps",
+    "CPU s",
+    "blasts per CPU s",
+    "million cell updates per CPU s",
+)
 _FLEET_HEADERS: Final = ("environments", "processes", "steps/s", "blasts/s")
 
 
@@ -78,13 +95,22 @@ def bench(
     ] = 2,
     memory: Annotated[bool, typer.Option(help="Also measure the memory of a large blast.")] = True,
     environment: Annotated[bool, typer.Option(help="Also time `BlastBarrier-v0`.")] = True,
+    particles: Annotated[bool, typer.Option(help="Time the particle engines.")] = True,
+    gas: Annotated[bool, typer.Option(help="Time gas dynamics.")] = True,
+    pyclaw_python: Annotated[
+        Path | None, typer.Option(help="An interpreter that has clawpack, to time it beside gas.")
+    ] = None,
 ) -> None:
-    """Time blasts on both engines and against pymunk alone, and measure the memory."""
+    """Time blasts on all engines and against other codes, and measure the memory."""
     with user_errors():
         scenes = benchmark_scenes()
         if scenario is not None:
             scenes = (BenchmarkScene(scenario, load_scenario(scenario)),)
         print_line(hardware())
+        if gas:
+            _print_gas(threads, pyclaw_python)
+        if not particles:
+            return
         result_console().print(_engine_table(scenes, repeats))
         print_line(
             "5 % step: the longest at which pymunk's loads are within 5 % of those of the event "
@@ -109,6 +135,47 @@ def bench(
             print_line(f"a frame with {FRAME_BALLS:,} balls: {frame_ms:.1f} ms; target 20 ms")
         if environment:
             _print_environment(load_scenario(scenario or "courtyard"), repeats)
+
+
+def _print_gas(threads: int, pyclaw_python: Path | None) -> None:
+    """Time a blast of gas dynamics by cells, threads and processes, and beside other codes."""
+    blasts = gas_blasts()
+    table = make_table("gas dynamics: 40 x 30 x 12 m, 60 ms, one thread", _GAS_HEADERS)
+    for cell_m, cost in blasts.items():
+        table.add_row(
+            f"{cell_m:g}",
+            f"{cost.cells:,}",
+            f"{cost.steps:,}",
+            f"{cost.cpu_s:.2f}",
+            f"{1.0 / cost.cpu_s:.2f}",
+            f"{1e-6 * cost.updates_per_cpu_s:.1f}",
+        )
+    result_console().print(table)
+    coarse, fine = blasts.values()
+    power = log(fine.cpu_s / coarse.cpu_s) / log(fine.cells / coarse.cells)
+    print_line(f"CPU time grows with the power {power:.2f} of the number of cells")
+    if threads > 1:
+        one_s, more_s = (measure(threads=count).clock_s for count in (1, threads))
+        crowd = measure_crowd(threads)
+        print_line(
+            f"by the clock, which needs as many idle cores: {threads} threads {one_s / more_s:.2f} "
+            f"times as fast as one, {threads} processes {crowd.ratio:.2f} times the blasts of one"
+        )
+        print_line(f"memory of a process: {crowd.process_bytes / 2**20:.0f} MiB")
+    others = {
+        "PyClaw": None if pyclaw_python is None else beside_pyclaw(pyclaw_python),
+        "rhoCentralFoam": beside_foam(),
+    }
+    for name, found in others.items():
+        if found is None:
+            hint = " (--pyclaw-python)" if name == "PyClaw" else ""
+            print_line(f"{name}: not installed{hint}")
+        else:
+            print_line(
+                f"{name}, {found.scene}: {1e-6 * found.theirs_per_s:.2f} million cell updates a "
+                f"CPU second, gas {1e-6 * found.ours_per_s:.1f}"
+            )
+    print_line("")
 
 
 def _engine_table(scenes: tuple[BenchmarkScene, ...], repeats: int) -> Table:

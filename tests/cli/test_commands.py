@@ -185,7 +185,7 @@ def test_bench_prints_the_hardware_and_the_ratios(
     sparse: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(sparse.parent)
-    options = ("--scenario", sparse.name, "--no-memory", "--no-environment")
+    options = ("--scenario", sparse.name, "--no-memory", "--no-environment", "--no-gas")
     result = run("bench", "--repeats", "1", *options)
     assert result.exit_code == 0, result.output
     for words in ("cores", "pymunk 7", sparse.name, "blasts/s", "time / pymunk alone"):

@@ -117,7 +117,7 @@ def test_only_particles_refuse_such_a_charge() -> None:
     document["simulation"]["preset"] = "ballistic"
     scenario = Scenario.from_document(document, "small charge")
     assert build_site(scenario).charge.tnt_kg == 5.0  # all that gas dynamics needs
-    with pytest.raises(BlastEnvError, match=r"small charge: charge: tnt_kg is 5: the parameters"):
+    with pytest.raises(BlastEnvError, match=r"courtyard: charge: tnt_kg is 5: the parameters"):
         build_scene(scenario)
 
 

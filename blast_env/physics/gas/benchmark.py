@@ -3,6 +3,7 @@
 import resource
 import time
 from dataclasses import dataclass
+from math import ceil
 from typing import Final, Literal
 
 import numpy as np
@@ -13,8 +14,11 @@ from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import FaceLoads, Gauges, GroundMap, Snapshots
 from blast_env.physics.gas.solver import GasSolver
 
-_CELL_M: Final = 0.5
-_SHAPE: Final = (80, 60, 24)
+CELL_M: Final = 0.5
+_SIZE_M: Final = (40.0, 30.0, 12.0)
+_WALLS_M: Final = (((15.0, 10.0, 0.0), (15.5, 20.0, 3.0)), ((25.0, 5.0, 0.0), (25.5, 15.0, 3.0)))
+_BUILDING_M: Final = (((32.0, 10.0, 0.0), (36.0, 20.0, 6.0)),)
+_GAUGES_M: Final = ((20.0, 15.0, 0.0), (31.0, 15.0, 0.0))
 _CHARGE_M: Final = (10.0, 15.0, 0.0)
 _CHARGE_KG: Final = 100.0
 _CHARGE_RADIUS_M: Final = 1.5
@@ -66,14 +70,14 @@ class GasBenchmark:
         )
 
 
-def site() -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def site(cell_m: float = CELL_M) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return solid cells and those of the building among them: two walls and a building."""
-    solid = np.zeros(_SHAPE, dtype=bool)
-    solid[30:31, 20:40, 0:6] = True
-    solid[50:51, 10:30, 0:6] = True
-    building = np.zeros(_SHAPE, dtype=bool)
-    building[64:72, 20:40, 0:12] = True
-    return solid | building, building
+    walls, building = (np.zeros([round(m / cell_m) for m in _SIZE_M], dtype=bool) for _ in "12")
+    for cells, boxes_m in ((walls, _WALLS_M), (building, _BUILDING_M)):
+        for low_m, high_m in boxes_m:
+            ends = zip(low_m, high_m, strict=True)
+            cells[tuple(slice(round(a / cell_m), ceil(b / cell_m)) for a, b in ends)] = True
+    return walls | building, building
 
 
 def hot_sphere(solver: GasSolver) -> None:
@@ -90,7 +94,11 @@ def hot_sphere(solver: GasSolver) -> None:
 
 
 def measure(
-    precision: Literal["single", "double"] = "single", threads: int = 1, *, record: bool = True
+    precision: Literal["single", "double"] = "single",
+    threads: int = 1,
+    *,
+    record: bool = True,
+    cell_m: float = CELL_M,
 ) -> GasBenchmark:
     """Run one blast and return what it cost.
 
@@ -98,15 +106,16 @@ def measure(
         precision: Of the state.
         threads: Threads that share the blast.
         record: Whether loads on the building, gauges, maps and pictures are recorded.
+        cell_m: Side of a cell.
     """
-    solid, building = site()
-    grid = GasGrid(_CELL_M, solid)
+    solid, building = site(cell_m)
+    grid = GasGrid(cell_m, solid)
     faces = exposed_faces(grid, building)
 
     def start() -> GasSolver:
         recorders = (
             FaceLoads(len(faces)),
-            Gauges(grid, [(40, 30, 0), (62, 30, 0)]),
+            Gauges(grid, [grid.cell_at(place) for place in _GAUGES_M]),
             GroundMap(grid),
             Snapshots(grid, 2, 3, np.linspace(0.0, _UNTIL_S, 60).tolist()),
         )
