@@ -23,7 +23,6 @@ from scripts.scenario_difficulty import (
     PICTURES,
     picture_path,
     studied_scenarios,
-    with_items,
     with_section,
 )
 from tests.agents.search_cases import ballistic
@@ -189,7 +188,7 @@ def test_only_the_section_of_the_scenario_changes() -> None:
         with_section(page, "z", "new")
 
 
-@pytest.mark.parametrize("name", sorted(set(studied_scenarios()) - set(with_items())))
+@pytest.mark.parametrize("name", studied_scenarios())
 def test_the_page_was_made_with_the_scenario_as_it_is(name: str) -> None:
     """Otherwise run `python -m scripts.scenario_difficulty`."""
     section = (REPOSITORY / PAGE).read_text("utf-8").partition(f"<!-- begin {name} -->")[2]
