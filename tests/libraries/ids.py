@@ -1,5 +1,6 @@
 """The registered environments, each with what makes its episodes cheap."""
 
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -17,6 +18,10 @@ def arguments(name: str) -> dict[str, Any]:
     return dict(_CHEAP.get(name, {"realisations": 1}))
 
 
-_CHEAP: Final = MappingProxyType(
-    {"BlastSimulator-v0": {"scenario": "free_field", "engine": "event"}, "BlastBarrierGas-v0": {}}
+_CHEAP: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
+    {
+        "BlastSimulator-v0": {"scenario": "free_field", "engine": "event"},
+        "BlastBarrierGas-v0": {},
+        "BlastBarrierItemSites-v0": {"engine": "event", "realisations": 1},
+    }
 )

@@ -11,7 +11,7 @@ from blast_agents.training import load_agent
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.run_folder import RunFolder
 from blast_env.errors import BlastEnvError
-from blast_env.sites import SITES
+from blast_env.sites import FAMILIES
 
 _ALGORITHMS: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
 
@@ -50,7 +50,7 @@ class TrainedRun:
             entry=Agent(load_agent(run), name, _training(folder, settings.evaluation_cases)),
             threat=settings.threat,
             scenario=settings.scenario,
-            scenario_hash=None if settings.scenario == SITES else configuration.scenario_hash,
+            scenario_hash=None if settings.scenario in FAMILIES else configuration.scenario_hash,
         )
 
     def is_for(self, track: Track) -> bool:

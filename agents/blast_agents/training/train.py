@@ -25,7 +25,7 @@ from blast_agents.training.run_folder import (
 )
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
-from blast_env.sites import SITES
+from blast_env.sites import FAMILIES
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +101,8 @@ def resume(
     own = folder.scenario(configuration)
     check_fit(configuration, own, folder)
     source: ScenarioSource = SingleScenario(own)
-    if configuration.settings.scenario == SITES:
-        source = training_source(SITES)
+    if configuration.settings.scenario in FAMILIES:
+        source = training_source(configuration.settings.scenario)
         check_scenario(source.representative, configuration, "generated sites")
     selection = Selection.of(configuration.settings, source)
     job = _Run(folder, configuration, source, selection)
