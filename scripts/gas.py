@@ -27,8 +27,9 @@ from blast_env.studies.gas.cells import CellLoads, cell_loads, difference
 from blast_env.studies.gas.corners import corner_waves
 from blast_env.studies.gas.ending import Ending, ending
 from blast_env.studies.gas.handover import load_from_radius
+from blast_env.studies.gas.judgement import Judgement
 from blast_env.studies.gas.judgement import judge as judgement
-from blast_env.studies.gas.loads import protected_impulse_pa_s
+from blast_env.studies.gas.loads import impulse_until
 from blast_env.studies.gas.reference import free_field, wide_wall
 from blast_env.studies.gas.sites import BARRIER_M, BUILDING_M, with_heights, yard
 from blast_env.studies.gas.sources import source_ratios, trade_off_figure
@@ -119,30 +120,34 @@ def kingery_bulmash(
 
 
 @app.command()
-def margins(
+def borders(
     scenario: str = "courtyard",
-    margins_m: Annotated[
-        str, typer.Option("--margins", help="m, separated by commas.")
-    ] = "2,4,8,16",
+    places: Annotated[
+        str, typer.Option(help="MARGIN/BORDER in m, separated by commas.")
+    ] = "2/0,2/12,2/24,2/48,8/48",
+    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.2,
+    all_layouts: Annotated[bool, typer.Option(help="Also the wall near the building.")] = False,
     cell: Cell = 0.5,
 ) -> None:
-    """Print how loads depend on how far the open borders at the sides are from the site.
+    """Print how loads depend on where the open borders at the sides and above are.
 
-    With everything as high as the air, and with real heights; the others are compared with the
-    last of the margins.
+    The margin is where cells begin to grow, the border where they end. With everything as high as
+    the air, and with real heights; the others are compared with the last of the places.
     """
-    rows, wanted = [], _numbers(margins_m)
+    rows = []
     with user_errors():
+        wanted = [_numbers(place.replace("/", ",")) for place in places.split(",")]
         loaded = load_scenario(scenario)
         for heights, site in (("endless", loaded), (_HEIGHTS, with_heights(loaded))):
-            for name, layout in _rule_layouts(site).items():
-                blasts = [
-                    GasBlast(site, layout, engine=GasEngine(cell_m=cell, margin_m=margin_m))
-                    for margin_m in wanted
+            for name, layout in list(_rule_layouts(site).items())[: None if all_layouts else 2]:
+                engines = [
+                    GasEngine(cell_m=cell, margin_m=margin_m, border_m=border_m)
+                    for margin_m, border_m in wanted
                 ]
-                loads = [protected_impulse_pa_s(blast.run()) for blast in blasts]
+                loads = [impulse_until(GasBlast(site, layout, engine=e), until) for e in engines]
                 rows.append((heights, name, *_against_last(loads)))
-    print_line(markdown_table(("heights", "layout", *(f"{m:g} m" for m in wanted)), rows))
+    headers = (f"{margin_m:g} m + {border_m:g} m" for margin_m, border_m in wanted)
+    print_line(markdown_table(("heights", "layout", *headers), rows))
 
 
 @app.command()
@@ -150,28 +155,25 @@ def air_height(
     scenario: str = "courtyard",
     heights_m: Annotated[
         str, typer.Option("--heights", help="m, separated by commas.")
-    ] = "12,18,24,36",
-    until: Annotated[float, typer.Option(help="When loads are looked at again, s.")] = 0.2,
+    ] = "9,12,18,24",
+    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.2,
+    all_layouts: Annotated[bool, typer.Option(help="Also the wall near the charge.")] = False,
     cell: Cell = 0.5,
 ) -> None:
-    """Print how loads depend on how high the air is, which ends at an open border.
+    """Print how loads depend on how high the air is, above which cells grow.
 
-    With real heights; at the end of the run, and later. The others are compared with the last of
-    the heights.
+    With real heights. The others are compared with the last of the heights.
     """
     rows, wanted = [], _numbers(heights_m)
     with user_errors():
         loaded, engine = load_scenario(scenario), GasEngine(cell_m=cell)
         for name, layout in _rule_layouts(loaded).items():
-            found = [
-                ending(GasBlast(with_heights(loaded, air_m=air_m), layout, engine=engine), until)
-                for air_m in wanted
-            ]
-            at_end = [each.impulse_pa_s for each in found]
-            later = [each.later_pa_s for each in found]
-            rows.append((name, "the end", *_against_last(at_end)))
-            rows.append((name, f"{until:g} s", *_against_last(later)))
-    print_line(markdown_table(("layout", "at", *(f"{m:g} m" for m in wanted)), rows))
+            if name == "wall near the charge" and not all_layouts:
+                continue
+            sites = [with_heights(loaded, air_m=air_m) for air_m in wanted]
+            loads = [impulse_until(GasBlast(site, layout, engine=engine), until) for site in sites]
+            rows.append((name, *_against_last(loads)))
+    print_line(markdown_table(("layout", *(f"{m:g} m" for m in wanted)), rows))
 
 
 @app.command()
@@ -385,13 +387,16 @@ def _within(gauges: FloatArray, band: ExperimentalBand) -> str:
 @app.command()
 def judge(
     scenario: str = "courtyard",
-    random_layouts: int = 8,
-    charges: int = 3,
-    seeds: int = 4,
+    random_layouts: Annotated[int, typer.Option(min=1)] = 58,
+    charges: Annotated[int, typer.Option(min=1)] = 3,
+    seeds: Annotated[int, typer.Option(min=1)] = 4,
+    store: Annotated[
+        Path | None, typer.Option(help="Folder from which a study that was broken off goes on.")
+    ] = None,
     processes: Processes = 2,
     cluster: ClusterAddress = None,
 ) -> None:
-    """Judge the particle model by gas dynamics: order, overstatement, regret.
+    """Judge the presets of the particle model by gas dynamics: order, overstatement, regret.
 
     Random layouts and the two walls by rule, each under charges that the scenario draws.
     """
@@ -399,24 +404,27 @@ def judge(
         chosen = load_scenario(scenario)
         rng = np.random.default_rng(0)
         drawn = [draw_charge(chosen, seed) for seed in range(charges)]
-        layouts = [random_layout(chosen, rng) for _ in range(random_layouts)]
-        layouts += [rule(chosen, drawn[0]) for rule in (wall_near_charge, wall_near_building)]
+        layouts = [rule(chosen, drawn[0]) for rule in (wall_near_charge, wall_near_building)]
+        layouts += [random_layout(chosen, rng) for _ in range(random_layouts)]
         with progress_bar(f"gas blasts in {chosen.name}") as progress:
-            found = judgement(chosen, layouts, drawn, seeds, processes, progress)
+            found = judgement(chosen, layouts, drawn, seeds, processes, progress, store=store)
+    headers = ("preset", "mean (gas)", "overstated", "rank correlation", "by charge", "regret")
+    rows = [(preset, *_judgement_row(each)) for preset, each in found.items()]
+    print_line(markdown_table((*headers, "best factor", "error with it", "without"), rows))
+
+
+def _judgement_row(found: Judgement) -> tuple[str, ...]:
     particle, gas = found.means
-    names = [*(f"random {n + 1}" for n in range(random_layouts)), "wall near charge"]
-    names.append("wall near building")
-    rows = [
-        (name, *(f"{100.0 * p:.0f} / {100.0 * g:.1f}" for p, g in zip(ps, gs, strict=True)))
-        for name, ps, gs in zip(names, found.particle, found.gas, strict=True)
-    ]
-    headers = ("reduction, particle / gas (%)", *(f"charge {n + 1}" for n in range(charges)))
-    print_line(markdown_table(headers, rows))
-    print_line(
-        f"mean {100.0 * particle:.1f} % by particles, {100.0 * gas:.1f} % by gas: overstated "
-        f"{found.overstatement:.1f} times; rank correlation {found.all_pairs:.2f} over all pairs, "
-        f"{', '.join(f'{each:.2f}' for each in found.rank_correlations)} by charge; regret "
-        f"{100.0 * found.regret.value:.1f} points"
+    error, spread = found.errors
+    return (
+        f"{100.0 * particle:.1f} % ({100.0 * gas:.1f} %)",
+        f"{found.overstatement:.1f} times",
+        f"{found.all_pairs:.2f}",
+        ", ".join(f"{each:.2f}" for each in found.rank_correlations),
+        f"{100.0 * found.regret.value:.1f} points",
+        f"{found.factor:.2f}",
+        f"{100.0 * error:.1f} points",
+        f"{100.0 * spread:.1f} points",
     )
 
 

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import typer
@@ -17,15 +17,28 @@ from blast_agents.search import Progress as SearchProgress
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import (
+    CacheFolder,
+    CellSide,
+    ChargePlace,
+    CvarLevel,
+    Processes,
+    TntMass,
+    fixed_charge,
+)
 from blast_env.cli.output import (
+    engine_text,
     make_table,
     message_console,
     print_line,
     progress_bar,
     result_console,
+    resume_with_cache,
     save_pictures,
+    show_interruption,
     user_errors,
 )
+from blast_env.cli.targets import checked_targets
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.envs.strategies import HiddenThreat
 from blast_env.errors import BlastEnvError
@@ -43,13 +56,15 @@ from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
-from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
 from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario, write_layout
 from blast_env.statistics import CVAR_LEVEL, ConditionalValueAtRisk, WorstRisk, reductions
 from blast_env.tables import write_csv
 
 ThreatName = Literal["visible", "hidden"]
+
+LAYOUT_NAME: Final = "layout.json"
+"""File of the layout in the folder of `--out`."""
 
 
 @dataclass(frozen=True)
@@ -64,9 +79,11 @@ class SearchOptions:
     threats: int | None
     realisations: int | None
     charge_position_m: tuple[float, float] | None
+    tnt_kg: float | None
     risk: str | None
     cvar_level: float
     engine: str
+    cell_m: float | None
     start_from: tuple[str, ...]
 
 
@@ -119,6 +136,7 @@ def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
         f"blasts spent, {run.cache_hits} of the loads asked for known already; "
         f"{run.seconds:.1f} s"
     )
+    print_line(engine_text(problem.evaluator.engine, [problem.scenario]))
 
 
 def write_search(
@@ -128,7 +146,7 @@ def write_search(
     result = run.result
     scenario = run.problem.scenario
     provenance = _provenance(run, options, checked)
-    written = [write_layout(out / "layout.json", scenario, result.layout, provenance)]
+    written = [write_layout(out / LAYOUT_NAME, scenario, result.layout, provenance)]
     if result.history:
         written.append(write_csv(result.history_table(), out / "history.csv"))
         written += save_pictures(lambda: _save_figure(run, out))
@@ -202,7 +220,7 @@ def search(
         typer.Option(
             help="random, greedy, annealing, genetic, nsga2, exhaustive, or a rule: "
             "(long_)wall_near_charge, (long_)wall_near_building, ring_around_charge, "
-            "ring_around_building, line_of_posts or posts_and_wall."
+            "ring_around_building, line_of_posts, posts_and_wall or sight_lines."
         ),
     ] = "genetic",
     scenario: Annotated[str, typer.Option(help="Bundled name, or a scenario file.")] = "courtyard",
@@ -219,10 +237,8 @@ def search(
         int | None,
         typer.Option(min=1, help="Blasts a charge; 2 (visible) or 1 (hidden) unless given."),
     ] = None,
-    charge_position: Annotated[
-        tuple[float, float] | None,
-        typer.Option(help="x and y in m of a visible charge; drawn unless given."),
-    ] = None,
+    charge: ChargePlace = None,
+    tnt_kg: TntMass = None,
     risk: Annotated[
         str | None,
         typer.Option(
@@ -230,16 +246,12 @@ def search(
             show_default="as the scenario's objective says",
         ),
     ] = None,
-    cvar_level: Annotated[
-        float, typer.Option(help="For the risk cvar; 0.8: the mean of the worst 20 %.")
-    ] = CVAR_LEVEL,
+    cvar_level: CvarLevel = CVAR_LEVEL,
     engine: Annotated[
         str, typer.Option(help="event or pymunk (particles), or gas (gas dynamics).")
     ] = "event",
-    cell: Annotated[
-        float | None, typer.Option(help="Side of the cells of gas dynamics, m; 0.5 unless given.")
-    ] = None,
-    processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
+    cell: CellSide = None,
+    processes: Processes = 1,
     cluster: ClusterAddress = None,
     start_from: Annotated[
         list[Path] | None, typer.Option(help="Layout file to begin with; more than one will do.")
@@ -247,11 +259,9 @@ def search(
     held_out: Annotated[
         int, typer.Option(min=1, help="Threats that the result is checked on at the end.")
     ] = 32,
-    cache: Annotated[
-        Path | None, typer.Option(help="Folder in which blasts are kept for the next run.")
-    ] = None,
+    cache: CacheFolder = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for layout, history, front and figure.")
+        Path | None, typer.Option(help="Folder for layout, its plan, history, front and figure.")
     ] = None,
 ) -> None:
     """Search for the layout with the least impulse on the protected structures.
@@ -259,7 +269,11 @@ def search(
     Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats that
     the search has not met; those blasts do not count.
     """
-    with user_errors(), running_on(cluster):
+    with (
+        user_errors(lambda: resume_with_cache(cache)),
+        checked_targets(folders={"--out": out, "--cache": cache}),
+        running_on(cluster),
+    ):
         options = SearchOptions(
             method=method,
             scenario=scenario,
@@ -268,22 +282,31 @@ def search(
             threat=threat,
             threats=threats,
             realisations=realisations,
-            charge_position_m=charge_position,
+            charge_position_m=charge,
+            tnt_kg=tnt_kg,
             risk=risk,
             cvar_level=cvar_level,
             engine=engine,
+            cell_m=cell,
             start_from=tuple(str(path) for path in start_from or ()),
         )
         evaluator = BlastEvaluator(load_scenario(scenario), find_engine(engine, cell), cache=cache)
         if out is not None:
             make_folder(out)
         run = _run(options, evaluator, processes)
+        if run.result.interrupted and not run.result.history:
+            raise KeyboardInterrupt  # nothing was found that could be kept
         checked = _check(run, options, held_out)
         print_search(run, checked)
         if out is not None:
             write_search(run, options, checked, out)
     if run.result.interrupted:
-        message_console().print("interrupted: the best layout so far was kept", style="yellow")
+        layout = None if out is None else out / LAYOUT_NAME
+        show_interruption(
+            "the best layout so far was kept",
+            "" if layout is None else f"--start-from {layout} begins with it",
+            resume_with_cache(cache),
+        )
         raise typer.Exit(130)
 
 
@@ -306,19 +329,16 @@ def _practice(scenario: Scenario, options: SearchOptions, engine: Engine) -> Cas
     if not isinstance(model, HiddenThreat):
         charge = _visible_charge(scenario, options)
         return practice_visible(scenario, charge, realisations, options.seed, risk)
-    if options.charge_position_m is not None:
-        raise BlastEnvError("--charge-position is for a visible threat: a hidden one is drawn")
+    for option, value in (("--charge", options.charge_position_m), ("--tnt-kg", options.tnt_kg)):
+        if value is not None:
+            raise BlastEnvError(f"{option} is for a visible threat: a hidden one is drawn")
     return practice_hidden(scenario, model.threats, realisations, options.seed, risk)
 
 
 def _visible_charge(scenario: Scenario, options: SearchOptions) -> AnyCharge:
     """Return the charge that is known: always that of the search's own seed."""
-    charge = scenario.sample_charge(np.random.default_rng(options.seed))
-    if options.charge_position_m is None:
-        return charge
-    moved = Charge(options.charge_position_m, charge.tnt_kg, charge.height_m)
-    scenario.with_charge(moved)  # refuses a place that is not clear
-    return moved
+    drawn = scenario.sample_charge(np.random.default_rng(options.seed))
+    return fixed_charge(scenario, drawn, options.charge_position_m, options.tnt_kg)
 
 
 def _with_progress(

@@ -78,6 +78,7 @@ class BlastEvaluator:
                 " overpressure: must be 'impulse', or the engine 'gas'"
             )
         if not is_gas(self.engine):
+            self.scenario.check_for_particles()
             self.calibration = scenario_calibration(self.scenario, self.engine.name)
         self.blasts = 0
         self.cache_hits = 0

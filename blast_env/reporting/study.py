@@ -16,7 +16,6 @@ from blast_env.export.bill import bill_of_quantities
 from blast_env.export.plan import LayoutPlan
 from blast_env.geometry import Element, Layout, Piece, layout_text
 from blast_env.physics.gas.engine import GasEngine
-from blast_env.physics.scene import Charge
 from blast_env.reporting.figures import Picture, blast_pictures, film_stills
 from blast_env.reporting.limits import Limit, check_limits
 from blast_env.reporting.loads import Measured, Target, measure, targets_of
@@ -60,7 +59,7 @@ class StudyOptions:
         BlastEnvError: If something is out of bounds.
     """
 
-    charges: tuple[Charge, ...] = ()
+    charges: tuple[AnyCharge, ...] = ()
     most_threats: int = 2
     cells_m: tuple[float, float] = (0.5, 0.25)
     limits: tuple[Limit, ...] = ()

@@ -146,10 +146,7 @@ def check_sources(parts: Parts) -> tuple[Problem, ...]:
 
     Those are what `check_parts` finds if the other sections fit each other.
     """
-    problems = (*_charge_problems(parts), *_build_zone_problems(parts))
-    if parts.parameters is None:
-        return problems
-    return (*problems, *_charge_scaling_problems(parts.parameters, parts.sources))
+    return (*_charge_problems(parts), *_build_zone_problems(parts))
 
 
 def _sound(adapter: TypeAdapter[Checked], value: object) -> Checked | None:
@@ -408,7 +405,6 @@ def _simulation_problems(parts: Parts) -> Iterator[Problem]:
     """Check that no balls overlap at the start."""
     if parts.parameters is None:
         return
-    yield from _charge_scaling_problems(parts.parameters, parts.sources)
     air, explosive = parts.parameters.air, parts.parameters.explosive
     if 0.0 < air.spacing_units < 2.0 * air.radius_units:
         yield Problem(
@@ -430,11 +426,16 @@ def _simulation_problems(parts: Parts) -> Iterator[Problem]:
             )
 
 
-def _charge_scaling_problems(
-    parameters: SimulationParameters, sources: Mapping[int, AnySource]
+def particle_problems(
+    parameters: SimulationParameters, sources: Sequence[AnySource]
 ) -> Iterator[Problem]:
-    """Check that the parameters reach to the mass of every charge."""
-    for index, source in sources.items():
+    """Yield why particles cannot run a scenario that gas dynamics can: its charges' masses.
+
+    Args:
+        parameters: Those of the particles; they must reach to the mass of every charge.
+        sources: The sources of the charges.
+    """
+    for index, source in enumerate(sources):
         try:
             for_charge(parameters, source.tnt_kg)
         except BlastEnvError as error:

@@ -30,13 +30,14 @@ from blast_env.scenario.checks import (
     charge_radius_m,
     check_parts,
     check_sources,
+    particle_problems,
     sound_parts,
     vehicle_ground,
 )
 from blast_env.scenario.georeference import AnyGeoreference
 from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
 from blast_env.scenario.objective import ObjectiveSection
-from blast_env.scenario.problems import ScenarioError, problems_from
+from blast_env.scenario.problems import Problem, ScenarioError, problems_from
 from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
@@ -175,6 +176,21 @@ class Scenario(Section):
     def height_notes(self) -> tuple[str, ...]:
         """What the scenario says of heights that an engine without them does not heed."""
         return height_notes(self.structures, self.charge, self.build_zone, self.gauges)
+
+    @property
+    def particle_problems(self) -> tuple[Problem, ...]:
+        """Why particles cannot run the scenario; gas dynamics needs nothing of it."""
+        return tuple(particle_problems(self.parameters, self.charge))
+
+    def check_for_particles(self) -> None:
+        """Refuse a scenario that particles cannot run.
+
+        Raises:
+            ScenarioError: If there is a reason; all are in it.
+        """
+        problems = self.particle_problems
+        if problems:
+            raise ScenarioError(self.name, dict.fromkeys(problems))
 
     @property
     def content_hash(self) -> str:

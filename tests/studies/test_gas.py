@@ -1,5 +1,6 @@
 """The studies of the gas engine, on scenes that take seconds."""
 
+from dataclasses import replace
 from math import cbrt
 
 import numpy as np
@@ -74,13 +75,16 @@ def test_the_load_is_the_mean_by_weight_of_the_protected(site: Scenario) -> None
 
 
 def test_a_run_s_end_is_compared_with_later(site: Scenario) -> None:
-    blast = GasBlast(site)
-    found = ending(blast, 0.1)
-    result = blast.run()
+    """Late waves bring a sixth of what comes behind a wall: a run must wait for them."""
+    blast = GasBlast(site, WALL)
+    found = ending(blast, 0.12)
     assert found.reason is EndReason.LOADS_COMPLETE
-    assert (found.time_s, found.impulse_pa_s) == (result.time_s, protected_impulse_pa_s(result))
-    assert found.later_s >= 0.1
-    assert 0.0 <= found.cut_off < 0.03
+    assert found.later_s >= 0.12
+    assert 0.0 <= found.cut_off < 0.01
+    early = ending(replace(blast, engine=GasEngine(time_limit_s=0.045)), 0.12)
+    assert early.reason is EndReason.TIME_LIMIT
+    assert early.later_pa_s == found.later_pa_s
+    assert early.cut_off > 0.1
 
 
 def test_what_is_cut_off_is_a_share_of_the_later_load() -> None:
@@ -88,24 +92,27 @@ def test_what_is_cut_off_is_a_share_of_the_later_load() -> None:
     assert found.cut_off == pytest.approx(0.1)
 
 
-def test_a_wider_margin_changes_loads_little(site: Scenario) -> None:
-    default, wide = (
-        protected_impulse_pa_s(GasBlast(site, WALL, engine=engine).run())
-        for engine in (GasEngine(), GasEngine(margin_m=8.0))
+def test_borders_farther_away_change_loads_little(site: Scenario) -> None:
+    """Beyond a few cells of full size those of the skirt will do; without them nothing does."""
+    until_s = 0.06
+    default, wide, near = (
+        ending(GasBlast(site, WALL, engine=replace(engine, time_limit_s=0.01)), until_s).later_pa_s
+        for engine in (GasEngine(), GasEngine(margin_m=6.0, border_m=40.0), GasEngine(border_m=0.0))
     )
-    assert default == pytest.approx(wide, rel=0.02)
+    assert default == pytest.approx(wide, rel=0.01)
+    assert near != pytest.approx(wide, rel=0.02)
 
 
 def test_loads_of_layouts_by_processes_are_the_same(site: Scenario) -> None:
     charge = draw_charge(site, 0)
-    one = cell_loads(site, [WALL], charge, 0.5)
-    two = cell_loads(site, [WALL], charge, 0.5, processes=2)
+    one = cell_loads(site, [WALL], charge, 0.5, until_s=0.03)
+    two = cell_loads(site, [WALL], charge, 0.5, until_s=0.03, processes=2)
     assert one.unprotected_pa_s == two.unprotected_pa_s
     assert one.impulse_pa_s.tolist() == two.impulse_pa_s.tolist()
     assert 0.0 < one.reduction[0] < 0.4
     assert one.cpu_s > 0.0
-    later = cell_loads(site, [WALL], charge, 0.5, until_s=0.06)
-    assert later.impulse_pa_s[0] == ending(GasBlast(site, WALL), 0.06).later_pa_s
+    at_end = cell_loads(site, [], charge, 0.5)
+    assert at_end.unprotected_pa_s == protected_impulse_pa_s(GasBlast(site).run())
 
 
 def test_differences_of_cells_by_hand() -> None:

@@ -17,6 +17,8 @@ from blast_agents.search import LayoutProblem
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Objective
 from blast_env.geometry import Layout
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine, is_gas
 from blast_env.runner import as_completed, check_workers
 
 Found = TypeVar("Found")
@@ -29,12 +31,12 @@ class SearchJob:
     Attributes:
         case: The case.
         search: The search.
-        engine: Name of the engine.
+        engine: Name of the engine, or the engine.
     """
 
     case: Case
     search: Search
-    engine: str
+    engine: str | Engine
 
     @property
     def blasts(self) -> int:
@@ -67,12 +69,12 @@ class EvaluationJob:
     Attributes:
         case: The case.
         layout: The layout.
-        engine: Name of the engine.
+        engine: Name of the engine, or the engine.
     """
 
     case: Case
     layout: Layout
-    engine: str
+    engine: str | Engine
 
     @property
     def blasts(self) -> int:
@@ -136,7 +138,7 @@ class Contest:
         track: The cases.
         entries: No barrier among them; their names differ.
         store: Keeps the results.
-        engine: Name of the engine.
+        engine: Name of the engine, or the engine.
 
     Raises:
         BlastEnvError: If two entries have one name, or no barrier is not among them.
@@ -145,7 +147,7 @@ class Contest:
     track: Track
     entries: tuple[Entry, ...]
     store: ResultStore
-    engine: str = "event"
+    engine: str | Engine = "event"
 
     def __post_init__(self) -> None:
         """Check the entries."""
@@ -251,7 +253,7 @@ class Contest:
             for entry, result in zip(self.entries, results, strict=True)
             if isinstance(entry, NoBarrier)
         )
-        return Standings(self.track, results, bare.loads, self.engine)
+        return Standings(self.track, results, bare.loads, _engine_words(self.engine))
 
     def _results(self) -> Iterator[Result]:
         for entry in self.entries:
@@ -280,3 +282,9 @@ class _Meter:
         self._done += blasts
         if self._show is not None:
             self._show(min(self._done / max(self._blasts, 1), 1.0))
+
+
+def _engine_words(engine: str | Engine) -> str:
+    """Return what people call an engine: its name, with the cells that it has."""
+    found = find_engine(engine)
+    return f"{found.name}, cells of {found.cell_m:g} m" if is_gas(found) else found.name

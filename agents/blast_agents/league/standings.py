@@ -71,7 +71,7 @@ class Standings:
         track: The track.
         results: One an entry.
         unprotected: Load without a barrier, likewise (cases, held-out threats).
-        engine: Name of the engine.
+        engine: Name of the engine, with the cells that it has.
 
     Raises:
         BlastEnvError: If nothing arrives at the protected structures of a case without a barrier.

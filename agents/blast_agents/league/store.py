@@ -21,7 +21,8 @@ from blast_env.evaluation import Case, Threat
 from blast_env.evaluation.store import calibration_digest, engine_text
 from blast_env.files import FolderStore
 from blast_env.geometry import Layout
-from blast_env.physics.engines import find_engine
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine, is_gas
 from blast_env.provenance import code_version, versions
 from blast_env.scenario import AnyCharge, VehicleCharge
 
@@ -37,7 +38,7 @@ class Model(NamedTuple):
     Attributes:
         scenario_hash: Content hash of the scenario.
         engine: The engine with its version.
-        calibration: Digest of the calibration.
+        calibration: Digest of the calibration; empty for gas dynamics.
         code: Version of the package.
     """
 
@@ -81,7 +82,7 @@ class EvaluationKey(NamedTuple):
     layout: Layout
 
 
-def search_key(case: Case, search: Search, engine: str) -> SearchKey:
+def search_key(case: Case, search: Search, engine: str | Engine) -> SearchKey:
     """Return the key of a search for a case.
 
     Raises:
@@ -99,7 +100,7 @@ def search_key(case: Case, search: Search, engine: str) -> SearchKey:
     )
 
 
-def evaluation_key(case: Case, layout: Layout, engine: str) -> EvaluationKey:
+def evaluation_key(case: Case, layout: Layout, engine: str | Engine) -> EvaluationKey:
     """Return the key of the loads with a layout on a case's held-out threats.
 
     Raises:
@@ -184,12 +185,9 @@ def _search_code() -> str:
     return f"{digest.hexdigest()[:16]} {drawn_with}"
 
 
-def _model(case: Case, engine: str) -> Model:
+def _model(case: Case, engine: str | Engine) -> Model:
     found = find_engine(engine)
-    calibration = scenario_calibration(case.scenario, found.name)
-    return Model(
-        case.scenario.content_hash,
-        engine_text(found),
-        calibration_digest(calibration),
-        code_version(),
-    )
+    digest = ""  # gas dynamics needs no calibration
+    if not is_gas(found):
+        digest = calibration_digest(scenario_calibration(case.scenario, found.name))
+    return Model(case.scenario.content_hash, engine_text(found), digest, code_version())

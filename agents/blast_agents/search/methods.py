@@ -1,30 +1,20 @@
 """Search methods that need no further library."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, islice
 from math import comb, exp
-from typing import Final
 
 import numpy as np
 
-from blast_agents.posts import line_of_posts, posts_and_wall
-from blast_agents.rules import (
-    long_wall_near_building,
-    long_wall_near_charge,
-    random_layout,
-    ring_around_building,
-    ring_around_charge,
-    wall_near_building,
-    wall_near_charge,
-)
+from blast_agents.rules import random_layout
 from blast_agents.search.moves import Draw, Moves, random_walls
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
 from blast_agents.search.session import SearchSession
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Element, Layout, Piece
-from blast_env.scenario import AnyCharge, Placement, Scenario
+from blast_env.scenario import Placement
 
 
 @dataclass(frozen=True)
@@ -54,58 +44,6 @@ class RandomSearch:
                 session.assess([random_layout(problem.scenario, rng) for _ in range(self.batch)])
 
         return session.result(self.name, seed, session.run(explore))
-
-
-@dataclass(frozen=True)
-class RuleSearch:
-    """Proposes the layout of a rule; no blast is simulated.
-
-    For a hidden charge the rule stands in the way of the middle of where one may be.
-
-    Attributes:
-        rule: Gives the layout for a charge.
-        name: Name in tables and on the command line.
-    """
-
-    rule: Callable[[Scenario, AnyCharge], Layout]
-    name: str
-
-    def search(
-        self,
-        problem: LayoutProblem,
-        budget: int,
-        seed: int,
-        report: Report | None = None,  # noqa: ARG002
-    ) -> SearchResult:
-        """Return the rule's layout; budget and seed change nothing.
-
-        Raises:
-            BlastEnvError: If there is no line of sight; see `line_of_sight_wall`.
-        """
-        return SearchResult(
-            method=self.name,
-            layout=tuple(sorted(self.rule(problem.scenario, problem.charge))),
-            load=None,
-            threats=0,
-            blasts=0,
-            budget=budget,
-            seed=seed,
-            history=(),
-            interrupted=False,
-        )
-
-
-RULE_SEARCHES: Final = (
-    RuleSearch(wall_near_charge, "wall_near_charge"),
-    RuleSearch(wall_near_building, "wall_near_building"),
-    RuleSearch(long_wall_near_charge, "long_wall_near_charge"),
-    RuleSearch(long_wall_near_building, "long_wall_near_building"),
-    RuleSearch(ring_around_charge, "ring_around_charge"),
-    RuleSearch(ring_around_building, "ring_around_building"),
-    RuleSearch(line_of_posts, "line_of_posts"),
-    RuleSearch(posts_and_wall, "posts_and_wall"),
-)
-"""The rules as methods; without a catalogue the long walls are the others."""
 
 
 @dataclass(frozen=True)

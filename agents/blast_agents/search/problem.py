@@ -69,10 +69,15 @@ class LayoutProblem:
         return Placement(self.scenario, layout).cost
 
     @property
+    def told(self) -> AnyCharge | None:
+        """The charge if it is known: the same one in all threats."""
+        known = set(self.case.charges)
+        return known.pop() if len(known) == 1 else None
+
+    @property
     def charge(self) -> AnyCharge:
         """The charge if it is known, else the middle of where the scenario lets one be."""
-        known = set(self.case.charges)
-        return known.pop() if len(known) == 1 else expected_charge(self.scenario.charge)
+        return self.told or expected_charge(self.scenario.charge)
 
     def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
         """Return the load that counts in each blast, in the unit of the scenario's objective.

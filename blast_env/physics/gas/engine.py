@@ -1,13 +1,13 @@
 """The gas engine: what a layout really does, in three dimensions and without any randomness.
 
-The site becomes a grid of cubes: structures, barrier and ground are solid, the borders are open and
-lie outside the site by a margin. The charge expands with spherical symmetry until its front reaches
-the first structure or the build zone, then the solver takes over, until the loads on the structures
-are complete.
+The site becomes a grid of cubes: structures, barrier and ground are solid. Around the site and
+above it cells grow outwards, to open borders far away. The charge expands with spherical symmetry
+until its front reaches the first structure or the build zone, then the solver takes over, until the
+loads on the structures are complete.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from math import cbrt, ceil, hypot, isclose
 from typing import Final
@@ -19,7 +19,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
 from blast_env.physics.gas.faces import Faces, exposed_faces
-from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.grid import GasGrid, layers_to
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import FaceLoads, Gauges
 from blast_env.physics.gas.solver import GasSolver, Recorder, state_bytes
@@ -44,14 +44,15 @@ CHECKED_CELLS: Final = 9.2
 
 _SOUND_M_S: Final = 340.0
 _MOST_BYTES: Final = 8 * 2**30
-_CHECK_STEPS: Final = 8
-_GROWTH: Final = 0.002  # of an impulse in a window, below which it is complete
+_FARTHEST_M: Final = 10_000.0
+# A charge sends more than one wave: its products swing between too wide and too narrow. All times
+# are those of 100 kg, and grow with the cube root of the mass. A run ends at one of few times that
+# are the same for all layouts, so that their loads can be compared.
+_SWING_S: Final = 0.11  # after sound has come all over, in which the other waves follow
+_WINDOW_S: Final = 0.03
+_GROWTH: Final = 0.02  # of an impulse in a window, below which it is complete then
+_TIME_LIMIT_S: Final = 0.3  # for more windows
 _SMALL_LOAD: Final = 0.05  # of the largest impulse: what counts at least
-_WINDOW_S: Final = 0.008  # of 100 kg; grows with the cube root of the mass
-_WINDOW_SHARE: Final = 0.3  # of the time since the wave could have come
-_NEARLY_ALL: Final = 0.98
-_LATE: Final = 1.2  # for ways round corners
-_TIME_LIMIT_S: Final = 0.1  # after that, of 100 kg
 
 Recorders = Callable[[GasGrid], Sequence[Recorder]]
 
@@ -66,20 +67,23 @@ class GasEngine:
 
     Attributes:
         cell_m: Side of a cell; a module's side must be a whole number of them.
-        margin_m: How far the open borders are outside the site.
+        margin_m: How far the cells keep their size outside the site.
+        border_m: How far the open borders are beyond that, and above the air, at least; the cells
+            between grow outwards.
         threads: Threads that share a blast; they change nothing but the time.
-        time_limit_s: When a run ends at the latest; by default long after the last arrival.
+        time_limit_s: When a run ends at the latest; by default long after the last wave.
 
     Raises:
         BlastEnvError: If one of them is out of bounds.
     """
 
     cell_m: float = 0.5
-    margin_m: float = 4.0
+    margin_m: float = 2.0
+    border_m: float = 24.0
     threads: int = 1
     time_limit_s: float | None = None
     name: str = "gas"
-    version: str = f"gas 1 (numba {version('numba')})"
+    version: str = f"gas 2 (numba {version('numba')})"
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -89,8 +93,9 @@ class GasEngine:
                 f"cell_m is {self.cell_m:g}, must be {MODULE_SIDE_M:g} m, the side of a module, "
                 "divided by a whole number"
             )
-        if not self.margin_m >= 0.0:
-            raise BlastEnvError(f"margin_m is {self.margin_m:g}, must be at least 0")
+        for name, length_m in (("margin_m", self.margin_m), ("border_m", self.border_m)):
+            if not 0.0 <= length_m <= _FARTHEST_M:
+                raise BlastEnvError(f"{name} is {length_m:g}, must be 0 to {_FARTHEST_M:g}")
         if self.time_limit_s is not None and not self.time_limit_s > 0.0:
             raise BlastEnvError(f"time_limit_s is {self.time_limit_s:g}, must be above 0")
 
@@ -172,15 +177,14 @@ class GasRun:
         if self.gauges is not None:
             _add_opening(self.gauges, self.grid, self.charge, self.handover_radius_m)
         self.end_reason: EndReason | None = None
-        self._groups = _groups(self.table, site)
-        # When the wave has come all over a structure; sound would not take longer than this.
-        self._reached_s = _LATE * _distances_m(self.charge, site) / _SOUND_M_S
         scale = cbrt(self.charge.mass_kg / 100.0)
         self._window_s = _WINDOW_S * scale
-        self.limit_s = engine.time_limit_s or float(
-            self._reached_s.max(initial=0.0) + _TIME_LIMIT_S * scale
-        )
-        self._history: list[tuple[float, FloatArray]] = []
+        watched = _watched(site)
+        self._groups = [_faces_of(self.table, site, index) for index in watched]
+        self._impulses: FloatArray | None = None
+        waves_s = _way_m(self.charge, site, watched) / _SOUND_M_S + _SWING_S * scale
+        self._check_s = waves_s - self._window_s
+        self.limit_s = engine.time_limit_s or waves_s + _TIME_LIMIT_S * scale
 
     @property
     def time_s(self) -> float:
@@ -201,33 +205,19 @@ class GasRun:
             self.solver.step()
             if self.solver.time_s >= self.limit_s:
                 self.end_reason = EndReason.TIME_LIMIT
-            elif self.solver.steps % _CHECK_STEPS == 0 and self._is_complete():
+            elif self.solver.time_s >= self._check_s and self._is_complete():
                 self.end_reason = EndReason.LOADS_COMPLETE
 
     def _is_complete(self) -> bool:
-        """Whether the impulse of every structure has stopped growing, and the wave has come."""
-        now_s = self.solver.time_s
+        """Whether the impulses have hardly grown in a window, after all waves of the charge."""
         impulse = self.loads.positive_impulse_pa_s
-        means = np.array([impulse[members].mean() for members in self._groups])
-        self._history.append((now_s, means))
-        for group, members in enumerate(self._groups):
-            if now_s < self._reached_s[group] and self._has_come(members):
-                self._reached_s[group] = now_s
-        if len(means) == 0 or not (now_s > self._reached_s).all():
+        impulses = np.array([impulse[members].mean() for members in self._groups])
+        before, self._impulses = self._impulses, impulses
+        self._check_s += self._window_s
+        if before is None:
             return False
-        times = np.array([time_s for time_s, _ in self._history])
-        windows = np.maximum(self._window_s, _WINDOW_SHARE * (now_s - self._reached_s))
-        if (now_s - self._reached_s < windows).any():
-            return False
-        first = np.searchsorted(times, now_s - windows, side="right") - 1
-        before = np.array([self._history[k][1][group] for group, k in enumerate(first)])
-        least = _SMALL_LOAD * means.max()
-        return bool((means - before <= _GROWTH * np.maximum(means, least)).all())
-
-    def _has_come(self, members: NDArray[np.int64]) -> bool:
-        """Return whether a wave has come to nearly all of some faces."""
-        arrived = np.isfinite(self.loads.arrival_s[members])
-        return bool(arrived.mean() > _NEARLY_ALL)
+        least = _SMALL_LOAD * impulses.max(initial=0.0)
+        return bool((impulses - before <= _GROWTH * np.maximum(impulses, least)).all())
 
     def _notes(self) -> tuple[str, ...]:
         """Return why the source was not checked for such a blast."""
@@ -268,15 +258,21 @@ def _grid(engine: GasEngine, site: BlastSite) -> tuple[GasGrid, NDArray[np.int64
     high = np.array([site.site.right, site.site.top]) / UNITS_PER_M
     plan = np.ceil(np.round((high - low) / cell_m, 9)).astype(int) + 2 * margin
     shape = (int(plan[0]), int(plan[1]), ceil(round(site.air_height_m / cell_m, 9)))
-    needed = state_bytes(shape, "single", with_fuel=True)
+    origin = low - margin * cell_m
+    grid = GasGrid(
+        cell_m,
+        np.broadcast_to(np.False_, shape),
+        (float(origin[0]), float(origin[1]), 0.0),
+        skirt=layers_to(engine.border_m / cell_m),
+    )
+    needed = state_bytes(grid, "single", with_fuel=True)
     if needed > _MOST_BYTES:
         raise BlastEnvError(
             f"a grid of {shape[0]} x {shape[1]} x {shape[2]} cells of {cell_m:g} m would need "
             f"{needed / 2**30:.1f} GiB, must be at most {_MOST_BYTES / 2**30:g}: take larger cells"
         )
-    origin = low - margin * cell_m
     owner = np.full((3, shape[0], shape[1]), -1)
-    grid = GasGrid(cell_m, np.zeros(shape, dtype=bool), (float(origin[0]), float(origin[1]), 0.0))
+    grid = replace(grid, solid=np.zeros(shape, dtype=bool))
     for index, outline in enumerate(site.structures):
         row, column = _modules_at(outline, grid)
         here = row >= 0
@@ -332,28 +328,34 @@ def _face_table(grid: GasGrid, owner: NDArray[np.int64]) -> FaceTable:
     return FaceTable(faces, structure, row, column, face, faces.centres_m(grid))
 
 
-def _groups(table: FaceTable, site: BlastSite) -> list[NDArray[np.int64]]:
-    """Return the faces of each structure that is no barrier, walls and roof."""
-    return [
-        np.flatnonzero(table.structure == index)
-        for index, outline in enumerate(site.structures)
-        if outline.cells is None and (table.structure == index).any()
-    ]
+def _watched(site: BlastSite) -> list[int]:
+    """Return the structures that a run waits for: those protected, or else all but the barrier."""
+    structures = [k for k, outline in enumerate(site.structures) if outline.cells is None]
+    return [k for k in structures if site.structures[k].protected] or structures
 
 
-def _distances_m(charge: GasCharge, site: BlastSite) -> FloatArray:
-    """Return the way from the charge to the far end of each structure, m."""
+def _faces_of(table: FaceTable, site: BlastSite, index: int) -> NDArray[np.int64]:
+    """Return the faces of the walls of a structure that count, of all if those are in others."""
+    own = table.structure == index
+    counting = [FACE_NAMES.index(name) for name in site.structures[index].faces]
+    chosen = own & np.isin(table.face, counting)
+    return np.flatnonzero(chosen if chosen.any() else own)
+
+
+def _way_m(charge: GasCharge, site: BlastSite, watched: Sequence[int]) -> float:
+    """Return the way in plan from the charge to the far end of what a run waits for, m.
+
+    To the farthest gauge where there is no structure.
+    """
     x_m, y_m, _ = charge.position_m
-    ways = []
-    for outline in site.structures:
-        if outline.cells is None:
-            left, bottom, right, top = (side / UNITS_PER_M for side in outline.rectangle)
-            across, along = (
-                max(abs(x_m - left), abs(x_m - right)),
-                max(abs(y_m - bottom), abs(y_m - top)),
-            )
-            ways.append(hypot(across, along))
-    return np.array(ways)
+    corners = [
+        (x / UNITS_PER_M, y / UNITS_PER_M)
+        for left, bottom, right, top in (site.structures[k].rectangle for k in watched)
+        for x in (left, right)
+        for y in (bottom, top)
+    ]
+    places = corners or [(x, y) for x, y, _ in (gauge.position_m for gauge in site.gauges)]
+    return max((hypot(x - x_m, y - y_m) for x, y in places), default=0.0)
 
 
 def _distance_units(point: tuple[float, float], outline: StructureOutline) -> float:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.kernels import MARGIN
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,22 +39,20 @@ class Faces:
         middle = 0.5 * (self.air + self.solid) + 0.5
         return np.asarray(grid.origin_m) + grid.cell_m * middle
 
-    def kernel_table(
-        self, shape: tuple[int, int, int]
-    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def kernel_table(self, grid: GasGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Return the faces as the kernels look them up, line by line.
 
         A face is kept under the cell on its high side. A line is a row of cells along x, for faces
         along x first, then along y and z.
 
         Args:
-            shape: Cells along x, y and z, without the margin.
+            grid: The grid.
 
         Returns:
             Cell along x, and number of the face (n, 2); first entry of each line (lines + 1,).
         """
-        nx, ny, nz = (n + 2 * MARGIN for n in shape)
-        high = np.maximum(self.air, self.solid) + MARGIN
+        nx, ny, nz = grid.array_shape
+        high = np.maximum(self.air, self.solid) + grid.lead
         line = (self.axis * nz + high[:, 2]) * ny + high[:, 1]
         order = np.argsort(line * nx + high[:, 0], kind="stable")
         table = np.stack((high[order, 0], order), axis=1).astype(np.int32)

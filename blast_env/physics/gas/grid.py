@@ -1,8 +1,14 @@
-"""The grid of the gas: cubic cells, some of them solid, and what lies beyond its six faces."""
+"""The grid of the gas: cubic cells, some of them solid, and what lies beyond its six faces.
+
+An open face reflects a little of what reaches it, and lets the mean pressure of what it encloses
+drift. So it should be far away. A skirt takes it there for little: layers of cells outside the
+grid, each thicker than the one before. They belong to the gas, but to nothing else: nobody looks at
+them, and no wave is resolved there.
+"""
 
 from dataclasses import dataclass
 from enum import StrEnum
-from math import isfinite
+from math import ceil, isfinite, log
 from typing import Final
 
 import numpy as np
@@ -12,6 +18,15 @@ from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.kernels import AIR, MARGIN, MIRROR, OPEN
 
 FACE_NAMES: Final = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
+
+SKIRT_GROWTH: Final = 1.5
+"""Thickness of a layer of the skirt over that of the one before."""
+
+
+def layers_to(cells: float) -> int:
+    """Return how many layers a skirt needs to be as thick as so many cells."""
+    inner = 1.0 + cells * (SKIRT_GROWTH - 1.0) / SKIRT_GROWTH
+    return ceil(round(log(inner) / log(SKIRT_GROWTH), 9))
 
 
 class FaceKind(StrEnum):
@@ -31,6 +46,8 @@ class GasGrid:
         origin_m: Low corner of the first cell: x, y, z.
         x_low: What lies beyond the face at the low end of x; the others likewise. The lowest one
             is the ground.
+        skirt: Layers of growing cells beyond each open face; what is solid at the face goes on in
+            them, the rest is air.
     """
 
     cell_m: float
@@ -42,6 +59,7 @@ class GasGrid:
     y_high: FaceKind = FaceKind.OPEN
     z_low: FaceKind = FaceKind.MIRROR
     z_high: FaceKind = FaceKind.OPEN
+    skirt: int = 0
 
     def __post_init__(self) -> None:
         if not (isfinite(self.cell_m) and self.cell_m > 0.0):
@@ -60,6 +78,8 @@ class GasGrid:
             if kind not in tuple(FaceKind):
                 known = ", ".join(repr(str(known)) for known in FaceKind)
                 raise BlastEnvError(f"{name} is {kind!r}, but must be one of {known}")
+        if self.skirt < 0:
+            raise BlastEnvError(f"skirt is {self.skirt}, but must be at least 0")
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -90,11 +110,54 @@ class GasGrid:
             index.append(min(cell, self.shape[axis] - 1))
         return index[0], index[1], index[2]
 
+    @property
+    def skirts(self) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
+        """Layers of the skirt below and above the grid along x, y and z; none beyond a mirror."""
+        x, y, z = (
+            (self._skirt(FACE_NAMES[2 * axis]), self._skirt(FACE_NAMES[2 * axis + 1]))
+            for axis in range(3)
+        )
+        return x, y, z
+
+    def _skirt(self, face: str) -> int:
+        return self.skirt if getattr(self, face) == FaceKind.OPEN else 0
+
+    @property
+    def lead(self) -> NDArray[np.int64]:
+        """Where the grid begins in the arrays of the kernels, along x, y and z (3,)."""
+        return np.array([MARGIN + low for low, _ in self.skirts])
+
+    @property
+    def array_shape(self) -> tuple[int, int, int]:
+        """Cells of the kernels' arrays along x, y and z: with the skirt, and their margin."""
+        nx, ny, nz = (
+            n + low + high + 2 * MARGIN
+            for n, (low, high) in zip(self.shape, self.skirts, strict=True)
+        )
+        return nx, ny, nz
+
+    @property
+    def inner(self) -> tuple[slice, slice, slice]:
+        """The grid in the arrays of the kernels, along z, y and x."""
+        x, y, z = (
+            slice(int(lead), int(lead) + n) for lead, n in zip(self.lead, self.shape, strict=True)
+        )
+        return z, y, x
+
+    def narrowness(self, axis: int) -> NDArray[np.float64]:
+        """Return the side of a cell over the width of each in the kernels' arrays (n,)."""
+        low, high = self.skirts[axis]
+        own = np.ones(self.shape[axis] + 2 * MARGIN)
+        grown = SKIRT_GROWTH ** -np.arange(1.0, self.skirt + 1.0)
+        wide = np.concatenate((grown[:low][::-1], own[MARGIN:-MARGIN], grown[:high]))
+        return np.pad(wide, MARGIN, mode="edge")
+
     def codes(self) -> NDArray[np.int8]:
-        """Return what each cell is to the kernels, margin included (z, y, x)."""
-        codes = np.full([n + 2 * MARGIN for n in self.shape], OPEN, dtype=np.int8)
+        """Return what each cell is to the kernels, skirt and margin included (z, y, x)."""
+        codes = np.full(self.array_shape, OPEN, dtype=np.int8)
         inner = slice(MARGIN, -MARGIN)
-        codes[inner, inner, inner] = np.where(self.solid, MIRROR, AIR)
+        solid = np.pad(self.solid, self.skirts, mode="edge")
+        codes[inner, inner, inner] = np.where(solid, MIRROR, AIR)
         for axis in range(3):
             kinds = [getattr(self, name) for name in FACE_NAMES[2 * axis : 2 * axis + 2]]
             for kind, place in zip(kinds, (slice(0, MARGIN), slice(-MARGIN, None)), strict=True):

@@ -39,7 +39,7 @@ _FUSED: Final = {"contract"}
 AIR, MIRROR, OPEN = 0, -1, 1
 """Codes of cells: gas, solid (normal velocity changes its sign), beyond an open face."""
 
-_LANES: Final = 8
+LANES: Final = 8
 """Rows are worked on in so many cells at once; what is done beyond their end is not used."""
 
 TILE: Final = 136
@@ -115,7 +115,7 @@ def _slope(back: Any, ahead: Any, limit: Any, half: Any, zero: Any) -> Any:
 @njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
 def _whole(n: int) -> int:
     """Return a number of cells rounded up: single cells at the end would cost as much as eight."""
-    return (n + _LANES - 1) & -_LANES
+    return (n + LANES - 1) & -LANES
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
@@ -211,8 +211,8 @@ def _lift_row(state: Reals, z: int, y: int, x: int, n: int) -> None:
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
-def _predict_plane_row(work: Reals, n: int, ratio: Any) -> None:
-    """Set the states at the four upright faces of n cells, half a step on."""
+def _predict_plane_row(work: Reals, n: int, ratio: Any, along: Reals, x: int, across: Any) -> None:
+    """Set the states at the four upright faces of n cells from x on, half a step on."""
     real = work.dtype.type
     zero, half, gamma = real(0.0), real(0.5), real(GAMMA)
     limit, least = real(_LIMIT), real(_LEAST_SHARE)
@@ -261,13 +261,16 @@ def _predict_plane_row(work: Reals, n: int, ratio: Any) -> None:
         ahead = select(air_n, get(work, _HIGH + _P + 1 + i), p)
         py = _slope(p - back, ahead - p, limit, half, zero)
 
-        spread = ux + vy
+        # In units of the cell's own sides; where those are 1, not a bit changes.
+        per_x = get(along, x + i)
+        fast_u, fast_v = u * per_x, v * across
+        spread = ux * per_x + vy * across
         per_r = step / r
-        r_half = r - step * ((u * rx + v * ry) + r * spread)
-        u_half = u - (step * (u * ux + v * uy) + per_r * px)
-        v_half = v - (step * (u * vx + v * vy) + per_r * py)
-        w_half = w - step * (u * wx + v * wy)
-        p_half = p - step * ((u * px + v * py) + gamma * p * spread)
+        r_half = r - step * ((fast_u * rx + fast_v * ry) + r * spread)
+        u_half = u - (step * (fast_u * ux + fast_v * uy) + per_r * (px * per_x))
+        v_half = v - (step * (fast_u * vx + fast_v * vy) + per_r * (py * across))
+        w_half = w - step * (fast_u * wx + fast_v * wy)
+        p_half = p - step * ((fast_u * px + fast_v * py) + gamma * p * spread)
 
         rx, ux, vx, wx, px = half * rx, half * ux, half * vx, half * wx, half * px
         ry, uy, vy, wy, py = half * ry, half * uy, half * vy, half * wy, half * py
@@ -448,13 +451,14 @@ def _hllc_row(
 
 
 @njit(error_model="numpy", fastmath=_FUSED)
-def _predict_plane_fuel(work: Reals, n: int, ratio: Any) -> None:
-    """Set the share of fuel at the four upright faces of n cells, half a step on."""
+def _predict_plane_fuel(work: Reals, n: int, ratio: Any, along: Reals, x: int, across: Any) -> None:
+    """Set the share of fuel at the four upright faces of n cells from x on, half a step on."""
     real = work.dtype.type
     zero, half, limit = real(0.0), real(0.5), real(_LIMIT)
     for i in range(_whole(n)):
         y = get(work, _MID + _Y + 1 + i)
-        u, v = get(work, _MID + _U + 1 + i), get(work, _MID + _V + 1 + i)
+        u = get(work, _MID + _U + 1 + i) * get(along, x + i)
+        v = get(work, _MID + _V + 1 + i) * across
         back = select(get(work, _CODE_MID + i) == zero, get(work, _MID + _Y + i), y)
         ahead = select(get(work, _CODE_MID + 2 + i) == zero, get(work, _MID + _Y + 2 + i), y)
         yx = half * _slope(y - back, ahead - y, limit, half, zero)
@@ -550,6 +554,8 @@ def advance_planes(
     z_from: int,
     z_to: int,
     ratio: Any,
+    along: Reals,
+    across: Reals,
     pressure: Reals,
     walls: NDArray[np.int32],
     first: NDArray[np.int32],
@@ -566,6 +572,8 @@ def advance_planes(
         z_from: First plane.
         z_to: Last plane + 1.
         ratio: Time step over cell side.
+        along: Cell side over the width of each cell along x (nx + 8,).
+        across: The same along y (ny + 8,).
         pressure: Pressures on the recorded faces, changed.
         walls: Cell beyond the face along x, and number of the face, row by row (k, 2).
         first: First entry of a row among `walls`, for faces along x and then along y.
@@ -591,9 +599,10 @@ def advance_planes(
                 _join_tiles(work, edges, y, tile, xb - xa)
                 if y < y0:
                     continue
-                _predict_plane_row(work, n - 2, ratio)
+                per_y = across[y - 1]
+                _predict_plane_row(work, n - 2, ratio, along, xa - 1, per_y)
                 if count > FUEL:
-                    _predict_plane_fuel(work, n - 2, ratio)
+                    _predict_plane_fuel(work, n - 2, ratio, along, xa - 1, per_y)
                 if y > y0:
                     _hllc_row(
                         work,
@@ -612,7 +621,7 @@ def advance_planes(
                     line = lines + z * rows + y - 1
                     _record_walls(work, pressure, walls, first, line, _ACROSS + _V + 2, xa, n - 4)
                 if y > y0 + 1:
-                    _update_plane_row(state, work, z, y - 2, xa, n - 4, ratio)
+                    _update_plane_row(state, work, z, y - 2, xa, n - 4, ratio, along, across[y - 2])
                 if y0 < y < y1 + 1:
                     _hllc_row(
                         work,
@@ -655,7 +664,15 @@ def _join_tiles(work: Reals, edges: Reals, y: int, tile: int, width: int) -> Non
 
 @njit(error_model="numpy", fastmath=_FUSED)
 def _update_plane_row(
-    state: Reals, work: Reals, z: int, y: int, x: int, n: int, ratio: Any
+    state: Reals,
+    work: Reals,
+    z: int,
+    y: int,
+    x: int,
+    n: int,
+    ratio: Any,
+    along: Reals,
+    per_y: Any,
 ) -> None:
     zero = work.dtype.type(0.0)
     for k in range(len(state)):
@@ -665,7 +682,8 @@ def _update_plane_row(
         for i in range(n):
             old = get(state, row + i)
             across = get(work, _ACROSS + shift + i) - get(work, _ACROSS_LOW + shift + i)
-            new = old - ratio * (get(work, _CHANGE + shift + i) + across)
+            change = get(work, _CHANGE + shift + i) * get(along, x + i)
+            new = old - ratio * (change + across * per_y)
             new = select(abs(new) > least, new, zero)
             put(state, row + i, select(get(work, _CODE_LOW + 2 + i) == zero, new, old))
 
@@ -696,12 +714,16 @@ def advance_columns(
     y_from: int,
     y_to: int,
     ratio: Any,
+    upright: Reals,
     pressure: Reals,
     walls: NDArray[np.int32],
     first: NDArray[np.int32],
     notes: NDArray[np.float64],
 ) -> None:
-    """Move the gas along z in the rows from y_from to y_to; see `advance_planes`."""
+    """Move the gas along z in the rows from y_from to y_to; see `advance_planes`.
+
+    `upright` is the cell side over the height of each cell along z (nz + 8,).
+    """
     z0, z1, x0, x1 = box[0], box[1], box[4], box[5]
     tiles = (x1 - x0 + TILE - 1) // TILE
     count = len(state)
@@ -718,9 +740,10 @@ def advance_columns(
                 lifted += _load_row(state, code, work, z, y, x, n)
                 if z < z0:
                     continue
-                _predict_column_row(work, n, ratio)
+                own_ratio = ratio * upright[z - 1]
+                _predict_column_row(work, n, own_ratio)
                 if count > FUEL:
-                    _predict_column_fuel(work, n, ratio)
+                    _predict_column_fuel(work, n, own_ratio)
                 if z > z0:
                     _hllc_row(
                         work, n, _ABOVE_LOW, _BELOW, _CODE_LOW, _CODE_MID, _W, _U, _V, _ACROSS
@@ -730,7 +753,7 @@ def advance_columns(
                     line = 2 * lines + (z - 1) * rows + y
                     _record_walls(work, pressure, walls, first, line, _ACROSS + _W, x, n)
                 if z > z0 + 1:
-                    _update_column_row(state, work, z - 2, y, x, n, ratio)
+                    _update_column_row(state, work, z - 2, y, x, n, ratio * upright[z - 2])
             notes[0] = max(notes[0], _fastest(work, n))
     notes[1] += lifted
 

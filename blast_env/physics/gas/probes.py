@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.kernels import MARGIN, Reals
+from blast_env.physics.gas.kernels import Reals
 from blast_env.physics.gas.solver import GasSolver
 
 ARRIVAL_PA: Final = 1000.0
@@ -247,12 +247,14 @@ class GroundMap:
     """
 
     def __init__(self, grid: GasGrid, layer: int = 0) -> None:
-        nx, ny, nz = grid.shape
+        nz = grid.shape[2]
         if not 0 <= layer < nz:
             raise BlastEnvError(f"layer is {layer}, but must be 0 to {nz - 1}")
         self._layer = layer
         self._solid = grid.solid[:, :, layer]
-        shape = (ny + 2 * MARGIN, nx + 2 * MARGIN)
+        self._inner = grid.inner[1:]
+        self._lead = int(grid.lead[2])
+        shape = grid.array_shape[1::-1]
         self._peak = np.zeros(shape, dtype=np.float32)
         self._impulse = np.zeros(shape, dtype=np.float32)
         self._unit_pa = 1.0
@@ -262,7 +264,7 @@ class GroundMap:
         self._unit_pa = solver.pressure_pa
         _add_to_map(
             solver.state,
-            self._layer + MARGIN,
+            self._layer + self._lead,
             solver.box,
             self._peak,
             self._impulse,
@@ -281,7 +283,7 @@ class GroundMap:
         return self._trimmed(self._impulse)
 
     def _trimmed(self, values: NDArray[np.float32]) -> NDArray[np.float64]:
-        inner = values[MARGIN:-MARGIN, MARGIN:-MARGIN].T.astype(np.float64)
+        inner = values[self._inner].T.astype(np.float64)
         return np.where(self._solid, np.nan, self._unit_pa * inner)
 
 

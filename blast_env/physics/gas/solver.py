@@ -32,13 +32,13 @@ _DTYPES: Final = {"single": np.float32, "double": np.float64}
 
 
 def state_bytes(
-    shape: tuple[int, int, int],
+    grid: GasGrid,
     precision: Literal["single", "double"] = "single",
     *,
     with_fuel: bool = False,
 ) -> int:
     """Return how much memory the state of a grid takes; nothing else grows with all its cells."""
-    nx, ny, nz = (n + 2 * MARGIN for n in shape)
+    nx, ny, nz = grid.array_shape
     per_cell = np.dtype(_DTYPES[precision]).itemsize * (6 if with_fuel else 5) + 1
     return nx * ny * nz * per_cell
 
@@ -150,8 +150,12 @@ class GasSolver:
         self.state: Reals = np.empty((components, *self._code.shape), dtype=dtype)
         self.state[:] = self._still[:, None, None, None]
         self.wall_pressure: Reals = np.ones(len(faces), dtype=dtype)
-        self._walls, self._first_wall = faces.kernel_table(grid.shape)
+        self._walls, self._first_wall = faces.kernel_table(grid)
         self._work = [np.zeros(kernels.WORK_SIZE, dtype=dtype) for _ in range(threads)]
+        self._narrow = [
+            np.pad(grid.narrowness(axis), (0, kernels.LANES), mode="edge").astype(dtype)
+            for axis in range(3)
+        ]
         edges = (self._code.shape[1], kernels.EDGE_SIZE)
         self._edges = [np.zeros(edges, dtype=dtype) for _ in range(threads)]
         self._notes = np.zeros((threads, 2))
@@ -259,12 +263,12 @@ class GasSolver:
 
     def overpressure_at(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the overpressures in some cells, x, y and z (n, 3)."""
-        x, y, z = cells.T + MARGIN
+        x, y, z = (cells + self.grid.lead).T
         return self.pressure_pa * self._excess(self.state[:, z, y, x])
 
     def overpressure_in(self, axis: int, layer: int) -> NDArray[np.float64]:
         """Return the overpressures in a layer of cells, along the two other axes."""
-        inner = self.state[:, MARGIN:-MARGIN, MARGIN:-MARGIN, MARGIN:-MARGIN]
+        inner = self.state[(slice(None), *self.grid.inner)]
         return self.pressure_pa * self._excess(np.take(inner, layer, axis=3 - axis)).T
 
     def largest_overpressure_pa(self) -> float:
@@ -272,7 +276,7 @@ class GasSolver:
         return self.pressure_pa * float(kernels.largest_excess(self.state, self.box))
 
     def totals(self) -> Totals:
-        """Return mass, momentum and energy of the gas in the grid."""
+        """Return mass, momentum and energy of the gas in the grid, without the skirt."""
         air = ~self.grid.solid
         volume = self.grid.cell_m**3
         sums = [float(self._get(k)[air].sum()) * volume for k in range(len(self.state))]
@@ -297,6 +301,8 @@ class GasSolver:
                 first,
                 end,
                 ratio,
+                self._narrow[0],
+                self._narrow[1],
                 self.wall_pressure,
                 self._walls,
                 self._first_wall,
@@ -317,6 +323,7 @@ class GasSolver:
                 first,
                 end,
                 ratio,
+                self._narrow[2],
                 self.wall_pressure,
                 self._walls,
                 self._first_wall,
@@ -380,10 +387,10 @@ class GasSolver:
 
     def _put(self, component: int, values: NDArray[np.float64]) -> None:
         """Set a component in the air cells; solid cells keep still air."""
-        inner = self.state[component, MARGIN:-MARGIN, MARGIN:-MARGIN, MARGIN:-MARGIN]
+        inner = self.state[(component, *self.grid.inner)]
         values = np.broadcast_to(values, self.grid.shape)
         inner[:] = np.where(self.grid.solid, float(self._still[component]), values).T
 
     def _get(self, component: int) -> NDArray[np.float64]:
-        inner = self.state[component, MARGIN:-MARGIN, MARGIN:-MARGIN, MARGIN:-MARGIN]
+        inner = self.state[(component, *self.grid.inner)]
         return inner.T.astype(np.float64)

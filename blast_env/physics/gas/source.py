@@ -225,6 +225,8 @@ def largest_radius_m(
 ) -> float:
     """Return how far the front of a charge can run before it meets a solid cell or the ground.
 
+    Or leaves the grid, where that has a skirt.
+
     At least `least_clearance_m`. Below that the ground does not count: what has passed through it
     is laid onto the grid as its mirror image.
 
@@ -243,6 +245,8 @@ def largest_radius_m(
         clear = min(clear, _distance_to(kept_clear, grid, (x, y, z)))
     if not charge.on_ground:
         clear = min(clear, max(z, least))
+    if grid.skirt > 0:
+        clear = min(clear, _nearest_face(grid, (x, y, z)))  # a skirt must begin with still air
     return min(max(clear, least), _farthest_corner(grid, (x, y, z)))
 
 
@@ -317,6 +321,13 @@ def _distance_to(
     low = np.array(grid.origin_m) + grid.cell_m * chosen
     outside = np.maximum(np.maximum(low - point, point - low - grid.cell_m), 0.0)
     return sqrt(float((outside**2).sum(axis=1).min()))
+
+
+def _nearest_face(grid: GasGrid, point: tuple[float, float, float]) -> float:
+    """Return the distance to the nearest open face."""
+    low = np.array(grid.origin_m)
+    ways = np.stack((point - low, low + grid.cell_m * np.array(grid.shape) - point), axis=1)
+    return float(np.where(np.array(grid.skirts) > 0, ways, inf).min())
 
 
 def _farthest_corner(grid: GasGrid, point: tuple[float, float, float]) -> float:

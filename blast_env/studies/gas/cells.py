@@ -16,8 +16,7 @@ from blast_env.runner import run_all
 from blast_env.scenario import Scenario
 from blast_env.simulation.gas import GasBlast
 from blast_env.statistics import reductions
-from blast_env.studies.gas.ending import ending
-from blast_env.studies.gas.loads import protected_impulse_pa_s
+from blast_env.studies.gas.loads import impulse_until, protected_impulse_pa_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +91,7 @@ def _load(
     if until_s is None:
         impulse = protected_impulse_pa_s(blast.run())
     else:
-        impulse = ending(blast, until_s).later_pa_s
+        impulse = impulse_until(blast, until_s)
     return impulse, process_time() - start
 
 

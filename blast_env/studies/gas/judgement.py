@@ -1,8 +1,11 @@
 """What gas dynamics says of the particle model: order, overstatement and regret of its layouts."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from scipy.stats import spearmanr
@@ -13,6 +16,15 @@ from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
 from blast_env.statistics import Estimate, mean_estimate, reductions
+
+PRESETS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "collisional": "collisional_kb",
+        "collisional_fine": "collisional_fine_kb",
+        "ballistic": "ballistic_kb_100kg",
+    }
+)
+"""The presets that are judged, each with the calibration that goes with it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +62,20 @@ class Judgement:
         return particle / gas
 
     @property
+    def factor(self) -> float:
+        """By which the particle model's reductions come nearest to those of gas dynamics."""
+        return float((self.particle * self.gas).sum() / (self.particle**2).sum())
+
+    @property
+    def errors(self) -> tuple[float, float]:
+        """Root mean squares: gas less `factor` times particles, and gas less its own mean.
+
+        The second is what one gets without looking at the layout.
+        """
+        left = self.gas - self.factor * self.particle
+        return float(np.sqrt((left**2).mean())), float(self.gas.std())
+
+    @property
     def regret(self) -> Estimate:
         """Gas reduction lost by taking the layout that the particle model likes best.
 
@@ -67,22 +93,38 @@ def judge(
     seeds: int = 4,
     processes: int = 1,
     progress: Callable[[float], None] | None = None,
-) -> Judgement:
-    """Return what both engines say of layouts.
+    presets: Mapping[str, str] = PRESETS,
+    store: Path | None = None,
+) -> dict[str, Judgement]:
+    """Return what gas dynamics and each preset of the particle model say of layouts.
 
     Args:
-        scenario: The scenario, with its preset and calibration for the particle model.
+        scenario: The scenario.
         layouts: At least three.
         charges: At least one.
         seeds: Blasts of the particle model for each layout and charge.
         processes: Worker processes.
         progress: Called with the share of the gas blasts that is done; the particle model's
             follow.
+        presets: Presets by name, each with its calibration.
+        store: Folder for the gas blasts, from which a study that was broken off goes on.
     """
     drawn = SeedRange.JUDGEMENT.seeds(0, seeds)
-    gas = _impulses(scenario, layouts, charges, drawn[:1], "gas", processes, progress)
-    particle = _impulses(scenario, layouts, charges, drawn, "event", processes, None)
-    return Judgement(reductions(particle[1:], _bare(particle)), reductions(gas[1:], _bare(gas)))
+    evaluator = BlastEvaluator(scenario, "gas", cache=store)
+    gas = _impulses(evaluator, layouts, charges, drawn[:1], processes, progress)
+    of_gas = reductions(gas[1:], _bare(gas))
+    found = {}
+    for preset, calibration in presets.items():
+        evaluator = BlastEvaluator(_with_preset(scenario, preset, calibration), "event")
+        particle = _impulses(evaluator, layouts, charges, drawn, processes, None)
+        found[preset] = Judgement(reductions(particle[1:], _bare(particle)), of_gas)
+    return found
+
+
+def _with_preset(scenario: Scenario, preset: str, calibration: str) -> Scenario:
+    document = scenario.model_dump()
+    document["calibration"] = calibration
+    return Scenario.from_document(document, scenario.name).with_simulation(preset)
 
 
 def _bare(impulses: FloatArray) -> FloatArray:
@@ -91,16 +133,14 @@ def _bare(impulses: FloatArray) -> FloatArray:
 
 
 def _impulses(
-    scenario: Scenario,
+    evaluator: BlastEvaluator,
     layouts: Sequence[Layout],
     charges: Sequence[Charge],
     seeds: Sequence[int],
-    engine: str,
     processes: int,
     progress: Callable[[float], None] | None,
 ) -> FloatArray:
     """Return the impulse without and with each layout, Pa s (1 + layouts, charges)."""
-    evaluator = BlastEvaluator(scenario, engine)
     pairs = [
         (layout, Threat(charge, seed))
         for layout in ((), *layouts)

@@ -56,4 +56,4 @@ def test_places_in_the_grid() -> None:
 def test_memory_is_known_beforehand() -> None:
     solver = GasSolver(GRID, precision="double", with_fuel=True)
     expected = solver.state.nbytes + solver.state[0].size
-    assert state_bytes(GRID.shape, "double", with_fuel=True) == expected
+    assert state_bytes(GRID, "double", with_fuel=True) == expected
