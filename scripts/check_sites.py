@@ -1,29 +1,39 @@
 """What generated sites are like, and whether the criterion that they are chosen by means anything.
 
-The criterion is told from lines of sight; here every site is measured with blasts. All sites that a
-seed draws are, the rejected ones too: a criterion that rejects the wrong ones would show.
+The criterion is told from lines of sight; here every site is measured with blasts: of particles, or
+of gas dynamics for the sites with heights and catalogues. All sites that a seed draws are, if asked
+for the rejected ones too: a criterion that rejects the wrong ones would show.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from time import process_time
 from typing import Annotated, Final
 
 import numpy as np
 import typer
-from blast_agents.rules import random_layout
+from blast_agents.posts import VEHICLE_RULES
+from blast_agents.rules import expected_charge, random_layout, rules_for
+from blast_agents.search import LayoutProblem
 
 from blast_env.arrays import FloatArray
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.evaluation import BlastEvaluator, draw_threats
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import BlastEvaluator, Case, draw_threats
+from blast_env.geometry import Layout
 from blast_env.rendering.figures import save_figure
 from blast_env.runner import run_all
-from blast_env.scenario import Scenario, SegmentSource, usable_cells
+from blast_env.scenario import Placement, Scenario, ScenarioError, SegmentSource, usable_cells
 from blast_env.scenario.zone import distance_m, source_bounds_m
 from blast_env.sites import (
+    FAMILIES,
+    ITEM_SITES,
+    SITES,
+    SiteCriterion,
     SiteMeasures,
     SiteRanges,
     Visibility,
@@ -33,6 +43,8 @@ from blast_env.sites import (
     visibility_layout,
 )
 from blast_env.sites.contact_sheet import contact_sheet
+from blast_env.sites.criterion import cut_share_of
+from blast_env.sites.generate import AnyRanges, criterion_of
 
 LEAST_REDUCTION: Final = 0.15
 
@@ -41,11 +53,8 @@ MOST_REDUCTION: Final = 0.85
 
 
 LEAST_ADVANTAGE: Final = 0.1
-"""A site is worth solving if blasts say so: the visibility layout takes so much off the impulse,
-no layout takes more than that, and random layouts take so much less on average."""
-
-
-CRITERION: Final = VisibilityCriterion()
+"""A site is worth solving if blasts say so: the visibility layout, or a rule, takes so much off the
+impulse, no layout takes more than that, and random layouts take so much less on average."""
 
 
 QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
@@ -61,7 +70,9 @@ class Measured:
         unprotected_pa_s: Impulse on the building without a barrier, Pa*s.
         cut: Share of the lines of sight that each layout cuts: the visibility layout, then the
             random ones (1 + random,).
-        reduction: Share of the impulse that each of them takes off (1 + random,).
+        reduction: Share of the load that each of them takes off (1 + random,).
+        rules: Share that the layout of each rule takes off, by name.
+        has_vehicle: Whether a vehicle brings the charge.
     """
 
     accepted: bool
@@ -69,50 +80,88 @@ class Measured:
     unprotected_pa_s: float
     cut: FloatArray
     reduction: FloatArray
+    rules: Mapping[str, float] = field(default_factory=dict)
+    has_vehicle: bool = False
+
+    @property
+    def made(self) -> float:
+        """Reduction of the best layout that is made by a plan: for visibility, or by a rule."""
+        return max(float(self.reduction[0]), *self.rules.values(), -inf)
 
     @property
     def advantage(self) -> float:
-        """Reduction of the visibility layout above that of random layouts, on average."""
-        return float(self.reduction[0] - self.reduction[1:].mean())
+        """How far that is above the reduction of random layouts, on average."""
+        return float(self.made - self.reduction[1:].mean())
 
     @property
     def fault(self) -> str:
         """What is wrong with the site by the blasts; empty if it is worth solving."""
-        if self.reduction[0] < LEAST_REDUCTION:
+        if self.made < LEAST_REDUCTION:
             return "too little to gain"
-        if self.reduction.max() > MOST_REDUCTION:
+        if max(self.reduction.max(), self.made) > MOST_REDUCTION:
             return "everything can be gained"
         return "the place does not matter" if self.advantage < LEAST_ADVANTAGE else ""
 
 
-def measured(site: Scenario, random_layouts: int, threats: int, engine: str) -> Measured:
+def measured(
+    site: Scenario,
+    random_layouts: int,
+    threats: int,
+    engine: str,
+    criterion: SiteCriterion | None = None,
+) -> Measured:
     """Measure a site with blasts of charges drawn from where they may be."""
     rng = np.random.default_rng(0)
     lines = Visibility.of(site)
     layouts = [visibility_layout(site, lines)]
     layouts += [random_layout(site, rng) for _ in range(random_layouts)]
-    evaluator = BlastEvaluator(site, engine, cache_size=0)
+    ruled = rule_layouts(site)
     drawn = draw_threats(site, range(threats))
-    pairs = [(layout, threat) for layout in ((), *layouts) for threat in drawn]
-    loads = evaluator.loads_of_many(pairs)
-    impulses = np.array([each.protected_impulse_pa_s for each in loads])
-    unprotected, *with_layout = impulses.reshape(-1, threats).mean(axis=1)
+    problem = LayoutProblem(BlastEvaluator(site, engine), Case(site, drawn))
+    bare = problem.load(())
+    reduction = {
+        layout: 1.0 - problem.load(layout) / bare for layout in (*layouts, *ruled.values())
+    }
     return Measured(
-        accepted=CRITERION.objection(site) is None,
+        accepted=(criterion or VisibilityCriterion()).objection(site) is None,
         shares=SiteMeasures.of(site),
-        unprotected_pa_s=float(unprotected),
-        cut=np.array([lines.cut_share(layout) for layout in layouts]),
-        reduction=1.0 - np.array(with_layout) / unprotected,
+        unprotected_pa_s=problem.evaluator.loads((), drawn[0]).protected_impulse_pa_s,
+        cut=np.array([cut_share_of(lines, Placement(site, layout)) for layout in layouts]),
+        reduction=np.array([reduction[layout] for layout in layouts]),
+        rules={name: reduction[layout] for name, layout in ruled.items()},
+        has_vehicle=bool(site.vehicles),
     )
 
 
-def drawn_sites(seed: int, ranges: SiteRanges) -> Iterator[Scenario]:
+def rule_layouts(site: Scenario) -> dict[str, Layout]:
+    """Return the layouts of the rules by hand where there is a catalogue; none without one.
+
+    A rule that finds no place for anything has none.
+    """
+    if not site.zone.items:
+        return {}
+    rules = {**rules_for(site), **(VEHICLE_RULES if site.vehicles else {})}
+    layouts: dict[str, Layout] = {}
+    for name, rule in rules.items():
+        try:
+            layout = rule(site, expected_charge(site.charge))
+        except BlastEnvError:  # no line of sight
+            continue
+        if layout:
+            layouts[name] = layout
+    return layouts
+
+
+def drawn_sites(seed: int, ranges: AnyRanges) -> Iterator[Scenario]:
     """Yield the sites that `generate_site` draws for a seed; the last one is what it returns."""
     rng = np.random.default_rng(seed)
     while True:
-        site = draw_site(rng, ranges, f"site_{seed}")
+        try:
+            site = draw_site(rng, ranges, f"site_{seed}")
+        except ScenarioError:  # what was drawn does not fit together
+            continue
         yield site
-        if CRITERION.objection(site) is None:
+        if criterion_of(ranges).objection(site) is None:
             return
 
 
@@ -123,14 +172,21 @@ def main(
     threats: Annotated[int, typer.Option(min=1, help="Charges and seeds a layout.")] = 4,
     processes: int = 2,
     cluster: ClusterAddress = None,
-    engine: str = "event",
+    family: Annotated[str, typer.Option(help="sites or item_sites.")] = SITES,
+    engine: Annotated[str | None, typer.Option(show_default="event, or gas for item_sites")] = None,
+    rejected: Annotated[
+        bool, typer.Option(help="Measure what the criterion rejected on the way, too.")
+    ] = True,
     preset: str = SiteRanges.preset,
     calibration: str = SiteRanges.calibration,
     picture: Annotated[Path | None, typer.Option(help="Where to draw the first twelve.")] = None,
 ) -> None:
     """Print tables about generated sites, and draw some."""
     with user_errors(), running_on(cluster):
-        ranges = SiteRanges(preset=preset, calibration=calibration)
+        if family not in FAMILIES:
+            raise UnknownNameError("family", family, FAMILIES)
+        ranges = replace(FAMILIES[family], preset=preset, calibration=calibration)
+        run_by = engine or ("gas" if family == ITEM_SITES else "event")
         seconds = [cpu_time_s(seed, ranges) for seed in range(sites)]
         generated = [generate_site(seed, ranges) for seed in range(sites)]
         of_seeds = [list(drawn_sites(seed, ranges)) for seed in range(sites)]
@@ -138,15 +194,23 @@ def main(
         print_time(seconds, sum(map(len, of_seeds)))
         if picture is not None:
             print_line(f"wrote {save_figure(contact_sheet(generated[:12]), picture)}")
-        drawn = [site for of_seed in of_seeds[:blasted] for site in of_seed]
-        measure = partial(measured, random_layouts=random_layouts, threats=threats, engine=engine)
+        asked = of_seeds[:blasted] if rejected else [each[-1:] for each in of_seeds[:blasted]]
+        drawn = [site for of_seed in asked for site in of_seed]
+        measure = partial(
+            measured,
+            random_layouts=random_layouts,
+            threats=threats,
+            engine=run_by,
+            criterion=criterion_of(ranges),
+        )
         with progress_bar("blasts") as progress:
             results = run_all(measure, drawn, processes, progress=progress)
         print_measured([each for each in results if each.accepted])
+        print_rules([each for each in results if each.accepted and each.rules])
         print_agreement(results)
 
 
-def cpu_time_s(seed: int, ranges: SiteRanges) -> float:
+def cpu_time_s(seed: int, ranges: AnyRanges) -> float:
     """Return the processor time that the site of a seed takes."""
     start_s = process_time()
     generate_site(seed, ranges)
@@ -159,6 +223,9 @@ def print_properties(sites: Sequence[Scenario]) -> None:
     print_line("|---" * 6 + "|")
     for name, value_of in PROPERTIES.items():
         values = np.array([value_of(site) for site in sites])
+        values = values[np.isfinite(values)]
+        if not len(values):
+            continue
         print_row(name, *(f"{value:.4g}" for value in np.quantile(values, QUANTILES)))
     for name, holds_for in CONDITIONS.items():
         print_line(f"{name}: {sum(map(holds_for, sites))} of {len(sites)} sites")
@@ -181,12 +248,44 @@ def print_measured(results: Sequence[Measured]) -> None:
         "reduction by random layouts, mean (%)": 100.0 * reduction[:, 1:].mean(axis=1),
         f"by the best of {reduction.shape[1] - 1} (%)": 100.0 * reduction[:, 1:].max(axis=1),
         "by the visibility layout (%)": 100.0 * reduction[:, 0],
-        "its advantage over random layouts (%)": np.array([100.0 * x.advantage for x in results]),
+        "by the best of these and of the rules (%)": 100.0
+        * np.array([max(x.made, float(x.reduction.max())) for x in results]),
+        "advantage of visibility or best rule over random layouts (%)": np.array(
+            [100.0 * x.advantage for x in results]
+        ),
     }
     print_row("measured with blasts", "least", "10 %", "median", "90 %", "largest")
     print_line("|---" * 6 + "|")
     for name, values in columns.items():
         print_row(name, *(f"{value:.0f}" for value in np.quantile(values, QUANTILES)))
+
+
+def print_rules(results: Sequence[Measured]) -> None:
+    """Print what each rule does, over sites with and without vehicles."""
+    if not results:
+        return
+    print_row("rule", "sites", "mean reduction (%)", "sites where it is the best rule")
+    print_line("|---" * 4 + "|")
+    for name in dict.fromkeys(name for each in results for name in each.rules):
+        own = [each for each in results if name in each.rules]
+        mean = 100.0 * np.mean([each.rules[name] for each in own])
+        best = sum(each.rules[name] >= max(each.rules.values()) for each in own)
+        print_row(name, str(len(own)), f"{mean:.0f}", str(best))
+    for words, has_vehicle in (("with a vehicle", True), ("without", False)):
+        own = [each for each in results if each.has_vehicle is has_vehicle]
+        if own:
+            means = [
+                100.0 * np.mean(values)
+                for values in (
+                    [each.reduction[1:].mean() for each in own],
+                    [each.reduction[0] for each in own],
+                    [max(each.rules.values()) for each in own],
+                )
+            ]
+            print_line(
+                f"{words}: {len(own)} sites; random layouts {means[0]:.0f} %, visibility layout"
+                f" {means[1]:.0f} %, best rule {means[2]:.0f} %"
+            )
 
 
 def print_agreement(results: Sequence[Measured]) -> None:
@@ -243,6 +342,9 @@ PROPERTIES: Final[Mapping[str, Callable[[Scenario], float]]] = {
     "modules in stock": lambda site: site.zone.stock,
     "keep-outs": lambda site: len(site.zone.keep_outs),
     "clearance (m)": lambda site: site.zone.clearance_m,
+    "height of the building (m)": lambda site: site.structures[0].height_m or np.nan,
+    "kinds of items in stock": lambda site: sum(item.stock > 0 for item in site.zone.items),
+    "budget": lambda site: site.zone.budget or np.nan,
 }
 
 
@@ -254,7 +356,13 @@ CONDITIONS: Final[Mapping[str, Callable[[Scenario], bool]]] = {
         facade_and_depth_m(site)[0] > facade_and_depth_m(site)[1]
     ),
     "access way": lambda site: site.zone.access_way is not None,
-    "duct and budget": lambda site: site.zone.budget is not None,
+    "duct": lambda site: bool(site.zone.cost_areas),
+    "vehicle": lambda site: bool(site.vehicles),
+    "second protected building": lambda site: sum(each.protected for each in site.structures) > 1,
+    "gate in the access way": lambda site: (
+        site.zone.access_way is not None and site.zone.access_way.gate is not None
+    ),
+    "the worst charges count": lambda site: site.objective.charges != "mean",
 }
 
 

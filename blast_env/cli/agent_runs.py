@@ -54,7 +54,7 @@ from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import save_scenario
 from blast_env.scenario.build_scene import charge_against
-from blast_env.sites import SITES
+from blast_env.sites import FAMILIES
 from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
 
@@ -87,8 +87,8 @@ def evaluate_run(run: Path, options: EvaluateOptions) -> None:
     agent = load_agent(run, weights)
     seeds = options.seed_range
     source: ScenarioSource = SingleScenario(folder.scenario(configuration))
-    if settings.scenario == SITES:
-        source = training_source(SITES)
+    if settings.scenario in FAMILIES:
+        source = training_source(settings.scenario)
     provenance = _provenance(run, settings, weights)
     notes = [_overlap(settings, seeds)] if weights == "best" else [_NO_BEST]
     for note in notes:
@@ -236,7 +236,7 @@ def _write_sites(
     settings: TrainingSettings, plans: dict[str, LayoutPlan], folder: Path
 ) -> list[Path]:
     """Write the scenario beside each layout for a generated site: nobody else has it as a file."""
-    if settings.scenario != SITES:
+    if settings.scenario not in FAMILIES:
         return []
     paths = [folder / f"{name}_site.toml" for name in plans]
     for path, plan in zip(paths, plans.values(), strict=True):
@@ -245,7 +245,7 @@ def _write_sites(
 
 
 def _place(settings: TrainingSettings, cases: Sequence[Case]) -> str:
-    if settings.scenario == SITES:
+    if settings.scenario in FAMILIES:
         return f"{len(cases)} generated sites"
     return cases[0].scenario.name
 
@@ -264,7 +264,7 @@ def _provenance(run: Path, settings: TrainingSettings, weights: str) -> dict[str
 
 def _overlap(settings: TrainingSettings, seeds: range) -> str:
     """Return what there is to say if the threats are those that the weights were chosen by."""
-    if settings.scenario == SITES:  # other sites, whatever the seeds
+    if settings.scenario in FAMILIES:  # other sites, whatever the seeds
         return ""
     chosen_by = SeedRange.SELECTION.seeds(settings.evaluation_first_seed, settings.evaluation_cases)
     both = range(max(seeds[0], chosen_by[0]), min(seeds[-1], chosen_by[-1]) + 1)

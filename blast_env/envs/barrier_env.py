@@ -130,8 +130,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     ## Information
     Always `action_mask` and `illegal_actions`; after a step `reward_terms`; at the end
     `impulse_psi_s`, `impulse_pa_s` and `impulse_sim` (simulation units), as the reward counts
-    them; `unprotected_impulse_pa_s`, the same blasts without a barrier; `peak_pa` and
-    `unprotected_peak_pa`, the largest overpressures (NaN for particles); `reduction`, the share
+    them; `unprotected_impulse_pa_s`, the same blasts without a barrier; with gas dynamics `peak_pa`
+    and `unprotected_peak_pa`, the largest overpressures; `reduction`, the share
     that the layout takes off what counts (NaN if nothing arrives without a barrier); `layout`,
     `scenario_hash`, `charges` (position, kg TNT, height; a vehicle's where the layout let it come)
     and `blast_seeds` (a tuple a charge) to repeat the blasts; `calibration` and

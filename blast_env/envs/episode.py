@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import fsum
+from math import fsum, isnan
 from typing import Any, Final
 
 import numpy as np
@@ -168,8 +168,7 @@ class Episode:
             "impulse_psi_s": protected.impulse_psi_s,
             "impulse_pa_s": protected.impulse_pa_s,
             "unprotected_impulse_pa_s": unprotected.impulse_pa_s,
-            "peak_pa": protected.peak_pa,
-            "unprotected_peak_pa": unprotected.peak_pa,
+            **_peaks(protected, unprotected),
             "reduction": protected.reduction_from(unprotected),
             "layout": self.placement.layout,
             "scenario_hash": self.observable.scenario.content_hash,
@@ -185,6 +184,13 @@ class Episode:
             "cache_hits": evaluators.cache_hits,
             "cache_hit_rate": evaluators.cache_hit_rate,
         }
+
+
+def _peaks(protected: Assessment, unprotected: Assessment) -> dict[str, float]:
+    """Return the peaks as they are told; nothing where the engine knows no overpressure."""
+    if isnan(unprotected.peak_pa):
+        return {}
+    return {"peak_pa": protected.peak_pa, "unprotected_peak_pa": unprotected.peak_pa}
 
 
 def _with_illegal_term(terms: Mapping[str, float], illegal: float) -> dict[str, float]:
@@ -249,6 +255,7 @@ class Task:
             scenario,
             self.threat_model.shown(scenario, charges),
             SimulatedModuleLoads(self.evaluators),
+            bool(self.source.representative.vehicles),
         )
         placement = Placement.of(possible, options.layout)
         return Episode(

@@ -98,11 +98,19 @@ class Observable:
         sources: Where the charge is, or may be.
         module_loads: For observations that show loads; they alone need an engine and a
             calibration, and only they call it.
+        among_vehicles: Whether other scenarios of the environment have vehicles, so that this one
+            shows that it has none.
     """
 
     scenario: Scenario
     sources: tuple[AnySource, ...]
     module_loads: ModuleLoads | None = None
+    among_vehicles: bool = False
+
+    @property
+    def shows_vehicles(self) -> bool:
+        """Whether observations have values for vehicles."""
+        return self.among_vehicles or bool(self.scenario.vehicles)
 
     def unprotected_loads(self, blasts: int) -> NDArray[np.float64]:
         """Return the load on each module of the structures without a barrier.
@@ -214,7 +222,8 @@ class GridObservation:
     | `<item>:left`, for each item | pieces that may still be placed / pieces at first = |
     | `<item>:legal`, `<item>:turned:legal` | 1 where a piece may have its lower left cell now |
 
-    Where the scenario has a vehicle, two planes come last. The plane `charge` shows where it
+    Where the scenario has a vehicle, or is drawn among others that have, two planes come last
+    (empty without a vehicle). The plane `charge` shows where it
     enters, whether the threat is visible or hidden: where it goes off is up to the layout.
 
     | plane | value |
@@ -238,10 +247,18 @@ class GridObservation:
         "budget_share",
     )
 
-    def channels_of(self, scenario: Scenario) -> tuple[str, ...]:
-        """Return the names of the planes; those of catalogue and vehicles, if any, come last."""
+    def channels_of(
+        self, scenario: Scenario, shows_vehicles: bool | None = None
+    ) -> tuple[str, ...]:
+        """Return the names of the planes; those of catalogue and vehicles, if any, come last.
+
+        Args:
+            scenario: The scenario.
+            shows_vehicles: Whether those of vehicles are there; if it has some, unless given.
+        """
         items = ItemChannels.of(scenario.zone.catalogue).all
-        return (*self.channels, *items, *vehicle_channels(scenario))
+        shown = bool(scenario.vehicles) if shows_vehicles is None else shows_vehicles
+        return (*self.channels, *items, *vehicle_channels(shown))
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (channels, rows, columns)."""
@@ -271,7 +288,7 @@ class GridObservation:
         vehicles = VehicleView.of(scenario, observable.sources)
         if scenario.vehicles:
             planes[EMPTY_REACH] = vehicles.reached(()).astype(np.float32)
-        channels = self.channels_of(scenario)
+        channels = self.channels_of(scenario, observable.shows_vehicles)
         static = np.zeros((len(channels), grid.rows, grid.columns), dtype=np.uint8)
         for name, plane in planes.items():
             static[channels.index(name)] = _levels(plane)
@@ -439,9 +456,10 @@ class FeaturesObservation:
     | cells | 1 where a module stands that stops vehicles |
     | variants x cells | 1 where a piece may have its lower left cell now, variant by variant |
 
-    Where the scenario has a vehicle, the box from 3 on is around where it enters, and one more
-    value comes last: how near it comes to a protected structure with what stands so far, as a share
-    of the site's diagonal.
+    Where the scenario has a vehicle, the box from 3 on is around where it enters. There, and in
+    scenarios that are drawn among others with a vehicle, one more value comes last: how near it
+    comes to a protected structure with what stands so far, as a share of the site's diagonal; 1
+    without a vehicle.
     """
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
@@ -480,11 +498,11 @@ class FeaturesObservation:
             )
             fixed += [_structure_heights(scenario), item_heights(zone), item_costs(zone)]
             fixed.append(np.zeros(changing))
-        if scenario.vehicles:
+        if observable.shows_vehicles:
             fixed.append(np.zeros(1))
         values = np.concatenate(fixed).astype(np.float32)
         vehicles = VehicleView.of(scenario, observable.sources)
-        return FeaturesEpisode(np.clip(values, 0.0, 1.0), vehicles)
+        return FeaturesEpisode(np.clip(values, 0.0, 1.0), vehicles, observable.shows_vehicles)
 
 
 @dataclass(frozen=True, eq=False)
@@ -494,10 +512,12 @@ class FeaturesEpisode:
     Attributes:
         static: What does not change (features,); the rest is 0.
         vehicles: The vehicles that may be seen.
+        shows_vehicles: Whether the stand-off is the last value; 1 without a vehicle.
     """
 
     static: Array
     vehicles: VehicleView
+    shows_vehicles: bool
 
     def observe(self, placement: Placement) -> Array:
         """Return all values for the modules placed so far, (features,)."""
@@ -511,7 +531,7 @@ class FeaturesEpisode:
             placed = PlacedItems.of(placement)
             ending += [items_left(placement), placed.heights, placed.stops_vehicles]
             ending.append(placement.legal)
-        if self.vehicles.scenario.vehicles:
+        if self.shows_vehicles:
             ending.append(np.array([self.vehicles.stand_off_share(placement.layout)]))
         if ending:
             last = np.concatenate([each.ravel() for each in ending])

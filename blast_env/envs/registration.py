@@ -5,7 +5,7 @@ from typing import Final
 import gymnasium as gym
 
 from blast_env.scenario import bundled_scenarios
-from blast_env.sites import SITES
+from blast_env.sites import ITEM_SITES, SITES
 
 BARRIER_ENTRY_POINT: Final = "blast_env.envs.barrier_env:BlastBarrierEnv"
 
@@ -36,6 +36,7 @@ def register_environments() -> None:
     _register_barrier("BlastBarrierIncremental-v0", scenario="courtyard", reward="incremental")
     _register_barrier("BlastBarrierGas-v0", scenario="courtyard", engine="gas")
     _register_barrier("BlastBarrierSites-v0", scenario=SITES)
+    _register_barrier("BlastBarrierItemSites-v0", scenario=ITEM_SITES, engine="gas")
     for name in bundled_scenarios():
         if name not in WITHOUT_BUILD_ZONE:
             engine = {"engine": "gas"} if name in FOR_GAS else {}

@@ -13,7 +13,7 @@ from blast_env.evaluation.comparison import Objective
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, AnyScenario, AnySource, Scenario, ScenarioField
 from blast_env.scenario.vehicles import source_of
-from blast_env.sites import SITES, SiteSource
+from blast_env.sites import FAMILIES, SiteSource
 
 
 class ThreatModel(Protocol):
@@ -71,7 +71,8 @@ class ScenarioSource(Protocol):
 
     All scenarios of a source have sites of one size, build zones of as many rows and columns, and
     catalogues with items of the same names and sizes, so that they share the observation and the
-    action space.
+    action space. Some of the items may be out of stock. If any has a vehicle, the representative
+    one has.
     """
 
     @property
@@ -106,16 +107,16 @@ def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
     """Return the source for what a user calls a scenario.
 
     Args:
-        scenario: Bundled name, `"sites"` for generated sites to train on, path of a scenario file,
-            a scenario or its plain data, or a source.
+        scenario: Bundled name, `"sites"` or `"item_sites"` for generated sites to train on, path of
+            a scenario file, a scenario or its plain data, or a source.
 
     Raises:
         ScenarioError: If there is no such scenario, or anything is wrong with it.
         BlastEnvError: If it has no build zone, or is anything else.
     """
     source: ScenarioSource
-    if isinstance(scenario, str) and scenario == SITES:
-        source = SiteSource.training()
+    if isinstance(scenario, str) and scenario in FAMILIES:
+        source = SiteSource.training(ranges=FAMILIES[scenario])
     elif isinstance(scenario, str | Path | Mapping | Scenario):
         source = SingleScenario(scenario)
     else:
@@ -137,17 +138,19 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
 
     Raises:
         BlastEnvError: If site, build zone or items have another size, there is no build zone, or
-            only one of them has a vehicle.
+            it has a vehicle and the representative has none. The other way round, observations
+            show that there is no vehicle.
     """
+    has_room = bool(representative.vehicles)
     for what, size, expected in zip(
         (
             "site (width, height in m)",
             "build zone (rows, columns)",
             "catalogue (item, turned, size)",
-            "number of vehicles (none or some)",
+            "room for vehicles (none or some)",
         ),
-        _sizes(scenario),
-        _sizes(representative),
+        _sizes(scenario, has_room and not scenario.vehicles),
+        _sizes(representative, False),
         strict=True,
     ):
         if size != expected:
@@ -157,12 +160,12 @@ def check_size(scenario: Scenario, representative: Scenario) -> None:
             )
 
 
-def _sizes(scenario: Scenario) -> tuple[tuple[object, ...], ...]:
+def _sizes(scenario: Scenario, has_room: bool) -> tuple[tuple[object, ...], ...]:
     site, zone = scenario.site, scenario.zone
     variants = [
         (each.name, each.turned, each.rows, each.columns) for each in zone.catalogue.variants
     ]
-    vehicles = ("some",) if scenario.vehicles else ("none",)
+    vehicles = ("some",) if scenario.vehicles or has_room else ("none",)
     return (site.width_m, site.height_m), zone.shape, tuple(variants), vehicles
 
 

@@ -1,6 +1,7 @@
 """What observations show of vehicles: the ground that they reach, and how near they come.
 
-Only scenarios with vehicles have these values; what others show does not change with them.
+Only scenarios with vehicles have these values, and those that an environment draws beside some:
+there nothing is reached, and nothing comes near.
 """
 
 from dataclasses import dataclass
@@ -19,9 +20,9 @@ EMPTY_REACH: Final = "reach_without_barrier"
 REACH: Final = "reach"
 
 
-def vehicle_channels(scenario: Scenario) -> tuple[str, ...]:
-    """Return the names of the planes that show vehicles; none without any."""
-    return (EMPTY_REACH, REACH) if scenario.vehicles else ()
+def vehicle_channels(shown: bool) -> tuple[str, ...]:
+    """Return the names of the planes that show vehicles; none where they are not shown."""
+    return (EMPTY_REACH, REACH) if shown else ()
 
 
 @dataclass(frozen=True)

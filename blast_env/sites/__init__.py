@@ -8,14 +8,18 @@ from blast_env.sites.criterion import (
     visibility_layout,
 )
 from blast_env.sites.generate import draw_site, generate_site
+from blast_env.sites.item_sites import ItemSiteRanges
 from blast_env.sites.ranges import SiteRanges
-from blast_env.sites.source import HELD_OUT_SITES, SITES, SiteSource
+from blast_env.sites.source import FAMILIES, HELD_OUT_SITES, ITEM_SITES, SITES, SiteSource
 from blast_env.sites.turning import turned
 from blast_env.sites.visibility import Visibility
 
 __all__ = [
+    "FAMILIES",
     "HELD_OUT_SITES",
+    "ITEM_SITES",
     "SITES",
+    "ItemSiteRanges",
     "Objection",
     "SiteCriterion",
     "SiteMeasures",

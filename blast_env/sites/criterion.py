@@ -1,7 +1,8 @@
 """Which generated sites are worth solving, by measures that need no blast."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Layout
 from blast_env.scenario import (
     AnyScenario,
+    BuildZone,
     Catalogue,
     Placement,
     Scenario,
@@ -26,9 +28,11 @@ class SiteMeasures:
         open_share: Share that no other structure stops; the other shares are of these lines.
         layout_share: Share that `visibility_layout` cuts.
         wall_share: Share that the best straight wall cuts, one row or column of the zone with as
-            many modules in a run as there are, budget and access way aside.
+            many modules in a run as there are, budget and access way aside. With a catalogue: as
+            many pieces of one item as stock and budget pay for.
         random_share: Share that as many modules cut on cells drawn at random, on average,
-            access way aside.
+            access way aside. With a catalogue: as many pieces as can be paid for, each of an item
+            drawn at random, in a place drawn at random.
     """
 
     open_share: float
@@ -48,36 +52,52 @@ class SiteMeasures:
         """
         scenario = find_scenario(scenario)
         lines = Visibility.of(scenario)
+        layout = visibility_layout(scenario, lines)
+        random_share = _random_pieces_share if scenario.zone.items else _random_share
         return cls(
             open_share=lines.open_share,
-            layout_share=lines.cut_share(visibility_layout(scenario, lines)),
+            layout_share=cut_share_of(lines, Placement(scenario, layout)),
             wall_share=_wall_share(scenario, lines),
-            random_share=_random_share(scenario, lines),
+            random_share=random_share(scenario, lines),
         )
+
+
+def cut_share_of(lines: Visibility, placement: Placement) -> float:
+    """Return the share of the lines that what stands cuts, its heights heeded."""
+    modules = placement.modules
+    return lines.cut_share([each.cell for each in modules], [each.height_m for each in modules])
 
 
 def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
     """Return a layout of which each module cuts as many lines by its cost as one more can.
 
-    With a catalogue, each piece; the lines are in plan, so heights do not count. It keeps every
-    condition of the build zone, and ends where nothing more would cut another line.
+    With a catalogue, each piece. It keeps every condition of the build zone, and ends where
+    nothing more would cut another line.
 
     Args:
         scenario: The scenario, or its bundled name or path.
         lines: Its lines of sight.
     """
     placement = Placement.empty(scenario)
-    left = lines.weight.copy()
+    left = np.ones(len(lines.weight), dtype=bool)
     cut = _cut_by_variants(lines, placement.catalogue)
+    gain = lines.weight @ cut
+    nothing = _ROUNDING * float(lines.weight.sum())
     while not placement.is_full:
-        gain = (left @ cut).reshape(placement.legal.shape)
-        worth = np.where(placement.legal, gain / placement.costs, 0.0)
+        worth = np.where(placement.legal, gain.reshape(placement.legal.shape), 0.0)
+        worth /= placement.costs
         action = int(worth.argmax())
-        if not worth.flat[action] > 0.0:
+        if not gain[action] > nothing or not worth.flat[action] > 0.0:
             break
         placement = placement.place(placement.catalogue.element(action))
-        left[cut[:, action]] = 0.0
+        newly = left & cut[:, action]
+        left &= ~newly
+        gain = gain - lines.weight[newly] @ cut[newly]
     return placement.layout
+
+
+_ROUNDING: Final = 1e-9
+"""Share of the lines that is nothing: what rounding leaves where weights are no whole numbers."""
 
 
 def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
@@ -85,21 +105,38 @@ def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
     rows, columns = catalogue.shape
     cut = np.zeros((len(lines.weight), len(catalogue.variants), rows, columns), dtype=bool)
     for number, variant in enumerate(catalogue.variants):
+        own = lines.cut_by(variant.height_m)
         for up, right in variant.cells_at(0, 0):
-            cut[:, number, : rows - up, : columns - right] |= lines.cut[:, up:, right:]
+            cut[:, number, : rows - up, : columns - right] |= own[:, up:, right:]
     return cut.reshape(len(lines.weight), -1)
 
 
 def _wall_share(scenario: Scenario, lines: Visibility) -> float:
     """Return the share of the lines that the best straight run of modules cuts."""
-    zone, usable = scenario.zone, usable_cells(scenario)
-    cut = lines.cut & usable
+    usable = usable_cells(scenario)
     best = 0.0
-    for along_rows in (cut, cut.transpose(0, 2, 1)):
-        run = min(zone.stock, along_rows.shape[1])
-        cut_by_run = _any_in_runs(along_rows, run).reshape(len(lines.weight), -1)
-        best = max(best, float((lines.weight @ cut_by_run).max(initial=0.0)))
-    return best / lines.weight.sum() if len(lines.weight) else 0.0
+    for height_m, longest in _longest_runs(scenario.zone):
+        cut = lines.cut_by(height_m) & usable
+        for along_rows in (cut, cut.transpose(0, 2, 1)):
+            run = min(longest, along_rows.shape[1])
+            cut_by_run = _any_in_runs(along_rows, run).reshape(len(lines.weight), -1)
+            best = max(best, float((lines.weight @ cut_by_run).max(initial=0.0)))
+    return min(float(best / lines.weight.sum()), 1.0) if len(lines.weight) else 0.0
+
+
+def _longest_runs(zone: BuildZone) -> Iterator[tuple[float | None, int]]:
+    """Yield the height of each kind of wall, and how many modules a straight one has.
+
+    All modules; or pieces of one item, as many as there are and are paid for.
+    """
+    if not zone.items:
+        yield zone.height_m, zone.stock
+    for item in zone.items:
+        pieces = min(item.stock, zone.stock)
+        if zone.budget is not None:
+            pieces = min(pieces, int(zone.budget / item.cost))
+        if pieces:
+            yield item.height_m, pieces * item.length_modules
 
 
 def _any_in_runs(cut: BoolArray, run: int) -> BoolArray:
@@ -125,6 +162,24 @@ def _random_share(scenario: Scenario, lines: Visibility) -> float:
         missed *= np.maximum(harmless - placed, 0) / (cells - placed)
     share = 1.0 - float(lines.weight @ missed) / max(float(lines.weight.sum()), 1e-300)
     return round(share, 9)  # so that the last bit, which differs between machines, never decides
+
+
+def _random_pieces_share(scenario: Scenario, lines: Visibility) -> float:
+    """Return about the share of the lines that random pieces cut; those may overlap here."""
+    zone, placement = scenario.zone, Placement.empty(scenario)
+    legal = placement.legal.reshape(len(placement.legal), -1)
+    cut = _cut_by_variants(lines, placement.catalogue).reshape(len(lines.weight), *legal.shape)
+    numbers = np.array([each.item for each in placement.catalogue.variants])
+    there = [number for number in range(len(zone.items)) if legal[numbers == number].any()]
+    mean_cost = float(np.mean([zone.items[number].cost for number in there]))
+    pieces = zone.stock if zone.budget is None else min(zone.stock, zone.budget / mean_cost)
+    missed: FloatArray = np.ones(len(lines.weight))
+    for number in there:
+        places = legal[numbers == number]
+        cutting = (cut[:, numbers == number] & places).sum(axis=(1, 2)) / places.sum()
+        missed *= (1.0 - cutting) ** min(zone.items[number].stock, pieces / len(there))
+    share = 1.0 - float(lines.weight @ missed) / max(float(lines.weight.sum()), 1e-300)
+    return round(share, 9)  # as `_random_share`
 
 
 class Objection(NamedTuple):

@@ -3,8 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import floor
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
 import numpy as np
 
@@ -25,96 +24,12 @@ from blast_env.scenario import (
     SimulationSection,
     Site,
 )
-from blast_env.scenario.zone import box_distances_m
 from blast_env.sites.criterion import Objection, SiteCriterion, VisibilityCriterion
-from blast_env.sites.ranges import MARGIN_M, SiteRanges, Span, WholeSpan, modules_within
+from blast_env.sites.draws import Apart, Draws, draw_place, on_grid
+from blast_env.sites.item_sites import ItemSiteRanges, draw_item_site
+from blast_env.sites.ranges import MARGIN_M, SiteRanges, Span
 from blast_env.sites.turning import turned
 from blast_env.units import MODULE_SIDE_M
-
-
-@dataclass(frozen=True, eq=False)
-class Draws:
-    """Draws values; each method takes one number from the stream.
-
-    Attributes:
-        rng: The stream.
-    """
-
-    rng: np.random.Generator
-
-    def length_m(self, span_m: Span) -> float:
-        """Return a multiple of 0.5 m; the lowest one where the range has none."""
-        first, last = modules_within(span_m)
-        return int(self.rng.integers(first, max(first, last), endpoint=True)) * MODULE_SIDE_M
-
-    def amount(self, span: Span, digits: int) -> float:
-        """Return a number, rounded to so many decimal places where the range allows it."""
-        low, high = span
-        drawn = round(low + (high - low) * float(self.rng.random()), digits)
-        return min(max(drawn, low), high)
-
-    def count(self, span: WholeSpan) -> int:
-        """Return a whole number."""
-        return int(self.rng.integers(*span, endpoint=True))
-
-    def happens(self, probability: float) -> bool:
-        """Return true with this probability."""
-        return bool(self.rng.random() < probability)
-
-
-def on_grid(value_m: float) -> float:
-    """Return the largest multiple of 0.5 m that is not above a length."""
-    return floor(value_m / MODULE_SIDE_M + 1e-9) * MODULE_SIDE_M
-
-
-_TOLERANCE_M = 1e-9
-
-
-class Apart(NamedTuple):
-    """Something that a thing must not come near to.
-
-    Attributes:
-        rectangle: Where it is, m.
-        distance_m: How far away the thing must be; at 0 they may touch, but not overlap.
-    """
-
-    rectangle: Rectangle
-    distance_m: float
-
-
-def draw_place(
-    draws: Draws, area: Rectangle, size_m: tuple[float, float], others: Sequence[Apart]
-) -> Rectangle | None:
-    """Draw where a thing stands, all places on the 0.5 m grid as likely.
-
-    Args:
-        draws: Draws.
-        area: Where it must lie, m; its corner is on the grid.
-        size_m: Width and height.
-        others: What it must keep away from.
-
-    Returns:
-        `None` if there is no such place.
-    """
-    width_m, height_m = size_m
-    left = np.arange(area.left, area.right - width_m + _TOLERANCE_M, MODULE_SIDE_M)
-    bottom = np.arange(area.bottom, area.top - height_m + _TOLERANCE_M, MODULE_SIDE_M)
-    bottom = bottom[:, np.newaxis]
-    boxes = (left, bottom, left + width_m, bottom + height_m)
-    has_room = np.ones((len(bottom), len(left)), dtype=bool)
-    for rectangle, distance_m in others:
-        if distance_m > 0.0:
-            has_room &= box_distances_m(rectangle, boxes) >= distance_m - _TOLERANCE_M
-        else:
-            # Smaller by a little, so that what only touches is at a distance.
-            has_room &= box_distances_m(rectangle.grown(-_TOLERANCE_M), boxes) > 0.0
-    places = np.argwhere(has_room)
-    if not len(places):
-        return None
-    row, column = places[draws.count((0, len(places) - 1))].tolist()
-    corner_m = (float(left[column]), float(bottom[row, 0]))
-    return Rectangle.from_corner(corner_m, size_m)
-
 
 NEIGHBOUR_DISTANCE_M: Final = 2.0
 """Least distance of the neighbouring building from the protected one and from the threat."""
@@ -297,12 +212,27 @@ def _yard(ground: Ground) -> Rectangle:
     return Rectangle(zone.left, zone.bottom, min(zone.right, ground.building.left), zone.top)
 
 
+AnyRanges = SiteRanges | ItemSiteRanges
+"""A family of sites: what they may be."""
+
+
 RANGES: Final = SiteRanges()
 """The ranges that sites are drawn from unless others are given."""
 
 
 CRITERION: Final = VisibilityCriterion()
-"""The criterion that sites meet unless another one is given."""
+"""The criterion that sites of `SiteRanges` meet unless another one is given."""
+
+
+ITEM_CRITERION: Final = VisibilityCriterion(
+    least_layout_share=0.5, most_layout_share=1.0, least_advantage=0.25
+)
+"""That of sites of `ItemSiteRanges`: a wall that cuts all lines in plan lets the blast over it."""
+
+
+def criterion_of(ranges: AnyRanges) -> SiteCriterion:
+    """Return the criterion that the sites of a family meet unless another one is given."""
+    return ITEM_CRITERION if isinstance(ranges, ItemSiteRanges) else CRITERION
 
 
 MOST_TRIES: Final = 200
@@ -320,7 +250,7 @@ _SIDES: Final = ("left", "lower", "right", "upper")
 
 
 def generate_site(
-    seed: int, ranges: SiteRanges = RANGES, criterion: SiteCriterion = CRITERION
+    seed: int, ranges: AnyRanges = RANGES, criterion: SiteCriterion | None = None
 ) -> Scenario:
     """Return the site of a seed: the first one of the seed's stream that the criterion accepts.
 
@@ -330,7 +260,7 @@ def generate_site(
     Args:
         seed: 0 to 2^63 - 1.
         ranges: What the site may be.
-        criterion: Which sites are used.
+        criterion: Which sites are used; the family's own unless given (`criterion_of`).
 
     Raises:
         BlastEnvError: If the seed is out of bounds, or none of 200 sites is accepted.
@@ -340,6 +270,7 @@ def generate_site(
     if not 0 <= seed <= MOST_SEED:
         raise BlastEnvError(f"seed is {seed}, must be 0 to {MOST_SEED}")
     rng = np.random.default_rng(int(seed))
+    wanted = criterion or criterion_of(ranges)
     objections: list[Objection] = []
     for _ in range(MOST_TRIES):
         try:
@@ -348,14 +279,14 @@ def generate_site(
             problem = error.problems[0]
             objections.append(Objection(f"{problem.key}: must fit", problem.message))
             continue
-        objection = criterion.objection(site)
+        objection = wanted.objection(site)
         if objection is None:
             return site
         objections.append(objection)
     raise _nothing_accepted(int(seed), objections)
 
 
-def draw_site(rng: np.random.Generator, ranges: SiteRanges, name: str) -> Scenario:
+def draw_site(rng: np.random.Generator, ranges: AnyRanges, name: str) -> Scenario:
     """Draw a site, whether any criterion would accept it or not.
 
     Args:
@@ -367,6 +298,8 @@ def draw_site(rng: np.random.Generator, ranges: SiteRanges, name: str) -> Scenar
         ScenarioError: If the things that were drawn do not fit each other, which does not happen
             with the default ranges.
     """
+    if isinstance(ranges, ItemSiteRanges):
+        return draw_item_site(rng, ranges, name)
     draws = Draws(rng)
     ground = draw_ground(draws, ranges)
     source = _source(ground.threat, draws.amount(ranges.tnt_kg, 0))

@@ -1,8 +1,9 @@
 """Sites for an environment: one set of seeds to train on, another to be judged on."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -10,17 +11,28 @@ import numpy as np
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
 from blast_env.sites.criterion import SiteCriterion
-from blast_env.sites.generate import CRITERION, MOST_SEED, RANGES, generate_site
-from blast_env.sites.ranges import SiteRanges
+from blast_env.sites.generate import MOST_SEED, RANGES, AnyRanges, generate_site
+from blast_env.sites.item_sites import ItemSiteRanges
 
 SITES: Final = "sites"
 """Name of the generated sites to train on, where an environment asks for a scenario."""
+
+ITEM_SITES: Final = "item_sites"
+"""Name of the generated sites with heights, catalogues and vehicles, likewise."""
+
+FAMILIES: Final[Mapping[str, AnyRanges]] = MappingProxyType(
+    {SITES: RANGES, ITEM_SITES: ItemSiteRanges()}
+)
+"""The families of generated sites that have names."""
 
 HELD_OUT_SITES: Final = 10_000
 """Seeds 0 to 9,999 are held out; training has the seeds from 10,000 on."""
 
 TRAINING_SITES: Final = 2**31
 """Number of seeds for training, as good as endless."""
+
+
+_MOST_LOOKED_AT: Final = 50
 
 
 @dataclass(frozen=True)
@@ -31,7 +43,7 @@ class SiteSource:
         first_seed: The first seed of the sites.
         count: How many sites there are; their seeds follow each other.
         ranges: What the sites may be.
-        criterion: Which sites are used.
+        criterion: Which sites are used; the family's own unless given.
 
     Raises:
         BlastEnvError: If seeds are out of bounds, or there are none.
@@ -39,8 +51,8 @@ class SiteSource:
 
     first_seed: int
     count: int
-    ranges: SiteRanges = RANGES
-    criterion: SiteCriterion = CRITERION
+    ranges: AnyRanges = RANGES
+    criterion: SiteCriterion | None = None
 
     def __post_init__(self) -> None:
         """Check the seeds; see the class for the errors."""
@@ -53,7 +65,7 @@ class SiteSource:
             )
 
     @classmethod
-    def training(cls, count: int = TRAINING_SITES, ranges: SiteRanges = RANGES) -> "SiteSource":
+    def training(cls, count: int = TRAINING_SITES, ranges: AnyRanges = RANGES) -> "SiteSource":
         """Return the sites to train on.
 
         Args:
@@ -66,7 +78,7 @@ class SiteSource:
         return cls(HELD_OUT_SITES, count, ranges)
 
     @classmethod
-    def held_out(cls, count: int = HELD_OUT_SITES, ranges: SiteRanges = RANGES) -> "SiteSource":
+    def held_out(cls, count: int = HELD_OUT_SITES, ranges: AnyRanges = RANGES) -> "SiteSource":
         """Return sites that training never sees, always the same ones in the same order.
 
         Args:
@@ -82,7 +94,11 @@ class SiteSource:
 
     @cached_property
     def representative(self) -> Scenario:
-        """The first site."""
+        """The first site; in a family with vehicles the first one that has a vehicle."""
+        wanted = isinstance(self.ranges, ItemSiteRanges) and self.ranges.vehicle_probability > 0.0
+        if wanted:
+            sites = (self.site(index) for index in range(min(self.count, _MOST_LOOKED_AT)))
+            return next((site for site in sites if site.vehicles), self.site(0))
         return self.site(0)
 
     def sample(self, rng: np.random.Generator) -> Scenario:

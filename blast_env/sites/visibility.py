@@ -25,6 +25,10 @@ DIRECTIONS: Final = 360
 """Lines that leave each place."""
 
 
+TARGETS: Final = 3
+"""Heights on a facade that lines go to, where it has a height: the middles of thirds."""
+
+
 PLACES: Final = 9
 """Places along a segment or an entry, or in a rectangle, 3 x 3."""
 
@@ -35,16 +39,21 @@ class Visibility:
 
     From places spread evenly over every source, lines leave in directions spread evenly, as the
     balls of a charge do. Those that would meet a protected structure count, each by the weights
-    of its source and of the structure.
+    of its source and of the structure. Where the structure has a height, each of them stands for
+    several, which rise from the charge to the middle of its lower, middle and upper third: a low
+    wall cuts them near the charge, and the lower ones alone near the structure.
 
     Attributes:
         weight: Weight of each line that no other structure stops (lines,).
-        cut: Which lines a module on each cell of the build zone would cut (lines, rows, columns).
+        cut: Which lines an endlessly high module on each cell of the build zone would cut
+            (lines, rows, columns).
+        height_m: How high each line is over each cell (lines, rows, columns).
         open_share: Share, by weight, of the lines that no other structure stops.
     """
 
     weight: FloatArray
     cut: BoolArray
+    height_m: FloatArray
     open_share: float
 
     @classmethod
@@ -60,29 +69,56 @@ class Visibility:
         scenario = find_scenario(scenario)
         origin, direction, source_weight = _all_lines(scenario)
         protected_m, other_m = np.full((2, len(origin)), np.inf)
-        weight = np.zeros(len(origin))
+        weight, target_m = np.zeros((2, len(origin)))
         for structure in scenario.structures:
             entry_m = _entry_m(origin, direction, structure.rectangle_m)
             if structure.protected:
                 nearer = entry_m < protected_m
                 weight[nearer] = (structure.weight * source_weight)[nearer]
+                target_m[nearer] = structure.height_m or 0.0
                 protected_m = np.minimum(protected_m, entry_m)
             else:
                 other_m = np.minimum(other_m, entry_m)
         free = (weight > 0.0) & (protected_m < other_m)
-        cut = _cut(scenario, origin[free], direction[free], protected_m[free])
-        return cls(weight[free], cut, float(weight[free].sum() / max(weight.sum(), 1e-300)))
+        open_share = float(weight[free].sum() / max(weight.sum(), 1e-300))
+        cut, along_share = _cut(scenario, origin[free], direction[free], protected_m[free])
+        if not target_m.any():
+            return cls(weight[free], cut, np.zeros(cut.shape), open_share)
+        shares = (np.arange(TARGETS) + 0.5) / TARGETS
+        ends_m = (shares[:, np.newaxis] * target_m[free]).ravel()  # third by third
+        return cls(
+            np.tile(weight[free] / TARGETS, TARGETS),
+            np.tile(cut, (TARGETS, 1, 1)),
+            ends_m[:, np.newaxis, np.newaxis] * np.tile(along_share, (TARGETS, 1, 1)),
+            open_share,
+        )
 
-    def cut_share(self, cells: Sequence[Element]) -> float:
+    def cut_by(self, height_m: float | None) -> BoolArray:
+        """Return which lines a module of a height would cut on each cell (lines, rows, columns).
+
+        Args:
+            height_m: The height; `None` is as high as the air.
+        """
+        return self.cut if height_m is None else self.cut & (self.height_m < height_m)
+
+    def cut_share(
+        self, cells: Sequence[Element], heights_m: Sequence[float | None] | None = None
+    ) -> float:
         """Return the share of the lines, by weight, that modules cut.
 
         Args:
             cells: (row, column) of the cells that hold a module (`Placement.cells`).
+            heights_m: Height of each module; all are as high as the air unless given.
         """
         if not cells or not len(self.weight):
             return 0.0
         rows, columns = zip(*(each[:2] for each in cells), strict=True)
-        return float(self.weight @ self.cut[:, rows, columns].any(axis=1) / self.weight.sum())
+        cut = self.cut[:, rows, columns]
+        if heights_m is not None:
+            tall = np.array([np.inf if each is None else each for each in heights_m])
+            cut = cut & (self.height_m[:, rows, columns] < tall)
+        share = float(self.weight @ cut.any(axis=1) / self.weight.sum())
+        return min(share, 1.0)  # rounding
 
 
 def _all_lines(scenario: Scenario) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -135,8 +171,11 @@ def _entry_m(origin: FloatArray, direction: FloatArray, rectangle: Rectangle) ->
 
 def _cut(
     scenario: Scenario, origin: FloatArray, direction: FloatArray, length_m: FloatArray
-) -> BoolArray:
-    """Return which lines a module on each cell would cut, (lines, rows, columns)."""
+) -> tuple[BoolArray, FloatArray]:
+    """Return which lines a module on each cell would cut, and how far along each line that is.
+
+    Both (lines, rows, columns); the latter as a share of the line's length, 0 to 1.
+    """
     x, y = scenario.zone.centres_m
     to_x = x[0] - origin[:, :1]  # (lines, columns)
     to_y = y[:, 0] - origin[:, 1:]  # (lines, rows)
@@ -149,4 +188,5 @@ def _cut(
         & (along > 0.0)
         & (along < length_m[:, np.newaxis, np.newaxis])
     )
-    return cut
+    share: FloatArray = np.clip(along / length_m[:, np.newaxis, np.newaxis], 0.0, 1.0)
+    return cut, share

@@ -25,5 +25,6 @@ _CHEAP: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
     {
         "BlastSimulator-v0": {"scenario": "free_field", "engine": "event"},
         "BlastBarrierGas-v0": {"scenario": hut()},
+        "BlastBarrierItemSites-v0": {"engine": "event", "realisations": 1},
     }
 )

@@ -13,7 +13,7 @@ from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import RunFolder
 from blast_env.errors import BlastEnvError
-from blast_env.sites import SITES
+from blast_env.sites import FAMILIES
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class TrainedRun:
             entry=Agent(load_agent(run), name, _training(folder, settings.evaluation_cases)),
             threat=settings.threat,
             scenario=settings.scenario,
-            scenario_hash=None if settings.scenario == SITES else configuration.scenario_hash,
+            scenario_hash=None if settings.scenario in FAMILIES else configuration.scenario_hash,
         )
 
     def search(self, budget: int) -> Search:

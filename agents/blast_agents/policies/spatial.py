@@ -24,7 +24,7 @@ _LOGIT_GAIN: Final = 0.01
 
 _OVERVIEW: Final = (
     *("protected", "other_structures", "charge", "barrier", "unprotected_load"),
-    *("structure_height", "barrier_height"),
+    *("structure_height", "barrier_height", "reach_without_barrier", "reach"),
 )
 """Channels of which the network sees the whole site, those of them that the observation has."""
 
@@ -42,7 +42,8 @@ class ZoneExtractor(BaseFeaturesExtractor):
     of each cell, cell by cell, then `width` features of the whole.
 
     With a catalogue the cells around show heights and where each variant may be placed as well,
-    and the features of the whole have heights, costs and what is left of the items.
+    and the features of the whole have heights, costs and what is left of the items. With vehicles
+    both show the ground that they reach.
 
     Args:
         observation_space: Of an observation of planes.
@@ -71,6 +72,8 @@ class ZoneExtractor(BaseFeaturesExtractor):
         self.items = tuple(each for each in self.channels if each.endswith(values))
         variants = variant_channels(self.channels)
         self.around = ("barrier_height", "stops_vehicles", *variants) if variants else ()
+        # A post belongs where the ground that a vehicle reaches can be cut off.
+        self.around += ("reach",) if "reach" in self.channels else ()
         self.near = nn.Conv2d(2 + len(self.around), width, 5, padding=2)
         self.overview = nn.Sequential(
             nn.AvgPool2d(4, ceil_mode=True),

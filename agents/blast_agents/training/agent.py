@@ -39,6 +39,7 @@ from blast_env.envs.observations import (
     SimulatedModuleLoads,
 )
 from blast_env.envs.strategies import check_size
+from blast_env.envs.vehicle_observations import vehicle_channels
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout
@@ -94,7 +95,10 @@ def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenari
     changes = {
         "rows": zone.rows,
         "columns": zone.columns,
-        "item_channels": ItemChannels.of(zone.catalogue).all,
+        "item_channels": (
+            *ItemChannels.of(zone.catalogue).all,
+            *vehicle_channels(bool(scenario.vehicles)),
+        ),
         "places": places,
     }
     spatial = _SPATIAL[settings.algorithm]
@@ -128,7 +132,7 @@ def check_fit(configuration: RunConfiguration, scenario: Scenario, folder: RunFo
 
 
 def channels_of(observation: str) -> tuple[str, ...]:
-    """Return the names of an observation's planes, without those of a catalogue.
+    """Return the names of an observation's planes, without those of catalogue and vehicles.
 
     None for one that is no planes.
     """
@@ -320,7 +324,8 @@ class TrainedAgent:
         sources = scenario.charge
         if charge is not None:
             sources = (source_of(charge),)
-        observable = Observable(scenario, sources, self._module_loads)
+        among_vehicles = bool(self.representative.vehicles)
+        observable = Observable(scenario, sources, self._module_loads, among_vehicles)
         return OBSERVATIONS[self.observation].episode(observable)
 
     def _actions(

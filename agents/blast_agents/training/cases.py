@@ -11,7 +11,8 @@ from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, Evaluators, SeedRange, compare, draw_threats
 from blast_env.scenario import Scenario
-from blast_env.sites import HELD_OUT_SITES, SiteSource
+from blast_env.sites import FAMILIES, HELD_OUT_SITES, SITES, SiteSource
+from blast_env.sites.generate import AnyRanges
 from blast_env.statistics import Estimate
 
 
@@ -52,7 +53,8 @@ class Selection:
         if isinstance(source, SingleScenario):
             scenarios: Sequence[Scenario] = (source.scenario,) * count
         else:
-            scenarios = tuple(SiteSource(HELD_OUT_SITES - count, count))
+            sites = SiteSource(HELD_OUT_SITES - count, count, _ranges_of(source))
+            scenarios = tuple(sites)
         evaluators = Evaluators(settings.blast_engine, most=count)
         evaluators.of(scenarios[0])  # refuses an unknown engine before anything is written
         return cls(_cases(settings, scenarios, seeds), evaluators, processes)
@@ -119,7 +121,13 @@ def unseen_cases(
     most = HELD_OUT_SITES - settings.evaluation_cases
     if not 1 <= len(seeds) <= most:
         raise BlastEnvError(f"seeds: there are {len(seeds)}, must be 1 to {most}, a site each")
-    return _cases(settings, tuple(SiteSource.held_out(len(seeds))), seeds)
+    sites = SiteSource.held_out(len(seeds), _ranges_of(source))
+    return _cases(settings, tuple(sites), seeds)
+
+
+def _ranges_of(source: ScenarioSource) -> AnyRanges:
+    """Return the family that the sites of a source are of."""
+    return source.ranges if isinstance(source, SiteSource) else FAMILIES[SITES]
 
 
 def _cases(

@@ -24,7 +24,7 @@ from blast_env.evaluation.store import BlastCache, LoadsCache
 from blast_env.physics.engine import Engine
 from blast_env.runner import workers_told
 from blast_env.scenario import bundled_scenarios
-from blast_env.sites import SITES
+from blast_env.sites import FAMILIES
 
 _Env = gym.Env[Array, np.int64]
 
@@ -115,7 +115,7 @@ _FORK_SERVER: Final = "forkserver"
 
 def environment_id(scenario: str) -> str:
     """Return the section of the hyperparameters for a scenario's name or path."""
-    if scenario == SITES:
+    if scenario in FAMILIES:
         return SITES_ID
     if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE | FOR_GAS:
         return barrier_id(scenario)

@@ -28,7 +28,7 @@ from blast_agents.training.self_labelling import SelfLabelling
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
-from blast_env.sites import SITES
+from blast_env.sites import FAMILIES
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +102,8 @@ def resume(
     own = folder.scenario(configuration)
     check_fit(configuration, own, folder)
     source: ScenarioSource = SingleScenario(own)
-    if configuration.settings.scenario == SITES:
-        source = training_source(SITES)
+    if configuration.settings.scenario in FAMILIES:
+        source = training_source(configuration.settings.scenario)
         check_scenario(source.representative, configuration, "generated sites")
     selection = _selection(configuration, source)
     job = _Run(folder, configuration, source, selection)

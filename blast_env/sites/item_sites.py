@@ -1,0 +1,438 @@
+"""Sites with heights, a catalogue, several buildings, and charges on roads or in vehicles."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, NamedTuple
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Rectangle
+from blast_env.physics.presets import preset
+from blast_env.scenario import SCHEMA_VERSION, Scenario
+from blast_env.sites.draws import Apart, Draws, draw_place, on_grid
+from blast_env.sites.ranges import (
+    MARGIN_M,
+    Bounds,
+    CountsBounds,
+    LengthBounds,
+    LengthsBounds,
+    PairBounds,
+    Probability,
+    Span,
+    WholeSpan,
+    check_bounds,
+)
+from blast_env.sites.turning import turned
+from blast_env.units import MODULE_SIDE_M
+
+
+class ItemKind(NamedTuple):
+    """An item that every site of the family has a place for: the actions are always the same.
+
+    Attributes:
+        name: Its name.
+        length_modules: Modules along its length.
+        thickness_modules: Modules across it.
+        rotatable: Whether it may be turned.
+        heights_m: Lowest and highest height, on the 0.5 m grid.
+        pieces: Least and largest number of pieces, where there are any.
+    """
+
+    name: str
+    length_modules: int
+    thickness_modules: int
+    rotatable: bool
+    heights_m: Span
+    pieces: WholeSpan
+
+
+ITEM_KINDS: Final = (
+    ItemKind("low_wall", 6, 1, True, (1.0, 1.0), (4, 8)),
+    ItemKind("wall", 3, 1, True, (2.0, 2.5), (4, 12)),
+    ItemKind("high_wall", 3, 1, True, (3.0, 4.0), (3, 8)),
+    ItemKind("basket", 4, 2, True, (1.5, 2.0), (4, 8)),
+    ItemKind("post", 1, 1, False, (1.0, 1.0), (6, 12)),
+)
+"""The items: a road barrier, two T-walls, an earth-filled basket, a bollard."""
+
+
+POST: Final = "post"
+
+
+@dataclass(frozen=True)
+class ItemSiteRanges:
+    """What a generated site with a catalogue may be.
+
+    As `SiteRanges`: pairs are lowest and highest value, lengths are on the 0.5 m grid, and the
+    words are those for a site with the threat on its left. Sizes are such that a blast of gas
+    dynamics with cells of 0.5 m takes a fraction of a second.
+
+    All sites have one size, build zones of one size, and the items of `ITEM_KINDS`, of which some
+    are not in stock; so they share action and observation space. Some have a vehicle: the planes
+    and values of vehicles are there for all.
+
+    Attributes:
+        side_m: Width and height of the site, m.
+        air_height_m: Height of the air, m.
+        zone_side_m: Width and height of the build zone, m.
+        tnt_kg: Mass of the charge.
+        vehicle_probability: How likely a vehicle brings the charge.
+        parking_probability: Of sites without a vehicle: how likely the charge is somewhere on a
+            parking area, not on a road.
+        road_length_m: Length of the road or parking area along the border, m.
+        entry_m: Length of the border through which a vehicle enters, m.
+        vehicle_width_m: Width of the vehicle, m.
+        forecourt_m: Extent along the border of the ground on which a vehicle can drive, m; it ends
+            within the build zone, so that it can be closed.
+        kerb_m: How far from the building that ground ends, m.
+        zone_from_border_m: From the left border to the build zone, m.
+        stand_off_m: From road, parking area or border to the nearest building, m.
+        facade_m: Length of the facades of the protected buildings, m.
+        depth_m: Their depth, m.
+        storeys: Their storeys, of 3 m.
+        second_probability: How likely there is a second protected building beside the first.
+        second_weight: How much its load counts; that of the first counts 1.
+        shed_probability: How likely there is an unprotected shed, where it has room.
+        shed_side_m: Its sides, m.
+        shift_m: From the middle of the site to that of road, entry and building, m.
+        path_probability: How likely a path to the door is kept out.
+        path_width_m: Its width, m.
+        trees: Number of trees that are kept out.
+        tree_side_m: Side of the square that a tree takes, m.
+        clearance_m: Least distance between a piece and a building, m.
+        access_way_probability: How likely an access way must stay open; with a vehicle it has a
+            gate.
+        access_way_width_m: Its width, m.
+        duct_probability: How likely there is a strip where building costs more.
+        duct_factor: What costs are multiplied by there.
+        item_probability: How likely an item is in stock; one kind of wall always is, and posts
+            only where there is a vehicle.
+        price_of_height: The cost of a piece is its length times its height to this power.
+        budget: What may be spent, in the cost of a metre of a wall 1 m high.
+        cvar_probability: How likely the worst charges count, not all alike.
+        preset: Preset of the particle model.
+        calibration: Calibration that the sites name, for the particle engines.
+
+    Raises:
+        BlastEnvError: If a value is out of bounds, or the site has no room for what may be drawn.
+        UnknownNameError: If there is no such preset.
+    """
+
+    side_m: Annotated[float, LengthBounds(10.0, 200.0)] = 26.0
+    air_height_m: Annotated[float, Bounds(4.0, 200.0)] = 9.0
+    zone_side_m: Annotated[float, LengthBounds(4.0, 100.0)] = 13.0
+    tnt_kg: Annotated[Span, PairBounds(0.1, 100_000.0)] = (100.0, 140.0)
+    vehicle_probability: Probability = 0.5
+    parking_probability: Probability = 0.4
+    road_length_m: Annotated[Span, LengthsBounds(0.5, 200.0)] = (6.0, 12.0)
+    entry_m: Annotated[Span, LengthsBounds(2.5, 200.0)] = (4.0, 6.0)
+    vehicle_width_m: Annotated[Span, LengthsBounds(1.5, 10.0)] = (2.0, 2.5)
+    forecourt_m: Annotated[Span, LengthsBounds(2.5, 200.0)] = (6.0, 11.0)
+    kerb_m: Annotated[Span, LengthsBounds(0.5, 50.0)] = (6.5, 7.5)
+    zone_from_border_m: Annotated[Span, LengthsBounds(2.5, 50.0)] = (4.0, 4.5)
+    stand_off_m: Annotated[Span, LengthsBounds(4.0, 100.0)] = (11.0, 15.0)
+    facade_m: Annotated[Span, LengthsBounds(2.0, 100.0)] = (5.0, 9.0)
+    depth_m: Annotated[Span, LengthsBounds(1.0, 100.0)] = (3.0, 5.0)
+    storeys: Annotated[WholeSpan, CountsBounds(1, 20)] = (1, 2)
+    second_probability: Probability = 0.4
+    second_weight: Annotated[Span, PairBounds(0.1, 100.0)] = (0.5, 2.0)
+    shed_probability: Probability = 0.4
+    shed_side_m: Annotated[Span, LengthsBounds(1.0, 50.0)] = (2.0, 4.0)
+    shift_m: Annotated[Span, LengthsBounds(-50.0, 50.0)] = (-2.0, 2.0)
+    path_probability: Probability = 0.5
+    path_width_m: Annotated[Span, LengthsBounds(0.5, 50.0)] = (1.5, 2.0)
+    trees: Annotated[WholeSpan, CountsBounds(0, 50)] = (0, 2)
+    tree_side_m: Annotated[Span, LengthsBounds(0.5, 50.0)] = (1.0, 2.0)
+    clearance_m: Annotated[Span, LengthsBounds(0.0, 50.0)] = (0.5, 1.5)
+    access_way_probability: Probability = 0.35
+    access_way_width_m: Annotated[Span, LengthsBounds(0.5, 50.0)] = (3.0, 3.5)
+    duct_probability: Probability = 0.35
+    duct_factor: Annotated[Span, PairBounds(0.1, 1e6)] = (1.5, 3.0)
+    item_probability: Probability = 0.7
+    price_of_height: Annotated[Span, PairBounds(0.0, 5.0)] = (0.8, 1.4)
+    budget: Annotated[Span, PairBounds(1.0, 1e6)] = (16.0, 34.0)
+    cvar_probability: Probability = 0.25
+    preset: str = "collisional"
+    calibration: str = "collisional_kb"
+
+    def __post_init__(self) -> None:
+        """Check the values; see the class for the errors."""
+        check_bounds(self)
+        preset(self.preset)
+        needs_m = {
+            "stand-off, the largest depth and the road": (
+                _ROAD_M + self.stand_off_m[0] + self.depth_m[0] + MARGIN_M
+            ),
+            "the build zone": self.zone_from_border_m[1] + self.zone_side_m,
+            "two facades": 2.0 * self.facade_m[0] + _BETWEEN_M + 2.0 * MARGIN_M,
+        }
+        for what, need_m in needs_m.items():
+            if need_m > self.side_m:
+                raise BlastEnvError(
+                    f"ItemSiteRanges: side_m is {self.side_m:g}, must be at least {need_m:g}, to"
+                    f" have room for {what}"
+                )
+        if self.forecourt_m[1] > self.zone_side_m:
+            raise BlastEnvError(
+                f"ItemSiteRanges: forecourt_m is {self.forecourt_m}, must be at most"
+                f" {self.zone_side_m:g}, zone_side_m: else nothing could stop a vehicle"
+            )
+        if 3.0 * self.storeys[1] > self.air_height_m:
+            raise BlastEnvError(
+                f"ItemSiteRanges: storeys is {self.storeys}, of 3 m each, must be at most"
+                f" {self.air_height_m:g} m in all, air_height_m"
+            )
+
+    @property
+    def zone_cells(self) -> int:
+        """Number of rows of the build zone, and of columns."""
+        return round(self.zone_side_m / MODULE_SIDE_M)
+
+
+_ROAD_M: Final = 2.0
+"""From the left border to a road, and the depth of a parking area."""
+
+
+_BETWEEN_M: Final = 2.0
+"""Between two buildings."""
+
+
+STOREY_M: Final = 3.0
+
+
+class Plan(NamedTuple):
+    """Where things lie on a site, m.
+
+    Attributes:
+        buildings: The protected ones.
+        zone: The build zone.
+        front_m: Where the nearest facade is.
+        middle_m: Middle of road or entry, along the border.
+    """
+
+    buildings: tuple[Rectangle, ...]
+    zone: Rectangle
+    front_m: float
+    middle_m: float
+
+
+def draw_item_site(rng: np.random.Generator, ranges: ItemSiteRanges, name: str) -> Scenario:
+    """Draw a site, whether any criterion would accept it or not.
+
+    Args:
+        rng: The stream.
+        ranges: What the site may be.
+        name: Its name.
+
+    Raises:
+        ScenarioError: If the things that were drawn do not fit each other.
+    """
+    draws = Draws(rng)
+    has_vehicle = draws.happens(ranges.vehicle_probability)
+    plan = _draw_plan(draws, ranges)
+    source = (_vehicle if has_vehicle else _place)(draws, ranges, plan)
+    structures = _structures(draws, ranges, plan)
+    zone = _zone(draws, ranges, plan, has_vehicle)
+    counts: dict[str, Any] = {}
+    if draws.happens(ranges.cvar_probability):
+        counts = {"objective": {"charges": "cvar"}}
+    quarter_turns = draws.count((0, 3))
+    front_m = plan.front_m - (0.0 if has_vehicle else _ROAD_M)
+    what = "a vehicle" if has_vehicle else "a car" if source["kind"] == "segment" else "parked cars"
+    document = {
+        "schema_version": SCHEMA_VERSION,
+        "name": name,
+        "description": f"A generated site: {what}, at most {front_m:g} m from what is protected.",
+        "calibration": ranges.calibration,
+        "site": {
+            "width_m": ranges.side_m,
+            "height_m": ranges.side_m,
+            "air_height_m": ranges.air_height_m,
+        },
+        "charge": [source],
+        "structures": structures,
+        "build_zone": zone,
+        "simulation": {"preset": ranges.preset},
+        **counts,
+    }
+    return turned(Scenario.from_document(document, name), quarter_turns)
+
+
+def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> Plan:
+    middle_m = ranges.side_m / 2.0 + draws.length_m(ranges.shift_m)
+    front_m = _ROAD_M + draws.length_m(ranges.stand_off_m)
+    rows = 2 if draws.happens(ranges.second_probability) else 1
+    most_m = (ranges.side_m - 2.0 * MARGIN_M - (rows - 1) * _BETWEEN_M) / rows
+    facades_m = [draws.length_m((ranges.facade_m[0], min(ranges.facade_m[1], on_grid(most_m))))]
+    facades_m += [draws.length_m((ranges.facade_m[0], min(ranges.facade_m[1], on_grid(most_m))))]
+    facades_m = facades_m[:rows]
+    together_m = sum(facades_m) + (rows - 1) * _BETWEEN_M
+    bottom = on_grid(ranges.side_m / 2.0 + draws.length_m(ranges.shift_m) - together_m / 2.0)
+    bottom = min(max(bottom, MARGIN_M), ranges.side_m - MARGIN_M - together_m)
+    buildings = []
+    for number, facade_m in enumerate(facades_m):
+        room_m = ranges.side_m - MARGIN_M - front_m
+        back_m = draws.length_m((0.0, 2.0)) if number else 0.0
+        depth_m = draws.length_m((ranges.depth_m[0], min(ranges.depth_m[1], room_m - back_m)))
+        corner_m = (front_m + back_m, bottom)
+        buildings.append(Rectangle.from_corner(corner_m, (depth_m, facade_m)))
+        bottom += facade_m + _BETWEEN_M
+    left = draws.length_m(ranges.zone_from_border_m)
+    middles = (middle_m + sum(each.centre[1] for each in buildings) / len(buildings)) / 2.0
+    low = on_grid(middles - ranges.zone_side_m / 2.0)
+    low = min(max(low, 0.0), ranges.side_m - ranges.zone_side_m)
+    zone = Rectangle.from_corner((left, low), (ranges.zone_side_m,) * 2)
+    return Plan(tuple(buildings), zone, front_m, on_grid(middle_m))
+
+
+def _place(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> dict[str, Any]:
+    """Return a stretch of road, or a parking area, on which the charge is hidden."""
+    length_m = draws.length_m(ranges.road_length_m)
+    bottom = on_grid(plan.middle_m - length_m / 2.0)
+    bottom = min(max(bottom, MARGIN_M), ranges.side_m - MARGIN_M - length_m)
+    mass = {"tnt_kg": draws.amount(ranges.tnt_kg, 0)}
+    if draws.happens(ranges.parking_probability):
+        corner_m, size_m = [MARGIN_M, bottom], [_ROAD_M - MARGIN_M + 1.0, length_m]
+        return {"kind": "rectangle", "corner_m": corner_m, "size_m": size_m, **mass}
+    ends = {"start_m": [_ROAD_M, bottom], "end_m": [_ROAD_M, bottom + length_m]}
+    return {"kind": "segment", **ends, **mass}
+
+
+def _vehicle(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> dict[str, Any]:
+    """Return a vehicle that enters on the left and drives up to the kerb before the buildings."""
+    width_m = draws.length_m(ranges.vehicle_width_m)
+    court_m = draws.length_m(ranges.forecourt_m)
+    entry_m = min(draws.length_m(ranges.entry_m), court_m)
+    zone = plan.zone
+    bottom = min(max(on_grid(plan.middle_m - court_m / 2.0), zone.bottom), zone.top - court_m)
+    start_m = bottom + draws.length_m((0.0, on_grid(court_m - entry_m)))
+    kerb_m = draws.length_m(ranges.kerb_m)
+    return {
+        "kind": "vehicle",
+        "tnt_kg": draws.amount(ranges.tnt_kg, 0),
+        "width_m": width_m,
+        "entries": [{"start_m": [0.0, start_m], "end_m": [0.0, start_m + entry_m]}],
+        "drivable": [{"corner_m": [0.0, bottom], "size_m": [plan.front_m - kerb_m, court_m]}],
+    }
+
+
+def _structures(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> list[dict[str, Any]]:
+    """Return the protected buildings, and a shed where it has room."""
+    structures: list[dict[str, Any]] = []
+    for number, building in enumerate(plan.buildings):
+        weight = round(draws.amount(ranges.second_weight, 1), 1) if number else 1.0
+        own: dict[str, Any] = {"protected": True, "weight": weight}
+        own["height_m"] = STOREY_M * draws.count(ranges.storeys)
+        structures.append(_block("annexe" if number else "building", building) | own)
+    if draws.happens(ranges.shed_probability):
+        size_m = (draws.length_m(ranges.shed_side_m), draws.length_m(ranges.shed_side_m))
+        far_m = ranges.side_m - MARGIN_M
+        area = Rectangle(2.0 * _ROAD_M, MARGIN_M, far_m, far_m)
+        others = [Apart(each, _BETWEEN_M) for each in plan.buildings]
+        shed = draw_place(draws, area, size_m, [*others, Apart(plan.zone, 0.0)])
+        if shed is not None:
+            structures.append(_block("shed", shed) | {"height_m": STOREY_M})
+    return structures
+
+
+def _block(name: str, rectangle: Rectangle) -> dict[str, Any]:
+    left, bottom, right, top = rectangle
+    return {
+        "kind": "ModularObstacle",
+        "name": name,
+        "corner_m": [left, bottom],
+        "rows": round((top - bottom) / MODULE_SIDE_M),
+        "columns": round((right - left) / MODULE_SIDE_M),
+    }
+
+
+def _zone(draws: Draws, ranges: ItemSiteRanges, plan: Plan, has_vehicle: bool) -> dict[str, Any]:
+    """Return the build zone with its conditions, catalogue and budget."""
+    zone = plan.zone
+    keep_outs = _keep_outs(draws, ranges, plan)
+    document: dict[str, Any] = {
+        "corner_m": [zone.left, zone.bottom],
+        "rows": ranges.zone_cells,
+        "columns": ranges.zone_cells,
+        "clearance_m": draws.length_m(ranges.clearance_m),
+        "items": _items(draws, ranges, has_vehicle),
+        "budget": draws.amount(ranges.budget, 0),
+        "keep_outs": keep_outs,
+    }
+    if draws.happens(ranges.access_way_probability):
+        document["access_way"] = _access_way(draws, ranges, zone, has_vehicle)
+    if draws.happens(ranges.duct_probability):
+        start_m = draws.length_m((0.0, on_grid(ranges.zone_side_m - 2.0)))
+        document["cost_areas"] = [
+            {
+                "corner_m": [zone.left + start_m, zone.bottom],
+                "size_m": [2.0, ranges.zone_side_m],
+                "cost_factor": draws.amount(ranges.duct_factor, 1),
+                "reason": "deep foundations over the duct",
+            }
+        ]
+    return document
+
+
+def _items(draws: Draws, ranges: ItemSiteRanges, has_vehicle: bool) -> list[dict[str, Any]]:
+    """Return the catalogue: always the same items, of which some are not in stock."""
+    power = draws.amount(ranges.price_of_height, 1)
+    always = draws.count((1, 2))  # one of the two kinds of T-walls
+    items = []
+    for number, kind in enumerate(ITEM_KINDS):
+        height_m, pieces = draws.length_m(kind.heights_m), draws.count(kind.pieces)
+        is_there = draws.happens(ranges.item_probability) or number == always
+        if kind.name == POST:
+            is_there = has_vehicle
+        length_m = kind.length_modules * MODULE_SIDE_M
+        items.append(
+            {
+                "name": kind.name,
+                "length_modules": kind.length_modules,
+                "thickness_modules": kind.thickness_modules,
+                "height_m": height_m,
+                "cost": round(max(length_m * height_m**power, 1.0), 1),
+                "stock": pieces if is_there else 0,
+                "rotatable": kind.rotatable,
+            }
+        )
+    return items
+
+
+def _keep_outs(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> list[dict[str, Any]]:
+    """Return a path to the door and trees, within the zone before the buildings."""
+    zone, building = plan.zone, plan.buildings[0]
+    yard = Rectangle(zone.left, zone.bottom, min(zone.right, plan.front_m), zone.top)
+    places: list[tuple[str, Rectangle]] = []
+    width_m = draws.length_m(ranges.path_width_m)
+    low, high = max(zone.bottom, building.bottom), min(zone.top, building.top) - width_m
+    if draws.happens(ranges.path_probability) and high >= low:
+        corner_m = (zone.left, draws.length_m((low, high)))
+        path = Rectangle.from_corner(corner_m, (yard.right - zone.left, width_m))
+        places.append(("the path to the door must stay open", path))
+    for _ in range(draws.count(ranges.trees)):
+        side_m = draws.length_m(ranges.tree_side_m)
+        others = [Apart(each, 0.0) for _, each in places]
+        tree = draw_place(draws, yard, (side_m, side_m), others)
+        if tree is not None:
+            places.append(("tree", tree))
+    return [
+        {
+            "corner_m": [each.left, each.bottom],
+            "size_m": [each.right - each.left, each.top - each.bottom],
+            "reason": reason,
+        }
+        for reason, each in places
+    ]
+
+
+def _access_way(
+    draws: Draws, ranges: ItemSiteRanges, zone: Rectangle, has_vehicle: bool
+) -> dict[str, Any]:
+    """Return a way along the buildings or, with a vehicle, one towards them through a gate."""
+    width_m = draws.length_m(ranges.access_way_width_m)
+    if not has_vehicle:
+        return {"width_m": width_m, "between": "bottom_top"}
+    low = zone.bottom + draws.length_m((0.0, on_grid(ranges.zone_side_m - width_m)))
+    gate = {"corner_m": [zone.left, low], "size_m": [MODULE_SIDE_M, width_m]}
+    return {"width_m": width_m, "between": "left_right", "gate": gate}

@@ -1,0 +1,159 @@
+"""Sites with heights, catalogues and vehicles: `item_sites`, `BlastBarrierItemSites-v0`."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.observations import GridObservation
+from blast_env.envs.strategies import check_size
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Piece
+from blast_env.scenario import Placement, Scenario
+from blast_env.scenario.build_scene import worst_places
+from blast_env.sites import (
+    FAMILIES,
+    HELD_OUT_SITES,
+    ITEM_SITES,
+    ItemSiteRanges,
+    SiteSource,
+    generate_site,
+)
+from blast_env.sites.criterion import cut_share_of
+from blast_env.sites.generate import ITEM_CRITERION
+from blast_env.sites.item_sites import ITEM_KINDS, POST
+from blast_env.sites.visibility import TARGETS, Visibility
+from tests.catalogue_sites import yard
+from tests.envs.small import ThinEngine, play, same
+
+RANGES = ItemSiteRanges()
+
+
+@pytest.fixture(scope="module")
+def item_sites() -> tuple[Scenario, ...]:
+    return tuple(generate_site(seed, RANGES) for seed in range(16))
+
+
+def test_a_seed_is_a_site_and_the_old_family_keeps_its_seeds(
+    item_sites: tuple[Scenario, ...],
+) -> None:
+    assert generate_site(3, RANGES) == item_sites[3]
+    assert len({site.content_hash for site in item_sites}) == len(item_sites)
+    assert generate_site(3).zone.items == ()
+    assert FAMILIES[ITEM_SITES] == RANGES
+
+
+def test_everything_is_drawn(item_sites: tuple[Scenario, ...]) -> None:
+    def differ(values: list[Any]) -> bool:
+        return len(set(values)) > 1
+
+    assert differ([bool(site.vehicles) for site in item_sites])
+    assert differ([sum(each.protected for each in site.structures) for site in item_sites])
+    assert differ([site.structures[0].height_m for site in item_sites])
+    assert differ([site.zone.access_way is None for site in item_sites])
+    assert differ([len(site.zone.keep_outs) for site in item_sites])
+    assert differ([bool(site.zone.cost_areas) for site in item_sites])
+    assert differ([site.objective.charges for site in item_sites])
+    assert differ([site.zone.budget for site in item_sites])
+    for number in range(len(ITEM_KINDS)):
+        assert differ([site.zone.items[number].stock > 0 for site in item_sites])
+        assert differ([site.zone.items[number].cost for site in item_sites]) or number in (0, 4)
+
+
+def test_all_share_the_spaces(item_sites: tuple[Scenario, ...]) -> None:
+    source = SiteSource.held_out(50, RANGES)
+    assert source.representative.vehicles
+    for site in item_sites:
+        check_size(site, source.representative)
+        assert [each.name for each in site.zone.items] == [kind.name for kind in ITEM_KINDS]
+        assert site.zone.shape == (RANGES.zone_cells, RANGES.zone_cells)
+
+
+def test_a_vehicle_needs_room_in_the_spaces(item_sites: tuple[Scenario, ...]) -> None:
+    driven = next(site for site in item_sites if site.vehicles)
+    other = next(site for site in item_sites if not site.vehicles)
+    with pytest.raises(BlastEnvError, match="room for vehicles"):
+        check_size(driven, other)
+
+
+def test_items_out_of_stock_are_masked(item_sites: tuple[Scenario, ...]) -> None:
+    for site in item_sites:
+        placement = Placement.empty(site)
+        for legal, variant in zip(placement.legal, placement.catalogue.variants, strict=True):
+            item = site.zone.items[variant.item]
+            assert item.stock > 0 or not legal.any()
+            assert (item.name != POST) or bool(site.vehicles) == (item.stock > 0)
+
+
+def test_vehicles_come_near_and_can_be_kept_away(item_sites: tuple[Scenario, ...]) -> None:
+    for site in item_sites:
+        for source in site.vehicles:
+            bare = worst_places(site, source)
+            assert bare.stand_off_m < site.vehicle_ground(source).entry_stand_off_m - 2.0
+
+
+def test_an_environment_draws_sites_with_and_without_vehicles() -> None:
+    source = SiteSource.training(ranges=RANGES)
+    env = gym.make("BlastBarrierItemSites-v0", engine=ThinEngine(), realisations=1).unwrapped
+    assert isinstance(env, BlastBarrierEnv)
+    assert env.task.source == source
+    channels = GridObservation().channels_of(source.representative)
+    seen = set()
+    for seed in range(5):
+        observation, _ = env.reset(seed=seed)
+        scenario = env.observable.scenario
+        assert env.observation_space.contains(observation)
+        assert int(scenario.name.removeprefix("site_")) >= HELD_OUT_SITES
+        reached = observation[channels.index("reach_without_barrier")].any()
+        assert reached == bool(scenario.vehicles)
+        seen.add(bool(scenario.vehicles))
+    assert seen == {True, False}
+
+
+@pytest.mark.parametrize("observation", ["grid", "features"])
+def test_a_seed_gives_the_same_episode_again(observation: str) -> None:
+    env, twin = (
+        BlastBarrierEnv(
+            scenario=ITEM_SITES, engine=ThinEngine(), realisations=1, observation=observation
+        )
+        for _ in range(2)
+    )
+    steps = play(env, 1)
+    assert same(steps, play(twin, 1))
+    assert all(isinstance(each, Piece) for each in steps[-1][4]["layout"])
+
+
+def test_a_low_wall_cuts_the_lines_to_the_foot_of_a_building_alone() -> None:
+    site = yard(budget=100.0)
+    lines = Visibility.of(site)
+    flat = len(lines.weight) // TARGETS
+    assert len(lines.weight) == TARGETS * flat
+    # Over one cell the lines to the upper third are five times as high as those to the lower one.
+    crossed = lines.cut[:flat] & (lines.height_m[:flat] > 0.0)
+    ratio = lines.height_m[2 * flat :][crossed] / lines.height_m[:flat][crossed]
+    assert np.allclose(ratio, 5.0)
+    wall = Placement.of(site, [Piece(5, 5, "wall", True)])
+    posts = Placement.of(site, [Piece(row, 5, "post") for row in (5, 6, 7)])
+    assert set(wall.cells) == set(posts.cells)
+    assert cut_share_of(lines, wall) > cut_share_of(lines, posts) > 0.0
+    assert lines.cut_share(wall.cells) >= cut_share_of(lines, wall)
+
+
+def test_the_criterion_is_kept(item_sites: tuple[Scenario, ...]) -> None:
+    assert all(ITEM_CRITERION.objection(site) is None for site in item_sites)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"side_m": 16.0}, "side_m is 16, must be at least"),
+        ({"forecourt_m": (6.0, 20.0)}, "forecourt_m is .* nothing could stop a vehicle"),
+        ({"storeys": (1, 4)}, "storeys is .* must be at most 9 m in all"),
+        ({"budget": (0.0, 3.0)}, "budget is .* must be a pair"),
+    ],
+)
+def test_ranges_without_room_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(BlastEnvError, match=message):
+        ItemSiteRanges(**changes)
