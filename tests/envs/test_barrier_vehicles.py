@@ -8,7 +8,7 @@ from gymnasium.utils.env_checker import check_env
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import FeaturesObservation, GridObservation
-from blast_env.envs.strategies import SingleScenario, check_size
+from blast_env.envs.strategies import check_size
 from blast_env.envs.vehicle_observations import EMPTY_REACH, REACH
 from blast_env.errors import BlastEnvError
 from blast_env.scenario.build_scene import vehicle_reach, worst_places
@@ -116,11 +116,12 @@ def test_the_environment_keeps_the_rules_of_gymnasium() -> None:
     check_env(env(), skip_render_check=True)
 
 
-def test_a_site_without_a_vehicle_has_another_size() -> None:
+def test_a_vehicle_needs_spaces_with_room_for_it() -> None:
     point = {"kind": "point", "position_m": [2.0, 4.0], "tnt_kg": 5.0}
     without = gate_site(**(site_document() | {"charge": [point]}))
-    with pytest.raises(BlastEnvError, match="number of vehicles"):
-        check_size(without, SingleScenario(SITE).representative)
+    check_size(without, SITE)
+    with pytest.raises(BlastEnvError, match="room for vehicles"):
+        check_size(SITE, without)
 
 
 def test_the_picture_shows_the_ground_that_is_left() -> None:
