@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 export SDL_VIDEODRIVER ?= dummy
 export PYGAME_HIDE_SUPPORT_PROMPT := 1
 
-.PHONY: demo test test-browser quick lint types compiled check setup clean
+.PHONY: demo test test-browser quick docs lint types compiled check setup clean
 
 demo: $(STAMP)
 	$(BIN)/python scripts/demo.py
@@ -26,6 +26,15 @@ quick: $(STAMP)
 # The page in a real browser, headless; needs chromium and chromium-driver. Screenshots: out/app/.
 test-browser: $(STAMP)
 	$(BIN)/pytest tests/app/browser
+
+# The site: out/docs/html/index.html. Warnings are errors; notebooks run when they have changed.
+docs: $(VENV)/.docs
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m sphinx --fail-on-warning --keep-going \
+		-b html -d out/docs/cache docs out/docs/html
+
+$(VENV)/.docs: $(STAMP)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[docs]"
+	touch $@
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

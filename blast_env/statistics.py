@@ -1,7 +1,7 @@
 """Means, reductions and tails over threats, with their uncertainty."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,9 @@ from scipy.special import stdtrit
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
+
+CVAR_LEVEL: Final = 0.8
+"""The mean of the worst 20 % of the threats, unless another level is given."""
 
 
 class Estimate(NamedTuple):
@@ -119,19 +122,28 @@ def _half_width(deviation: FloatArray) -> float:
 
 
 class Risk(Protocol):
-    """Turns the impulses of several threats into the one that counts."""
+    """Turns the loads of several threats into the one that counts."""
 
-    def __call__(self, impulses: NDArray[np.float64]) -> float:
-        """Return the impulse that counts; `impulses` has one value a threat (n,), n >= 1."""
+    def __call__(self, loads: NDArray[np.float64]) -> float:
+        """Return the load that counts; `loads` has one value a threat (n,), n >= 1."""
 
 
 @dataclass(frozen=True)
 class MeanRisk:
     """All threats count alike."""
 
-    def __call__(self, impulses: NDArray[np.float64]) -> float:
+    def __call__(self, loads: NDArray[np.float64]) -> float:
         """Return the mean."""
-        return float(impulses.mean())
+        return float(loads.mean())
+
+
+@dataclass(frozen=True)
+class WorstRisk:
+    """Only the worst threat counts."""
+
+    def __call__(self, loads: NDArray[np.float64]) -> float:
+        """Return the largest load."""
+        return float(loads.max())
 
 
 @dataclass(frozen=True)
@@ -151,6 +163,6 @@ class ConditionalValueAtRisk:
         """Check the level."""
         check_cvar_level(self.level)
 
-    def __call__(self, impulses: NDArray[np.float64]) -> float:
+    def __call__(self, loads: NDArray[np.float64]) -> float:
         """Return the mean of the worst share 1 - `level`."""
-        return conditional_value_at_risk(impulses, self.level)
+        return conditional_value_at_risk(loads, self.level)

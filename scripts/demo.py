@@ -211,8 +211,8 @@ def write_pictures(settings: DemoSettings, comparison: Comparison) -> list[Path]
             f"{name}: {impulse_pa_s:,.0f} Pa s on {where}",
         )
         for name, cells, impulse_pa_s in (
-            ("no barrier", (), standings.unprotected_pa_s[0, 0]),
-            (f"layout of {AGENT}", layout, agent.impulse_pa_s[0, 0]),
+            ("no barrier", (), standings.unprotected[0, 0]),
+            (f"layout of {AGENT}", layout, agent.loads[0, 0]),
         )
     ]
     film = settings.out / "side_by_side.mp4"

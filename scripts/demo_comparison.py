@@ -74,7 +74,7 @@ class Comparison:
         ahead = self.standings.difference(self.agent, result)
         return (
             result.name,
-            f"{result.impulse_pa_s.mean():,.0f}",
+            f"{result.loads.mean():,.0f}",
             percent(reduction.value),
             interval(reduction),
             *(("-", "-") if result is self.agent else (percent(ahead.value), interval(ahead))),

@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation import CVAR_LEVEL
 from blast_env.geometry import Layout
 from blast_env.statistics import (
+    CVAR_LEVEL,
     Estimate,
     conditional_value_at_risk,
     mean_estimate,
@@ -56,8 +56,13 @@ class Outcome:
         """Standard deviation of the reduction between layouts; 0 for a single one."""
         if len(self.impulse_pa_s) < 2:
             return 0.0
-        reductions = 1.0 - self.impulse_pa_s.mean(axis=1) / self.unprotected_pa_s.mean()
-        return float(reductions.std(ddof=1))
+        return float(self.layout_reductions.std(ddof=1))
+
+    @property
+    def layout_reductions(self) -> FloatArray:
+        """1 - mean impulse / mean impulse without a barrier, by layout (layouts,)."""
+        means = self.impulse_pa_s.mean(axis=1)
+        return np.asarray(1.0 - means / self.unprotected_pa_s.mean())
 
     @property
     def worst_pa_s(self) -> float:
@@ -83,26 +88,26 @@ class TaskResult:
     Attributes:
         bare: Without a barrier.
         random: Random layouts, as they come.
-        walls: The hand-made wall at `STAND_OFFS`.
-        searched: The best of many random layouts.
+        rules: Layouts by hand; without a catalogue the wall at `STAND_OFFS`.
+        searched: The best that was searched.
     """
 
     bare: Outcome
     random: Outcome
-    walls: tuple[Outcome, ...]
+    rules: tuple[Outcome, ...]
     searched: Outcome
 
     @property
     def rows(self) -> tuple[Outcome, ...]:
         """All of them in the order of the table."""
-        return (self.bare, self.random, *self.walls, self.searched)
+        return (self.bare, self.random, *self.rules, self.searched)
 
     @property
-    def best_wall(self) -> Outcome:
-        """The wall at the best stand-off."""
-        return max(self.walls, key=lambda outcome: outcome.reduction.value)
+    def best_rule(self) -> Outcome:
+        """The best of the layouts by hand."""
+        return max(self.rules, key=lambda outcome: outcome.reduction.value)
 
     @property
     def best(self) -> Outcome:
         """What reduces most."""
-        return max(self.best_wall, self.searched, key=lambda outcome: outcome.reduction.value)
+        return max(self.best_rule, self.searched, key=lambda outcome: outcome.reduction.value)

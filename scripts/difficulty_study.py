@@ -114,7 +114,7 @@ class Study:
         return TaskResult(
             bare=Outcome(_BARE, ((),), bare, bare[0]),
             random=outcome(_RANDOM, self._pool[: effort.random_hidden]),
-            walls=tuple(
+            rules=tuple(
                 outcome(f"wall {where}", [line_of_sight_wall(scenario, middle, share)])
                 for share, where in STAND_OFFS.items()
             ),
@@ -141,7 +141,7 @@ class Study:
         return TaskResult(
             bare=Outcome(_BARE, ((),), bare[np.newaxis], bare),
             random=Outcome(_RANDOM, tuple(random), on_charges, bare),
-            walls=tuple(
+            rules=tuple(
                 outcome(
                     f"wall {where}",
                     [line_of_sight_wall(scenario, charge, share) for charge in charges],

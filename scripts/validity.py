@@ -1,4 +1,4 @@
-"""The tables and figures of docs/engineers/validity.md: what of the particle model is right."""
+"""The tables and figures of docs/studies/particles.md: what of the particle model is right."""
 
 from dataclasses import asdict
 from functools import partial

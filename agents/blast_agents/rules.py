@@ -20,11 +20,13 @@ from blast_env.scenario import (
     Placement,
     Scenario,
     VehicleSource,
+    find_scenario,
 )
 from blast_env.scenario.catalogue import Variant
 from blast_env.scenario.sections import PointM
 from blast_env.scenario.vehicles import source_of
 from blast_env.scenario.zone import source_bounds_m
+from blast_env.sites import Visibility, visibility_layout
 from blast_env.units import MODULE_SIDE_M
 
 NEAR_CHARGE: Final = 0.0
@@ -195,6 +197,22 @@ def ring_around_building(scenario: AnyScenario, charge: AnyCharge) -> Layout:
     here = Rectangle(x_m, y_m, x_m, y_m)
     nearest = min(protected, key=lambda rectangle: _gap_m(rectangle, here))
     return _ring(placement, nearest, (x_m, y_m))
+
+
+def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
+    """Return a layout that cuts as many lines of sight as it can; see `visibility_layout`.
+
+    Args:
+        scenario: The scenario, or its bundled name or path; it has a build zone.
+        charge: Where the charge is; `None` for a layout against all places where one may be.
+
+    Raises:
+        BlastEnvError: If the scenario has no build zone.
+    """
+    found = find_scenario(scenario)
+    if charge is not None:
+        found = found.model_copy(update={"charge": (source_of(charge),)})
+    return visibility_layout(found, Visibility.of(found))
 
 
 Rule = Callable[[AnyScenario, AnyCharge], Layout]

@@ -36,7 +36,6 @@ from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.engines import find_engine
 from blast_env.physics.gas.engine import GasEngine
-from blast_env.physics.scene import Charge
 from blast_env.provenance import versions
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.film import largest_load, paint_at, plan_film
@@ -47,7 +46,8 @@ from blast_env.rendering.pressure_film import record_planes, scale_end_kpa
 from blast_env.rendering.pressure_frames import PressurePainter, default_section
 from blast_env.rendering.style import render_extra
 from blast_env.runner import share_of
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario import AnyCharge, Scenario, load_scenario
+from blast_env.scenario.build_scene import charge_against
 from blast_env.simulation import Blast
 from blast_env.simulation.gas import GasBlast, GasResult
 from blast_env.statistics import mean_estimate
@@ -124,7 +124,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
 def _run_one(
     task: BlastTask, scenario: Scenario, threat: ThreatOf, layout: Layout, tell: Tell
 ) -> None:
-    charge = Charge(threat.position_m, threat.tnt_kg, threat.height_m)
+    charge = charge_against(scenario, layout, threat.charge)
     key = blast_key(scenario.content_hash, layout, charge, task.engine)
     folder = Path(task.blasts) / key
     if read_record(folder) is not None:
@@ -132,7 +132,7 @@ def _run_one(
     make_folder(folder)
     began_s = perf_counter()
     run = _gas if task.engine.is_gas else _particles
-    found = run(task, scenario, layout, charge, folder, tell)
+    found = run(task, scenario, layout, threat.charge, folder, tell)
     record = BlastRecord(
         key=key,
         threat=threat.name,
@@ -153,7 +153,7 @@ def _run_one(
 
 
 def _particles(
-    task: BlastTask, scenario: Scenario, layout: Layout, charge: Charge, folder: Path, tell: Tell
+    task: BlastTask, scenario: Scenario, layout: Layout, charge: AnyCharge, folder: Path, tell: Tell
 ) -> dict[str, Any]:
     blast = Blast(scenario, layout, 0, "event", charge)
     bare = Blast(scenario, (), 0, "event", charge).run()
@@ -174,7 +174,7 @@ def _particles(
 
 
 def _particle_loads(
-    task: BlastTask, scenario: Scenario, layout: Layout, charge: Charge, tell: Tell
+    task: BlastTask, scenario: Scenario, layout: Layout, charge: AnyCharge, tell: Tell
 ) -> list[BlastLoads]:
     evaluator = BlastEvaluator(scenario, "event", cache=task.cache)
     pairs = [(layout, Threat(charge, seed)) for seed in SEEDS]
@@ -202,7 +202,7 @@ def _mean_loads(loads: Sequence[BlastLoads]) -> tuple[Load, ...]:
 
 
 def _gas(
-    task: BlastTask, scenario: Scenario, layout: Layout, charge: Charge, folder: Path, tell: Tell
+    task: BlastTask, scenario: Scenario, layout: Layout, charge: AnyCharge, folder: Path, tell: Tell
 ) -> dict[str, Any]:
     engine = find_engine("gas", task.engine.cell_m)
     if not isinstance(engine, GasEngine):
@@ -213,7 +213,8 @@ def _gas(
     told = share_of(tell, 0, 100, 60) or tell
     shot = record_planes(blast, height_m, section, told, ground_recorders)
     result = shot.result
-    bare_key = blast_key(scenario.content_hash, (), charge, task.engine)
+    bare_charge = charge_against(scenario, (), charge)
+    bare_key = blast_key(scenario.content_hash, (), bare_charge, task.engine)
     scale = _scale(result, Path(task.blasts) / bare_key / _SCALE)
     if not layout:
         write_kept(scale, folder / _SCALE)

@@ -26,7 +26,9 @@ from blast_env.rendering.style import (
     STRUCTURE,
 )
 from blast_env.scenario import AnySource, Placement, RectangleSource, Scenario, VehicleSource
+from blast_env.scenario.build_scene import vehicle_reach, worst_places
 from blast_env.scenario.sections import PointM
+from blast_env.scenario.vehicles import nearest_point_m, squares_of
 from blast_env.units import MODULE_SIDE_M
 
 _FITS: Final = "#0072B2"  # Okabe and Ito: blue and orange, whatever one's colour vision
@@ -117,6 +119,7 @@ def plan_svg(view: View, scenario: Scenario, layout: Layout, selected: Thing | N
             _PATTERNS,
             *_ground(view, scenario),
             *_zone(view, scenario, layout),
+            *_reach(view, scenario, layout),
             *_structures(view, scenario),
             *_charges(view, scenario),
             *_layout(view, scenario, layout),
@@ -261,16 +264,39 @@ def _structures(view: View, scenario: Scenario) -> Iterator[str]:
             yield _text(x, y + 15.0, height, _hex(QUIET_INK), 11)
 
 
+def _reach(view: View, scenario: Scenario, layout: Layout) -> Iterator[str]:
+    """Yield the ground that vehicles reach, and what stand-off is left."""
+    red = _hex(EXPLOSIVE)
+    for source in scenario.vehicles:
+        rows, columns = squares_of(scenario.site)
+        ground = vehicle_reach(scenario, source, layout).ground(rows, columns)
+        for bottom, left, top, right in merged_cells(ground):
+            sides_m = (MODULE_SIDE_M * each for each in (left, bottom, right, top))
+            yield _rectangle(view, Rectangle(*sides_m), red, opacity=0.14)
+        place_m = worst_places(scenario, source, layout).places_m[0]
+        wall_m = nearest_point_m(scenario.structures, place_m)
+        (x0, y0), (x1, y1) = view.pixel(*place_m), view.pixel(*wall_m)
+        yield (
+            f'<line x1="{x0}" y1="{y0}" x2="{x1}" y2="{y1}" stroke="{_hex(INK)}"'
+            ' stroke-width="1.5" stroke-dasharray="5 3"></line>'
+        )
+        yield _star(x0, y0, red)
+        stand_off_m = float(np.hypot(*np.subtract(place_m, wall_m)))
+        words = f"stand-off {stand_off_m:.1f} m"
+        yield _text((x0 + x1) / 2.0, (y0 + y1) / 2.0 - 6.0, words, _hex(INK), 12)
+
+
 def _charges(view: View, scenario: Scenario) -> Iterator[str]:
     red = _hex(EXPLOSIVE)
     for number, source in enumerate(scenario.charge, start=1):
         yield _charge_place(view, source, scenario.charge_radius_m, red)
         centre = edits.rectangle_of(scenario, Thing(Kind.CHARGE, number - 1)).centre
         x, y = view.pixel(*centre)
-        if not isinstance(source, RectangleSource):
+        if not isinstance(source, RectangleSource | VehicleSource):
             yield _star(x, y, red)
         raised = f", {source.height_m:g} m up" if source.height_m > 0.0 else ""
-        words = f"charge {number}: {source.tnt_kg:g} kg{raised}"
+        kind = "vehicle" if isinstance(source, VehicleSource) else "charge"
+        words = f"{kind} {number}: {source.tnt_kg:g} kg{raised}"
         near_left = x < 0.2 * view.width_px
         anchor, shift = ("start", 12.0) if near_left else ("middle", 0.0)
         yield _text(x + shift, y - 12.0, words, red, 12, anchor)

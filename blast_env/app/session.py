@@ -28,6 +28,7 @@ from blast_env.app.work import (
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
 from blast_env.scenario import Scenario
+from blast_env.scenario.build_scene import charge_against
 
 BARE = "no barrier"
 """What the blast without a layout is called."""
@@ -271,15 +272,7 @@ class Session:
         return self.scenario.model_dump(mode="json", exclude_none=True)
 
     def _threats_as_data(self) -> tuple[ThreatOf, ...]:
-        return tuple(
-            ThreatOf(
-                name=each.name,
-                position_m=each.charge.position_m,
-                tnt_kg=each.charge.tnt_kg,
-                height_m=each.charge.height_m,
-            )
-            for each in self.chosen_threats()
-        )
+        return tuple(ThreatOf.of(each.name, each.charge) for each in self.chosen_threats())
 
     # Results.
 
@@ -298,7 +291,8 @@ class Session:
 
     def key(self, layout: Layout, threat: NamedThreat) -> str:
         """Return the key of a blast."""
-        return blast_key(self.scenario.content_hash, layout, threat.charge, self.engine)
+        charge = charge_against(self.scenario, layout, threat.charge)
+        return blast_key(self.scenario.content_hash, layout, charge, self.engine)
 
     def comparison(self) -> list[Row]:
         """Return the table of all blasts that were run for the design as it is now."""

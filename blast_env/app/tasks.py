@@ -4,13 +4,12 @@ Whatever takes long tells how far it has come through a `Teller`, and may be int
 `KeyboardInterrupt`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import Final
 
-from blast_agents.rules import RULES, expected_charge
 from blast_agents.search import (
     LayoutProblem,
     Progress,
@@ -19,7 +18,7 @@ from blast_agents.search import (
 
 from blast_env.app import placing
 from blast_env.app.blasts import run_blasts, warm_engines
-from blast_env.app.offers import PROPOSERS, SIGHT_LINES
+from blast_env.app.offers import proposed
 from blast_env.app.work import (
     BlastTask,
     FilmTask,
@@ -27,19 +26,15 @@ from blast_env.app.work import (
     ReportTask,
     SearchTask,
     Status,
-    ThreatOf,
     read_status,
     read_task,
     scenario_of,
     write_status,
 )
-from blast_env.errors import UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.geometry import Layout
 from blast_env.physics.engines import find_engine
-from blast_env.physics.scene import Charge
-from blast_env.scenario import PointSource, Scenario
-from blast_env.sites import Visibility, visibility_layout
+from blast_env.scenario import Scenario
 
 _LEAST_PAUSE_S: Final = 0.1
 _REALISATIONS: Final = 8  # of the particle model, divided among the charges
@@ -115,22 +110,13 @@ def _propose(task: ProposalTask, teller: Teller) -> None:
 
 
 def _proposed(task: ProposalTask, scenario: Scenario) -> Layout:
-    known = _charges(task.threats)
+    known = [each.charge for each in task.threats]
     if task.is_run:
         from blast_agents.training import load_agent  # torch takes seconds to import
 
         agent = load_agent(task.proposer)
         return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None))
-    if task.proposer == SIGHT_LINES:
-        seen = scenario.with_charge(known[0]) if len(known) == 1 else scenario
-        return visibility_layout(scenario, Visibility.of(seen))
-    if task.proposer not in RULES:
-        raise UnknownNameError("rule", task.proposer, PROPOSERS)
-    return RULES[task.proposer](scenario, expected_charge([PointSource.at(c) for c in known]))
-
-
-def _charges(threats: Sequence[ThreatOf]) -> list[Charge]:
-    return [Charge(each.position_m, each.tnt_kg, each.height_m) for each in threats]
+    return proposed(task.proposer, scenario, known)
 
 
 def _search(task: SearchTask, teller: Teller) -> None:
@@ -142,7 +128,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
         BlastEvaluator(scenario, engine, cache=task.cache), practice_case(scenario, task)
     )
     teller.tell(text="blasts without a barrier")
-    problem.unprotected_pa_s  # noqa: B018  # refuses a case in which nothing arrives
+    problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
 
     def report(progress: Progress) -> None:
         share = progress.blasts / progress.budget
@@ -158,11 +144,11 @@ def _search(task: SearchTask, teller: Teller) -> None:
             teller.tell(share=share, text=text)
 
     result = method.search(problem, task.budget, 0, report)
-    if result.impulse_pa_s is None:
+    if result.load is None:
         raise KeyboardInterrupt
     reduction = 100.0 * problem.reduction(result.history[-1])
     text = (
-        f"{reduction:.1f} % less impulse on the search's own blasts, after {result.blasts} of"
+        f"{reduction:.1f} % less on the search's own blasts, after {result.blasts} of"
         f" {result.budget} ({task.engine.label}); blast it for a judgement"
     )
     state = "stopped" if result.interrupted else "done"
@@ -171,7 +157,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
 
 def practice_case(scenario: Scenario, task: SearchTask) -> Case:
     """Return what a search may spend its blasts on: the threats, again and again with particles."""
-    charges = _charges(task.threats)
+    charges = [each.charge for each in task.threats]
     realisations = 1 if task.engine.is_gas else max(_REALISATIONS // len(charges), 1)
     first = SeedRange.SEARCH.seeds(0, realisations * len(charges))
     threats = [Threat(charges[k % len(charges)], seed) for k, seed in enumerate(first)]
@@ -179,7 +165,7 @@ def practice_case(scenario: Scenario, task: SearchTask) -> Case:
 
 
 def _film(task: FilmTask, teller: Teller) -> None:
-    scenario, (charge,) = scenario_of(task.scenario), _charges((task.threat,))
+    scenario, charge = scenario_of(task.scenario), task.threat.charge
     layout, path = placing.layout_from(scenario, task.layout), Path(task.path)
     write: Callable[..., object]
     if task.engine.is_gas:
@@ -213,7 +199,8 @@ def _report(task: ReportTask, teller: Teller) -> None:
         if teller.is_due:
             teller.tell(text=what, share=min(max(share, 0.0), 1.0))
 
-    options = StudyOptions(charges=tuple(_charges(task.threats)), cache=Path(task.cache))
+    charges = tuple(each.charge for each in task.threats)
+    options = StudyOptions(charges=charges, cache=Path(task.cache))
     study = run_study(scenario, placing.layout_from(scenario, task.layout), options, tell)
     written = write_report(study, page, None if task.pdf is None else Path(task.pdf))
     words = " and ".join(path.name for path in written)

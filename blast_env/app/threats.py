@@ -1,27 +1,39 @@
 """Which charges a design is held against: by name, at places that can be pointed to."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
 from blast_env.physics.scene import Charge
-from blast_env.scenario import RectangleSource, Scenario, SegmentSource, VehicleSource
+from blast_env.scenario import (
+    AnyCharge,
+    RectangleSource,
+    Scenario,
+    SegmentSource,
+    VehicleCharge,
+    VehicleSource,
+)
 from blast_env.scenario.sections import PointM
+
+_NEAREST: Final = ", as near as it comes"
 
 
 @dataclass(frozen=True)
 class NamedThreat:
-    """A charge with what people call it."""
+    """A charge with what people call it, at its place or on its vehicle."""
 
     name: str
-    charge: Charge
+    charge: AnyCharge
 
 
 def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
     """Return the charges that a site is held against.
 
     Of a line its middle and its ends, of an area its middle and its corners; the middle comes
-    first, since most blasts are run there.
+    first, since most blasts are run there. Of a vehicle its worst place, wherever the layout lets
+    it come, and the next ones.
     """
-    named = []
+    named: list[NamedThreat] = []
     for index, source in enumerate(scenario.charge):
         places: list[tuple[str, PointM]]
         if isinstance(source, SegmentSource):
@@ -38,7 +50,8 @@ def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
                 (", upper right", (right, top)),
             ]
         elif isinstance(source, VehicleSource):
-            continue  # where it gets to depends on the layout
+            named += _of_vehicle(f"charge {index + 1}", source)
+            continue
         else:
             places = [("", source.position_m)]
         named += [
@@ -48,10 +61,16 @@ def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
     return tuple(named)
 
 
+def _of_vehicle(name: str, source: VehicleSource) -> Iterator[NamedThreat]:
+    for rank in range(source.places):
+        words = _NEAREST if rank == 0 else f", place {rank + 1} by distance"
+        yield NamedThreat(f"{name}{words}", VehicleCharge(source, rank))
+
+
 def usual_threats(scenario: Scenario) -> tuple[str, ...]:
     """Return the names of the threats that a blast is run with unless others are chosen."""
     return tuple(each.name for each in threats_of(scenario) if _is_first(each.name))
 
 
 def _is_first(name: str) -> bool:
-    return name.endswith(", middle") or "," not in name
+    return name.endswith((", middle", _NEAREST)) or "," not in name

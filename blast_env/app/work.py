@@ -8,7 +8,8 @@ from pydantic import Field, TypeAdapter, ValidationError
 from blast_env.app.records import Engine, Kept
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.scenario import Scenario
+from blast_env.physics.scene import Charge
+from blast_env.scenario import AnyCharge, Scenario, VehicleCharge, VehicleSource
 
 TASK: Final = "task.json"
 STATUS: Final = "status.json"
@@ -16,13 +17,40 @@ STATUS: Final = "status.json"
 State = Literal["waiting", "running", "done", "failed", "stopped"]
 
 
+class PlaceOf(Kept):
+    """A charge at a place, as data."""
+
+    position_m: tuple[float, float]
+    tnt_kg: float
+    height_m: float = 0.0
+
+
+class VehicleOf(Kept):
+    """The charge of a vehicle, as data; `rank` as for `VehicleCharge`."""
+
+    source: VehicleSource
+    rank: int = 0
+
+
 class ThreatOf(Kept):
     """A threat, as data."""
 
     name: str
-    position_m: tuple[float, float]
-    tnt_kg: float
-    height_m: float = 0.0
+    charge_of: PlaceOf | VehicleOf
+
+    @classmethod
+    def of(cls, name: str, charge: AnyCharge) -> "ThreatOf":
+        """Return the threat of a charge."""
+        if isinstance(charge, VehicleCharge):
+            return cls(name=name, charge_of=VehicleOf(source=charge.source, rank=charge.rank))
+        return cls(name=name, charge_of=PlaceOf(**charge._asdict()))
+
+    @property
+    def charge(self) -> AnyCharge:
+        """The charge."""
+        if isinstance(self.charge_of, VehicleOf):
+            return VehicleCharge(self.charge_of.source, self.charge_of.rank)
+        return Charge(**self.charge_of.model_dump())
 
 
 class BlastTask(Kept):

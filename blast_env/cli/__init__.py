@@ -23,6 +23,7 @@ from blast_env.provenance import package_version
 app = typer.Typer(
     name="blast-env",
     no_args_is_help=True,
+    rich_markup_mode="markdown",  # its own markup takes [row, column] for a style
     pretty_exceptions_enable=False,
 )
 _COMMANDS = (

@@ -5,14 +5,16 @@ Imports torch, so the command imports this module only when it is asked for a ru
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
 from blast_agents.proposal import propose
-from blast_agents.training import TrainedAgent, TrainingSettings, load_agent
+from blast_agents.training import TrainedAgent, TrainingSettings, load_agent, newest_weights
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.environments import training_source
+from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import RunFolder
 
 from blast_env.cli.evaluation_report import (
@@ -21,12 +23,27 @@ from blast_env.cli.evaluation_report import (
     cache_text,
     percent,
     print_means,
+    print_record,
     report_layout,
-    seeds_text,
+    threats_text,
 )
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.cli.output import (
+    engine_text,
+    make_table,
+    print_line,
+    progress_bar,
+    result_console,
+)
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
-from blast_env.evaluation import BlastEvaluator, Case, Comparison, Evaluators, SeedRange, compare
+from blast_env.evaluation import (
+    BlastEvaluator,
+    Case,
+    Comparison,
+    Evaluators,
+    SeedRange,
+    Threat,
+    compare,
+)
 from blast_env.evaluation.report import case_table, comparison_record
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
@@ -52,7 +69,9 @@ _HEADERS: Final = (
 )
 
 
-_ALGORITHMS: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
+_NO_BEST: Final = (
+    "the run has no evaluation yet, so there are no best weights: the last ones propose"
+)
 
 
 def evaluate_run(run: Path, options: EvaluateOptions) -> None:
@@ -64,37 +83,38 @@ def evaluate_run(run: Path, options: EvaluateOptions) -> None:
     folder = RunFolder(run)
     configuration = folder.configuration()
     settings = configuration.settings
-    agent = load_agent(run)
+    weights = newest_weights(run)
+    agent = load_agent(run, weights)
     seeds = options.seed_range
     source: ScenarioSource = SingleScenario(folder.scenario(configuration))
     if settings.scenario == SITES:
         source = training_source(SITES)
-    provenance = _provenance(run, settings)
-    note = _overlap(settings, seeds)
-    if note and not options.as_json:
-        print_line(f"note: {note}")
+    provenance = _provenance(run, settings, weights)
+    notes = [_overlap(settings, seeds)] if weights == "best" else [_NO_BEST]
+    for note in notes:
+        if note and not options.any_json:
+            print_line(f"note: {note}")
     if isinstance(source, SingleScenario) and settings.threat == "hidden":
-        _report_hidden(agent, source, provenance, seeds, options)
+        _report_hidden(agent, source, provenance, options)
     else:
-        _report_cases(agent, settings, source, provenance, seeds, options)
+        _report_cases(agent, settings, source, provenance, options)
 
 
 def _report_hidden(
     agent: TrainedAgent,
     source: SingleScenario,
     provenance: dict[str, Any],
-    seeds: range,
     options: EvaluateOptions,
 ) -> None:
     """One layout for all the places where the charge may be."""
     evaluator = BlastEvaluator(
         source.scenario,
-        find_engine(options.engine or agent.engine, options.cell_m),
+        _engine(agent, options),
         cache=options.cache,
     )
     proposal = propose(agent, source.scenario, None)
     plan = LayoutPlan(source.scenario, proposal.layout, provenance=provenance)
-    report_layout(plan, evaluator, seeds, options)
+    report_layout(plan, evaluator, options)
 
 
 def _report_cases(
@@ -102,15 +122,13 @@ def _report_cases(
     settings: TrainingSettings,
     source: ScenarioSource,
     provenance: dict[str, Any],
-    seeds: range,
     options: EvaluateOptions,
 ) -> None:
     """A layout for each charge, or each site."""
+    seeds = options.seed_range
     options.prepare_files(len(seeds))
-    cases = unseen_cases(settings, source, seeds)
-    evaluators = Evaluators(
-        find_engine(options.engine or agent.engine, options.cell_m), options.cache
-    )
+    cases = [_fixed(case, options) for case in unseen_cases(settings, source, seeds)]
+    evaluators = Evaluators(_engine(agent, options), options.cache)
     proposals = [propose(agent, each.scenario, each.charge) for each in cases]
     with progress_bar(f"{2 * len(cases)} blasts in {_place(settings, cases)}") as progress:
         comparison = compare(
@@ -124,13 +142,12 @@ def _report_cases(
     record = {**comparison_record(comparison, evaluators.engine), "provenance": provenance}
     written = [] if options.out is None else _write(comparison, record, options.out)
     exported = _export(comparison, settings, provenance, options)
-    if options.as_json:
+    if options.any_json:
         files = [str(path) for path in [*written, *exported]]
-        content = {**record, "cache": cache_record(evaluators), "files": files}
-        print_line(json.dumps(content, indent=2))
+        print_record({**record, "cache": cache_record(evaluators), "files": files}, options)
         return
-    title = f"{_ALGORITHMS[settings.algorithm]} of {provenance['run']}, a layout a row"
-    _print_cases(comparison, evaluators.engine, f"{title}, {seeds_text(seeds)}")
+    title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
+    _print_cases(comparison, evaluators.engine, f"{title}, {threats_text(len(cases), seeds)}")
     milliseconds = median(MS_PER_S * each.seconds for each in proposals)
     print_line(f"proposed in {milliseconds:.1f} ms each (median), no blast spent on any")
     for path in written:
@@ -138,6 +155,20 @@ def _report_cases(
     if exported:
         print_line(f"wrote {len(cases)} layouts to {options.export}, files: {len(exported)}")
     print_line(cache_text(evaluators))
+
+
+def _engine(agent: TrainedAgent, options: EvaluateOptions) -> Engine:
+    """Return the engine that judges: the one asked for, or that of the run."""
+    return find_engine(options.engine or agent.engine, options.cell_m)
+
+
+def _fixed(case: Case, options: EvaluateOptions) -> Case:
+    """Return a case with what the user has fixed of its charge."""
+    threats = tuple(
+        Threat(options.fixed(case.scenario, threat.charge), threat.seed) for threat in case.threats
+    )
+    charge = None if case.charge is None else options.fixed(case.scenario, case.charge)
+    return replace(case, threats=threats, charge=charge)
 
 
 def _export(
@@ -156,28 +187,25 @@ def _export(
 
 def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
     table, cases = make_table(title, _HEADERS), case_table(comparison)
+    objective = comparison.cases[0].scenario.objective
     for row in cases.to_dict("records"):
         table.add_row(
             row["scenario"],
             f"({row['charge_x_m']:.1f}, {row['charge_y_m']:.1f})",
             f"{row['tnt_kg']:g}",
             str(row["modules"]),
-            f"{row['unprotected_impulse_pa_s']:,.0f}",
-            f"{row['impulse_pa_s']:,.0f}",
+            objective.text(row["unprotected_load"]),
+            objective.text(row["load"]),
             percent(row["reduction"]) + ("" if row["in_range"] else " ~"),
         )
     result_console().print(table)
     outside = int((~cases["in_range"]).sum())
     if outside:
         print_line(f"note: {outside} threats are outside the range of the calibration (~)")
-    print_means(
-        comparison.reduction,
-        (comparison.unprotected_mean_pa_s, comparison.mean_pa_s),
-        (comparison.unprotected_cvar_pa_s, comparison.cvar_pa_s),
-        comparison.cvar_level,
-    )
+    print_means(comparison, objective)
     calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)
-    print_line(f"engine {engine.name} ({engine.version}), calibration {', '.join(calibrations)}")
+    words = engine_text(engine, [case.scenario for case in comparison.cases])
+    print_line(f"{words}, calibration {', '.join(calibrations)}")
 
 
 def _write(comparison: Comparison, record: dict[str, Any], out: Path) -> list[Path]:
@@ -222,12 +250,12 @@ def _place(settings: TrainingSettings, cases: Sequence[Case]) -> str:
     return cases[0].scenario.name
 
 
-def _provenance(run: Path, settings: TrainingSettings) -> dict[str, Any]:
+def _provenance(run: Path, settings: TrainingSettings, weights: str) -> dict[str, Any]:
     """Return where the layouts come from."""
     return {
         "command": command(),
         "run": str(run),
-        "weights": "best",
+        "weights": weights,
         "algorithm": settings.algorithm,
         "threat": settings.threat,
         "versions": versions(packages=("torch", "stable-baselines3", "numpy")),

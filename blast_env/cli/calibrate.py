@@ -18,7 +18,9 @@ from blast_env.calibration.model import (
 )
 from blast_env.calibration.references import paper_table
 from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import Processes, TntMass
 from blast_env.cli.output import (
+    engine_text,
     make_table,
     print_line,
     progress_bar,
@@ -26,6 +28,7 @@ from blast_env.cli.output import (
     save_pictures,
     user_errors,
 )
+from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
 from blast_env.physics.engines import find_engine
@@ -109,8 +112,8 @@ def calibrate_free_field(options: FreeFieldOptions) -> None:
     distances_m = _parse_numbers("--distances", options.distances)
     tnt_range_kg = _parse_range(options.tnt_range)
     make_folder(options.out)
-    engine = find_engine(options.engine).name
-    study = FreeFieldStudy(_scenario(options), distances_m, options.seeds, engine)
+    engine = find_engine(options.engine)
+    study = FreeFieldStudy(_scenario(options), distances_m, options.seeds, engine.name)
     reference = _reference(options.reference, study, options.burst)
     with progress_bar(f"{len(options.seeds) * len(distances_m)} blasts") as progress:
         runs = study.run(options.processes, Path(f"{options.stem}.runs.jsonl"), progress)
@@ -119,6 +122,7 @@ def calibrate_free_field(options: FreeFieldOptions) -> None:
     stored = stored.model_copy(update={"tnt_range_kg": tnt_range_kg})
     written = _write(report, stored, options.stem)
     _print(report, stored)
+    print_line(engine_text(engine, [study.scenario]))
     for path in (*written, f"{options.stem}.runs.jsonl"):
         print_line(f"wrote {path}")
 
@@ -277,6 +281,8 @@ def calibrate_shielding(options: ShieldingOptions) -> None:
     written = _write_shielding(report, reflection, exponent, options)
     _print_ratios(report, exponent)
     _print_reflection(reflection)
+    engine = find_engine(options.engine)
+    print_line(f"{engine_text(engine)}, preset {options.preset}")
     for path in written:
         print_line(f"wrote {path}")
 
@@ -408,6 +414,10 @@ PAPER_DISTANCES = "15,30,45,60,75,90,105,120"
 _SHIELDING_PANEL = "Shielding study"
 
 
+_RESUME: Final = "the same command goes on from the blasts that are finished"
+_RESUME_SHIELDING: Final = "nothing of it is kept: the same command begins anew"
+
+
 _FREE_FIELD_OPTIONS = (
     "name",
     "reference",
@@ -430,7 +440,11 @@ def calibrate(
         str | None, typer.Option(help="Name of the calibration and of its files.")
     ] = None,
     reference: Annotated[
-        ReferenceName | None, typer.Option(help="What to calibrate against.")
+        ReferenceName | None,
+        typer.Option(
+            metavar="REFERENCE",
+            help="paper_ufc, or Kingery-Bulmash: reflected_ or incident_impulse.",
+        ),
     ] = None,
     distances: Annotated[
         str, typer.Option(help="Distances from charge to facade, m, separated by commas.")
@@ -444,19 +458,27 @@ def calibrate(
     engine: Annotated[
         str | None, typer.Option(help="pymunk or event; without it pymunk, for --shielding event.")
     ] = None,
-    law: Annotated[LawName, typer.Option(help="The law to store.")] = "power",
+    law: Annotated[
+        LawName,
+        typer.Option(metavar="LAW", help="The law to store: proportional, linear or power."),
+    ] = "power",
     simulated: Annotated[
-        SimulatedQuantity, typer.Option(help="Convert m|v|, or the momentum really transferred.")
+        SimulatedQuantity,
+        typer.Option(
+            metavar="QUANTITY",
+            help="Convert impulse (m|v|), or transferred_impulse (momentum really transferred).",
+        ),
     ] = "impulse",
-    burst: Annotated[Burst, typer.Option(help="For Kingery-Bulmash.")] = "hemispherical",
-    tnt_kg: Annotated[
-        float | None, typer.Option(help="Mass of the charge, instead of the scenario's.")
-    ] = None,
+    burst: Annotated[
+        Burst,
+        typer.Option(metavar="BURST", help="For Kingery-Bulmash: hemispherical or spherical."),
+    ] = "hemispherical",
+    tnt_kg: TntMass = None,
     tnt_range: Annotated[
         str | None,
         typer.Option(help="LOW,HIGH: masses, kg, for which the law shall hold by scaling."),
     ] = None,
-    processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
+    processes: Processes = 1,
     cluster: ClusterAddress = None,
     out: Annotated[Path, typer.Option(help="Folder for all files.")] = Path("out/calibration"),
     shielding: Annotated[
@@ -492,7 +514,8 @@ def calibrate(
     above.
     """
     numbers = tuple(range(first_seed, first_seed + seeds))
-    with user_errors(), running_on(cluster):
+    resume = _RESUME_SHIELDING if shielding else _RESUME
+    with user_errors(lambda: resume), checked_targets(folders={"--out": out}), running_on(cluster):
         if shielding:
             _refuse(context, _FREE_FIELD_OPTIONS, "does not go with --shielding")
             used, engine = preset or DEFAULT_PRESET, engine or "event"

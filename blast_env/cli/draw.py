@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from blast_env.cli.output import print_line, user_errors
+from blast_env.cli.targets import PICTURES, FileTarget, checked_targets
 from blast_env.scenario import load_layout, load_scenario
 
 
@@ -34,7 +35,7 @@ def draw(
 
     Heights are to scale. No blast is run.
     """
-    with user_errors():
+    with user_errors(), checked_targets({"--out": FileTarget(out, PICTURES)}):
         found = load_scenario(scenario)
         elements = () if layout is None else load_layout(layout, found)
         # Here, because pictures need the extra `render`.

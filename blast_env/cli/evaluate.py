@@ -7,16 +7,24 @@ import typer
 
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.evaluation_report import EvaluateOptions, report_layout
-from blast_env.cli.output import (
-    user_errors,
+from blast_env.cli.options import (
+    AsJson,
+    CacheFolder,
+    CellSide,
+    ChargePlace,
+    CvarLevel,
+    JsonAll,
+    Processes,
+    TntMass,
 )
+from blast_env.cli.output import check_json, resume_with_cache, user_errors
+from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.export import LayoutPlan
 from blast_env.physics.engines import find_engine
 from blast_env.scenario import LayoutFile, load_layout, load_scenario
-from blast_env.statistics import check_cvar_level
+from blast_env.statistics import CVAR_LEVEL, check_cvar_level
 
 _SCENARIO = "courtyard"
 
@@ -51,27 +59,11 @@ FirstSeed = Annotated[
 ]
 
 
-Processes = Annotated[int, typer.Option(min=1, help="Worker processes.")]
-
-
 EngineName = Annotated[
     str | None,
     typer.Option(
         help="Engine that runs the blasts.", show_default=f"{_ENGINE}; with --run that of the run"
     ),
-]
-
-
-CellSide = Annotated[
-    float | None, typer.Option(help="Side of the cells of gas dynamics, m; 0.5 unless given.")
-]
-
-
-CvarLevel = Annotated[float, typer.Option(help="0.8: also show the mean of the worst 20 %.")]
-
-
-CacheFolder = Annotated[
-    Path | None, typer.Option(help="Folder in which blasts are kept for the next run.")
 ]
 
 
@@ -89,9 +81,6 @@ OutFolder = Annotated[
 ]
 
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-
-
 def evaluate(
     layout: LayoutPath = None,
     run: RunPath = None,
@@ -102,11 +91,14 @@ def evaluate(
     cluster: ClusterAddress = None,
     engine: EngineName = None,
     cell: CellSide = None,
+    charge: ChargePlace = None,
+    tnt_kg: TntMass = None,
     cvar_level: CvarLevel = CVAR_LEVEL,
     cache: CacheFolder = None,
     export: ExportPath = None,
     out: OutFolder = None,
     as_json: AsJson = False,
+    json_all: JsonAll = False,
 ) -> None:
     """Compare layouts with no barrier, both exposed to the same threats.
 
@@ -114,10 +106,28 @@ def evaluate(
     trained on visible charges proposes a layout for each of them, any other one layout for all.
     """
     options = EvaluateOptions(
-        seeds, first_seed, processes, engine, cell, cvar_level, cache, export, out, as_json
+        seeds=seeds,
+        first_seed=first_seed,
+        processes=processes,
+        engine=engine,
+        cell_m=cell,
+        charge_m=charge,
+        tnt_kg=tnt_kg,
+        cvar_level=cvar_level,
+        cache=cache,
+        export=export,
+        out=out,
+        as_json=as_json,
+        json_all=json_all,
     )
-    with user_errors(), running_on(cluster):
+    folders = {"--out": out, "--cache": cache}
+    with (
+        user_errors(lambda: resume_with_cache(cache)),
+        checked_targets(options.files, folders | options.folders),
+        running_on(cluster),
+    ):
         check_cvar_level(cvar_level)
+        check_json(as_json, json_all)
         if run is not None:
             _refuse_beside_run(layout, scenario)
             _evaluate_run(run, options)
@@ -145,7 +155,7 @@ def _evaluate_file(path: Path, scenario: str, options: EvaluateOptions) -> None:
     evaluator = BlastEvaluator(
         chosen, find_engine(options.engine or _ENGINE, options.cell_m), cache=options.cache
     )
-    report_layout(plan, evaluator, options.seed_range, options)
+    report_layout(plan, evaluator, options)
 
 
 def _evaluate_run(run: Path, options: EvaluateOptions) -> None:

@@ -1,30 +1,39 @@
 """The options of `blast-env evaluate`, and what it prints and writes."""
 
-import json
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
 from typing import Final
 
+from blast_env.cli.options import fixed_charge
 from blast_env.cli.output import (
+    engine_text,
     make_table,
+    print_json,
     print_line,
     progress_bar,
     result_console,
     save_pictures,
+    without,
 )
+from blast_env.cli.targets import FileTarget
 from blast_env.evaluation import (
     BlastEvaluator,
     Evaluators,
     LayoutEvaluation,
     SeedRange,
+    Threat,
     draw_threats,
     evaluate_against,
 )
-from blast_env.export import LayoutPlan, check_target, export_layouts
+from blast_env.evaluation.comparison import Comparison
+from blast_env.export import LayoutPlan, check_target, export_layouts, is_file
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import is_gas
+from blast_env.scenario import AnyCharge, ObjectiveSection, Scenario
 from blast_env.statistics import Estimate
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
@@ -41,11 +50,49 @@ class EvaluateOptions:
     processes: int
     engine: str | None
     cell_m: float | None
+    charge_m: tuple[float, float] | None
+    tnt_kg: float | None
     cvar_level: float
     cache: Path | None
     export: Path | None
     out: Path | None
     as_json: bool
+    json_all: bool
+
+    @property
+    def files(self) -> dict[str, FileTarget]:
+        """The file of `--export`, if it is one; its suffix is looked at by `check_target`."""
+        if self.export is None or not is_file(self.export):
+            return {}
+        return {"--export": FileTarget(self.export, (self.export.suffix.lower(),))}
+
+    @property
+    def folders(self) -> dict[str, Path | None]:
+        """The folder of `--export`, if it is one."""
+        is_folder = self.export is not None and not self.export.suffix
+        return {"--export": self.export if is_folder else None}
+
+    @property
+    def any_json(self) -> bool:
+        """Whether the result is printed as JSON."""
+        return self.as_json or self.json_all
+
+    def fixed(self, scenario: Scenario, charge: AnyCharge) -> AnyCharge:
+        """Return a charge with what the user has fixed of it; see `fixed_charge`."""
+        return fixed_charge(scenario, charge, self.charge_m, self.tnt_kg)
+
+    def threats(self, scenario: Scenario, engine: Engine) -> tuple[Threat, ...]:
+        """Return the threats that the seeds draw, with what the user has fixed of their charges.
+
+        A charge has one realisation by gas dynamics: of threats with the same one, one is left.
+        """
+        drawn = draw_threats(scenario, self.seed_range)
+        threats = tuple(
+            Threat(self.fixed(scenario, threat.charge), threat.seed) for threat in drawn
+        )
+        if self.charge_m is None or not is_gas(engine):
+            return threats
+        return tuple({threat.charge: threat for threat in reversed(threats)}.values())[::-1]
 
     @property
     def seed_range(self) -> range:
@@ -97,11 +144,20 @@ def interval(estimate: Estimate) -> str:
     return f"{percent(estimate.low)} to {percent(estimate.high)}"
 
 
-def seeds_text(seeds: range) -> str:
+def threats_text(count: int, seeds: range) -> str:
     """Return what the means are over."""
-    if len(seeds) == 1:
+    if count == 1:
         return f"seed {seeds[0]}"
-    return f"means over {len(seeds)} threats (seeds {seeds[0]} to {seeds[-1]})"
+    return f"means over {count} threats (seeds {seeds[0]} to {seeds[-1]})"
+
+
+_NOT_IN_SHORT: Final = ("scenario", "threats", "modules", "cases")
+"""Parts of a record that `--json` leaves out."""
+
+
+def print_record(record: Mapping[str, object], options: EvaluateOptions) -> None:
+    """Print a record as JSON, in short or all of it."""
+    print_json(record if options.json_all else without(record, _NOT_IN_SHORT))
 
 
 _HEADERS: Final = (
@@ -115,13 +171,12 @@ _HEADERS: Final = (
 )
 
 
-def report_layout(
-    plan: LayoutPlan, evaluator: BlastEvaluator, seeds: range, options: EvaluateOptions
-) -> None:
+def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: EvaluateOptions) -> None:
     """Evaluate a layout on threats that the seeds draw; print and write the result."""
-    threats = draw_threats(plan.scenario, seeds)
+    engine = evaluator.engine
+    threats = options.threats(plan.scenario, engine)
     options.prepare_files(1)
-    with progress_bar(f"{2 * len(seeds)} blasts in {plan.scenario.name}") as progress:
+    with progress_bar(f"{2 * len(threats)} blasts in {plan.scenario.name}") as progress:
         evaluation = evaluate_against(
             evaluator,
             plan.layout,
@@ -133,16 +188,18 @@ def report_layout(
     written = [] if options.out is None else _write(evaluation, options.out)
     if options.export is not None:
         written += export_layouts({"layout": plan}, options.export)
-    if options.as_json:
-        content = {
+    if options.any_json:
+        record = {
             **evaluation.to_dict(),
+            "scenario_name": plan.scenario.name,
+            "preset": None if is_gas(engine) else plan.scenario.simulation.preset,
             "provenance": dict(plan.provenance),
             "cache": cache_record(evaluator),
             "files": [str(path) for path in written],
         }
-        print_line(json.dumps(content, indent=2))
+        print_record(record, options)
         return
-    _print_evaluation(evaluation, seeds)
+    _print_evaluation(evaluation, options.seed_range, engine)
     for path in written:
         print_line(f"wrote {path}")
     print_line(cache_text(evaluator))
@@ -167,12 +224,12 @@ def _save_figure(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
     return [save_figure(evaluation_figure(evaluation), out / "evaluation.png")]
 
 
-def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
+def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine) -> None:
     """Print the structures' mean loads, and what the layout does over all threats."""
     count = len(evaluation.threats)
     table = make_table(
         f"{evaluation.scenario.name}: {layout_counts(evaluation.layout, 'barrier')} against none, "
-        f"{seeds_text(seeds)}",
+        f"{threats_text(count, seeds)}",
         _HEADERS,
         text_columns=2,
     )
@@ -188,55 +245,63 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
             f"{row['threats_in_range']} of {count}",
         )
     result_console().print(table)
-    _print_totals(evaluation)
+    _print_totals(evaluation, engine)
     for note in evaluation.notes:
         print_line(f"note: {note}")
 
 
-def _print_totals(evaluation: LayoutEvaluation) -> None:
+def _print_totals(evaluation: LayoutEvaluation, engine: Engine) -> None:
     """Print what there is to say about the protected structures together."""
-    worst = evaluation.worst
-    print_means(
-        evaluation.reduction,
-        (evaluation.unprotected_impulse_pa_s, evaluation.impulse_pa_s),
-        (evaluation.unprotected_cvar, evaluation.cvar),
-        evaluation.cvar_level,
-    )
+    worst, objective = evaluation.worst, evaluation.scenario.objective
+    comparison = evaluation.comparison
+    print_means(comparison, objective)
+    if objective != ObjectiveSection():
+        print_line(
+            f"objective ({_objective_text(objective)}): "
+            f"{objective.text(evaluation.unprotected_load)} without barrier, "
+            f"{objective.text(evaluation.load)} with"
+        )
     charge = worst.charge
     print_line(
         f"worst threat: {charge.tnt_kg:g} kg TNT at ({charge.position_m[0]:.2f}, "
-        f"{charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: {worst.impulse_pa_s:,.0f} Pa s, "
-        f"reduction {percent(worst.reduction)}"
+        f"{charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: "
+        f"{objective.text(worst.load)}, reduction {percent(worst.reduction)}"
     )
     print_line(
-        f"engine {evaluation.engine_name} ({evaluation.engine_version}), calibration "
-        f"{evaluation.calibration}, scenario hash {evaluation.scenario.content_hash[:12]}"
+        f"{engine_text(engine, [evaluation.scenario])}, calibration {evaluation.calibration}, "
+        f"scenario hash {evaluation.scenario.content_hash[:12]}"
     )
 
 
-def print_means(
-    reduction: Estimate,
-    impulses_pa_s: Sequence[Estimate],
-    cvars_pa_s: Sequence[float],
-    cvar_level: float,
-) -> None:
-    """Print the reduction, and the mean impulses without and with barrier.
+def _objective_text(objective: ObjectiveSection) -> str:
+    """Return what a scenario counts, and over which charges: `peak overpressure, worst charge`."""
+    over = {"mean": "mean over", "cvar": "mean of the worst", "worst": "worst of"}
+    noun = "impulse and peak" if objective.quantity == "both" else objective.noun
+    return f"{noun}, {over[objective.charges]} the charges"
+
+
+def print_means(comparison: Comparison, objective: ObjectiveSection) -> None:
+    """Print the reduction, and the mean loads without and with barrier.
 
     Args:
-        reduction: Of the protected structures, by weight.
-        impulses_pa_s: Without, with.
-        cvars_pa_s: Without, with.
-        cvar_level: Of these.
+        comparison: The loads.
+        objective: What they are.
     """
+    reduction = comparison.reduction
     print_line(
         f"protected structures, by weight: mean reduction {percent(reduction.value)} "
         f"(95 % interval {interval(reduction)})"
     )
-    names = ("without barrier", "with barrier")
-    for words, impulse, cvar in zip(names, impulses_pa_s, cvars_pa_s, strict=True):
-        half_width = "" if isnan(impulse.low) else f" +- {impulse.high - impulse.value:,.0f}"
+    share = f"{100.0 * (1.0 - comparison.cvar_level):.3g} %"
+    for words, load, cvar in (
+        ("without barrier", comparison.unprotected_mean, comparison.unprotected_cvar),
+        ("with barrier", comparison.mean, comparison.cvar),
+    ):
+        half_width = ""
+        if not isnan(load.low):
+            half_width = f" +- {objective.text(load.high - load.value)}"
+        psi_s = "" if objective.needs_peaks else f" ({load.value / PA_PER_PSI:.4f} psi s)"
         print_line(
-            f"{words}: mean {impulse.value:,.0f}{half_width} Pa s "
-            f"({impulse.value / PA_PER_PSI:.4f} psi s), mean of the worst "
-            f"{100.0 * (1.0 - cvar_level):.3g} % {cvar:,.0f} Pa s"
+            f"{words}: mean {objective.text(load.value)}{half_width}{psi_s}, "
+            f"mean of the worst {share} {objective.text(cvar)}"
         )

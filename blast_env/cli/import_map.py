@@ -1,6 +1,5 @@
 """`blast-env import`: a site from a map or drawing."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,11 +7,13 @@ import typer
 
 from blast_env.cli.output import (
     make_table,
+    print_json,
     print_line,
     result_console,
     save_pictures,
     user_errors,
 )
+from blast_env.cli.targets import PICTURES, FileTarget, checked_targets
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import save_scenario
 
@@ -88,7 +89,9 @@ def import_map(
     protect_near: Annotated[
         Place | None, typer.Option(metavar="X Y", help="Protect the building nearest to this.")
     ] = None,
-    tnt: Annotated[float, typer.Option(help="Mass of the charges, kg TNT.")] = 100.0,
+    tnt_kg: Annotated[
+        float, typer.Option("--tnt-kg", metavar="KG", help="Mass of the charges, kg TNT.")
+    ] = 100.0,
     charge_at: Annotated[
         list[str] | None,
         typer.Option(metavar="X,Y", help="A further place of a charge."),
@@ -135,7 +138,8 @@ def import_map(
     The site is turned to the direction of most walls and buildings are cut into modules of 0.5 m;
     the table says how far each is from its outline.
     """
-    with user_errors():
+    files = {"--out": FileTarget(out, (".toml",)), "--picture": FileTarget(picture, PICTURES)}
+    with user_errors(), checked_targets(files):
         # Here, because maps need the extra `maps`.
         from blast_env.importing import ImportOptions, import_site
 
@@ -154,7 +158,7 @@ def import_map(
             keep_outs_from=tuple(keep_outs_from or ()),
             protect=tuple(protect or ()),
             protect_near=protect_near,
-            tnt_kg=tnt,
+            tnt_kg=tnt_kg,
             charge_at=tuple(_place(text) for text in charge_at or ()),
             zone_m=zone,
             zone_around_m=zone_around,
@@ -175,7 +179,7 @@ def import_map(
         save_scenario(imported.scenario, out)
         written = [out, *save_pictures(lambda: _pictures(imported, picture))]
     if as_json:
-        print_line(json.dumps(_record(imported, written), indent=2))
+        print_json(_record(imported, written))
     else:
         _print(imported, written)
 
@@ -218,7 +222,10 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
             f"{each.block_m:g}",
         )
     result_console().print(table)
-    print_line(f"places of charges: {len(imported.scenario.charge)}")
+    print_line(
+        f"places of charges: {len(imported.scenario.charge)}; particle engines use the preset "
+        f"{imported.scenario.simulation.preset}"
+    )
     for note in imported.notes:
         print_line(f"note: {note}")
     for path in written:

@@ -16,14 +16,19 @@ from blast_agents.league import (
 )
 
 from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import CellSide, Processes
 from blast_env.cli.output import (
+    engine_text,
     make_table,
     print_line,
     progress_bar,
     result_console,
     user_errors,
 )
+from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
 from blast_env.provenance import command
 
 if TYPE_CHECKING:
@@ -62,25 +67,33 @@ def league(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Decides cases, threats and searches.")] = 0,
-    engine: Annotated[str, typer.Option(help="Engine that runs the blasts.")] = "event",
-    processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
+    engine: Annotated[str, typer.Option(help="event or pymunk (particles), or gas.")] = "event",
+    cell: CellSide = None,
+    processes: Processes = 1,
     cluster: ClusterAddress = None,
 ) -> None:
     """Compare searches, rules and trained agents on the same held-out cases and seeds.
 
     An interrupted league goes on when it is called again with the same folder.
     """
-    with user_errors(), running_on(cluster):
+    with (
+        user_errors(lambda: "the same command goes on with what is through"),
+        checked_targets(folders={"--out": out}),
+        running_on(cluster),
+    ):
         # Here, because its figures need the extra `render`.
         from blast_agents.league.report import write_league
 
+        chosen = find_engine(engine, cell)
         tracks = find_tracks(track, cases, seeds, seed, scenario or ())
         runs = _load_runs(run or (), tracks)
         store = ResultStore(out / "results")
         contests = [
-            _contest(each, runs, _names(methods), _numbers(budgets), store, engine)
+            _contest(each, runs, _names(methods), _numbers(budgets), store, chosen)
             for each in tracks
         ]
+        scenarios = [case.scenario for each in tracks for case in each.cases]
+        print_line(engine_text(chosen, scenarios))
         _print_outlook(contests)
         all_standings = [_play(contest, processes) for contest in contests]
         written = write_league(all_standings, out, shlex.join(command()))
@@ -106,7 +119,7 @@ def _contest(
     methods: Sequence[str],
     budgets: Sequence[int],
     store: ResultStore,
-    engine: str,
+    engine: Engine,
 ) -> Contest:
     agents = tuple(run.entry for run in runs if run.is_for(track))
     vehicles = all(case.scenario.vehicles for case in track.cases)

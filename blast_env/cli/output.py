@@ -1,23 +1,32 @@
 """What all commands share: consoles, tables, errors, a progress bar."""
 
+import json
+import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
+from blast_env.cli.tables import ResultTable
 from blast_env.errors import BlastEnvError, MissingExtraError
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import is_gas
+from blast_env.scenario import Scenario
 
 _PIPE_COLUMNS = 120
 
 
 def result_console() -> Console:
-    """Return the console for results (standard output); wide enough for tables in a pipe."""
-    width = None if sys.stdout.isatty() else _PIPE_COLUMNS
+    """Return the console for results (standard output).
+
+    In a pipe it is wide enough for most tables, unless `COLUMNS` says how wide it is to be.
+    """
+    known = sys.stdout.isatty() or "COLUMNS" in os.environ
+    width = None if known else _PIPE_COLUMNS
     return Console(highlight=False, width=width)
 
 
@@ -32,16 +41,73 @@ def message_console() -> Console:
 
 
 @contextmanager
-def user_errors() -> Iterator[None]:
-    """Turn errors of the user into a message and exit code 2, Ctrl-C into exit code 130."""
+def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
+    """Turn errors of the user into a message and exit code 2, Ctrl-C into exit code 130.
+
+    Args:
+        resume: Says how to go on after Ctrl-C, where a command can.
+    """
     try:
         yield
     except BlastEnvError as error:
         message_console().print(f"error: {error}", markup=False, style="red")
         raise typer.Exit(2) from error
     except KeyboardInterrupt:
-        message_console().print("interrupted: no file was left half-written", style="yellow")
+        show_interruption("no file was left half-written", "" if resume is None else resume())
         raise typer.Exit(130) from None
+
+
+def show_interruption(*parts: str) -> None:
+    """Say on standard error that the command was interrupted, what is kept and how to go on."""
+    text = "; ".join(part for part in parts if part)
+    message_console().print(f"interrupted: {text}", markup=False, style="yellow")
+
+
+def resume_with_cache(cache: Path | None) -> str:
+    """Return how a command goes on whose blasts are kept in a folder, if they are."""
+    if cache is None:
+        return "with --cache FOLDER the blasts would have been kept for the next call"
+    return f"the same command goes on with the blasts that are kept in {cache}"
+
+
+def engine_text(engine: Engine, scenarios: Iterable[Scenario] = ()) -> str:
+    """Return in words which engine runs blasts, and with which preset's parameters.
+
+    Args:
+        engine: The engine.
+        scenarios: Those that it runs; gas dynamics has no parameters.
+    """
+    known = engine.version.split()[0] == engine.name
+    text = f"engine {engine.version}" if known else f"engine {engine.name}, {engine.version}"
+    if is_gas(engine):
+        return f"{text}, cells of {engine.cell_m:g} m"
+    presets = dict.fromkeys(_preset_text(each) for each in scenarios)
+    return f"{text}, preset {', '.join(presets)}" if presets else text
+
+
+def _preset_text(scenario: Scenario) -> str:
+    section = scenario.simulation
+    return section.preset + (" with overrides" if section.overrides else "")
+
+
+def print_json(content: Mapping[str, object]) -> None:
+    """Print plain data as JSON to standard output."""
+    print_line(json.dumps(content, indent=2, allow_nan=False))
+
+
+def check_json(as_json: bool, json_all: bool) -> None:
+    """Refuse both forms of JSON at once.
+
+    Raises:
+        BlastEnvError: If both are asked for.
+    """
+    if as_json and json_all:
+        raise BlastEnvError("--json and --json-all exclude each other: one of them is printed")
+
+
+def without(content: Mapping[str, object], names: Collection[str]) -> dict[str, object]:
+    """Return what `--json` prints of a record: all but the long parts."""
+    return {name: value for name, value in content.items() if name not in names}
 
 
 def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:
@@ -73,9 +139,6 @@ def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
         yield lambda share: progress.update(task, completed=share)
 
 
-def make_table(title: str, headers: Sequence[str], text_columns: int = 1) -> Table:
+def make_table(title: str, headers: Sequence[str], text_columns: int = 1) -> ResultTable:
     """Return an empty table; all columns but the first `text_columns` are set to the right."""
-    table = Table(title=title, title_justify="left", title_style="bold")
-    for number, header in enumerate(headers):
-        table.add_column(header, justify="left" if number < text_columns else "right")
-    return table
+    return ResultTable(title, headers, text_columns)

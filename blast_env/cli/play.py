@@ -5,10 +5,12 @@ from typing import Annotated
 import gymnasium as gym
 import typer
 
-from blast_env.cli.output import print_line, user_errors
+from blast_env.cli.output import engine_text, print_line, user_errors
 from blast_env.envs.play import KEYS
 from blast_env.envs.play import play as play_in_window
 from blast_env.geometry import layout_counts
+from blast_env.physics.engines import find_engine
+from blast_env.scenario import find_scenario
 
 
 def play(
@@ -34,6 +36,7 @@ def play(
             render_mode="rgb_array",
             show_blast=film,
         )
+        print_line(engine_text(find_engine(engine), [find_scenario(scenario)]))
         print_line(KEYS)
         for played in play_in_window(env, seed):
             print_line(

@@ -6,8 +6,17 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, Progress, TextColumn
 
-from blast_env.cli.output import message_console, print_line, user_errors
+from blast_env.cli.options import CacheFolder, Processes
+from blast_env.cli.output import (
+    engine_text,
+    message_console,
+    print_line,
+    resume_with_cache,
+    user_errors,
+)
+from blast_env.cli.targets import FileTarget, checked_targets
 from blast_env.errors import BlastEnvError
+from blast_env.physics.engines import GAS, find_engine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import load_layout, load_scenario
 
@@ -44,17 +53,16 @@ def report(
     places: Annotated[int, typer.Option(help="Other places of each charge source.")] = 5,
     items: Annotated[bool, typer.Option(help="Rank what each module or piece is worth.")] = True,
     stills: Annotated[int, typer.Option(help="Moments of the film, 0 to 12.")] = 4,
-    processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
-    cache: Annotated[
-        Path | None, typer.Option(help="Folder in which blasts are kept for the next run.")
-    ] = None,
+    processes: Processes = 1,
+    cache: CacheFolder = None,
 ) -> None:
     """Report on a layout by gas dynamics: HTML that needs nothing else, and PDF.
 
     Site and threats, bill of quantities, loads with two sizes of cells, facades, film stills, what
     each item is worth, other masses and places, limits, validity, and everything to repeat it.
     """
-    with user_errors():
+    files = {"--out": FileTarget(out, (".html", ".htm")), "--pdf": FileTarget(pdf, (".pdf",))}
+    with user_errors(lambda: resume_with_cache(cache)), checked_targets(files, {"--cache": cache}):
         # Here, because reports need extras, and Numba half a second.
         from blast_env.reporting import Limit, StudyOptions, UnitSystem, run_study, write_report
         from blast_env.reporting.page import check_targets
@@ -84,6 +92,7 @@ def report(
                 progress.update(task, description=what, completed=share)
 
             study = run_study(chosen, cells_of_layout, options, tell)
+        print_line(f"{engine_text(find_engine(GAS, cells[0]))} and of {cells[1]:g} m")
         for path in write_report(study, out, pdf):
             print_line(f"wrote {path}")
 

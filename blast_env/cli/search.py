@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import typer
@@ -17,15 +17,28 @@ from blast_agents.search import Progress as SearchProgress
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import (
+    CacheFolder,
+    CellSide,
+    ChargePlace,
+    CvarLevel,
+    Processes,
+    TntMass,
+    fixed_charge,
+)
 from blast_env.cli.output import (
+    engine_text,
     make_table,
     message_console,
     print_line,
     progress_bar,
     result_console,
+    resume_with_cache,
     save_pictures,
+    show_interruption,
     user_errors,
 )
+from blast_env.cli.targets import checked_targets
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.envs.strategies import HiddenThreat
 from blast_env.errors import BlastEnvError
@@ -39,18 +52,19 @@ from blast_env.evaluation import (
     evaluate_against,
 )
 from blast_env.evaluation.cases import practice_hidden, practice_visible
-from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
-from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
 from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario, write_layout
-from blast_env.statistics import reductions
+from blast_env.statistics import CVAR_LEVEL, ConditionalValueAtRisk, WorstRisk, reductions
 from blast_env.tables import write_csv
 
 ThreatName = Literal["visible", "hidden"]
+
+LAYOUT_NAME: Final = "layout.json"
+"""File of the layout in the folder of `--out`."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +79,11 @@ class SearchOptions:
     threats: int | None
     realisations: int | None
     charge_position_m: tuple[float, float] | None
-    risk: str
+    tnt_kg: float | None
+    risk: str | None
     cvar_level: float
     engine: str
+    cell_m: float | None
     start_from: tuple[str, ...]
 
 
@@ -88,29 +104,29 @@ class SearchRun:
     cache_hits: int
 
 
-def print_search(run: SearchRun, options: SearchOptions, checked: LayoutEvaluation) -> None:
+def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
     """Print what the layout does against the search's threats and against others, and the cost."""
     result, problem = run.result, run.problem
     table = make_table(
-        f"{problem.scenario.name}: {result.method} search, {_risk_text(options)}",
-        ("threats", "number", "without (Pa s)", "with (Pa s)", "reduction", "95 % interval"),
+        f"{problem.scenario.name}: {result.method} search, {_risk_text(problem)}",
+        ("threats", "number", "without", "with", "reduction", "95 % interval"),
     )
-    bare_pa_s = problem.case.combined(problem.unprotected_pa_s)
-    impulse_pa_s = problem.impulse_pa_s(result.layout)
+    bare, load = problem.case.combined(problem.unprotected), problem.load(result.layout)
+    counts = problem.scenario.objective
     table.add_row(
         "of the search",
         str(len(problem.threats)),
-        f"{bare_pa_s:,.0f}",
-        f"{impulse_pa_s:,.0f}",
-        percent(reductions(impulse_pa_s, bare_pa_s).item()),
+        counts.text(bare),
+        counts.text(load),
+        percent(reductions(load, bare).item()),
         "-",
     )
     low, high = checked.ci95
     table.add_row(
-        "held out, mean",
+        "held out",
         str(len(checked.threats)),
-        f"{checked.unprotected_impulse_pa_s.value:,.0f}",
-        f"{checked.impulse_pa_s.value:,.0f}",
+        counts.text(checked.unprotected_load),
+        counts.text(checked.load),
         percent(checked.mean_reduction),
         "-" if np.isnan(low) else f"{percent(low)} to {percent(high)}",
     )
@@ -120,6 +136,7 @@ def print_search(run: SearchRun, options: SearchOptions, checked: LayoutEvaluati
         f"blasts spent, {run.cache_hits} of the loads asked for known already; "
         f"{run.seconds:.1f} s"
     )
+    print_line(engine_text(problem.evaluator.engine, [problem.scenario]))
 
 
 def write_search(
@@ -129,7 +146,7 @@ def write_search(
     result = run.result
     scenario = run.problem.scenario
     provenance = _provenance(run, options, checked)
-    written = [write_layout(out / "layout.json", scenario, result.layout, provenance)]
+    written = [write_layout(out / LAYOUT_NAME, scenario, result.layout, provenance)]
     if result.history:
         written.append(write_csv(result.history_table(), out / "history.csv"))
         written += save_pictures(lambda: _save_figure(run, out))
@@ -170,7 +187,8 @@ def _provenance(
         "result": {
             "blasts": result.blasts,
             "interrupted": result.interrupted,
-            "impulse_pa_s": result.impulse_pa_s,
+            "load": result.load,
+            "unit": problem.scenario.objective.unit,
             "threats_met": result.threats,
             "held_out_threats": len(checked.threats),
             "held_out_reduction": checked.mean_reduction,
@@ -179,12 +197,16 @@ def _provenance(
     }
 
 
-def _risk_text(options: SearchOptions) -> str:
-    """Return what the impulses under the search's threats are."""
-    if options.risk == "mean":
-        return "mean impulse on the protected structures"
-    share = f"{100.0 * (1.0 - options.cvar_level):.3g} %"
-    return f"impulse on the protected structures, mean of the worst {share}"
+def _risk_text(problem: LayoutProblem) -> str:
+    """Return what the loads under the search's threats are."""
+    noun = problem.scenario.objective.noun
+    words = f"{noun} of the protected structures"
+    risk = problem.case.risk or problem.scenario.objective.risk
+    if isinstance(risk, WorstRisk):
+        return f"largest {words}"
+    if isinstance(risk, ConditionalValueAtRisk):
+        return f"{words}, mean of the worst {100.0 * (1.0 - risk.level):.3g} %"
+    return f"mean {words}"
 
 
 def percent(share: float) -> str:
@@ -198,7 +220,7 @@ def search(
         typer.Option(
             help="random, greedy, annealing, genetic, nsga2, exhaustive, or a rule: "
             "(long_)wall_near_charge, (long_)wall_near_building, ring_around_charge, "
-            "ring_around_building, line_of_posts or posts_and_wall."
+            "ring_around_building, line_of_posts, posts_and_wall or sight_lines."
         ),
     ] = "genetic",
     scenario: Annotated[str, typer.Option(help="Bundled name, or a scenario file.")] = "courtyard",
@@ -215,21 +237,21 @@ def search(
         int | None,
         typer.Option(min=1, help="Blasts a charge; 2 (visible) or 1 (hidden) unless given."),
     ] = None,
-    charge_position: Annotated[
-        tuple[float, float] | None,
-        typer.Option(help="x and y in m of a visible charge; drawn unless given."),
+    charge: ChargePlace = None,
+    tnt_kg: TntMass = None,
+    risk: Annotated[
+        str | None,
+        typer.Option(
+            help="mean, cvar or worst, over the charges.",
+            show_default="as the scenario's objective says",
+        ),
     ] = None,
-    risk: Annotated[str, typer.Option(help="mean or cvar, over the charges.")] = "mean",
-    cvar_level: Annotated[
-        float, typer.Option(help="For the risk cvar; 0.8: the mean of the worst 20 %.")
-    ] = CVAR_LEVEL,
+    cvar_level: CvarLevel = CVAR_LEVEL,
     engine: Annotated[
         str, typer.Option(help="event or pymunk (particles), or gas (gas dynamics).")
     ] = "event",
-    cell: Annotated[
-        float | None, typer.Option(help="Side of the cells of gas dynamics, m; 0.5 unless given.")
-    ] = None,
-    processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 1,
+    cell: CellSide = None,
+    processes: Processes = 1,
     cluster: ClusterAddress = None,
     start_from: Annotated[
         list[Path] | None, typer.Option(help="Layout file to begin with; more than one will do.")
@@ -237,11 +259,9 @@ def search(
     held_out: Annotated[
         int, typer.Option(min=1, help="Threats that the result is checked on at the end.")
     ] = 32,
-    cache: Annotated[
-        Path | None, typer.Option(help="Folder in which blasts are kept for the next run.")
-    ] = None,
+    cache: CacheFolder = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for layout, history, front and figure.")
+        Path | None, typer.Option(help="Folder for layout, its plan, history, front and figure.")
     ] = None,
 ) -> None:
     """Search for the layout with the least impulse on the protected structures.
@@ -249,7 +269,11 @@ def search(
     Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats that
     the search has not met; those blasts do not count.
     """
-    with user_errors(), running_on(cluster):
+    with (
+        user_errors(lambda: resume_with_cache(cache)),
+        checked_targets(folders={"--out": out, "--cache": cache}),
+        running_on(cluster),
+    ):
         options = SearchOptions(
             method=method,
             scenario=scenario,
@@ -258,22 +282,31 @@ def search(
             threat=threat,
             threats=threats,
             realisations=realisations,
-            charge_position_m=charge_position,
+            charge_position_m=charge,
+            tnt_kg=tnt_kg,
             risk=risk,
             cvar_level=cvar_level,
             engine=engine,
+            cell_m=cell,
             start_from=tuple(str(path) for path in start_from or ()),
         )
         evaluator = BlastEvaluator(load_scenario(scenario), find_engine(engine, cell), cache=cache)
         if out is not None:
             make_folder(out)
         run = _run(options, evaluator, processes)
+        if run.result.interrupted and not run.result.history:
+            raise KeyboardInterrupt  # nothing was found that could be kept
         checked = _check(run, options, held_out)
-        print_search(run, options, checked)
+        print_search(run, checked)
         if out is not None:
             write_search(run, options, checked, out)
     if run.result.interrupted:
-        message_console().print("interrupted: the best layout so far was kept", style="yellow")
+        layout = None if out is None else out / LAYOUT_NAME
+        show_interruption(
+            "the best layout so far was kept",
+            "" if layout is None else f"--start-from {layout} begins with it",
+            resume_with_cache(cache),
+        )
         raise typer.Exit(130)
 
 
@@ -282,7 +315,7 @@ def _run(options: SearchOptions, evaluator: BlastEvaluator, processes: int) -> S
     initial = tuple(load_layout(path, scenario) for path in options.start_from)
     method = find_search_method(options.method, initial)
     problem = LayoutProblem(evaluator, _practice(scenario, options, evaluator.engine), processes)
-    problem.unprotected_pa_s  # noqa: B018  # refuses a case in which nothing arrives
+    problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
     hits, begun_s = evaluator.cache_hits, perf_counter()
     result = _with_progress(method, problem, options)
     return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)
@@ -296,19 +329,16 @@ def _practice(scenario: Scenario, options: SearchOptions, engine: Engine) -> Cas
     if not isinstance(model, HiddenThreat):
         charge = _visible_charge(scenario, options)
         return practice_visible(scenario, charge, realisations, options.seed, risk)
-    if options.charge_position_m is not None:
-        raise BlastEnvError("--charge-position is for a visible threat: a hidden one is drawn")
+    for option, value in (("--charge", options.charge_position_m), ("--tnt-kg", options.tnt_kg)):
+        if value is not None:
+            raise BlastEnvError(f"{option} is for a visible threat: a hidden one is drawn")
     return practice_hidden(scenario, model.threats, realisations, options.seed, risk)
 
 
 def _visible_charge(scenario: Scenario, options: SearchOptions) -> AnyCharge:
     """Return the charge that is known: always that of the search's own seed."""
-    charge = scenario.sample_charge(np.random.default_rng(options.seed))
-    if options.charge_position_m is None:
-        return charge
-    moved = Charge(options.charge_position_m, charge.tnt_kg, charge.height_m)
-    scenario.with_charge(moved)  # refuses a place that is not clear
-    return moved
+    drawn = scenario.sample_charge(np.random.default_rng(options.seed))
+    return fixed_charge(scenario, drawn, options.charge_position_m, options.tnt_kg)
 
 
 def _with_progress(

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from blast_env.cli.cluster import ClusterAddress, running_on
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.cli.options import CellSide
+from blast_env.cli.output import engine_text, print_line, progress_bar, user_errors
+from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 
 if TYPE_CHECKING:
@@ -19,7 +21,8 @@ _DEFAULT_SCENARIO: Final = "courtyard"
 
 def train(
     algo: Annotated[
-        str | None, typer.Option(help="ppo or maskable_ppo.", show_default=_DEFAULT_ALGORITHM)
+        str | None,
+        typer.Option(help="ppo, maskable_ppo or self_labelling.", show_default=_DEFAULT_ALGORITHM),
     ] = None,
     scenario: Annotated[
         str | None,
@@ -29,13 +32,23 @@ def train(
         ),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(min=1, help="Steps, a module each; else as the YAML file says.")
+        int | None,
+        typer.Option(
+            min=1,
+            help="Steps, a module each (of self_labelling, a layout that meets a threat each); "
+            "else as the YAML file says.",
+        ),
     ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Decides everything.", show_default="0")
     ] = None,
     envs: Annotated[
-        int | None, typer.Option(min=1, help="Parallel environments; else as the YAML file says.")
+        int | None,
+        typer.Option(
+            min=1,
+            help="Parallel environments (of self_labelling, worker processes); "
+            "else as the YAML file says.",
+        ),
     ] = None,
     run: Annotated[Path | None, typer.Option(help="Folder for the run; new or empty.")] = None,
     threat: Annotated[
@@ -47,6 +60,7 @@ def train(
     engine: Annotated[
         str | None, typer.Option(help="Engine that runs the blasts.", show_default="event")
     ] = None,
+    cell: CellSide = None,
     observation: Annotated[
         str | None,
         typer.Option(
@@ -57,6 +71,12 @@ def train(
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", help="key=value, e.g. ent_coef=0.01; may be given again."),
+    ] = None,
+    start_from: Annotated[
+        Path | None,
+        typer.Option(
+            help="Run folder whose best weights to begin with, of a scenario of this size."
+        ),
     ] = None,
     resume: Annotated[
         Path | None,
@@ -73,11 +93,17 @@ def train(
         "run": run,
         "threat": threat,
         "engine": engine,
+        "cell": cell,
         "observation": observation,
         "set": set_ or None,
+        "start-from": None if start_from is None else str(start_from),
     }
     given = {name: value for name, value in fresh.items() if value is not None}
-    with user_errors(), running_on(cluster):
+    with (
+        user_errors(lambda: _how_to_resume(resume or run)),
+        checked_targets(folders={"--run": run}),
+        running_on(cluster),
+    ):
         if resume is not None:
             result = _resume(resume, scenario, given)
         elif run is None:
@@ -85,6 +111,18 @@ def train(
         else:
             result = _train(run, scenario or _DEFAULT_SCENARIO, given, set_ or [], envs)
     _print_result(result)
+
+
+def _how_to_resume(folder: Path | None) -> str:
+    """Return how an interrupted training goes on."""
+    if folder is None:
+        return ""
+    # Here, because torch takes seconds to start, and is an extra.
+    from blast_agents.training.run_folder import RunFolder
+
+    if RunFolder(folder).is_run:
+        return f"blast-env train --resume {folder} goes on"
+    return "the run had not begun: the same command begins anew"
 
 
 def _resume(folder: Path, scenario: str | None, given: Mapping[str, object]) -> "TrainingResult":
@@ -107,13 +145,16 @@ def _train(
     with import_extra("agents,render", "training"):
         from blast_agents.training import load_hyperparameters, train
         from blast_agents.training.environments import environment_id
-        from blast_agents.training.hyperparameters import HYPERPARAMETER_KEYS, parse_options
+        from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
         from blast_agents.training.run_folder import SETTING_KEYS, settings_from
 
     algorithm = str(given.get("algo", _DEFAULT_ALGORITHM))
-    changes = parse_options(options, [*HYPERPARAMETER_KEYS, *SETTING_KEYS])
+    changes = parse_options(options, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
     names = ("steps", "seed", "threat", "engine", "observation")
     values = {name: given[name] for name in names if name in given}
+    if "cell" in given:
+        values["cell_m"] = given["cell"]
+    values["start_from"] = given.get("start-from")
     if given.get("observation") == "features":  # no planes, which the YAML file's policy looks at
         changes.setdefault("policy", "MlpPolicy")
     values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
@@ -132,6 +173,9 @@ def _print_result(result: "TrainingResult") -> None:
         f"{counters.steps:,} steps, {counters.episodes:,} episodes, {counters.blasts:,} blasts "
         f"in {counters.seconds:,.0f} s"
     )
+    settings = result.configuration.settings
+    scenario = folder.scenario(result.configuration)
+    print_line(engine_text(settings.blast_engine, [scenario]))
     for row in result.progress.evaluations:
         if row.steps == counters.best_steps:
             print_line(

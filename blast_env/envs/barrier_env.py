@@ -38,14 +38,13 @@ from blast_env.envs.strategies import (
     scenario_source,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.comparison import CVAR_LEVEL
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.evaluation.store import BlastCache
 from blast_env.geometry import Cell, Element
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
 from blast_env.scenario import AnyScenario, Placement
-from blast_env.statistics import Risk
+from blast_env.statistics import CVAR_LEVEL, Risk
 
 
 class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
@@ -92,10 +91,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     `info["reward_terms"]`:
 
     - `impulse`: over an episode, minus the calibrated impulse per area of the protected
-      structures, times their weights, added up. `reward="terminal"` pays it when the charge goes
-      off. With `"incremental"` the first step pays -I(no barrier) (with the option `layout`, of
-      that layout), and a module earns I(before) - I(after) at once; the sum over an episode is
-      the same (not if it is discounted), for a set of blasts a module.
+      structures, times their weights, added up. Where the scenario's objective counts peaks, the
+      term is `peak` (psi), and where it counts both, `load` (no unit). `reward="terminal"` pays it
+      when the charge goes off. With `"incremental"` the first step pays -I(no barrier) (with the
+      option `layout`, of that layout), and a module earns I(before) - I(after) at once; the sum
+      over an episode is the same (not if it is discounted), for a set of blasts a module.
     - `deposit`, with `"terminal"`: the first step pays -2 I(no barrier), which comes back when
       the charge goes off.
     - `illegal_actions`: an illegal action changes nothing, is counted in
@@ -109,9 +109,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     No module stands. The scenario's distribution gives position and mass of the charge:
     `threat="visible"` draws one, which the observation shows; `threat="hidden"` draws `threats` of
     them, the observation shows only where charges may be, and the impulse is that of one layout
-    against all, as their mean or CVaR (`risk`). Each charge goes off `realisations` times, with
-    other seeds of fan and air; the impulse is the mean. Charges and seeds follow from the seed of
-    `reset` alone, so that with one seed all layouts meet the same blasts.
+    against all, as their mean, CVaR or worst (`risk`). Each charge goes off `realisations` times,
+    with other seeds of fan and air; the impulse is the mean. Charges and seeds follow from the seed
+    of `reset` alone, so that with one seed all layouts meet the same blasts.
 
     The charge of a vehicle is the exception: it goes off at the worst place that the layout lets
     the vehicle reach, without a barrier at the worst place of the empty site; of several threats of
@@ -130,8 +130,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     ## Information
     Always `action_mask` and `illegal_actions`; after a step `reward_terms`; at the end
     `impulse_psi_s`, `impulse_pa_s` and `impulse_sim` (simulation units), as the reward counts
-    them; `unprotected_impulse_pa_s`, the same blasts without a barrier, and `reduction`, the share
-    that the layout takes off it (NaN if nothing arrives without a barrier); `layout`,
+    them; `unprotected_impulse_pa_s`, the same blasts without a barrier; `peak_pa` and
+    `unprotected_peak_pa`, the largest overpressures (NaN for particles); `reduction`, the share
+    that the layout takes off what counts (NaN if nothing arrives without a barrier); `layout`,
     `scenario_hash`, `charges` (position, kg TNT, height; a vehicle's where the layout let it come)
     and `blast_seeds` (a tuple a charge) to repeat the blasts; `calibration` and
     `calibration_in_range`; `blasts`, `cache_hits` (loads that needed no blast) and
@@ -147,9 +148,10 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     - `threats`: how many charges are drawn when they are hidden; 16 unless given.
     - `realisations`: blasts for each charge; 2 unless given, and 1 where charges are hidden, since
       these differ anyway.
-    - `risk`: `"mean"`, `"cvar"`, or a `Risk` (`blast_env.statistics`).
+    - `risk`: `"mean"`, `"cvar"`, `"worst"`, or a `Risk` (`blast_env.statistics`); as the scenario's
+      objective says unless given.
     - `cvar_level`: the worst share 1 - `cvar_level` of the charges makes the CVaR.
-    - `illegal_action_cost`: psi s; 0.001, or 6.9 Pa s, unless given.
+    - `illegal_action_cost`: in the unit of the reward; 0.001 (psi s: 6.9 Pa s) unless given.
     - `illegal_action_limit`: illegal actions that end the episode; 100 unless given.
     - `engine`: name of an engine, or an engine. `"event"` and `"pymunk"` run the particle model:
       for studying it, for learning methods cheaply, for a first look. `"gas"` (id
@@ -226,7 +228,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         threat: str | ThreatModel = "visible",
         threats: int | None = None,
         realisations: int | None = None,
-        risk: str | Risk = "mean",
+        risk: str | Risk | None = None,
         cvar_level: float = CVAR_LEVEL,
         illegal_action_cost: float = 0.001,
         illegal_action_limit: int = 100,

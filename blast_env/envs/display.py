@@ -245,8 +245,8 @@ def _shown_threat(episode: Episode) -> Threat:
     """Return the worst threat, with its first realisation."""
     objective = episode.objective
     case = objective.case
-    impulses = np.array(objective.impulses_pa_s(episode.placement.layout))
-    of_charges = impulses.reshape(case.realisations, -1).mean(axis=0)
+    loads = np.array(objective.counted_loads(episode.placement.layout))
+    of_charges = loads.reshape(case.realisations, -1).mean(axis=0)
     return case.threats[int(of_charges.argmax())]
 
 
@@ -266,10 +266,11 @@ def _outcome(episode: Episode) -> str:
     protected, unprotected = episode.assess()
     reduction_percent = 100.0 * protected.reduction_from(unprotected)
     of_all = "all charges: " if len(episode.objective.case.charges) > 1 else ""
-    return (
-        f"{of_all}{protected.impulse_psi_s:.3g} psi s ({protected.impulse_pa_s:.3g} Pa s),"
-        f" reduction {reduction_percent:.0f} %"
-    )
+    load = f"{protected.impulse_psi_s:.3g} psi s ({protected.impulse_pa_s:.3g} Pa s)"
+    counts = episode.objective.case.scenario.objective
+    if counts.needs_peaks:
+        load = f"{load}, {counts.noun} {counts.text(counts.in_si(protected.counted))}"
+    return f"{of_all}{load}, reduction {reduction_percent:.0f} %"
 
 
 def _state_lines(episode: Episode) -> list[str]:

@@ -39,7 +39,7 @@ from blast_env.physics.engine import Engine
 from blast_env.physics.engines import is_gas
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.scenario.build_scene import charge_against
-from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk
+from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 
 ILLEGAL_TERM: Final = "illegal_actions"
 """The name of the reward term for illegal actions."""
@@ -50,7 +50,7 @@ class IllegalActions:
     """What illegal actions lead to.
 
     Attributes:
-        cost: What each one costs, psi*s.
+        cost: What each one costs, in the unit of the reward.
         limit: After so many of them the episode ends as if finished.
     """
 
@@ -168,6 +168,8 @@ class Episode:
             "impulse_psi_s": protected.impulse_psi_s,
             "impulse_pa_s": protected.impulse_pa_s,
             "unprotected_impulse_pa_s": unprotected.impulse_pa_s,
+            "peak_pa": protected.peak_pa,
+            "unprotected_peak_pa": unprotected.peak_pa,
             "reduction": protected.reduction_from(unprotected),
             "layout": self.placement.layout,
             "scenario_hash": self.observable.scenario.content_hash,
@@ -214,7 +216,7 @@ class Task:
         source: Gives each episode its scenario.
         threat_model: Draws the charges of an episode.
         realisations: Blasts for each charge, with different fan and air.
-        risk: How the impulses of several charges become one.
+        risk: How the loads of several charges become one; as the scenario says if `None`.
         observation: What is seen.
         evaluators: Run the blasts.
     """
@@ -222,7 +224,7 @@ class Task:
     source: ScenarioSource
     threat_model: ThreatModel
     realisations: int
-    risk: Risk
+    risk: Risk | None
     observation: Observation
     evaluators: Evaluators
 
@@ -301,13 +303,19 @@ def find_realisations(realisations: int | None, threat: str | ThreatModel, engin
     return whole_number("realisations", realisations, 1, 1000)
 
 
-def find_risk(risk: str | Risk, cvar_level: float) -> Risk:
-    """Return the risk measure for the arguments `risk` and `cvar_level`.
+def find_risk(risk: str | Risk | None, cvar_level: float) -> Risk | None:
+    """Return the risk measure for the arguments `risk` and `cvar_level`; `None` for none.
 
     Raises:
         UnknownNameError: If there is no risk measure of that name.
         BlastEnvError: If the level is no number or out of bounds.
     """
     level = real_number("cvar_level", cvar_level, 0.0, 1.0)
-    measures: dict[str, Risk] = {"mean": MeanRisk(), "cvar": ConditionalValueAtRisk(level)}
+    if risk is None:
+        return None
+    measures: dict[str, Risk] = {
+        "mean": MeanRisk(),
+        "cvar": ConditionalValueAtRisk(level),
+        "worst": WorstRisk(),
+    }
     return strategy("risk", risk, measures)

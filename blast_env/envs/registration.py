@@ -12,6 +12,12 @@ BARRIER_ENTRY_POINT: Final = "blast_env.envs.barrier_env:BlastBarrierEnv"
 WITHOUT_BUILD_ZONE: Final = frozenset({"free_field"})
 """Bundled scenarios in which nothing can be placed; named here, since loading all takes time."""
 
+FOR_GAS: Final = frozenset(
+    {"control_room", "hotel_forecourt", "school_and_clinic", "shopping_street", "visitor_entrance"}
+)
+"""Bundled scenarios with heights and a catalogue, which have no calibration: their environments are
+of gas dynamics."""
+
 
 def barrier_id(scenario_name: str) -> str:
     """Return the id of the environment of a bundled scenario: `BlastBarrier/PerimeterGate-v0`."""
@@ -32,7 +38,8 @@ def register_environments() -> None:
     _register_barrier("BlastBarrierSites-v0", scenario=SITES)
     for name in bundled_scenarios():
         if name not in WITHOUT_BUILD_ZONE:
-            _register_barrier(barrier_id(name), scenario=name)
+            engine = {"engine": "gas"} if name in FOR_GAS else {}
+            _register_barrier(barrier_id(name), scenario=name, **engine)
 
 
 def _register_barrier(environment_id: str, **arguments: str) -> None:

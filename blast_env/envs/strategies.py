@@ -186,6 +186,11 @@ class Transition:
     ended: bool
     objective: Objective
 
+    @property
+    def term(self) -> str:
+        """Name of the reward's term for the load: `impulse`, `peak` or `load`."""
+        return self.objective.case.scenario.objective.term
+
 
 class Reward(Protocol):
     """Pays for an action, in named terms.
@@ -203,13 +208,15 @@ class Reward(Protocol):
 
 
 DEPOSIT: Final = 2.0
-"""Times the impulse without a barrier: more than any layout lets through; measured by
+"""Times the load without a barrier: more than any layout lets through; measured by
 `python -m scripts.layouts deposit`."""
 
 
 @dataclass(frozen=True)
 class TerminalReward:
-    """Minus the impulse of the whole layout, paid when the charge goes off.
+    """Minus the load with the whole layout, paid when the charge goes off.
+
+    The load is what the scenario's objective counts: the impulse unless it says otherwise.
 
     The first action also pays a deposit, which comes back when the charge goes off: an episode that
     is cut off before loses it. It is more than any layout lets through, so that to finish always
@@ -217,36 +224,39 @@ class TerminalReward:
     """
 
     def __call__(self, transition: Transition) -> Mapping[str, float]:
-        """Return the terms `impulse`, 0 before the end, and `deposit`, 0 in between; psi*s."""
+        """Return the term of the load, 0 before the end, and `deposit`, 0 in between.
+
+        The load's is named `impulse` (psi s), `peak` (psi) or `load` (both, without a unit).
+        """
         assess = transition.objective.assess
-        impulse = deposit = 0.0
+        load = deposit = 0.0
         if transition.begins != transition.ended:
-            deposit = DEPOSIT * assess(()).impulse_psi_s
+            deposit = DEPOSIT * assess(()).counted
         if transition.ended:
-            impulse = -assess(transition.after).impulse_psi_s
-        return {"impulse": impulse, "deposit": deposit if transition.ended else -deposit}
+            load = -assess(transition.after).counted
+        return {transition.term: load, "deposit": deposit if transition.ended else -deposit}
 
 
 @dataclass(frozen=True)
 class IncrementalReward:
-    """What each module takes off the impulse, paid at once; a set of blasts per module.
+    """What each module takes off the load, paid at once; a set of blasts per module.
 
-    A placement earns I(before) - I(after). The first action also pays -I(initial), the impulse of
-    the layout at `reset`, which is the one without a barrier unless an option says otherwise. So
-    what has been paid is at any time minus the impulse with what stands: what finishing would come
-    to, and over an episode the sum of `TerminalReward`.
+    A placement earns I(before) - I(after), where I is what the scenario's objective counts. The
+    first action also pays -I(initial), the load with the layout at `reset`, which is the one
+    without a barrier unless an option says otherwise. So what has been paid is at any time minus
+    the load with what stands: what finishing would come to, and over an episode the sum of
+    `TerminalReward`.
     """
 
     def __call__(self, transition: Transition) -> Mapping[str, float]:
-        """Return the term `impulse`, psi*s."""
-        impulse = 0.0
+        """Return the term of the load, named as by `TerminalReward`."""
+        load = 0.0
         assess = transition.objective.assess
         if transition.after != transition.before:
-            before, after = assess(transition.before), assess(transition.after)
-            impulse += before.impulse_psi_s - after.impulse_psi_s
+            load += assess(transition.before).counted - assess(transition.after).counted
         if transition.begins:
-            impulse -= assess(transition.initial).impulse_psi_s
-        return {"impulse": impulse}
+            load -= assess(transition.initial).counted
+        return {transition.term: load}
 
 
 REWARDS: Final[Mapping[str, Reward]] = MappingProxyType(

@@ -2,7 +2,6 @@
 
 from blast_env.evaluation.cases import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.comparison import (
-    CVAR_LEVEL,
     Assessment,
     Comparison,
     Objective,
@@ -18,6 +17,7 @@ from blast_env.evaluation.report import (
 )
 from blast_env.evaluation.store import BlastCache, BlastKey, DiskCache, LoadsCache
 from blast_env.statistics import (
+    CVAR_LEVEL,
     Estimate,
     conditional_value_at_risk,
     mean_estimate,

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,10 +132,6 @@ class SeedRange(Enum):
         return [self.value.start + int(each) for each in drawn]
 
 
-MEAN: Final = MeanRisk()
-"""All charges count alike: the risk measure unless another is given."""
-
-
 @dataclass(frozen=True, eq=False)
 class Case:
     """What layouts are held against each other on: a scenario and the threats that each meets.
@@ -150,7 +145,8 @@ class Case:
             charge, then another of each, and so on: threat k is of charge k modulo the number of
             charges.
         realisations: How many threats there are of each charge.
-        risk: How the impulses of several charges become one.
+        risk: How the loads of several charges become one; as the scenario's objective says
+            unless given.
         charge: The charge, where whoever proposes a layout is told it; `None` where it is hidden.
         name: For people.
         seed: Decides what a search or a random layout draws.
@@ -164,7 +160,7 @@ class Case:
     scenario: ScenarioField = ScenarioField()
     threats: tuple[Threat, ...]  # type: ignore[misc]  # a scenario has no default
     realisations: int = 1
-    risk: Risk = MEAN
+    risk: Risk | None = None
     charge: AnyCharge | None = None
     name: str = ""
     seed: int = 0
@@ -195,20 +191,26 @@ class Case:
         count = max(len(self.threats) // self.realisations, 1)
         return tuple(threat.charge for threat in self.threats[:count])
 
-    def combined(self, impulses: Sequence[float] | FloatArray) -> float:
-        """Return the one impulse that counts: the mean per charge, then the risk over the charges.
+    @property
+    def is_mean(self) -> bool:
+        """Whether all charges count alike."""
+        return isinstance(self.risk or self.scenario.objective.risk, MeanRisk)
+
+    def combined(self, loads: Sequence[float] | FloatArray) -> float:
+        """Return the one load that counts: the mean per charge, then the risk over the charges.
 
         Args:
-            impulses: One a threat, in their order; at least one, perhaps only the first ones.
+            loads: One a threat, in their order; at least one, perhaps only the first ones.
         """
-        values = np.asarray(impulses, dtype=np.float64)
+        values = np.asarray(loads, dtype=np.float64)
         count = min(len(self.charges), len(values))
         means = [float(values[index :: len(self.charges)].mean()) for index in range(count)]
-        return self.risk(np.array(means))
+        risk = self.risk or self.scenario.objective.risk
+        return risk(np.array(means))
 
 
 def visible_case(
-    scenario: AnyScenario, charge: AnyCharge, seeds: Sequence[int], risk: Risk = MEAN
+    scenario: AnyScenario, charge: AnyCharge, seeds: Sequence[int], risk: Risk | None = None
 ) -> Case:
     """Return the case of a known charge: it goes off once a seed, with another fan and air."""
     threats = tuple(Threat(charge, seed) for seed in seeds)
@@ -220,7 +222,7 @@ def practice_visible(
     charge: AnyCharge,
     realisations: int,
     seed: int,
-    risk: Risk = MEAN,
+    risk: Risk | None = None,
 ) -> Case:
     """Return what a search for a known charge may spend its blasts on.
 
@@ -240,7 +242,7 @@ def practice_visible(
 
 
 def practice_hidden(
-    scenario: AnyScenario, charges: int, realisations: int, seed: int, risk: Risk = MEAN
+    scenario: AnyScenario, charges: int, realisations: int, seed: int, risk: Risk | None = None
 ) -> Case:
     """Return what a search for a hidden charge may spend its blasts on.
 

@@ -8,7 +8,6 @@ comparison that is to say how good layouts are is refused for a case in which no
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from blast_env.evaluation.loads import BlastLoads
 from blast_env.geometry import Element, Layout
 from blast_env.scenario import check_layout
 from blast_env.statistics import (
+    CVAR_LEVEL,
     Estimate,
     check_cvar_level,
     conditional_value_at_risk,
@@ -29,13 +29,10 @@ from blast_env.statistics import (
 )
 from blast_env.units import PA_PER_PSI
 
-CVAR_LEVEL: Final = 0.8
-"""The mean of the worst 20 % of the threats."""
-
 
 @dataclass(frozen=True)
 class Assessment:
-    """The impulse on the protected structures with one layout.
+    """The load on the protected structures with one layout.
 
     Each is the mean over the realisations of a charge, then by the risk measure over the charges.
 
@@ -43,11 +40,16 @@ class Assessment:
         impulse_psi_s: Calibrated impulses per area of the protected structures, by weight, added
             up, psi*s.
         impulse_sim: The same in simulation units.
+        peak_pa: The largest overpressure on their walls, Pa; NaN for particles.
+        counted: What the scenario's objective counts, as rewards are paid: psi s for impulses,
+            psi for peaks, without a unit for both.
         in_range: Whether the calibration was made for every one of the blasts.
     """
 
     impulse_psi_s: float
     impulse_sim: float
+    peak_pa: float
+    counted: float
     in_range: bool
 
     @property
@@ -56,8 +58,8 @@ class Assessment:
         return self.impulse_psi_s * PA_PER_PSI
 
     def reduction_from(self, unprotected: "Assessment") -> float:
-        """Return by which share the impulse is below that without a barrier; NaN if that is 0."""
-        return reductions(self.impulse_psi_s, unprotected.impulse_psi_s).item()
+        """Return by which share what counts is below that without a barrier; NaN if that is 0."""
+        return reductions(self.counted, unprotected.counted).item()
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +88,13 @@ class Objective:
         """
         key = tuple(sorted(layout))
         if key not in self._assessed:
-            loads = self.loads(key)
+            loads, combined = self.loads(key), self.case.combined
+            counts = self.case.scenario.objective
             self._assessed[key] = Assessment(
-                impulse_psi_s=self.case.combined([each.protected_impulse_psi_s for each in loads]),
-                impulse_sim=self.case.combined([each.protected_impulse_sim for each in loads]),
+                impulse_psi_s=combined([each.protected_impulse_psi_s for each in loads]),
+                impulse_sim=combined([each.protected_impulse_sim for each in loads]),
+                peak_pa=combined([each.protected_peak_pa for each in loads]),
+                counted=combined([each.counted(counts) for each in loads]),
                 in_range=all(each.in_range for each in loads),
             )
         return self._assessed[key]
@@ -103,28 +108,30 @@ class Objective:
         pairs = [(layout, threat) for threat in self.case.threats]
         return self.evaluator.loads_of_many(pairs, self.processes)
 
-    def impulses_pa_s(self, layout: Sequence[Element]) -> tuple[float, ...]:
-        """Return the impulse on the protected structures with a layout, Pa*s, one a threat."""
-        return tuple(each.protected_impulse_pa_s for each in self.loads(layout))
+    def counted_loads(self, layout: Sequence[Element]) -> tuple[float, ...]:
+        """Return the load that counts with a layout, in the objective's unit, one a threat."""
+        counts = self.case.scenario.objective
+        return tuple(each.load(counts) for each in self.loads(layout))
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """Layouts, one a case, against no barrier on the same threats.
 
-    Where there are several cases, each counts alike: a case's reduction is 1 - mean impulse with
-    the barrier / without it over its threats, and the intervals are those of the mean over cases.
-    With a single case they are those over its threats. Intervals are 95 % confidence intervals;
-    they say nothing about how right the model is.
+    Where there are several cases, each counts alike: a case's reduction is 1 - load with the
+    barrier / without it, each as the case combines its threats (the mean, unless the scenario's
+    objective says otherwise), and the intervals are those of the mean over cases. With a single
+    case they are those over its threats, and there is none for CVaR and worst. Intervals are 95 %
+    confidence intervals; they say nothing about how right the model is.
 
     Attributes:
         cases: The cases; each has as many threats.
         layouts: One a case.
-        impulse_pa_s: On the protected structures with the layouts, Pa*s (cases, threats); see
-            `BlastLoads.protected_impulse_pa_s`.
-        unprotected_pa_s: The same without a barrier, Pa*s (cases, threats).
+        loads: On the protected structures with the layouts, in the unit of the objective
+            (cases, threats); see `BlastLoads.load`.
+        unprotected: The same without a barrier (cases, threats).
         in_range: Whether the calibration was made for it (cases, threats); all, unless given.
-        cvar_level: Level of `cvar_pa_s`: 0.8 is the mean of the worst 20 %.
+        cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
 
     Raises:
         BlastEnvError: If nothing arrives at the protected structures of a case without a barrier.
@@ -132,15 +139,15 @@ class Comparison:
 
     cases: tuple[Case, ...]
     layouts: tuple[Layout, ...]
-    impulse_pa_s: FloatArray
-    unprotected_pa_s: FloatArray
+    loads: FloatArray
+    unprotected: FloatArray
     in_range: BoolArray
     cvar_level: float = CVAR_LEVEL
 
     def __post_init__(self) -> None:
         """Check that there is something to reduce."""
         check_cvar_level(self.cvar_level)
-        check_something_arrives(self.cases, self.unprotected_pa_s)
+        check_something_arrives(self.cases, self.unprotected)
 
     @property
     def has_one_case(self) -> bool:
@@ -150,13 +157,15 @@ class Comparison:
     @cached_property
     def case_reductions(self) -> FloatArray:
         """The reduction in each case (cases,)."""
-        return reductions(self.impulse_pa_s.mean(axis=1), self.unprotected_pa_s.mean(axis=1))
+        return reductions(self._of_cases(self.loads), self._of_cases(self.unprotected))
 
     @cached_property
     def reduction(self) -> Estimate:
         """The mean reduction with its 95 % interval."""
+        if self.has_one_case and self.cases[0].is_mean:
+            return reduction_estimate(self.loads[0], self.unprotected[0])
         if self.has_one_case:
-            return reduction_estimate(self.impulse_pa_s[0], self.unprotected_pa_s[0])
+            return Estimate(float(self.case_reductions[0]), np.nan, np.nan)
         value, low, high = mean_estimate(self.case_reductions)
         return Estimate(value, low, min(high, 1.0))  # no reduction is above 1
 
@@ -166,10 +175,10 @@ class Comparison:
         Args:
             other: Other layouts on the same cases.
         """
-        if self.has_one_case:
+        if self.has_one_case and self.cases[0].is_mean:
             # As a reduction: of what is left if all that this takes off more is taken off.
-            bare = self.unprotected_pa_s[0]
-            left = bare + self.impulse_pa_s[0] - other.impulse_pa_s[0]
+            bare = self.unprotected[0]
+            left = bare + self.loads[0] - other.loads[0]
             return reduction_estimate(left, bare)
         return mean_estimate(self.case_reductions - other.case_reductions)
 
@@ -181,32 +190,35 @@ class Comparison:
         """
         if not self.has_one_case:
             return float(self.case_reductions.min())
-        return float(np.nanmin(reductions(self.impulse_pa_s[0], self.unprotected_pa_s[0])))
+        return float(np.nanmin(reductions(self.loads[0], self.unprotected[0])))
 
     @property
-    def mean_pa_s(self) -> Estimate:
-        """Mean impulse with the layouts, Pa*s."""
-        return mean_estimate(self._samples(self.impulse_pa_s))
+    def mean(self) -> Estimate:
+        """Mean load with the layouts, in the unit of the objective."""
+        return mean_estimate(self._samples(self.loads))
 
     @property
-    def unprotected_mean_pa_s(self) -> Estimate:
-        """Mean impulse without a barrier, Pa*s."""
-        return mean_estimate(self._samples(self.unprotected_pa_s))
+    def unprotected_mean(self) -> Estimate:
+        """Mean load without a barrier, likewise."""
+        return mean_estimate(self._samples(self.unprotected))
 
     @property
-    def cvar_pa_s(self) -> float:
-        """Mean impulse of the worst cases (threats of a single one) with the layouts, Pa*s."""
-        return conditional_value_at_risk(self._samples(self.impulse_pa_s), self.cvar_level)
+    def cvar(self) -> float:
+        """Mean load of the worst cases (threats of a single one) with the layouts, likewise."""
+        return conditional_value_at_risk(self._samples(self.loads), self.cvar_level)
 
     @property
-    def unprotected_cvar_pa_s(self) -> float:
-        """The same without a barrier, Pa*s."""
-        return conditional_value_at_risk(self._samples(self.unprotected_pa_s), self.cvar_level)
+    def unprotected_cvar(self) -> float:
+        """The same without a barrier."""
+        return conditional_value_at_risk(self._samples(self.unprotected), self.cvar_level)
 
-    def _samples(self, impulse_pa_s: FloatArray) -> FloatArray:
+    def _samples(self, loads: FloatArray) -> FloatArray:
         """Return what means and tails are over: the cases, or the threats of a single one."""
-        samples: FloatArray = impulse_pa_s[0] if self.has_one_case else impulse_pa_s.mean(axis=1)
-        return samples
+        return loads[0] if self.has_one_case else self._of_cases(loads)
+
+    def _of_cases(self, loads: FloatArray) -> FloatArray:
+        """Return the load that counts in each case (cases,)."""
+        return np.array([case.combined(row) for case, row in zip(self.cases, loads, strict=True)])
 
 
 def compare(
@@ -246,8 +258,8 @@ def compare(
     return Comparison(
         cases=tuple(cases),
         layouts=tuple(cells),
-        impulse_pa_s=_impulses([protected for protected, _ in blasts]),
-        unprotected_pa_s=_impulses([bare for _, bare in blasts]),
+        loads=_counted(cases, [protected for protected, _ in blasts]),
+        unprotected=_counted(cases, [bare for _, bare in blasts]),
         in_range=np.array([[load.in_range for load in protected] for protected, _ in blasts]),
         cvar_level=cvar_level,
     )
@@ -276,7 +288,7 @@ def check_something_arrives(cases: Sequence[Case], unprotected: FloatArray) -> N
 
     Args:
         cases: The cases.
-        unprotected: Impulse on the protected structures without a barrier (cases, threats).
+        unprotected: Load on the protected structures without a barrier (cases, threats).
 
     Raises:
         BlastEnvError: If it is 0 under every threat of a case; the message says of which.
@@ -331,5 +343,10 @@ def _runs_of_one_scenario(cases: Sequence[Case]) -> Iterator[tuple[int, int]]:
             first = index
 
 
-def _impulses(loads: Sequence[Sequence[BlastLoads]]) -> FloatArray:
-    return np.array([[each.protected_impulse_pa_s for each in of_case] for of_case in loads])
+def _counted(cases: Sequence[Case], loads: Sequence[Sequence[BlastLoads]]) -> FloatArray:
+    return np.array(
+        [
+            [each.load(case.scenario.objective) for each in of_case]
+            for case, of_case in zip(cases, loads, strict=True)
+        ]
+    )

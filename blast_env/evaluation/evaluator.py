@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from blast_env.calibration.model import Calibration, scenario_calibration
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.loads import BlastLoads, blast_loads, gas_loads
 from blast_env.evaluation.store import (
@@ -56,7 +57,8 @@ class BlastEvaluator:
         CalibrationError: If the scenario names no calibration, or one that was made with other
             parameters or another engine.
         UnknownNameError: If there is no such engine or calibration.
-        BlastEnvError: If the cache size is negative, or `cache` is of no use.
+        BlastEnvError: If the cache size is negative, `cache` is of no use, or the scenario's
+            objective counts peaks and the engine has none.
     """
 
     def __init__(
@@ -69,7 +71,14 @@ class BlastEvaluator:
         self.scenario = find_scenario(scenario)
         self.engine = find_engine(engine)
         self.calibration: Calibration | None = None
+        if self.scenario.objective.needs_peaks and not is_gas(self.engine):
+            raise BlastEnvError(
+                f"scenario {self.scenario.name!r}: objective.quantity is"
+                f" {self.scenario.objective.quantity!r}, but engine {self.engine.name!r} knows no"
+                " overpressure: must be 'impulse', or the engine 'gas'"
+            )
         if not is_gas(self.engine):
+            self.scenario.check_for_particles()
             self.calibration = scenario_calibration(self.scenario, self.engine.name)
         self.blasts = 0
         self.cache_hits = 0

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from blast_env.calibration.model import Calibration
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scenario import AnyScenario, find_scenario
+from blast_env.scenario import AnyScenario, AnyStructure, ObjectiveSection, find_scenario
 from blast_env.simulation import BlastResult
 from blast_env.units import PA_PER_PSI
 
@@ -27,6 +27,8 @@ class StructureLoad:
         impulse_sim: Sum of m |v| over the collisions, simulation units.
         transferred_impulse_sim: Momentum really transferred, simulation units.
         impulse_psi_s: Calibrated impulse per area, psi*s.
+        peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which know none.
+        peak_weight: How much that counts among the protected structures.
         in_range: Whether the calibration was made for this distance and charge.
         notes: Why not, a sentence each.
     """
@@ -37,6 +39,8 @@ class StructureLoad:
     impulse_sim: float
     transferred_impulse_sim: float
     impulse_psi_s: float
+    peak_pa: float | None
+    peak_weight: float
     in_range: bool
     notes: tuple[str, ...]
 
@@ -92,6 +96,29 @@ class BlastLoads:
         return sum(load.weight * load.impulse_sim for load in self.protected)
 
     @property
+    def protected_peak_pa(self) -> float:
+        """The largest overpressure on any wall of a protected structure, Pa; NaN for particles."""
+        peaks = [load.peak_pa for load in self.protected]
+        return max((np.nan if peak is None else peak for peak in peaks), default=0.0)
+
+    def counted(self, objective: ObjectiveSection) -> float:
+        """Return the load of the protected structures as rewards are paid: psi s, psi or no unit.
+
+        Args:
+            objective: Says which load counts.
+        """
+        return sum(
+            objective.counted(
+                load.impulse_psi_s, load.peak_pa or 0.0, load.weight, load.peak_weight
+            )
+            for load in self.protected
+        )
+
+    def load(self, objective: ObjectiveSection) -> float:
+        """Return the load of the protected structures in the unit of the objective."""
+        return objective.in_si(self.counted(objective))
+
+    @property
     def in_range(self) -> bool:
         """Whether the calibration was made for this distance to every protected structure."""
         return all(load.in_range for load in self.protected)
@@ -116,6 +143,7 @@ def gas_loads(result: "GasResult") -> BlastLoads:
     """Return the loads of a blast of gas dynamics, which has no simulation units (NaN)."""
     table = result.structures
     structures = []
+    peak_weights = {each.name: _peak_weight(each) for each in result.blast.scenario.structures}
     for row in table.to_dict("records"):
         scaled = result.impulse(row["structure"])
         structures.append(
@@ -126,6 +154,8 @@ def gas_loads(result: "GasResult") -> BlastLoads:
                 impulse_sim=np.nan,
                 transferred_impulse_sim=np.nan,
                 impulse_psi_s=scaled.psi_s,
+                peak_pa=float(row["peak_pa"]),
+                peak_weight=peak_weights[row["structure"]],
                 in_range=scaled.in_range,
                 notes=scaled.notes,
             )
@@ -144,6 +174,13 @@ def _structure_load(
         impulse_sim=obstacle.impulse,
         transferred_impulse_sim=obstacle.transferred_impulse,
         impulse_psi_s=scaled.psi_s,
+        peak_pa=None,
+        peak_weight=obstacle.weight,
         in_range=scaled.in_range,
         notes=scaled.notes,
     )
+
+
+def _peak_weight(structure: AnyStructure) -> float:
+    """Return how much the peak on a structure counts: as much as its impulse unless it says so."""
+    return structure.weight if structure.peak_weight is None else structure.peak_weight

@@ -11,12 +11,9 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from blast_env.arrays import FloatArray
 from blast_env.evaluation.cases import Case, Threat, draw_threats
-from blast_env.evaluation.comparison import (
-    CVAR_LEVEL,
-    Comparison,
-    loads_of_both,
-)
+from blast_env.evaluation.comparison import Comparison, loads_of_both
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastCache
@@ -31,8 +28,11 @@ from blast_env.scenario import AnyScenario, Scenario, check_layout
 from blast_env.scenario.build_scene import build_site
 from blast_env.scenario.vehicles import stand_off_m
 from blast_env.statistics import (
+    CVAR_LEVEL,
     Estimate,
     check_cvar_level,
+    conditional_value_at_risk,
+    mean_estimate,
     reduction_estimate,
     reductions,
 )
@@ -54,6 +54,10 @@ STRUCTURE_COLUMNS: Final = (
     Column("unprotected_impulse_sim", "sim", "sum of m |v| without it"),
     Column("transferred_impulse_sim", "sim", "momentum really transferred with the barrier"),
     Column("unprotected_transferred_impulse_sim", "sim", "momentum transferred without it"),
+    Column(
+        "peak_pa", "Pa", "largest overpressure on its walls with the barrier, mean over threats"
+    ),
+    Column("unprotected_peak_pa", "Pa", "the same without it; particles have none"),
     Column("threats_in_range", "", "threats that the calibration was made for"),
 )
 
@@ -85,7 +89,11 @@ THREAT_COLUMNS: Final = (
     Column("tnt_kg", "kg", "TNT-equivalent mass of the charge"),
     Column("impulse_pa_s", "Pa s", "protected structures, with the barrier"),
     Column("unprotected_impulse_pa_s", "Pa s", "protected structures, without it"),
-    Column("reduction", "", "of that impulse"),
+    Column("peak_pa", "Pa", "largest overpressure on them, with the barrier"),
+    Column("unprotected_peak_pa", "Pa", "the same without it; particles have none"),
+    Column("load", "", "what the scenario's objective counts, with the barrier"),
+    Column("unprotected_load", "", "the same without it"),
+    Column("reduction", "", "of that load"),
     Column("in_range", "", "whether the calibration was made for this threat"),
     Column("stand_off_m", "m", "from the charge to the nearest protected wall, with the barrier"),
     Column("unprotected_stand_off_m", "m", "the same without it: less only for a vehicle"),
@@ -100,9 +108,10 @@ CASE_COLUMNS: Final = (
     Column("charge_height_m", "m", "height of its centre; 0: it lies on the ground"),
     Column("tnt_kg", "kg", "TNT-equivalent mass of its charge"),
     Column("modules", "", "modules, or pieces, of the layout"),
-    Column("impulse_pa_s", "Pa s", "protected structures, with the layout, mean over the threats"),
-    Column("unprotected_impulse_pa_s", "Pa s", "the same without a barrier"),
-    Column("reduction", "", "of that impulse"),
+    Column("load", "", "protected structures, with the layout, over the threats"),
+    Column("unprotected_load", "", "the same without a barrier"),
+    Column("unit", "", "of that load; empty where impulse and peak count together"),
+    Column("reduction", "", "of that load"),
     Column("in_range", "", "whether the calibration was made for every threat"),
 )
 
@@ -142,6 +151,10 @@ def _threat_row(outcome: "ThreatOutcome") -> dict[str, object]:
         "tnt_kg": charge.tnt_kg,
         "impulse_pa_s": outcome.impulse_pa_s,
         "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
+        "peak_pa": outcome.peak_pa,
+        "unprotected_peak_pa": outcome.unprotected_peak_pa,
+        "load": outcome.load,
+        "unprotected_load": outcome.unprotected_load,
         "reduction": outcome.reduction,
         "in_range": outcome.in_range,
         "stand_off_m": outcome.stand_off_m,
@@ -172,6 +185,9 @@ def _structure_row(
     for name in ("impulse_pa_s", "impulse_psi_s", "impulse_sim", "transferred_impulse_sim"):
         for column, each in ((name, loads), (f"unprotected_{name}", bare)):
             row[column] = float(np.mean([getattr(load, name) for load in each]))
+    for column, each in (("peak_pa", loads), ("unprotected_peak_pa", bare)):
+        peaks = [np.nan if load.peak_pa is None else load.peak_pa for load in each]
+        row[column] = float(np.mean(peaks))
     return row
 
 
@@ -213,8 +229,9 @@ def case_table(comparison: Comparison) -> pd.DataFrame:
                 "charge_height_m": charge.height_m,
                 "tnt_kg": charge.tnt_kg,
                 "modules": len(layout),
-                "impulse_pa_s": float(comparison.impulse_pa_s[index].mean()),
-                "unprotected_impulse_pa_s": float(comparison.unprotected_pa_s[index].mean()),
+                "load": case.combined(comparison.loads[index]),
+                "unprotected_load": case.combined(comparison.unprotected[index]),
+                "unit": case.scenario.objective.unit,
                 "reduction": float(comparison.case_reductions[index]),
                 "in_range": bool(comparison.in_range[index].all()),
             }
@@ -240,11 +257,12 @@ def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
         "versions": versions(engine.version),
         "result": {
             "reduction": _estimate(comparison.reduction),
-            "impulse_pa_s": _estimate(comparison.mean_pa_s),
-            "unprotected_impulse_pa_s": _estimate(comparison.unprotected_mean_pa_s),
+            "load": _estimate(comparison.mean),
+            "unprotected_load": _estimate(comparison.unprotected_mean),
+            "unit": comparison.cases[0].scenario.objective.unit,
             "cvar_level": comparison.cvar_level,
-            "cvar_pa_s": comparison.cvar_pa_s,
-            "unprotected_cvar_pa_s": comparison.unprotected_cvar_pa_s,
+            "cvar": comparison.cvar,
+            "unprotected_cvar": comparison.unprotected_cvar,
         },
         "cases": cases,
     }
@@ -260,10 +278,16 @@ def _result(evaluation: "LayoutEvaluation") -> dict[str, Any]:
             evaluation.unprotected_impulse_pa_s.scaled(1.0 / PA_PER_PSI)
         ),
         "cvar_level": evaluation.cvar_level,
-        "cvar_pa_s": evaluation.cvar,
-        "cvar_psi_s": evaluation.cvar / PA_PER_PSI,
-        "unprotected_cvar_pa_s": evaluation.unprotected_cvar,
-        "unprotected_cvar_psi_s": evaluation.unprotected_cvar / PA_PER_PSI,
+        "cvar_pa_s": evaluation.cvar_pa_s,
+        "cvar_psi_s": evaluation.cvar_pa_s / PA_PER_PSI,
+        "unprotected_cvar_pa_s": evaluation.unprotected_cvar_pa_s,
+        "unprotected_cvar_psi_s": evaluation.unprotected_cvar_pa_s / PA_PER_PSI,
+        "objective": {
+            **evaluation.scenario.objective.model_dump(mode="json", exclude_none=True),
+            "unit": evaluation.scenario.objective.unit,
+            "load": evaluation.load,
+            "unprotected_load": evaluation.unprotected_load,
+        },
         "worst": _worst(evaluation.worst),
         "in_range": evaluation.in_range,
     }
@@ -282,6 +306,8 @@ def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
         "tnt_kg": outcome.charge.tnt_kg,
         "impulse_pa_s": outcome.impulse_pa_s,
         "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
+        "load": outcome.load,
+        "unprotected_load": outcome.unprotected_load,
         "reduction": _or_none(outcome.reduction),
         "in_range": outcome.in_range,
     }
@@ -310,6 +336,10 @@ class ThreatOutcome:
         unprotected_stand_off_m: How far it is without the barrier; only a vehicle comes nearer.
         impulse_pa_s: Impulse on the protected structures with the barrier, Pa*s.
         unprotected_impulse_pa_s: The same without it, Pa*s.
+        peak_pa: Largest overpressure on their walls with the barrier, Pa; NaN for particles.
+        unprotected_peak_pa: The same without it, Pa.
+        load: What the scenario's objective counts, with the barrier, in its unit.
+        unprotected_load: The same without it.
         in_range: Whether the calibration was made for such a threat.
     """
 
@@ -319,12 +349,16 @@ class ThreatOutcome:
     unprotected_stand_off_m: float
     impulse_pa_s: float
     unprotected_impulse_pa_s: float
+    peak_pa: float
+    unprotected_peak_pa: float
+    load: float
+    unprotected_load: float
     in_range: bool
 
     @property
     def reduction(self) -> float:
-        """Share of the impulse that is gone; NaN if there is none without a barrier."""
-        return reductions(self.impulse_pa_s, self.unprotected_impulse_pa_s).item()
+        """Share of the load that is gone; NaN if there is none without a barrier."""
+        return reductions(self.load, self.unprotected_load).item()
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,8 +366,9 @@ class LayoutEvaluation:
     """A layout against no barrier, on the threats of one case.
 
     Impulses are those of `BlastLoads.protected_impulse_pa_s`: per area, by weight, added up over
-    the protected structures. Intervals are 95 % confidence intervals of the mean over all threats
-    that the scenario can draw; they say nothing about how right the model is.
+    the protected structures. Reductions are of the load that the scenario's objective counts, which
+    is that impulse unless it says otherwise. Intervals are 95 % confidence intervals of the mean
+    over all threats that the scenario can draw; they say nothing about how right the model is.
 
     Attributes:
         case: The scenario, and what both were exposed to.
@@ -374,12 +409,13 @@ class LayoutEvaluation:
 
     @cached_property
     def comparison(self) -> Comparison:
-        """The numbers behind all estimates."""
+        """The loads that count, and what they come to."""
+        counts = self.scenario.objective
         return Comparison(
             cases=(self.case,),
             layouts=(self.layout,),
-            impulse_pa_s=np.array([[load.protected_impulse_pa_s for load in self.loads]]),
-            unprotected_pa_s=np.array([[load.protected_impulse_pa_s for load in self.unprotected]]),
+            loads=np.array([[load.load(counts) for load in self.loads]]),
+            unprotected=np.array([[load.load(counts) for load in self.unprotected]]),
             in_range=np.array([[load.in_range for load in self.loads]]),
             cvar_level=self.cvar_level,
         )
@@ -401,13 +437,27 @@ class LayoutEvaluation:
             unprotected_stand_off_m=stand_off_m(scenario.structures, unprotected.position_m),
             impulse_pa_s=load.protected_impulse_pa_s,
             unprotected_impulse_pa_s=bare.protected_impulse_pa_s,
+            peak_pa=load.protected_peak_pa,
+            unprotected_peak_pa=bare.protected_peak_pa,
+            load=load.load(scenario.objective),
+            unprotected_load=bare.load(scenario.objective),
             in_range=load.in_range,
         )
 
     @property
     def reduction(self) -> Estimate:
-        """1 - mean impulse with the barrier / without; see `reduction_estimate`."""
+        """1 - load with the barrier / without; see `Comparison` and `reduction_estimate`."""
         return self.comparison.reduction
+
+    @property
+    def load(self) -> float:
+        """What the scenario's objective makes of all threats, with the barrier, in its unit."""
+        return self.case.combined(self.comparison.loads[0])
+
+    @property
+    def unprotected_load(self) -> float:
+        """The same without the barrier."""
+        return self.case.combined(self.comparison.unprotected[0])
 
     @property
     def mean_reduction(self) -> float:
@@ -421,28 +471,28 @@ class LayoutEvaluation:
 
     @property
     def impulse_pa_s(self) -> Estimate:
-        """Mean impulse with the barrier, Pa*s."""
-        return self.comparison.mean_pa_s
+        """Mean impulse with the barrier, Pa*s, whatever the objective counts."""
+        return mean_estimate(_impulses_pa_s(self.loads))
 
     @property
     def unprotected_impulse_pa_s(self) -> Estimate:
         """Mean impulse without the barrier, Pa*s."""
-        return self.comparison.unprotected_mean_pa_s
+        return mean_estimate(_impulses_pa_s(self.unprotected))
 
     @cached_property
     def worst(self) -> ThreatOutcome:
-        """The threat with the largest impulse in spite of the barrier."""
-        return max(self.outcomes, key=lambda outcome: outcome.impulse_pa_s)
+        """The threat with the largest load in spite of the barrier."""
+        return max(self.outcomes, key=lambda outcome: outcome.load)
 
     @property
-    def cvar(self) -> float:
+    def cvar_pa_s(self) -> float:
         """Mean impulse of the worst threats with the barrier, Pa*s; see `cvar_level`."""
-        return self.comparison.cvar_pa_s
+        return conditional_value_at_risk(_impulses_pa_s(self.loads), self.cvar_level)
 
     @property
-    def unprotected_cvar(self) -> float:
+    def unprotected_cvar_pa_s(self) -> float:
         """Mean impulse of the worst threats without the barrier, Pa*s."""
-        return self.comparison.unprotected_cvar_pa_s
+        return conditional_value_at_risk(_impulses_pa_s(self.unprotected), self.cvar_level)
 
     @cached_property
     def table(self) -> pd.DataFrame:
@@ -503,6 +553,10 @@ class LayoutEvaluation:
         with write_atomically(path) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
         return Path(path)
+
+
+def _impulses_pa_s(loads: Sequence[BlastLoads]) -> FloatArray:
+    return np.array([load.protected_impulse_pa_s for load in loads])
 
 
 def evaluate_layout(

@@ -1,6 +1,6 @@
 """Layouts as files for other programs: JSON, CSV, GeoJSON and DXF."""
 
-from blast_env.export.files import SUFFIXES, check_target, export_layout, export_layouts
+from blast_env.export.files import SUFFIXES, check_target, export_layout, export_layouts, is_file
 from blast_env.export.plan import Feature, FeatureKind, LayoutPlan
 
 __all__ = [
@@ -11,4 +11,5 @@ __all__ = [
     "check_target",
     "export_layout",
     "export_layouts",
+    "is_file",
 ]

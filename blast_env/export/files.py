@@ -204,7 +204,7 @@ def export_layouts(plans: Mapping[str, LayoutPlan], target: str | Path) -> list[
     """
     target = Path(target)
     check_target(target, len(plans))
-    if _is_file(target):
+    if is_file(target):
         return [export_layout(plan, target) for plan in plans.values()]
     make_folder(target)
     return [
@@ -232,15 +232,16 @@ def check_target(target: str | Path, count: int) -> None:
             f"{target}: suffix is {suffix!r}{suggestion(suffix, SUFFIXES)}, must be "
             f"{_named_suffixes()}, or nothing for a folder"
         )
-    if _is_file(target) and count != 1:
+    if is_file(target) and count != 1:
         raise BlastEnvError(
             f"{target}: is one file, but there are {count} layouts: name a folder, without a suffix"
         )
-    if suffix == ".dxf" or not _is_file(target):
+    if suffix == ".dxf" or not is_file(target):
         import_module("blast_env.export.dxf")  # says how to get what is missing
 
 
-def _is_file(target: Path) -> bool:
+def is_file(target: Path) -> bool:
+    """Return whether a target is one file, rather than a folder."""
     return _suffix(target) in SUFFIXES and not target.is_dir()
 
 

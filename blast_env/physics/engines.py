@@ -29,6 +29,9 @@ ENGINE_NAMES: Final = tuple(_CLASSES)
 GAS: Final = "gas"
 """Gas dynamics: no particles, no seed, no calibration."""
 
+STEP_NAMES: Final[Mapping[str, str]] = MappingProxyType({"event": "events"})
+"""What an engine's steps are, for those that do not go by steps of time."""
+
 PARTICLE_ENGINES: Final = tuple(name for name in ENGINE_NAMES if name != GAS)
 """The engines of the particle model; the first one is the reference."""
 

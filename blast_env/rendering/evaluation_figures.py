@@ -193,7 +193,8 @@ def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
 def _title(evaluation: LayoutEvaluation) -> str:
     layout = evaluation.layout
     barrier = layout_counts(layout, "barrier") if layout else "no barrier"
-    reduction = f"reduction of the impulse {_percent(evaluation.mean_reduction)}"
+    noun = evaluation.scenario.objective.noun
+    reduction = f"reduction of the {noun} {_percent(evaluation.mean_reduction)}"
     return f"{evaluation.scenario.name}, {barrier}: {reduction}{_interval(evaluation.reduction)}"
 
 
@@ -204,7 +205,7 @@ def _subtitle(evaluation: LayoutEvaluation) -> str:
     range_note = "" if evaluation.in_range else "; partly outside the calibration's range"
     return (
         f"{count_of('threat', len(evaluation.threats))}; worst: {charge.tnt_kg:g} kg TNT at "
-        f"({x_m:.1f} m, {y_m:.1f} m), {evaluation.worst.impulse_pa_s:,.0f} Pa·s; "
+        f"({x_m:.1f} m, {y_m:.1f} m), {_load_text(evaluation, evaluation.worst.load)}; "
         f"{stand_off and f'{stand_off}; '}"
         f"calibration {evaluation.calibration}, engine {evaluation.engine_name}{range_note}"
     )
@@ -222,38 +223,46 @@ def _interval(reduction: Estimate) -> str:
 
 
 def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
-    """Draw the impulse of each threat without and with the barrier, the worst first."""
-    outcomes = sorted(evaluation.outcomes, key=lambda outcome: -outcome.impulse_pa_s)
+    """Draw the load of each threat without and with the barrier, the worst first."""
+    outcomes = sorted(evaluation.outcomes, key=lambda outcome: -outcome.load)
     place = np.arange(1, len(outcomes) + 1)
-    bare = np.array([outcome.unprotected_impulse_pa_s for outcome in outcomes])
-    impulse = np.array([outcome.impulse_pa_s for outcome in outcomes])
-    axes.vlines(place, impulse, bare, color=unit_interval(QUIET_INK), linewidth=1.2, zorder=2)
+    bare = np.array([outcome.unprotected_load for outcome in outcomes])
+    load = np.array([outcome.load for outcome in outcomes])
+    objective, comparison = evaluation.scenario.objective, evaluation.comparison
+    axes.vlines(place, load, bare, color=unit_interval(QUIET_INK), linewidth=1.2, zorder=2)
     for values, estimate, colour, words in (
-        (bare, evaluation.unprotected_impulse_pa_s, _WITHOUT, "without"),
-        (impulse, evaluation.impulse_pa_s, _WITH, "with"),
+        (bare, comparison.unprotected_mean, _WITHOUT, "without"),
+        (load, comparison.mean, _WITH, "with"),
     ):
-        label = f"{words} barrier, mean {estimate.value:,.0f} Pa·s"
+        label = f"{words} barrier, mean {_load_text(evaluation, estimate.value)}"
         axes.plot(place, values, "o", color=colour, markersize=5.5, label=label, zorder=3)
         axes.axhline(estimate.value, color=colour, linewidth=1.2, zorder=1)
         if not np.isnan(estimate.low):
             axes.axhspan(estimate.low, estimate.high, color=colour, alpha=0.15, linewidth=0.0)
     worst = _percent(1.0 - evaluation.cvar_level)
-    label = f"mean of the worst {worst} with barrier, {evaluation.cvar:,.0f} Pa·s"
-    axes.axhline(evaluation.cvar, color=_WITH, linewidth=1.4, linestyle="--", label=label)
+    label = f"mean of the worst {worst} with barrier, {_load_text(evaluation, comparison.cvar)}"
+    axes.axhline(comparison.cvar, color=_WITH, linewidth=1.4, linestyle="--", label=label)
     axes.set_xlim(0.3, len(outcomes) + 0.7)
-    axes.set_ylim(0.0, 1.32 * max(bare.max(), impulse.max()))  # room for the legend
-    axes.set_ylabel(f"{_impulse_name(evaluation)}\nprotected structures (Pa·s)")
+    axes.set_ylim(0.0, 1.32 * max(bare.max(), load.max()))  # room for the legend
+    unit = f" ({objective.unit.replace(' ', '·')})" if objective.unit else ""
+    axes.set_ylabel(f"{_load_name(evaluation)}\nprotected structures{unit}")
     axes.set_title("Every threat, the worst with the barrier first", fontsize=11)
     axes.legend(loc="upper center", ncols=2, fontsize=8.5, frameon=False)
     axes.grid(axis="y", alpha=0.3)
     _name_threats(axes, [outcome.threat.seed for outcome in outcomes])
 
 
-def _impulse_name(evaluation: LayoutEvaluation) -> str:
-    """Return what the impulses are: of one structure as it is, or a weighted sum."""
+def _load_text(evaluation: LayoutEvaluation, load: float) -> str:
+    """Return a load with its unit as figures write it."""
+    return evaluation.scenario.objective.text(load).replace("Pa s", "Pa·s")
+
+
+def _load_name(evaluation: LayoutEvaluation) -> str:
+    """Return what the loads are: of one structure as it is, or a weighted sum."""
+    noun = evaluation.scenario.objective.noun
     protected = evaluation.loads[0].protected
     weighted = len(protected) > 1 or protected[0].weight != 1.0
-    return "weighted sum of the impulses on the" if weighted else "impulse on the"
+    return f"weighted sum of the {noun} on the" if weighted else f"{noun} on the"
 
 
 def _name_threats(axes: Axes, seeds: Sequence[int]) -> None:
@@ -474,7 +483,8 @@ def _headline(count: int, reduction: Estimate) -> str:
 
 def _cases_subtitle(panels: Sequence[_Panel]) -> str:
     """Return what the numbers are, how many cases are shown, and which are to be distrusted."""
-    parts = ["reduction of the impulse on the protected structures"]
+    noun = panels[0].case.scenario.objective.noun
+    parts = [f"reduction of the {noun} on the protected structures"]
     if len(panels) > MOST_SHOWN:
         parts.append(
             f"mean over all {len(panels)} cases, of which the first {MOST_SHOWN} are shown"

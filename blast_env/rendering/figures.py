@@ -17,7 +17,7 @@ from blast_env.physics.particles import CollisionType, explosion_fan
 from blast_env.physics.scene import Scene, StructureOutline
 from blast_env.physics.structure import Colour, ModularObstacle, load_colour
 from blast_env.recording.tables import faces_hit
-from blast_env.rendering.heat_map import heat_map
+from blast_env.rendering.heat_map import common_scale, heat_map
 from blast_env.rendering.site_plan import (
     draw_outline,
     draw_site,
@@ -322,6 +322,8 @@ def _draw_structure(
 
 __all__ = [
     "FIGURE_SUFFIXES",
+    "Figure",
+    "common_scale",
     "heat_map",
     "impulse_over_time",
     "initial_velocities",

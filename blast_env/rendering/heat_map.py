@@ -1,5 +1,6 @@
 """The impulse on every module, in its place on the site."""
 
+from collections.abc import Sequence
 from math import isqrt
 
 from blast_env.physics.structure import ModularObstacle
@@ -48,20 +49,24 @@ _LARGEST_NUMBER_PT, _SMALLEST_NUMBER_PT = 9.0, 5.5
 _DARK_SHARE = 0.55  # of the scale; numbers turn white there
 
 
-def heat_map(result: BlastResult, structure: str | None = None) -> Figure:
+def heat_map(
+    result: BlastResult, structure: str | None = None, scale: Normalize | None = None
+) -> Figure:
     """Return the impulse on every module, on the site plan and enlarged.
 
     Args:
         result: The blast.
         structure: The structure to enlarge. Without it these are the protected ones, or all if
             none is protected; at most four, those with the largest impulses.
+        scale: The colour scale, for maps that are to be compared; see `common_scale`. Without it
+            it ends at the largest load of what is enlarged, rounded up.
 
     Raises:
         UnknownNameError: If there is no structure of that name.
     """
     chosen = _chosen(result, structure)
-    loads = [part.impulse for obstacle in chosen for part in obstacle.parts]
-    scale = Normalize(0.0, nice_ceiling(max(loads)) if max(loads) > 0.0 else 1.0)
+    if scale is None:
+        scale = common_scale([result], structure)
     columns = isqrt(len(chosen) - 1) + 1
     rows = -(-len(chosen) // columns)
     widths_in = _widths_in(result, chosen, columns, rows)
@@ -84,6 +89,25 @@ def heat_map(result: BlastResult, structure: str | None = None) -> Figure:
     write_heading(figure, f"{title}: impulse per module", subtitle)
     write_names(overview, result.obstacles)
     return figure
+
+
+def common_scale(results: Sequence[BlastResult], structure: str | None = None) -> Normalize:
+    """Return one colour scale for the heat maps of several results, say without and with a barrier.
+
+    Args:
+        results: The results.
+        structure: As for `heat_map`.
+
+    Raises:
+        UnknownNameError: If there is no structure of that name.
+    """
+    largest = max(
+        part.impulse
+        for result in results
+        for obstacle in _chosen(result, structure)
+        for part in obstacle.parts
+    )
+    return Normalize(0.0, nice_ceiling(largest) if largest > 0.0 else 1.0)
 
 
 def _chosen(result: BlastResult, structure: str | None) -> list[ModularObstacle]:

@@ -2,19 +2,21 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import cbrt
+from math import cbrt, hypot
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from blast_env.calibration.references import Burst, kingery_bulmash
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.physics.gas.engine import Recorders
+from blast_env.physics.gas.engine import GasRun, Recorders
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import Snapshots
 from blast_env.physics.gas.solver import Recorder
+from blast_env.physics.scene import BlastSite, StructureOutline
 from blast_env.rendering.film import FilmPlan, for_gif, known_suffix, open_film, plan_until
 from blast_env.rendering.frames import Frame
 from blast_env.rendering.gas import (
@@ -24,6 +26,7 @@ from blast_env.rendering.gas import (
     layout_words,
 )
 from blast_env.rendering.pressure_frames import (
+    PlaneNow,
     PressurePainter,
     PressureShot,
     Section,
@@ -35,9 +38,12 @@ from blast_env.simulation.gas import GasBlast, GasResult
 
 _EVERY_S: Final = 0.0002  # of 100 kg
 _LONGEST_S: Final = 4.0  # of 100 kg
+_CURVES: Final = (0.2, 30.0)  # scaled distances, m/kg^(1/3), that both kinds of burst have
+_LONGEST_WAY_M: Final = 100.0
 _SHARE_OF_RUNS: Final = 0.5  # of the progress
 _NARROWEST_PX, _WIDEST_PX = 480, 4096
-_PLAN_HEIGHT_M: Final = 1.5
+PLAN_HEIGHT_M: Final = 1.5
+"""Height of the plan of a film unless another is given."""
 
 
 def write_pressure_film(
@@ -45,12 +51,13 @@ def write_pressure_film(
     path: str | Path,
     *,
     beside: GasBlast | None = None,
-    height_m: float = _PLAN_HEIGHT_M,
+    height_m: float = PLAN_HEIGHT_M,
     section: Section | None = None,
     full_kpa: float | None = None,
     frames_per_s: float = 25.0,
     slow_motion: float | None = None,
     width_px: int | None = None,
+    further: Recorders = lambda _: (),
     progress: Callable[[float], None] = lambda _: None,
 ) -> tuple[GasResult, ...]:
     """Run a blast and write a film of the overpressure in plan and in a section.
@@ -67,6 +74,7 @@ def write_pressure_film(
         frames_per_s: Frames in a second of the film.
         slow_motion: Seconds of the film for a second of the blast; by default it lasts about 10 s.
         width_px: Width of the film; 960, or 1600 with two blasts.
+        further: Further recorders for each blast, as for `GasBlast.run`.
         progress: Called from time to time with the share of the work that is done.
 
     Returns:
@@ -90,7 +98,9 @@ def write_pressure_film(
         for number, each in enumerate(blasts):
             part = _SHARE_OF_RUNS / len(blasts)
             shots.append(
-                record_planes(each, height_m, section, _part(progress, number * part, part))
+                record_planes(
+                    each, height_m, section, _part(progress, number * part, part), further
+                )
             )
         end_s = max(shot.result.time_s for shot in shots)
         plan = plan_until(end_s, frames_per_s, slow_motion)
@@ -124,7 +134,7 @@ class PressureScreening:
         Args:
             frames_per_s: Frames in a second of the film.
         """
-        shot = record_planes(self.blast, _PLAN_HEIGHT_M, default_section(self.blast.site))
+        shot = record_planes(self.blast, PLAN_HEIGHT_M, default_section(self.blast.site))
         plan = plan_until(shot.result.time_s, frames_per_s)
         width_px, height_px = self.size_px
         painter = PressurePainter([shot], scale_end_kpa([shot.result]), width_px, height_px)
@@ -132,6 +142,59 @@ class PressureScreening:
             frame = painter.paint(plan.time_s(number), plan.real_time_factor)
             below = np.full((height_px - len(frame), width_px, 3), PAGE, dtype=np.uint8)
             yield np.concatenate([frame, below])
+
+
+class PressureNow:
+    """Shows a blast that is on its way, whatever comes of it.
+
+    The scale ends at the peak that Kingery and Bulmash have in the open as near to the charge as
+    the nearest structure that counts, so that all layouts of a site have the same one.
+
+    Args:
+        blast: The blast.
+        run: Its run.
+        width_px: Width of the frames.
+    """
+
+    def __init__(self, blast: GasBlast, run: GasRun, width_px: int = 960) -> None:
+        section = default_section(blast.site)
+        cell = _cell_of(run.grid, blast.site, PLAN_HEIGHT_M, section)
+        planes = (
+            PlaneNow(run, 2, cell[2]),
+            PlaneNow(run, section.normal, cell[section.normal]),
+        )
+        opening = opening_of(run.charge, run.handover_radius_m)
+        shot = PressureShot(GasResult(blast, run), section, opening, planes)
+        self._run = run
+        self._painter = PressurePainter([shot], _free_field_peak_kpa(blast.site), width_px)
+
+    def frame(self) -> Frame:
+        """Return a picture of now, uint8 (height, width, 3)."""
+        return self._painter.paint(self._run.time_s)
+
+
+def _free_field_peak_kpa(site: BlastSite) -> float:
+    """Return a peak that a scale can end at before the blast is run, rounded up.
+
+    It is Kingery and Bulmash's for the incident wave where the nearest structure that counts is,
+    as far as their curves reach; reflections go beyond it.
+    """
+    solids = [each for each in site.structures if each.cells is None]
+    chosen = [each for each in solids if each.protected] or solids
+    nearest_m = min((_distance_m(site, each) for each in chosen), default=_LONGEST_WAY_M)
+    mass_kg, on_ground = site.charge.tnt_kg, site.charge.height_m == 0.0
+    low, high = (z * cbrt(mass_kg) for z in _CURVES)
+    distance_m = min(max(nearest_m, low), high)
+    burst: Burst = "hemispherical" if on_ground else "spherical"
+    peak_pa = kingery_bulmash("incident_overpressure", distance_m, mass_kg, burst)
+    return nice_ceiling(float(peak_pa) / PA_PER_KPA)
+
+
+def _distance_m(site: BlastSite, outline: StructureOutline) -> float:
+    left, bottom, right, top = in_metres(outline.rectangle)
+    x_m, y_m = site.charge.position_m
+    across, along = max(left - x_m, x_m - right, 0.0), max(bottom - y_m, y_m - top, 0.0)
+    return hypot(across, along)
 
 
 def _part(progress: Callable[[float], None], first: float, part: float) -> Callable[[float], None]:
@@ -178,17 +241,27 @@ def record_planes(
         BlastEnvError: If a plane is outside the grid.
     """
     made: list[Snapshots] = []
-    site_m = in_metres(blast.site.site)
     scale = cbrt(blast.site.charge.tnt_kg / 100.0)
     times_s = (scale * np.arange(0.0, _LONGEST_S, _EVERY_S)).tolist()
 
     def recorders(grid: GasGrid) -> Sequence[Recorder]:
-        place = [*site_m.centre]
-        place[section.normal] = section.at_m
-        cell = grid.cell_at((place[0], place[1], height_m))
+        cell = _cell_of(grid, blast.site, height_m, section)
         made.extend(Snapshots(grid, axis, cell[axis], times_s) for axis in (2, section.normal))
         return (*made, *further(grid))
 
     result = blast.run(progress, recorders)
     opening = opening_of(result.run.charge, result.run.handover_radius_m)
     return PressureShot(result, section, opening, (made[0], made[1]))
+
+
+def _cell_of(
+    grid: GasGrid, site: BlastSite, height_m: float, section: Section
+) -> tuple[int, int, int]:
+    """Return a cell that both planes go through.
+
+    Raises:
+        BlastEnvError: If a plane is outside the grid.
+    """
+    place = [*in_metres(site.site).centre]
+    place[section.normal] = section.at_m
+    return grid.cell_at((place[0], place[1], height_m))

@@ -7,7 +7,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,9 @@ from scipy.sparse import csr_matrix
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
+from blast_env.physics.gas.engine import GasRun
 from blast_env.physics.gas.opening import Opening
-from blast_env.physics.gas.probes import Snapshots
+from blast_env.physics.gas.probes import Snapshot
 from blast_env.physics.scene import BlastSite, StructureOutline
 from blast_env.physics.structure import Colour
 from blast_env.rendering.frames import Frame
@@ -101,6 +102,45 @@ def default_section(site: BlastSite) -> Section:
     return Section("y", y_m) if across >= along else Section("x", x_m)
 
 
+class Plane(Protocol):
+    """Pictures of the overpressure in a plane of cells, as `Snapshots` has them.
+
+    Attributes:
+        axis: Axis that the plane is normal to.
+        layer: The layer of cells along it.
+        frames: The pictures, by time.
+    """
+
+    axis: int
+    layer: int
+
+    @property
+    def frames(self) -> Sequence[Snapshot]:
+        """The pictures, by time."""
+
+
+class PlaneNow:
+    """A plane of a blast that is on its way: its only picture is that of now.
+
+    Args:
+        run: The blast.
+        axis: Axis that the plane is normal to.
+        layer: The layer of cells along it.
+    """
+
+    def __init__(self, run: GasRun, axis: int, layer: int) -> None:
+        self.axis, self.layer = axis, layer
+        self._solver = run.solver
+        self._solid = np.take(run.grid.solid, layer, axis=axis)
+
+    @property
+    def frames(self) -> Sequence[Snapshot]:
+        """The picture of now."""
+        plane = self._solver.overpressure_in(self.axis, self.layer)
+        pressure = np.where(self._solid, np.nan, plane).astype(np.float32)
+        return [Snapshot(self._solver.time_s, pressure)]
+
+
 @dataclass(frozen=True, eq=False)
 class PressureShot:
     """A blast with pictures of the overpressure in two planes.
@@ -115,7 +155,7 @@ class PressureShot:
     result: GasResult
     section: Section
     opening: Opening
-    planes: tuple[Snapshots, Snapshots]
+    planes: tuple[Plane, Plane]
 
     def at(self, time_s: float, plane: int) -> FloatArray | None:
         """Return the overpressure in a plane at a time, Pa, along its two axes; nan in solids.

@@ -16,7 +16,6 @@ from blast_env.export.bill import bill_of_quantities
 from blast_env.export.plan import LayoutPlan
 from blast_env.geometry import Element, Layout, Piece, layout_text
 from blast_env.physics.gas.engine import GasEngine
-from blast_env.physics.scene import Charge
 from blast_env.reporting.figures import Picture, blast_pictures, film_stills
 from blast_env.reporting.limits import Limit, check_limits
 from blast_env.reporting.loads import Measured, Target, measure, targets_of
@@ -60,7 +59,7 @@ class StudyOptions:
         BlastEnvError: If something is out of bounds.
     """
 
-    charges: tuple[Charge, ...] = ()
+    charges: tuple[AnyCharge, ...] = ()
     most_threats: int = 2
     cells_m: tuple[float, float] = (0.5, 0.25)
     limits: tuple[Limit, ...] = ()
@@ -317,7 +316,7 @@ class Runs:
 
     def _outcomes(self, label: str, charges: Sequence[NamedCharge]) -> tuple[Outcome, ...]:
         layouts: tuple[Layout, ...] = ((), self.layout)
-        impulses = self._impulses_pa_s(label, layouts, [each.charge for each in charges])
+        impulses = self._loads(label, layouts, [each.charge for each in charges])
         return tuple(
             Outcome(each.name, each.why, float(bare), float(walled))
             for each, (bare, walled) in zip(charges, impulses.T, strict=True)
@@ -329,7 +328,7 @@ class Runs:
             self.layout[:index] + self.layout[index + 1 :] for index in range(len(self.layout))
         ]
         charges = [each.charge for each in self.threats]
-        impulses = self._impulses_pa_s("without each item", ((), self.layout, *fewer), charges)
+        impulses = self._loads("without each item", ((), self.layout, *fewer), charges)
         bare, whole, without = impulses[0], impulses[1], impulses[2:]
         worths = ((without - whole) / bare).mean(axis=1)
         items = [
@@ -347,7 +346,7 @@ class Runs:
         if not layouts:
             return ()
         charges = [each.charge for each in self.threats]
-        impulses = self._impulses_pa_s("front", ((), *layouts), charges)
+        impulses = self._loads("front", ((), *layouts), charges)
         bare = np.broadcast_to(impulses[0], impulses[1:].shape)
         gone = reductions(impulses[1:], bare).mean(axis=1)
         points = [
@@ -356,15 +355,15 @@ class Runs:
         ]
         return tuple(sorted(points, key=lambda each: (each.cost, each.reduction)))
 
-    def _impulses_pa_s(
+    def _loads(
         self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
     ) -> FloatArray:
-        """Return the weighted impulses on what is protected (layouts, charges)."""
+        """Return the loads that count on what is protected (layouts, charges)."""
         pairs = [(layout, Threat(charge, 0)) for layout in layouts for charge in charges]
         told = partial(self.progress, label)
         loads = self._evaluator.loads_of_many(pairs, self.options.processes, told)
-        impulses = np.array([each.protected_impulse_pa_s for each in loads])
-        return np.asarray(impulses.reshape(len(layouts), len(charges)))
+        counted = [each.load(self.scenario.objective) for each in loads]
+        return np.asarray(np.reshape(counted, (len(layouts), len(charges))))
 
 
 def _front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:

@@ -73,14 +73,13 @@ def chief_threats(scenario: Scenario, most: int) -> tuple[NamedCharge, ...]:
     )
 
 
-def asked_threats(scenario: Scenario, charges: tuple[Charge, ...]) -> tuple[NamedCharge, ...]:
+def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[NamedCharge, ...]:
     """Return the charges that the user named.
 
     Raises:
         ScenarioError: If one is out of bounds, or not clear of structures and the border.
     """
-    for charge in charges:
-        scenario.with_charge(charge)
+    scenario.with_possible_charges(charges)
     return tuple(
         NamedCharge(f"T{number}", charge, "as asked for")
         for number, charge in enumerate(charges, start=1)

@@ -31,6 +31,7 @@ from blast_env.scenario.models import (
     Site,
     VehicleSource,
 )
+from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.placement import Placement, check_layout, usable_cells
 from blast_env.scenario.problems import Problem, ScenarioError
 from blast_env.scenario.vehicles import AnyCharge, VehicleCharge
@@ -57,6 +58,7 @@ __all__ = [
     "Layout",
     "LayoutFile",
     "ModularObstacleSection",
+    "ObjectiveSection",
     "Piece",
     "PlacedModule",
     "Placement",

@@ -9,9 +9,11 @@ from typing import Any, Final, TypeVar
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Rectangle
 from blast_env.physics.parameters import AirParameters, SimulationParameters
 from blast_env.physics.particles import lattice_capacity
+from blast_env.physics.presets import for_charge
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.scenario.heights import air_height_m, depth_inside_m, is_over
 from blast_env.scenario.problems import Problem, extent
@@ -422,6 +424,22 @@ def _simulation_problems(parts: Parts) -> Iterator[Problem]:
                 f" {explosive.ball_count} balls of one charge that collide with each other"
                 " (collide_within_charge): they would overlap",
             )
+
+
+def particle_problems(
+    parameters: SimulationParameters, sources: Sequence[AnySource]
+) -> Iterator[Problem]:
+    """Yield why particles cannot run a scenario that gas dynamics can: its charges' masses.
+
+    Args:
+        parameters: Those of the particles; they must reach to the mass of every charge.
+        sources: The sources of the charges.
+    """
+    for index, source in enumerate(sources):
+        try:
+            for_charge(parameters, source.tnt_kg)
+        except BlastEnvError as error:
+            yield Problem(f"charge[{index}].tnt_kg", str(error).removeprefix("tnt_kg "))
 
 
 def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:

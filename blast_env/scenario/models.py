@@ -30,12 +30,14 @@ from blast_env.scenario.checks import (
     charge_radius_m,
     check_parts,
     check_sources,
+    particle_problems,
     sound_parts,
     vehicle_ground,
 )
 from blast_env.scenario.georeference import AnyGeoreference
 from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
-from blast_env.scenario.problems import ScenarioError, problems_from
+from blast_env.scenario.objective import ObjectiveSection
+from blast_env.scenario.problems import Problem, ScenarioError, problems_from
 from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
@@ -78,6 +80,7 @@ __all__ = [
     "GaugeSection",
     "KeepOut",
     "ModularObstacleSection",
+    "ObjectiveSection",
     "PointM",
     "PointSource",
     "RectangleSource",
@@ -121,6 +124,7 @@ class Scenario(Section):
         simulation: Parameters of the blast model.
         calibration: Name of the calibration that turns impulses into pascal seconds.
         gauges: Where overpressure is recorded, by engines that know it.
+        objective: Which load counts, and how those of several charges become one.
         georeference: Where on a map or drawing the site lies; no result depends on it.
     """
 
@@ -134,6 +138,7 @@ class Scenario(Section):
     simulation: SimulationSection = SimulationSection()
     calibration: Name | None = None
     gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100)] = ()
+    objective: ObjectiveSection = ObjectiveSection()
     georeference: AnyGeoreference | None = None
 
     @property
@@ -171,6 +176,21 @@ class Scenario(Section):
     def height_notes(self) -> tuple[str, ...]:
         """What the scenario says of heights that an engine without them does not heed."""
         return height_notes(self.structures, self.charge, self.build_zone, self.gauges)
+
+    @property
+    def particle_problems(self) -> tuple[Problem, ...]:
+        """Why particles cannot run the scenario; gas dynamics needs nothing of it."""
+        return tuple(particle_problems(self.parameters, self.charge))
+
+    def check_for_particles(self) -> None:
+        """Refuse a scenario that particles cannot run.
+
+        Raises:
+            ScenarioError: If there is a reason; all are in it.
+        """
+        problems = self.particle_problems
+        if problems:
+            raise ScenarioError(self.name, dict.fromkeys(problems))
 
     @property
     def content_hash(self) -> str:

@@ -304,6 +304,8 @@ class StructureSection(Section):
         corner_m: Lower left corner.
         protected: Whether the load on it counts.
         weight: How much its load counts among the protected structures.
+        peak_weight: How much its peak overpressure counts, where the objective counts peaks; as
+            much as `weight` says unless given.
         module_capacity: Impulse, simulation units, that a module bears before it is removed;
             without it modules never fail.
         height_m: Height; without it, as high as the air.
@@ -316,6 +318,7 @@ class StructureSection(Section):
     corner_m: PointM
     protected: StrictBool = False
     weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] = 1.0
+    peak_weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] | None = None
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
     height_m: Height | None = None
     faces: Annotated[

@@ -16,10 +16,10 @@ FIRST_VERSION: Final = 1
 
 
 NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
-    "": ("gauges", "georeference"),
+    "": ("gauges", "objective", "georeference"),
     "site": ("air_height_m",),
     "charge": ("height_m",),
-    "structures": ("height_m", "faces", "building"),
+    "structures": ("height_m", "faces", "building", "peak_weight"),
     "build_zone": ("height_m", "items"),
     "build_zone.access_way": ("gate",),
 }

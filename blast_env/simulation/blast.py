@@ -20,7 +20,12 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Element, layout_text
 from blast_env.physics.collisions import CollisionArray
 from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, ParticleEngine
-from blast_env.physics.engines import find_engine, find_particle_engine, is_gas
+from blast_env.physics.engines import (
+    STEP_NAMES,
+    find_engine,
+    find_particle_engine,
+    is_gas,
+)
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.provenance import versions
@@ -157,6 +162,11 @@ class BlastResult:
     steps: int
     end_reason: EndReason
 
+    @property
+    def step_name(self) -> str:
+        """What `steps` counts: steps of time, or the events of an engine that goes by them."""
+        return STEP_NAMES.get(self.engine_name, "steps")
+
     @cached_property
     def collisions(self) -> pd.DataFrame:
         """One row a collision; the columns are `recording.tables.COLLISION_COLUMNS`."""
@@ -266,12 +276,13 @@ class BlastResult:
             "charge TNT equivalent (kg)": charge.tnt_kg,
             "engine": self.engine_name,
             "engine version": known["engine"],
+            "preset": blast.scenario.simulation.preset,
             "blast-env version": known["blast_env"],
             "python version": known["python"],
             "numpy version": known["numpy"],
             "balls at the start": len(blast.scene.balls),
             "balls at the end": len(self.final_balls),
-            "steps": self.steps,
+            self.step_name: self.steps,
             "simulated time (s)": self.time_s,
             "ended because": str(self.end_reason),
             "digest": self.digest,

@@ -48,14 +48,14 @@ def result(
         budget=blasts,
         training=training,
         proposals=tuple(Proposal(layout, each, blasts) for each in times),
-        impulse_pa_s=np.array(impulse_pa_s, dtype=np.float64),
+        loads=np.array(impulse_pa_s, dtype=np.float64),
     )
 
 
 def standings(
-    unprotected_pa_s: Sequence[Sequence[float]], *results: Result, track: Track | None = None
+    unprotected: Sequence[Sequence[float]], *results: Result, track: Track | None = None
 ) -> Standings:
     """Return standings of results on so many cases and held-out threats."""
-    bare = np.array(unprotected_pa_s, dtype=np.float64)
+    bare = np.array(unprotected, dtype=np.float64)
     track = track or known_track(road_scenario(), *bare.shape)
     return Standings(track, (result("no barrier", bare.tolist()), *results), bare, "event")

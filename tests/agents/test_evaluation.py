@@ -24,7 +24,7 @@ def test_each_layout_meets_the_threat_of_its_case_alone() -> None:
     threats = draw_threats(small_scenario(), range(3))
     for index, (threat, layout) in enumerate(zip(threats, WALLS, strict=True)):
         expected = evaluate_layout(small_scenario(), layout, threats=[threat])
-        assert comparison.impulse_pa_s[index, 0] == pytest.approx(expected.impulse_pa_s.value)
+        assert comparison.loads[index, 0] == pytest.approx(expected.impulse_pa_s.value)
         assert cases[index].charge == threat.charge
     assert comparison.case_reductions[1] == 0.0
 
@@ -34,10 +34,10 @@ def test_the_record_has_what_the_comparison_found() -> None:
     evaluators = Evaluators("event")
     comparison = compare(evaluators, cases, [WALLS[0]] * 4, cvar_level=0.5)
     expected = evaluate_layout(small_scenario(), WALLS[0], range(4), cvar_level=0.5)
-    assert comparison.mean_pa_s == pytest.approx(expected.impulse_pa_s)
-    assert comparison.unprotected_mean_pa_s == pytest.approx(expected.unprotected_impulse_pa_s)
-    assert (comparison.cvar_pa_s, comparison.unprotected_cvar_pa_s) == pytest.approx(
-        (expected.cvar, expected.unprotected_cvar)
+    assert comparison.mean == pytest.approx(expected.impulse_pa_s)
+    assert comparison.unprotected_mean == pytest.approx(expected.unprotected_impulse_pa_s)
+    assert (comparison.cvar, comparison.unprotected_cvar) == pytest.approx(
+        (expected.cvar_pa_s, expected.unprotected_cvar_pa_s)
     )
     each = [outcome.reduction for outcome in expected.outcomes]
     assert comparison.reduction.value == pytest.approx(sum(each) / 4)  # every case counts alike
@@ -70,7 +70,7 @@ def test_sites_are_evaluated_in_the_order_of_their_cases_with_progress() -> None
     assert all(early <= late for early, late in pairwise(shares))
     assert shares[-1] == pytest.approx(1.0)
     alone = compare(evaluators, first, [WALLS[0]] * 2)
-    assert comparison.impulse_pa_s[0::2].tolist() == alone.impulse_pa_s.tolist()
+    assert comparison.loads[0::2].tolist() == alone.loads.tolist()
 
 
 def test_the_weights_are_chosen_by_seeds_of_their_own() -> None:

@@ -11,10 +11,11 @@ import yaml
 from blast_agents.training import TrainedAgent, load_archive
 from blast_agents.training.environments import environment_id, training_source
 from blast_agents.training.hyperparameters import (
-    ALGORITHMS,
-    HYPERPARAMETER_KEYS,
+    PPO_ALGORITHMS,
     WRAPPERS,
+    Hyperparameters,
     hyperparameter_file,
+    hyperparameter_keys,
     load_hyperparameters,
     parse_options,
     schedule,
@@ -23,11 +24,12 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 
 from blast_env import load_scenario
-from blast_env.envs.registration import WITHOUT_BUILD_ZONE
+from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import bundled_scenarios
 
-SCENARIOS = ("sites", *(name for name in bundled_scenarios() if name not in WITHOUT_BUILD_ZONE))
+WITHOUT_SECTION = WITHOUT_BUILD_ZONE | FOR_GAS
+SCENARIOS = ("sites", *(name for name in bundled_scenarios() if name not in WITHOUT_SECTION))
 MODELS = {"ppo": PPO, "maskable_ppo": MaskablePPO}
 OF_RL_ZOO = {"n_timesteps", "n_envs", "env_wrapper", "normalize"}
 """Keys that RL Zoo takes out before it hands the others to the algorithm."""
@@ -51,7 +53,7 @@ def sections(algorithm: str) -> dict[str, dict]:
     return content
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", PPO_ALGORITHMS)
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_every_scenario_has_a_section_for_its_zone(algorithm: str, scenario: str) -> None:
     """RL Zoo cannot fill in rows and columns, so the file must have the right ones."""
@@ -62,7 +64,7 @@ def test_every_scenario_has_a_section_for_its_zone(algorithm: str, scenario: str
     load_hyperparameters(algorithm, environment_id(scenario))
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", PPO_ALGORITHMS)
 def test_rl_zoo_can_use_every_section(algorithm: str) -> None:
     """Its keys go to the algorithm as they are; policy and wrappers are imported by name."""
     accepted = set(inspect.signature(MODELS[algorithm]).parameters)
@@ -124,8 +126,9 @@ def test_an_archive_with_an_unknown_policy_is_refused_with_the_reason(
 
 def test_options_are_read_as_yaml_and_reach_the_policy() -> None:
     options = ["ent_coef=0.02", "learning_rate=lin_3e-4", "policy_kwargs.width=16", "gamma=9e-1"]
-    changes = parse_options(options, HYPERPARAMETER_KEYS)
+    changes = parse_options(options, hyperparameter_keys("maskable_ppo"))
     chosen = load_hyperparameters("maskable_ppo", "BlastBarrier-v0", changes)
+    assert isinstance(chosen, Hyperparameters)
     assert (chosen.ent_coef, chosen.gamma, chosen.policy_kwargs.width) == (0.02, 0.9, 16)
     rate = schedule(chosen.learning_rate)
     assert callable(rate)
@@ -151,7 +154,9 @@ def test_options_are_read_as_yaml_and_reach_the_policy() -> None:
 def test_a_wrong_option_is_refused_with_the_reason(option: str, words: str) -> None:
     with pytest.raises(BlastEnvError, match=words.replace("*", r"\*")):
         load_hyperparameters(
-            "maskable_ppo", "BlastBarrier-v0", parse_options([option], HYPERPARAMETER_KEYS)
+            "maskable_ppo",
+            "BlastBarrier-v0",
+            parse_options([option], hyperparameter_keys("maskable_ppo")),
         )
 
 

@@ -223,8 +223,8 @@ def test_searches_find_layouts_of_pieces(problem: LayoutProblem, method: str) ->
     assert Placement.of(problem.scenario, result.layout).layout == result.layout
     assert any(isinstance(each, Piece) and each.item == "wall" for each in result.layout)
     assert result.blasts <= 60
-    assert result.impulse_pa_s is not None
-    assert result.impulse_pa_s < 0.8 * problem.impulse_pa_s(())
+    assert result.load is not None
+    assert result.load < 0.8 * problem.load(())
     assert find_search_method(method).search(problem, 60, 0).layout == result.layout
 
 
@@ -235,7 +235,7 @@ def test_the_front_is_over_the_cost(problem: LayoutProblem) -> None:
     assert costs[0] == 0.0
     assert len(costs) >= 3
     assert result.front_table()["cost"].tolist() == costs
-    impulses = [each.impulse_pa_s for each in result.front]
+    impulses = [each.load for each in result.front]
     assert impulses == sorted(impulses, reverse=True)
 
 

@@ -152,9 +152,7 @@ def test_an_interrupted_league_goes_on(tmp_path: Path) -> None:
     assert len(counted.calls) == 3
     assert shares[-1] == 1.0
     untroubled = Contest(TRACK, entries, store(tmp_path / "other")).play()
-    assert np.array_equal(
-        standings.results[1].impulse_pa_s, untroubled.results[1].impulse_pa_s, equal_nan=False
-    )
+    assert np.array_equal(standings.results[1].loads, untroubled.results[1].loads, equal_nan=False)
 
 
 def test_what_is_finished_is_not_done_again(tmp_path: Path) -> None:
@@ -203,7 +201,7 @@ def test_a_damaged_result_is_found_again(tmp_path: Path, damage: bytes) -> None:
     again = Contest(TRACK, entries, store(tmp_path))
     assert again.outlook().kept_searches == 0
     for one, other in zip(first.results, again.play().results, strict=True):
-        assert np.array_equal(one.impulse_pa_s, other.impulse_pa_s)
+        assert np.array_equal(one.loads, other.loads)
 
 
 def test_what_an_interrupted_search_has_is_not_its_answer(tmp_path: Path) -> None:
@@ -223,7 +221,7 @@ def test_processes_change_nothing(tmp_path: Path) -> None:
         for processes in (1, 2)
     )
     for first, second in zip(one.results, two.results, strict=True):
-        assert np.array_equal(first.impulse_pa_s, second.impulse_pa_s)
+        assert np.array_equal(first.loads, second.loads)
 
 
 def test_bad_input_is_refused(tmp_path: Path) -> None:

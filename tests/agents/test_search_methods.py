@@ -1,6 +1,7 @@
 """Every search method: how near it comes to a known optimum, and what holds for all of them."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,17 +15,20 @@ from blast_agents.search import (
     SearchResult,
     find_search_method,
 )
-from blast_agents.search.methods import RULE_SEARCHES, every_layout
+from blast_agents.search.by_rule import RULE_SEARCHES, layouts_by_rule
+from blast_agents.search.from_policy import PolicySearch
+from blast_agents.search.methods import every_layout
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
 from blast_env.evaluation.cases import practice_hidden
 from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, Scenario
+from blast_env.scenario import AnyCharge, Placement, Scenario
 from tests.agents.search_cases import WatchedEvaluator, ballistic, small_problem, small_scenario
 
 ALL_BLASTS = 598
-DRAWN = ("random", "greedy", "annealing", "genetic", "nsga2")
+DRAWN = ("random", "greedy", "annealing", "winners", "genetic", "nsga2")
+FROM_RULES = tuple(f"{name}_from_rules" for name in ("annealing", "winners", "genetic"))
 SEEDS = range(3)
 
 
@@ -41,16 +45,16 @@ def optimum(problem: LayoutProblem) -> SearchResult:
 
 def gap(problem: LayoutProblem, result: SearchResult, optimum: SearchResult) -> float:
     """Return what a result misses of the optimum, as a share of the impulse without a barrier."""
-    assert optimum.impulse_pa_s is not None
-    missed_pa_s = problem.impulse_pa_s(result.layout) - optimum.impulse_pa_s
-    return missed_pa_s / problem.impulse_pa_s(())
+    assert optimum.load is not None
+    missed_pa_s = problem.load(result.layout) - optimum.load
+    return missed_pa_s / problem.load(())
 
 
 def test_the_optimum_is_known(problem: LayoutProblem, optimum: SearchResult) -> None:
     layouts = list(every_layout(problem))
     assert len(layouts) == len(set(layouts)) == 299
     assert optimum.blasts == ALL_BLASTS
-    assert optimum.impulse_pa_s == min(map(problem.impulse_pa_s, layouts))
+    assert optimum.load == min(map(problem.load, layouts))
     assert gap(problem, optimum, optimum) == 0.0
 
 
@@ -137,9 +141,9 @@ def test_histories_say_what_was_best_when(name: str, problem: LayoutProblem) -> 
     for earlier, later in pairwise(result.history):
         assert earlier.blasts < later.blasts
         more = later.threats > earlier.threats
-        assert more or later.impulse_pa_s < earlier.impulse_pa_s
+        assert more or later.load < earlier.load
     last = result.history[-1]
-    assert (last.layout, last.impulse_pa_s) == (result.layout, result.impulse_pa_s)
+    assert (last.layout, last.load) == (result.layout, result.load)
     assert result.best_at(0) is None
     assert result.best_at(last.blasts - 1) in (None, *result.history[:-1])
     assert result.best_at(60) == last
@@ -161,7 +165,7 @@ def test_an_interruption_keeps_the_best_so_far(name: str, problem: LayoutProblem
 
 def test_an_interruption_before_the_first_blast_leaves_the_empty_layout() -> None:
     result = find_search_method("genetic").search(_interrupted_after(0), 100, 0)
-    assert (result.layout, result.impulse_pa_s, result.blasts) == ((), None, 0)
+    assert (result.layout, result.load, result.blasts) == ((), None, 0)
     assert result.interrupted
 
 
@@ -230,7 +234,7 @@ def test_rules_spend_nothing(
 ) -> None:
     result = find_search_method(name).search(problem, 0, 0)
     assert result.blasts == 0
-    assert result.impulse_pa_s is None
+    assert result.load is None
     assert set(result.layout) == set(rule(problem.scenario, problem.charge))
 
 
@@ -245,14 +249,14 @@ def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:
 def test_the_front_is_near_the_true_one(problem: LayoutProblem, optimum: SearchResult) -> None:
     """For each number of modules the gap to the best layout with at most as many."""
     result = find_search_method("nsga2").search(problem, ALL_BLASTS // 2, 1)
-    bare_pa_s = problem.impulse_pa_s(())
+    bare_pa_s = problem.load(())
     layouts = list(every_layout(problem))
     assert [len(each.layout) for each in result.front] == [0, 1, 2, 3]
     for each in result.front:
         true_pa_s = min(
-            problem.impulse_pa_s(layout) for layout in layouts if len(layout) <= len(each.layout)
+            problem.load(layout) for layout in layouts if len(layout) <= len(each.layout)
         )
-        assert (problem.impulse_pa_s(each.layout) - true_pa_s) / bare_pa_s <= 0.03
+        assert (problem.load(each.layout) - true_pa_s) / bare_pa_s <= 0.03
     assert result.layout == result.front[-1].layout
     assert len(result.front_table()) == 4
 
@@ -260,7 +264,54 @@ def test_the_front_is_near_the_true_one(problem: LayoutProblem, optimum: SearchR
 def test_every_method_has_its_name() -> None:
     assert all(name == method.name for name, method in SEARCH_METHODS.items())
     rules = {rule.name for rule in RULE_SEARCHES}
-    assert {*DRAWN, "exhaustive", *rules} == set(SEARCH_METHODS)
+    assert {*DRAWN, *FROM_RULES, "exhaustive", "best_rule", *rules} == set(SEARCH_METHODS)
+
+
+def test_the_best_rule_is_chosen_by_a_blast_each(problem: LayoutProblem) -> None:
+    layouts = set(layouts_by_rule(problem.scenario, problem.told).values())
+    result = find_search_method("best_rule").search(problem, 100, 0)
+    assert result.blasts == len(layouts) * len(problem.threats)
+    assert result.layout in layouts
+    assert problem.load(result.layout) == min(map(problem.load, layouts))
+
+
+@pytest.mark.parametrize("name", FROM_RULES)
+def test_what_begins_with_the_rules_is_never_worse(problem: LayoutProblem, name: str) -> None:
+    """With as many blasts as tell all that is tried apart under one threat."""
+    (threat, *_) = problem.threats
+    case = replace(problem.case, threats=(threat,), realisations=1)
+    alone = LayoutProblem(problem.evaluator, case)
+    best = find_search_method("best_rule").search(alone, 9, 0)
+    found = find_search_method(name).search(alone, 20, 0)
+    assert found.method == name
+    assert alone.load(found.layout) <= alone.load(best.layout)
+
+
+@dataclass(frozen=True)
+class OneLayoutAgent:
+    """Proposes and draws always the same."""
+
+    layout: Layout
+
+    def propose(self, _: Scenario, _charge: AnyCharge | None = None) -> Layout:
+        return self.layout
+
+    def sample(
+        self, _: Scenario, _charge: AnyCharge | None = None, count: int = 8, _seed: int = 0
+    ) -> list[Layout]:
+        return [self.layout] * count
+
+
+def test_a_search_from_a_policy_ends_no_worse_than_it_and_the_rules(problem: LayoutProblem) -> None:
+    agent = OneLayoutAgent(((0, 0), (1, 0)))
+    search = PolicySearch(agent, digest="one")
+    result = search.search(problem, 60, 0)
+    rules = find_search_method("best_rule").search(problem, 100, 0)
+    bound = min(problem.load(agent.layout), problem.load(rules.layout))
+    assert problem.load(result.layout) <= 1.02 * bound  # by one threat of two at first
+    assert result.blasts <= 60
+    assert result == search.search(problem, 60, 0)
+    assert "OneLayoutAgent" not in repr(search)
 
 
 def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
@@ -271,7 +322,7 @@ def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
     for seed in (0, 1):
         problem = LayoutProblem(evaluator, practice_hidden(scenario, 1, 2, seed))
         genetic, drawn = (
-            problem.impulse_pa_s(find_search_method(name).search(problem, 100, seed).layout)
+            problem.load(find_search_method(name).search(problem, 100, seed).layout)
             for name in ("genetic", "random")
         )
         better_pa_s.append(drawn - genetic)

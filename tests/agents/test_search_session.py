@@ -42,7 +42,7 @@ def test_the_number_is_the_environments(risk: MeanRisk | ConditionalValueAtRisk)
     case = practice_hidden(scenario, 3, 2, 1, risk)
     layout = ((9, 0), (10, 0), (11, 0))
     expected = Objective(evaluator, case).assess(layout).impulse_pa_s
-    found = LayoutProblem(evaluator, case).impulse_pa_s(layout)
+    found = LayoutProblem(evaluator, case).load(layout)
     assert found == pytest.approx(expected, rel=1e-12)
 
 
@@ -113,10 +113,10 @@ def test_the_lucky_one_is_found_out(problem: LayoutProblem) -> None:
     it = SearchSession(problem, 100, Plan(1, 12))
     it.run(lambda: _ask(it))
     assert it.best is not None
-    impulses = {layout: problem.impulse_pa_s(layout) for layout in LAYOUTS}
+    impulses = {layout: problem.load(layout) for layout in LAYOUTS}
     assert it.best.threats == 4
     assert it.best.layout == min(impulses, key=lambda each: impulses[each])
-    assert it.best.impulse_pa_s == pytest.approx(min(impulses.values()))
+    assert it.best.load == pytest.approx(min(impulses.values()))
 
 
 def test_what_is_held_back_is_not_explored_with(problem: LayoutProblem) -> None:
@@ -137,8 +137,8 @@ def test_the_front_is_the_front(problem: LayoutProblem) -> None:
     front = it.front()
     assert [len(each.layout) for each in front] == [0, 1, 2]
     for fewer, more in pairwise(front):
-        assert fewer.impulse_pa_s > more.impulse_pa_s
-    assert front[1].impulse_pa_s == it.assess(LAYOUTS).min()
+        assert fewer.load > more.load
+    assert front[1].load == it.assess(LAYOUTS).min()
 
 
 def test_it_reports_every_batch(problem: LayoutProblem) -> None:

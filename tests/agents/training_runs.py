@@ -5,7 +5,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from blast_agents.training import Hyperparameters, TrainingSettings, load_hyperparameters
+from blast_agents.training import TrainingSettings, load_hyperparameters
+from blast_agents.training.hyperparameters import AnyHyperparameters
 
 from blast_env.scenario import Scenario, save_scenario
 
@@ -67,6 +68,6 @@ def settings(scenario: Path, **changes: Any) -> TrainingSettings:
 
 def hyperparameters(
     changes: Mapping[str, Any] = MappingProxyType({}), algorithm: str = "maskable_ppo"
-) -> Hyperparameters:
+) -> AnyHyperparameters:
     """Return hyperparameters for the small scenario."""
     return load_hyperparameters(algorithm, "BlastBarrier-v0", {**SMALL, **changes})

@@ -15,6 +15,7 @@ from blast_env.app.solids import boxes
 from blast_env.geometry import Piece
 from blast_env.scenario import load_scenario, usable_cells
 from tests.gas_sites import WALL, hut
+from tests.vehicle_sites import POSTS, gate_site
 
 
 @pytest.fixture
@@ -179,6 +180,15 @@ def test_the_plan_says_nothing_that_a_browser_could_run() -> None:
     svg = plan_svg(view, scenario, ((0, 0),), Thing(Kind.STRUCTURE))
     assert svg.count("building") == 1
     assert "<script" not in svg
+
+
+def test_the_plan_shows_where_a_vehicle_gets_to() -> None:
+    site = gate_site()
+    view = View.of(site, 600, 400)
+    bare, posts = (plan_svg(view, site, layout, None) for layout in ((), POSTS))
+    assert "stand-off 1.0 m" in bare  # half of its width from the hut
+    assert "stand-off 7.0 m" in posts
+    assert "vehicle 1: 5 kg" in bare
 
 
 def test_solids_have_the_heights_of_the_site() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from time import monotonic, sleep
 
 import pytest
+from blast_agents.posts import VEHICLE_RULES
 
 from blast_env import reporting
 from blast_env.app import offers
@@ -17,16 +18,18 @@ from blast_env.app.jobs import Workers, settle
 from blast_env.app.records import Engine, blast_key, read_film
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of
-from blast_env.app.work import Status, read_status, write_status
+from blast_env.app.work import Status, ThreatOf, read_status, write_status
 from blast_env.app.worker import do
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.geometry import Layout
+from blast_env.physics.scene import Charge
 from blast_env.reporting import StudyOptions
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.simulation.gas import GasBlast
 from tests.gas_sites import WALL, hut
 from tests.scenarios import BALLISTIC_COURTYARD
+from tests.vehicle_sites import gate_site, vehicle_document
 
 CELLS: Layout = tuple((row, 0) for row in range(22, 32))
 
@@ -69,7 +72,7 @@ def gas(tmp_path_factory: pytest.TempPathFactory) -> Session:
 def test_a_particle_blast_has_a_film_and_the_loads_of_the_library(particles: Session) -> None:
     assert state_of(particles).state == "done"
     (threat,) = particles.chosen_threats()
-    assert threat.charge.position_m == (5.0, 15.0)
+    assert threat.charge == Charge((5.0, 15.0), 100.0)
     bare, own = particles.shown(threat)
     record = particles.folder.record_of(own.key)
     assert record is not None
@@ -145,21 +148,22 @@ def test_what_is_there_is_not_run_again(gas: Session) -> None:
 
 
 def test_keys_know_what_a_result_depends_on() -> None:
-    (threat,) = threats_of(hut())
+    charge = Charge((2.0, 4.0), 5.0)
+    assert [each.charge for each in threats_of(hut())] == [charge]
     scenario_hash, engine = hut().content_hash, Engine(name="gas")
-    key = blast_key(scenario_hash, WALL, threat.charge, engine)
-    assert key == blast_key(scenario_hash, WALL[::-1], threat.charge, engine)
-    assert key == blast_key(scenario_hash, WALL, threat.charge, Engine(name="gas", cell_m=0.5))
+    key = blast_key(scenario_hash, WALL, charge, engine)
+    assert key == blast_key(scenario_hash, WALL[::-1], charge, engine)
+    assert key == blast_key(scenario_hash, WALL, charge, Engine(name="gas", cell_m=0.5))
     others = {
-        blast_key(scenario_hash, WALL[:-1], threat.charge, engine),
-        blast_key(scenario_hash, WALL, threat.charge._replace(tnt_kg=6.0), engine),
-        blast_key(scenario_hash, WALL, threat.charge, Engine(name="gas", cell_m=0.25)),
-        blast_key("0", WALL, threat.charge, engine),
+        blast_key(scenario_hash, WALL[:-1], charge, engine),
+        blast_key(scenario_hash, WALL, charge._replace(tnt_kg=6.0), engine),
+        blast_key(scenario_hash, WALL, charge, Engine(name="gas", cell_m=0.25)),
+        blast_key("0", WALL, charge, engine),
     }
     assert len(others | {key}) == 5
 
 
-@pytest.mark.parametrize("proposer", offers.PROPOSERS)
+@pytest.mark.parametrize("proposer", offers.proposers(load_scenario("courtyard")))
 def test_a_proposal_can_be_taken(tmp_path: Path, proposer: str) -> None:
     session = session_on(tmp_path, BALLISTIC_COURTYARD)
     session.propose(proposer)
@@ -210,7 +214,7 @@ def test_what_cannot_be_begun_is_refused_at_once(tmp_path: Path) -> None:
     with pytest.raises(BlastEnvError, match="no build zone"):
         session.search("random", 10)
     with pytest.raises(BlastEnvError, match="no build zone"):
-        session.propose(offers.PROPOSERS[0])
+        session.propose("wall near the charge")
     courtyard = session_on(tmp_path, load_scenario("courtyard"))
     with pytest.raises(BlastEnvError, match="budget is 0"):
         courtyard.search("random", 0)
@@ -225,8 +229,33 @@ def test_threats_have_places_that_one_can_point_to() -> None:
         "charge 1, start",
         "charge 1, end",
     ]
-    assert courtyard[1].charge.position_m == (5.0, 6.0)
+    assert courtyard[1].charge == Charge((5.0, 6.0), 100.0)
     assert [each.name for each in threats_of(hut())] == ["charge 1"]
+
+
+def test_a_vehicle_is_where_the_layout_lets_it_come(tmp_path: Path) -> None:
+    """Rules against it are offered, and its blasts differ in the place."""
+    site = gate_site(vehicle_document(places=2))
+    nearest, second = threats_of(site)
+    assert nearest.name == "charge 1, as near as it comes"
+    session = session_on(tmp_path, site)
+    assert session.threats == (nearest.name,)
+    assert {"line of posts", "posts and a wall"} < set(offers.proposers(site))
+    assert not set(VEHICLE_RULES) & set(offers.proposers(hut()))
+    session.propose("line of posts")
+    session.take(state_of(session), 0)
+    session.engine = Engine(name="gas", cell_m=0.5)
+    session.blast([0])
+    assert state_of(session).state == "done", state_of(session).text
+    bare, posts = (session.folder.record_of(each.key) for each in session.shown(nearest))
+    assert bare is not None
+    assert posts is not None
+    assert bare.repeat["charge"][0] == [9.0, 4.0]
+    assert posts.repeat["charge"][0][0] <= 3.0
+    assert posts.loads[0].impulse_pa_s < 0.6 * bare.loads[0].impulse_pa_s
+    (task,) = [each for each in session._threats_as_data() if each.name == nearest.name]
+    again = ThreatOf.model_validate_json(task.model_dump_json())
+    assert again.charge == nearest.charge != second.charge
 
 
 # Processes.

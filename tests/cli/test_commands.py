@@ -110,7 +110,7 @@ def test_simulate_writes_each_picture(
 
 
 def test_simulate_prints_json_that_can_be_read() -> None:
-    result = run("simulate", "free_field", "--stand-off", "20", "--json")
+    result = run("simulate", "free_field", "--stand-off", "20", "--json-all")
     assert result.exit_code == 0
     content = json.loads(result.stdout)
     expected = simulate(load_scenario("free_field").at_stand_off(20.0))
@@ -174,7 +174,7 @@ def test_validate_reports_all_problems_of_all_files(tmp_path: Path) -> None:
     bad.write_text(text.replace("width_m", "widht_m").replace("stock = 16", "stock = -1"))
     result = run("validate", "courtyard", bad)
     assert result.exit_code == 1
-    assert "courtyard: good" in result.stdout
+    assert "courtyard: good for simulate" in result.stdout
     output = result.stdout.replace("\n", " ")
     assert "site.widht_m: unknown key, did you mean 'width_m'?" in output
     assert "build_zone.stock: is -1, must be at least 1" in output

@@ -52,7 +52,7 @@ def test_a_visible_threat_gets_a_layout_for_each_charge(visible: Path, tmp_path:
         layout = load_layout(path, scenario)
         assert layout == agent.propose(scenario, threat.charge)
         expected = evaluate_layout(scenario, layout, threats=[threat])
-        assert table["impulse_pa_s"][number - 1] == pytest.approx(expected.impulse_pa_s.value)
+        assert table["load"][number - 1] == pytest.approx(expected.load)
         provenance = LayoutFile.load(path).provenance
         assert provenance["charge"]["position_m"] == list(
             threat.charge_against(scenario, layout).position_m
@@ -92,7 +92,7 @@ def test_a_hidden_threat_gets_one_layout(hidden: Path, tmp_path: Path) -> None:
 
 
 def test_json_has_every_case_and_nothing_else_is_printed(visible: Path) -> None:
-    result = evaluate("--run", visible, "--seeds", 2, "--first-seed", 1_000_000, "--json")
+    result = evaluate("--run", visible, "--seeds", 2, "--first-seed", 1_000_000, "--json-all")
     content = json.loads(result.stdout)
     assert [case["seed"] for case in content["cases"]] == [1_000_000, 1_000_001]
     assert content["cache"] == {"blasts": 4, "hits": 0, "hit_rate": 0.0}

@@ -1,13 +1,16 @@
 """`--engine gas` on the command line: loads without a calibration, and what it cannot draw."""
 
 import json
+from functools import partial
 from pathlib import Path
 
+import matplotlib
 import pytest
 from typer.testing import CliRunner, Result
 
 import blast_env
 from blast_env.cli import app
+from blast_env.rendering import pressure_film
 from blast_env.scenario import save_scenario, write_layout
 from tests.gas_sites import WALL, hut
 
@@ -38,7 +41,7 @@ def test_a_blast_prints_what_the_library_finds(site: Path, tmp_path: Path) -> No
     assert f"{expected.impulse('hut').pa_s:,.0f}" in result.stdout
     assert "front" in result.stdout
     assert "20 x 16" not in result.stdout
-    assert "36 x 32 x 10 cells of 0.5 m" in " ".join(result.stdout.split())
+    assert "cells of 0.5 m: 36 x 32 x 10 cells" in " ".join(result.stdout.split())
     assert (tmp_path / "a.xlsx").exists()
     assert (tmp_path / "a.parquet").exists()
 
@@ -49,6 +52,7 @@ def test_json_has_the_loads_and_the_cell(site: Path) -> None:
     assert content["run"]["cell (m)"] == 0.25
     assert content["impulse"]["hut"]["pa_s"] > 0.0
     assert [each["name"] for each in content["gauges"]] == ["front", "behind"]
+    assert "modules" not in content
 
 
 def test_a_layout_is_evaluated_by_gas(site: Path, tmp_path: Path) -> None:
@@ -63,14 +67,62 @@ def test_a_layout_is_evaluated_by_gas(site: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--film", "a.mp4"), "--film draws particles: engine 'gas' has none"),
+        (("--scheme", "a.png"), "--scheme draws particles: engine 'gas' has none"),
+        (("--velocities", "a.png"), "--velocities draws particles: engine 'gas' has none"),
+        (("--preset", "ballistic"), "--preset is for particles"),
+        (("--gauge", "front"), "--gauge is for --history: no history is to be drawn"),
+        (("--gauge", "frnt", "--history", "a.png"), "did you mean 'front'"),
+        (("--film-height", "1"), "--film-height is for --film"),
+        (("--film", "a.mp4", "--film-section", "z=1"), "must be x=M or y=M, e.g. x=12.5"),
+        (("--film", "a.mp4", "--film-height", "99"), "z = 99.0 m is outside"),
+        (("--heat-map", "a.png", "--quantity", "paek"), "did you mean 'peak'"),
+        (("--impulse-map", "a.png", "--side-by-side"), "--layout is missing"),
         (("--cell", "0.2"), "cell_m is 0.2, must be 0.5 m"),
     ],
 )
-def test_what_gas_has_not_is_said(site: Path, arguments: tuple[str, str], words: str) -> None:
+def test_what_gas_has_not_is_said(
+    site: Path,
+    arguments: tuple[str, ...],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
     result = run("simulate", site, "--engine", "gas", *arguments)
     assert result.exit_code == 2
+    assert list(tmp_path.iterdir()) == [site]
     assert words in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize(
+    "option", ["--impulse-map=a.png", "--peak-map=a.png", "--gauge=front", "--film-height=2"]
+)
+def test_what_only_gas_has_is_said(site: Path, option: str) -> None:
+    result = run("simulate", site, "--engine", "event", option)
+    assert result.exit_code == 2
+    assert f"{option.split('=')[0]} is for gas dynamics" in " ".join(result.stderr.split())
+
+
+def test_a_layout_and_the_empty_site_are_shown_in_every_picture(
+    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(matplotlib.rcParams, "svg.fonttype", "none")  # text stays text
+    short = partial(pressure_film.write_pressure_film, frames_per_s=0.5)
+    monkeypatch.setattr(pressure_film, "write_pressure_film", short)
+    layout = write_layout(tmp_path / "wall.json", hut(), WALL, {"made by": "hand"})
+    names = ("heat-map", "history", "impulse-map", "peak-map")
+    options = [text for name in names for text in (f"--{name}", tmp_path / f"{name}.svg")]
+    film = ("--film", tmp_path / "film.gif", "--film-height", 1, "--film-section", "x=3")
+    chosen = ("--gauge", "behind", "--quantity", "peak", "--side-by-side", *film)
+    result = run("simulate", site, "--engine", "gas", "--layout", layout, *options, *chosen)
+    assert result.exit_code == 0, result.output
+    for name in names:
+        words = (tmp_path / f"{name}.svg").read_text("utf-8")
+        assert "no barrier" in words
+        assert "barrier of 6 modules" in words
+    assert "Kingery-Bulmash" in (tmp_path / "history.svg").read_text("utf-8")
+    assert "peak overpressure" in (tmp_path / "heat-map.svg").read_text("utf-8")
+    assert (tmp_path / "film.gif").stat().st_size > 10_000
 
 
 def test_a_cell_is_for_gas_alone(site: Path) -> None:

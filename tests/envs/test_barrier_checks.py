@@ -4,19 +4,21 @@ import doctest
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_agents
 
 from blast_env.envs import barrier_env
-from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
+from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.scenario import bundled_scenarios, load_scenario
 from tests.envs.small import make
 from tests.gas_sites import hut
 
 pytestmark = pytest.mark.slow
 
-IDS = sorted(name for name in gym.registry if name.startswith("BlastBarrier"))
+ITEM_IDS = sorted(map(barrier_id, FOR_GAS))
+IDS = sorted({name for name in gym.registry if name.startswith("BlastBarrier")} - {*ITEM_IDS})
 
 
 @pytest.mark.parametrize("env_id", IDS)
@@ -29,6 +31,20 @@ def test_both_checkers_pass_on_every_id(env_id: str) -> None:
     env = gym.make(env_id, render_mode="rgb_array", **arguments)
     check_env(env.unwrapped)
     check_env_for_agents(env.unwrapped)
+
+
+@pytest.mark.parametrize("env_id", ITEM_IDS)
+def test_ids_with_items_can_be_made_and_played(env_id: str) -> None:
+    """One piece is placed; the only blast, which takes a second, is that of the empty site."""
+    env = gym.make(env_id)
+    observation, info = env.reset(seed=0)
+    assert env.observation_space.contains(observation)
+    assert not info["action_mask"].all()
+    action = np.flatnonzero(info["action_mask"])[0]
+    observation, _, ended, _, info = env.step(action)
+    assert not ended
+    assert env.observation_space.contains(observation)
+    assert not info["action_mask"][action]
 
 
 @pytest.mark.parametrize("observation", ["grid", "grid_with_load", "features"])
@@ -47,7 +63,10 @@ def test_every_bundled_scenario_with_a_build_zone_has_an_id() -> None:
     for name, has_zone in zones.items():
         assert (barrier_id(name) in gym.registry) == has_zone
         if has_zone:
-            assert gym.spec(barrier_id(name)).kwargs["scenario"] == name
+            kwargs = gym.spec(barrier_id(name)).kwargs
+            assert kwargs["scenario"] == name
+            assert kwargs.get("engine") == ("gas" if name in FOR_GAS else None)
+    assert {name for name in zones if load_scenario(name).schema_version == 2} == FOR_GAS
 
 
 def test_examples_in_the_environment_s_docstring() -> None:

@@ -20,7 +20,7 @@ SCENARIOS = {
     **{
         name: scenario
         for name in bundled_scenarios()
-        if (scenario := load_scenario(name)).build_zone is not None
+        if (scenario := load_scenario(name)).build_zone is not None and not scenario.zone.items
     },
 }
 EPISODES = 60

@@ -38,7 +38,8 @@ def key(seed: int) -> BlastKey:
 
 def loads(seed: int) -> BlastLoads:
     """Loads with numbers that need every bit."""
-    house = StructureLoad("haus ß", True, 2.0, 0.1 + 0.2, 1.0 / 3.0, 1e-300, False, ("far", "b\n"))
+    notes = ("far", "b\n")
+    house = StructureLoad("haus ß", True, 2.0, 0.1 + 0.2, 1.0 / 3.0, 1e-300, 0.7, 2.0, False, notes)
     structures = (house, replace(house, name="b", notes=()))
     return BlastLoads(structures, np.array([0.0, float(seed), np.pi, 1e300]))
 

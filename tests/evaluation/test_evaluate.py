@@ -34,7 +34,7 @@ def test_no_barrier_reduces_by_exactly_nothing(evaluator: BlastEvaluator) -> Non
     assert evaluation.mean_reduction == 0.0
     assert evaluation.ci95 == (0.0, 0.0)
     assert evaluation.impulse_pa_s == evaluation.unprotected_impulse_pa_s
-    assert evaluation.cvar == evaluation.unprotected_cvar
+    assert evaluation.cvar_pa_s == evaluation.unprotected_cvar_pa_s
     assert (evaluation.threat_table.reduction == 0.0).all()
     assert (evaluation.module_table.reduction.dropna() == 0.0).all()
 
@@ -62,7 +62,7 @@ def test_the_numbers_are_those_of_the_blasts(evaluation: LayoutEvaluation) -> No
     assert evaluation.impulse_pa_s.value == pytest.approx(with_wall.mean())
     assert evaluation.unprotected_impulse_pa_s.value == pytest.approx(without.mean())
     assert evaluation.mean_reduction == pytest.approx(1.0 - with_wall.sum() / without.sum())
-    assert evaluation.cvar == pytest.approx(with_wall.max())  # 20 % of four threats: the worst
+    assert evaluation.cvar_pa_s == pytest.approx(with_wall.max())  # 20 % of four threats: the worst
     worst = int(with_wall.argmax())
     assert evaluation.worst.threat == THREATS[worst]
     assert evaluation.worst.impulse_pa_s == pytest.approx(with_wall[worst])

@@ -34,8 +34,8 @@ def comparison(
     return Comparison(
         cases=tuple(cases),
         layouts=tuple(tuple((row, 0) for row in range(index + 1)) for index in range(len(cases))),
-        impulse_pa_s=600.0 * (1.0 - np.array([reductions]).T),
-        unprotected_pa_s=np.full((len(cases), 1), 600.0),
+        loads=600.0 * (1.0 - np.array([reductions]).T),
+        unprotected=np.full((len(cases), 1), 600.0),
         in_range=np.array([list(in_range) or [True] * len(cases)]).T,
     )
 

@@ -93,6 +93,14 @@ def tall_document() -> Document:
     document["site"]["air_height_m"] = 14.0
     document["charge"][0]["height_m"] = 1.0
     document["structures"][0] |= {"height_m": 6.0, "faces": ["west", "south"], "building": "farm"}
+    document["structures"][0]["peak_weight"] = 2.0
+    document["objective"] = {
+        "quantity": "both",
+        "reference_impulse_pa_s": 500.0,
+        "reference_peak_pa": 5e4,
+        "charges": "cvar",
+        "cvar_level": 0.5,
+    }
     document["build_zone"]["height_m"] = 3.0
     gate = {"corner_m": [12.0, 12.0], "size_m": [0.5, 2.0]}
     document["build_zone"]["access_way"]["gate"] = gate

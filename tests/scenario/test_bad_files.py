@@ -31,6 +31,8 @@ OPTIONAL = {
     *("air_height_m", "height_m", "faces", "gauges", "gate"),
     *("building", "georeference", "crs", "rotation_deg"),
     *("drivable", "places", "apart_m"),
+    *("peak_weight", "objective", "quantity", "charges", "cvar_level"),
+    *("reference_impulse_pa_s", "reference_peak_pa"),
 }
 CASES = [(document, path) for document in all_documents() for path in key_paths(document)]
 KEYS = [(document, path) for document, path in CASES if isinstance(path[-1], str)]

@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 from blast_env.errors import LayoutError
 from blast_env.geometry import Piece, Rectangle
 from blast_env.scenario import (
+    Item,
     LayoutFile,
+    ObjectiveSection,
     Placement,
     Scenario,
     ScenarioError,
@@ -27,7 +29,7 @@ from blast_env.scenario import (
 from blast_env.scenario.build_scene import build_scene, build_site
 from blast_env.simulation import simulate
 from tests.catalogue_sites import ITEMS, WALL, item, yard, yard_document
-from tests.scenario.documents import Document
+from tests.scenario.documents import REPOSITORY, Document
 from tests.scenario.zones import buildable, catalogue_documents, pieces_may_stand
 
 
@@ -469,3 +471,19 @@ def test_what_the_stock_list_needs_beside_the_name_is_the_stock() -> None:
     assert lines_for(items=[{"from_catalogue": "planter"}])[0] == (
         "yard: build_zone.items[0].stock: missing"
     )
+
+
+def test_the_description_of_the_format_has_the_stock_list() -> None:
+    text = (REPOSITORY / "docs" / "reference" / "scenario_format.md").read_text(encoding="utf-8")
+    for name, each in stock_barriers().items():
+        size = (each.length_modules * 0.5, each.thickness_modules * 0.5, each.height_m)
+        row = " x ".join(f"{side:g}" for side in size)
+        turns = "yes" if each.rotatable else "no"
+        assert f"| `{name}` | {row} | {each.cost:g} | {turns} | {each.description} |" in text
+        assert each.stops_vehicles  # as the text says of all
+
+
+def test_the_description_of_the_format_names_every_key_of_items_and_objective() -> None:
+    text = (REPOSITORY / "docs" / "reference" / "scenario_format.md").read_text(encoding="utf-8")
+    for section in (Item, ObjectiveSection):
+        assert not [key for key in section.model_fields if f"`{key}`" not in text]

@@ -92,11 +92,13 @@ def test_order_does_not_matter_and_fewer_modules_are_no_worse(
     assert (fewer.free >= full.free).all()
 
 
-# --- The bundled scenarios, as they are and with every condition added.
+# --- The bundled scenarios of single modules, as they are and with every condition added.
+
+MODULAR = [name for name in bundled_scenarios() if load_scenario(name).schema_version == 1]
 
 
 @pytest.mark.parametrize("conditions", [{}, CONDITIONS], ids=["as they are", "with conditions"])
-@pytest.mark.parametrize("name", bundled_scenarios())
+@pytest.mark.parametrize("name", MODULAR)
 def test_bundled_scenarios_are_placed_without_contradiction(
     name: str, conditions: Document
 ) -> None:

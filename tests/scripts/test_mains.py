@@ -1,6 +1,5 @@
 """The scripts' commands: those of the documentation are there, and quick ones work."""
 
-import importlib
 import re
 from pathlib import Path
 
@@ -15,43 +14,9 @@ from blast_env.studies.agreement import layouts as study
 from blast_env.studies.paper import LINEAR, comparison_table
 from scripts import engines, layouts, reproduce_paper, validity
 
-ROOT = Path(__file__).parents[2]
-NAMED = sorted(
-    {
-        tuple(match.split())
-        for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
-        for match in re.findall(
-            r"python -m\s+(scripts\.\w+(?:[ \n]+[a-z][\w-]+)?)", path.read_text("utf-8")
-        )
-    }
-)
-"""Module, and command where it has several."""
-
 
 def run(app: Typer, *arguments: str) -> Result:
     return CliRunner().invoke(app, arguments)
-
-
-@pytest.mark.parametrize("named", NAMED, ids=" ".join)
-def test_commands_of_the_documentation_exist(named: tuple[str, ...]) -> None:
-    module = importlib.import_module(named[0])
-    app = getattr(module, "app", None)
-    if app is None:
-        assert callable(module.main)
-        return
-    assert run(app, *named[1:], "--help").exit_code == 0
-    assert len(named) == 2, "a script of several commands is named without one"
-
-
-def test_the_documentation_names_every_command() -> None:
-    for name in ("engines", "gas", "layouts", "validity", "presets"):
-        commands = importlib.import_module(f"scripts.{name}").app.registered_commands
-        found = {each.name or each.callback.__name__.replace("_", "-") for each in commands}
-        documented = {named[1] for named in NAMED if named[0] == f"scripts.{name}"}
-        assert found - documented <= {
-            "noise",
-            "deposit",
-        }  # named where its result is used, in the code
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from scripts.scenario_difficulty import (
     PICTURES,
     picture_path,
     studied_scenarios,
+    with_items,
     with_section,
 )
 from tests.agents.search_cases import ballistic
@@ -56,7 +57,7 @@ def result(
     return TaskResult(
         bare=Outcome("no barrier", ((),), BARE[np.newaxis], BARE),
         random=outcome(*random),
-        walls=tuple(outcome(each) for each in walls),
+        rules=tuple(outcome(each) for each in walls),
         searched=outcome(searched),
     )
 
@@ -82,19 +83,19 @@ def visible(study: Study) -> TaskResult:
 def test_one_layout_for_all_is_judged_as_evaluate_layout_judges_it(
     study: Study, hidden: TaskResult
 ) -> None:
-    for row in (*hidden.walls, hidden.searched):
+    for row in (*hidden.rules, hidden.searched):
         expected = evaluate_against(study.evaluator, row.layouts[0], study.held_out)
         assert row.reduction == pytest.approx(expected.reduction)
         assert row.mean_pa_s == pytest.approx(expected.impulse_pa_s)
         assert row.worst_pa_s == pytest.approx(expected.worst.impulse_pa_s)
-        assert row.cvar_pa_s == pytest.approx(expected.cvar)
+        assert row.cvar_pa_s == pytest.approx(expected.cvar_pa_s)
         assert row.modules == len(row.layouts[0])
     assert hidden.bare.reduction == (0.0, 0.0, 0.0)
 
 
 def test_every_visible_charge_gets_a_wall_of_its_own(study: Study, visible: TaskResult) -> None:
     scenario, charges = study.evaluator.scenario, [each.charge for each in study._tried]
-    for wall, share in zip(visible.walls, STAND_OFFS, strict=True):
+    for wall, share in zip(visible.rules, STAND_OFFS, strict=True):
         assert list(wall.layouts) == [line_of_sight_wall(scenario, at, share) for at in charges]
         assert wall.impulse_pa_s.shape == (1, SMALL.charges)
     assert visible.random.impulse_pa_s.shape == (SMALL.random_visible, SMALL.charges)
@@ -188,7 +189,7 @@ def test_only_the_section_of_the_scenario_changes() -> None:
         with_section(page, "z", "new")
 
 
-@pytest.mark.parametrize("name", studied_scenarios())
+@pytest.mark.parametrize("name", sorted(set(studied_scenarios()) - set(with_items())))
 def test_the_page_was_made_with_the_scenario_as_it_is(name: str) -> None:
     """Otherwise run `python -m scripts.scenario_difficulty`."""
     section = (REPOSITORY / PAGE).read_text("utf-8").partition(f"<!-- begin {name} -->")[2]

@@ -43,9 +43,3 @@ def test_bounds_are_those_of_the_criterion() -> None:
     assert f"after {MOST_TRIES} sites" in DOCUMENT
     assert f"{DIRECTIONS} lines" in DOCUMENT
     assert f"Seeds 0 to {HELD_OUT_SITES - 1:,} are held out" in DOCUMENT
-
-
-@pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", DOCUMENT, re.DOTALL))
-def test_its_code_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    exec(compile(block, "docs/researchers/sites.md", "exec"), {})

@@ -17,6 +17,8 @@ from blast_agents.search import LayoutProblem
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Objective
 from blast_env.geometry import Layout
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine, is_gas
 from blast_env.runner import as_completed, check_workers
 
 Found = TypeVar("Found")
@@ -29,12 +31,12 @@ class SearchJob:
     Attributes:
         case: The case.
         search: The search.
-        engine: Name of the engine.
+        engine: Name of the engine, or the engine.
     """
 
     case: Case
     search: Search
-    engine: str
+    engine: str | Engine
 
     @property
     def blasts(self) -> int:
@@ -67,12 +69,12 @@ class EvaluationJob:
     Attributes:
         case: The case.
         layout: The layout.
-        engine: Name of the engine.
+        engine: Name of the engine, or the engine.
     """
 
     case: Case
     layout: Layout
-    engine: str
+    engine: str | Engine
 
     @property
     def blasts(self) -> int:
@@ -80,9 +82,9 @@ class EvaluationJob:
         return len(self.case.threats)
 
     def __call__(self) -> tuple[float, ...]:
-        """Return the impulses on the protected structures, Pa*s, one a held-out threat."""
+        """Return the loads that count, in the unit of the objective, one a held-out threat."""
         evaluator = BlastEvaluator(self.case.scenario, self.engine)
-        return Objective(evaluator, self.case).impulses_pa_s(self.layout)
+        return Objective(evaluator, self.case).counted_loads(self.layout)
 
 
 def propose_at_once(entry: Instant, cases: Sequence[Case]) -> tuple[Proposal, ...]:
@@ -129,14 +131,14 @@ class Contest:
     """Entries on a track.
 
     Proposals that take no blast are made first, in this process, where nothing disturbs their
-    time; then the searches; then all layouts meet the held-out threats. Searches and impulses are
+    time; then the searches; then all layouts meet the held-out threats. Searches and loads are
     kept as soon as they are there, and not done again.
 
     Attributes:
         track: The cases.
         entries: No barrier among them; their names differ.
         store: Keeps the results.
-        engine: Name of the engine.
+        engine: Name of the engine, or the engine.
 
     Raises:
         BlastEnvError: If two entries have one name, or no barrier is not among them.
@@ -145,7 +147,7 @@ class Contest:
     track: Track
     entries: tuple[Entry, ...]
     store: ResultStore
-    engine: str = "event"
+    engine: str | Engine = "event"
 
     def __post_init__(self) -> None:
         """Check the entries."""
@@ -201,10 +203,10 @@ class Contest:
             self.store.keep_proposal(search_key(job.case, job.search, self.engine), proposal)
             meter.add(job.blasts)
         evaluations = self._missing_evaluations()
-        for index, impulses_pa_s in as_completed(_done, evaluations, processes):
+        for index, loads in as_completed(_done, evaluations, processes):
             asked = evaluations[index]
             key = evaluation_key(asked.case, asked.layout, self.engine)
-            self.store.keep_impulses(key, impulses_pa_s)
+            self.store.keep_loads(key, loads)
             meter.add(asked.blasts)
         return self._standings()
 
@@ -220,7 +222,7 @@ class Contest:
         return sorted(jobs, key=lambda job: -job.blasts)
 
     def _missing_evaluations(self) -> list[EvaluationJob]:
-        """Return the layouts proposed so far whose impulses are not known, each once."""
+        """Return the layouts proposed so far whose loads are not known, each once."""
         asked = dict.fromkeys(
             (index, proposal.layout)
             for entry in self.entries
@@ -231,7 +233,7 @@ class Contest:
         return [
             EvaluationJob(cases[index], layout, self.engine)
             for index, layout in asked
-            if self._impulses_pa_s(cases[index], layout) is None
+            if self._loads(cases[index], layout) is None
         ]
 
     def _proposals(self, entry: Entry) -> Sequence[Proposal | None]:
@@ -241,8 +243,8 @@ class Contest:
         cases = self.track.cases
         return [self.store.proposal(search_key(case, entry, self.engine)) for case in cases]
 
-    def _impulses_pa_s(self, case: Case, layout: Layout) -> tuple[float, ...] | None:
-        return self.store.impulses_pa_s(evaluation_key(case, layout, self.engine))
+    def _loads(self, case: Case, layout: Layout) -> tuple[float, ...] | None:
+        return self.store.loads(evaluation_key(case, layout, self.engine))
 
     def _standings(self) -> Standings:
         results = tuple(self._results())
@@ -251,13 +253,13 @@ class Contest:
             for entry, result in zip(self.entries, results, strict=True)
             if isinstance(entry, NoBarrier)
         )
-        return Standings(self.track, results, bare.impulse_pa_s, self.engine)
+        return Standings(self.track, results, bare.loads, _engine_words(self.engine))
 
     def _results(self) -> Iterator[Result]:
         for entry in self.entries:
             proposals = tuple(each for each in self._proposals(entry) if each is not None)
-            impulses_pa_s = [
-                self._impulses_pa_s(case, proposal.layout)
+            loads = [
+                self._loads(case, proposal.layout)
                 for case, proposal in zip(self.track.cases, proposals, strict=True)
             ]
             yield Result(
@@ -266,7 +268,7 @@ class Contest:
                 budget=entry.budget if isinstance(entry, Search) else 0,
                 training=entry.training if isinstance(entry, Agent) else None,
                 proposals=proposals,
-                impulse_pa_s=np.array(impulses_pa_s, dtype=np.float64),
+                loads=np.array(loads, dtype=np.float64),
             )
 
 
@@ -280,3 +282,9 @@ class _Meter:
         self._done += blasts
         if self._show is not None:
             self._show(min(self._done / max(self._blasts, 1), 1.0))
+
+
+def _engine_words(engine: str | Engine) -> str:
+    """Return what people call an engine: its name, with the cells that it has."""
+    found = find_engine(engine)
+    return f"{found.name}, cells of {found.cell_m:g} m" if is_gas(found) else found.name

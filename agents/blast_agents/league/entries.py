@@ -7,14 +7,13 @@ import numpy as np
 
 from blast_agents.posts import VEHICLE_RULES
 from blast_agents.proposal import LayoutAgent
-from blast_agents.rules import RULES, expected_charge, random_layout
+from blast_agents.rules import ITEM_RULES, RULES, expected_charge, random_layout, sight_lines
 from blast_agents.search import SearchMethod, find_search_method
+from blast_agents.search.by_rule import MOST_SIGHT_LINES
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Scenario
-from blast_env.scenario.vehicles import source_of
-from blast_env.sites import Visibility, visibility_layout
 
 
 @dataclass(frozen=True)
@@ -75,20 +74,17 @@ class Rule:
 
 @dataclass(frozen=True)
 class VisibilityLayout:
-    """Cuts as many lines of sight as it can; see `blast_env.sites.visibility_layout`.
+    """Cuts as many lines of sight as it can; see `sight_lines`.
 
     Attributes:
         name: In tables.
     """
 
-    name: str = "most sight lines cut"
+    name: str = MOST_SIGHT_LINES
 
     def propose(self, case: Case) -> Layout:
         """Return the layout for the charge, or for all the places where a hidden one may be."""
-        scenario = case.scenario
-        if case.charge is not None:
-            scenario = scenario.model_copy(update={"charge": (source_of(case.charge),)})
-        return visibility_layout(scenario, Visibility.of(scenario))
+        return sight_lines(case.scenario, case.charge)
 
 
 @dataclass(frozen=True)
@@ -150,7 +146,7 @@ def search_name(method: str, budget: int) -> str:
 
 
 def standard_entries(
-    methods: Sequence[str], budgets: Sequence[int], vehicles: bool = False
+    methods: Sequence[str], budgets: Sequence[int], vehicles: bool = False, items: bool = False
 ) -> tuple[Entry, ...]:
     """Return all entries but agents: no barrier, a random layout, rules, lines of sight, searches.
 
@@ -158,12 +154,13 @@ def standard_entries(
         methods: Names of search methods.
         budgets: Blasts a case; each method enters with each.
         vehicles: Whether every case has a vehicle: the rules against them enter then.
+        items: Whether every case has a catalogue: there are more rules then.
 
     Raises:
         UnknownNameError: If there is no such method; the message names the nearest one.
         BlastEnvError: If a budget is below 1.
     """
-    named = {**RULES, **VEHICLE_RULES} if vehicles else RULES
+    named = {**(ITEM_RULES if items else RULES), **(VEHICLE_RULES if vehicles else {})}
     rules = (Rule(rule, name) for name, rule in named.items())
     found = [find_search_method(name) for name in methods]
     searches = (Search(method, budget) for method in found for budget in budgets)

@@ -133,7 +133,7 @@ def _error_bars(standings: Standings, results: list[Result]) -> "np.ndarray[tupl
 
 
 def _subtitle(standings: Standings) -> str:
-    count, threats = standings.unprotected_pa_s.shape
+    count, threats = standings.unprotected.shape
     if standings.has_one_case:
         return f"one case, 95 % intervals over its {threats} held-out threats; " + _engine(
             standings

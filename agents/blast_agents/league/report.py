@@ -34,17 +34,17 @@ def summary_table(standings: Standings) -> pd.DataFrame:
 
 
 def case_table(standings: Standings) -> pd.DataFrame:
-    """Return one row an entry and case; impulses are means over the held-out threats."""
+    """Return one row an entry and case; loads are what each case makes of its held-out threats."""
     return pd.DataFrame(
         [
             {"entry": result.name, "method": result.method, "budget": result.budget}
-            | _case(case, proposal, impulses_pa_s, bare_pa_s)
+            | _case(case, proposal, loads, bare)
             for result in standings.results
-            for case, proposal, impulses_pa_s, bare_pa_s in zip(
+            for case, proposal, loads, bare in zip(
                 standings.track.cases,
                 result.proposals,
-                result.impulse_pa_s,
-                standings.unprotected_pa_s,
+                result.loads,
+                standings.unprotected,
                 strict=True,
             )
         ]
@@ -58,7 +58,7 @@ def _summary(standings: Standings, result: Result) -> dict[str, Any]:
         "method": result.method,
         "budget": result.budget,
         "cases": len(standings.track.cases),
-        "held_out_threats": standings.unprotected_pa_s.shape[1],
+        "held_out_threats": standings.unprotected.shape[1],
         "reduction": reduction.value,
         "reduction_low": reduction.low,
         "reduction_high": reduction.high,
@@ -80,9 +80,7 @@ def _summary(standings: Standings, result: Result) -> dict[str, Any]:
     }
 
 
-def _case(
-    case: Case, proposal: Proposal, impulses_pa_s: FloatArray, bare_pa_s: FloatArray
-) -> dict[str, Any]:
+def _case(case: Case, proposal: Proposal, loads: FloatArray, bare: FloatArray) -> dict[str, Any]:
     told = None if case.charge is None else charge_against(case.scenario, (), case.charge)
     x_m, y_m = (np.nan, np.nan) if told is None else told.position_m
     return {
@@ -91,9 +89,10 @@ def _case(
         "charge_x_m": x_m,
         "charge_y_m": y_m,
         "first_held_out_seed": case.threats[0].seed,
-        "impulse_pa_s": float(impulses_pa_s.mean()),
-        "unprotected_impulse_pa_s": float(bare_pa_s.mean()),
-        "reduction": reductions(impulses_pa_s.mean(), bare_pa_s.mean()).item(),
+        "load": case.combined(loads),
+        "unprotected_load": case.combined(bare),
+        "unit": case.scenario.objective.unit,
+        "reduction": reductions(case.combined(loads), case.combined(bare)).item(),
         "blasts": proposal.blasts,
         "seconds": proposal.seconds,
         "modules": len(proposal.layout),
@@ -134,7 +133,7 @@ def verdict_lines(standings: Standings) -> list[str]:
 
 def sample_text(standings: Standings) -> str:
     """Return what the numbers are means over."""
-    count, threats = standings.unprotected_pa_s.shape
+    count, threats = standings.unprotected.shape
     held_out = count_of("held-out threat", threats)
     if standings.has_one_case:
         return f"One case; intervals and worst case are over its {held_out}"

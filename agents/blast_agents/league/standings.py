@@ -28,7 +28,7 @@ class Result:
         budget: Most blasts of a search for a case; else 0.
         training: What an agent cost before; `None` for all others.
         proposals: One a case; the cells are sorted.
-        impulse_pa_s: With the layouts, Pa*s (cases, held-out threats).
+        loads: With the layouts, in the unit of the objective (cases, held-out threats).
     """
 
     name: str
@@ -36,7 +36,7 @@ class Result:
     budget: int
     training: Training | None
     proposals: tuple[Proposal, ...]
-    impulse_pa_s: FloatArray
+    loads: FloatArray
 
     @property
     def blasts_per_case(self) -> float:
@@ -70,8 +70,8 @@ class Standings:
     Attributes:
         track: The track.
         results: One an entry.
-        unprotected_pa_s: Impulse without a barrier, Pa*s (cases, held-out threats).
-        engine: Name of the engine.
+        unprotected: Load without a barrier, likewise (cases, held-out threats).
+        engine: Name of the engine, with the cells that it has.
 
     Raises:
         BlastEnvError: If nothing arrives at the protected structures of a case without a barrier.
@@ -79,12 +79,12 @@ class Standings:
 
     track: Track
     results: tuple[Result, ...]
-    unprotected_pa_s: FloatArray
+    unprotected: FloatArray
     engine: str
 
     def __post_init__(self) -> None:
         """Check that there is something to reduce."""
-        check_something_arrives(self.track.cases, self.unprotected_pa_s)
+        check_something_arrives(self.track.cases, self.unprotected)
 
     @property
     def has_one_case(self) -> bool:
@@ -102,9 +102,9 @@ class Standings:
         return Comparison(
             cases=self.track.cases,
             layouts=tuple(proposal.layout for proposal in result.proposals),
-            impulse_pa_s=result.impulse_pa_s,
-            unprotected_pa_s=self.unprotected_pa_s,
-            in_range=np.ones(self.unprotected_pa_s.shape, dtype=bool),
+            loads=result.loads,
+            unprotected=self.unprotected,
+            in_range=np.ones(self.unprotected.shape, dtype=bool),
         )
 
     def reduction(self, result: Result) -> Estimate:
@@ -165,7 +165,7 @@ def verdicts(standings: Standings) -> tuple[Verdict, ...]:
     count = len(standings.track.cases)
     sample = f"{count} cases"
     if standings.has_one_case:
-        sample = f"{standings.unprotected_pa_s.shape[1]} held-out threats of one case"
+        sample = f"{standings.unprotected.shape[1]} held-out threats of one case"
     return tuple(
         Verdict(
             agent=result.name,

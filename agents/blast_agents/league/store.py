@@ -21,7 +21,8 @@ from blast_env.evaluation import Case, Threat
 from blast_env.evaluation.store import calibration_digest, engine_text
 from blast_env.files import FolderStore
 from blast_env.geometry import Layout
-from blast_env.physics.engines import find_engine
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine, is_gas
 from blast_env.provenance import code_version, versions
 from blast_env.scenario import AnyCharge, VehicleCharge
 
@@ -37,7 +38,7 @@ class Model(NamedTuple):
     Attributes:
         scenario_hash: Content hash of the scenario.
         engine: The engine with its version.
-        calibration: Digest of the calibration.
+        calibration: Digest of the calibration; empty for gas dynamics.
         code: Version of the package.
     """
 
@@ -81,7 +82,7 @@ class EvaluationKey(NamedTuple):
     layout: Layout
 
 
-def search_key(case: Case, search: Search, engine: str) -> SearchKey:
+def search_key(case: Case, search: Search, engine: str | Engine) -> SearchKey:
     """Return the key of a search for a case.
 
     Raises:
@@ -99,8 +100,8 @@ def search_key(case: Case, search: Search, engine: str) -> SearchKey:
     )
 
 
-def evaluation_key(case: Case, layout: Layout, engine: str) -> EvaluationKey:
-    """Return the key of the impulses with a layout on a case's held-out threats.
+def evaluation_key(case: Case, layout: Layout, engine: str | Engine) -> EvaluationKey:
+    """Return the key of the loads with a layout on a case's held-out threats.
 
     Raises:
         CalibrationError: If the scenario has no calibration for the engine.
@@ -110,7 +111,7 @@ def evaluation_key(case: Case, layout: Layout, engine: str) -> EvaluationKey:
 
 
 _PROPOSAL: Final = TypeAdapter(Proposal)
-_IMPULSES: Final = TypeAdapter(tuple[float, ...])
+_LOADS: Final = TypeAdapter(tuple[float, ...])
 
 
 class ResultStore:
@@ -144,18 +145,18 @@ class ResultStore:
         """
         self._store.put(_text(key), _PROPOSAL.dump_json(proposal))
 
-    def impulses_pa_s(self, key: EvaluationKey) -> tuple[float, ...] | None:
-        """Return the impulses under the threats, Pa*s, or `None` if they are not known."""
+    def loads(self, key: EvaluationKey) -> tuple[float, ...] | None:
+        """Return the loads under the threats, in the objective's unit, or `None` if not known."""
         content = self._store.get(_text(key))
-        return None if content is None else _IMPULSES.validate_json(content)
+        return None if content is None else _LOADS.validate_json(content)
 
-    def keep_impulses(self, key: EvaluationKey, impulses_pa_s: tuple[float, ...]) -> None:
-        """Keep the impulses under the threats, Pa*s.
+    def keep_loads(self, key: EvaluationKey, loads: tuple[float, ...]) -> None:
+        """Keep the loads under the threats, in the unit of the objective.
 
         Raises:
             BlastEnvError: If they cannot be written.
         """
-        self._store.put(_text(key), _IMPULSES.dump_json(impulses_pa_s))
+        self._store.put(_text(key), _LOADS.dump_json(loads))
 
 
 def _text(key: SearchKey | EvaluationKey) -> str:
@@ -184,12 +185,9 @@ def _search_code() -> str:
     return f"{digest.hexdigest()[:16]} {drawn_with}"
 
 
-def _model(case: Case, engine: str) -> Model:
+def _model(case: Case, engine: str | Engine) -> Model:
     found = find_engine(engine)
-    calibration = scenario_calibration(case.scenario, found.name)
-    return Model(
-        case.scenario.content_hash,
-        engine_text(found),
-        calibration_digest(calibration),
-        code_version(),
-    )
+    digest = ""  # gas dynamics needs no calibration
+    if not is_gas(found):
+        digest = calibration_digest(scenario_calibration(case.scenario, found.name))
+    return Model(case.scenario.content_hash, engine_text(found), digest, code_version())

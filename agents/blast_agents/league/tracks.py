@@ -50,16 +50,21 @@ class Track:
     reference_budget: int
 
 
-def known_track(scenario: AnyScenario, cases: int, seeds: int, seed: int = 0) -> Track:
+def known_track(
+    scenario: AnyScenario, cases: int, seeds: int, seed: int = 0, *, noisy: bool = True
+) -> Track:
     """Return the track of a known threat at unseen positions.
 
-    A search meets `VISIBLE_REALISATIONS` fans and airs of the case's own charge.
+    A search meets `VISIBLE_REALISATIONS` fans and airs of the case's own charge; without noise it
+    meets the very blast that layouts are judged on.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
         cases: How many charges are drawn, at most 1,000.
         seeds: Held-out fans and airs of each, at most 1,000.
         seed: Decides everything, at most 1,000.
+        noisy: Whether the engine has fans and airs to draw; if not, there is one held-out blast a
+            case, whatever `seeds` says.
 
     Raises:
         BlastEnvError: If a number is out of bounds, or there is no build zone.
@@ -67,15 +72,16 @@ def known_track(scenario: AnyScenario, cases: int, seeds: int, seed: int = 0) ->
     scenario = find_scenario(scenario)
     scenario.zone  # noqa: B018  # refuses a scenario without one
     drawn = []
+    realisations = VISIBLE_REALISATIONS if noisy else 1
     for index, first in enumerate(_first_seeds(cases, seeds, seed)):
         charge, search_seed = draw_threat(scenario, first), seed * MOST_CASES + index
-        judged = visible_case(scenario, charge, range(first, first + seeds))
+        judged = visible_case(scenario, charge, range(first, first + (seeds if noisy else 1)))
         drawn.append(
             replace(
                 judged,
                 name=f"{scenario.name} {index}",
                 seed=search_seed,
-                practice=practice_visible(scenario, charge, VISIBLE_REALISATIONS, search_seed),
+                practice=practice_visible(scenario, charge, realisations, search_seed),
             )
         )
     return Track(

@@ -3,17 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Literal
 
 from blast_agents.league.entries import Agent, Training
 from blast_agents.league.tracks import Track
 from blast_agents.training import load_agent
 from blast_agents.training.checkpoint import Checkpoint
+from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import RunFolder
 from blast_env.errors import BlastEnvError
 from blast_env.sites import SITES
-
-_ALGORITHMS: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +43,7 @@ class TrainedRun:
         folder = RunFolder(run)
         configuration = folder.configuration()
         settings = configuration.settings
-        name = f"{_ALGORITHMS[settings.algorithm]} ({run.resolve().name})"
+        name = f"{ALGORITHM_NAMES[settings.algorithm]} ({run.resolve().name})"
         return cls(
             run=run,
             entry=Agent(load_agent(run), name, _training(folder, settings.evaluation_cases)),

@@ -87,7 +87,7 @@ def _draw_history(axes: Axes, result: SearchResult, problem: LayoutProblem) -> N
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("blasts spent")
     axes.set_title("Best layout so far", fontsize=11)
-    _set_reduction_axis(axes)
+    _set_reduction_axis(axes, problem)
     axes.legend(loc="lower right", fontsize=9, frameon=False)
 
 
@@ -103,14 +103,14 @@ def _draw_front(axes: Axes, front: Sequence[Candidate], problem: LayoutProblem) 
     threats = count_of("threat", front[0].threats)
     what = "spending is" if has_items else "modules are"
     axes.set_title(f"Front: what {what} worth, under {threats}", fontsize=11)
-    _set_reduction_axis(axes)
+    _set_reduction_axis(axes, problem)
 
 
-def _set_reduction_axis(axes: Axes) -> None:
+def _set_reduction_axis(axes: Axes, problem: LayoutProblem) -> None:
     low = min(0.0, axes.get_ylim()[0])
     axes.set_ylim(low, 1.0)
     axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
-    axes.set_ylabel("reduction of the impulse")
+    axes.set_ylabel(f"reduction of the {problem.scenario.objective.noun}")
     axes.grid(alpha=0.3, which="both")
     axes.spines[["top", "right"]].set_visible(False)
 

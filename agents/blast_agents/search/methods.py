@@ -1,30 +1,20 @@
 """Search methods that need no further library."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, islice
 from math import comb, exp
-from typing import Final
 
 import numpy as np
 
-from blast_agents.posts import line_of_posts, posts_and_wall
-from blast_agents.rules import (
-    long_wall_near_building,
-    long_wall_near_charge,
-    random_layout,
-    ring_around_building,
-    ring_around_charge,
-    wall_near_building,
-    wall_near_charge,
-)
+from blast_agents.rules import random_layout
 from blast_agents.search.moves import Draw, Moves, random_walls
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
 from blast_agents.search.session import SearchSession
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Element, Layout, Piece
-from blast_env.scenario import AnyCharge, Placement, Scenario
+from blast_env.scenario import Placement
 
 
 @dataclass(frozen=True)
@@ -54,58 +44,6 @@ class RandomSearch:
                 session.assess([random_layout(problem.scenario, rng) for _ in range(self.batch)])
 
         return session.result(self.name, seed, session.run(explore))
-
-
-@dataclass(frozen=True)
-class RuleSearch:
-    """Proposes the layout of a rule; no blast is simulated.
-
-    For a hidden charge the rule stands in the way of the middle of where one may be.
-
-    Attributes:
-        rule: Gives the layout for a charge.
-        name: Name in tables and on the command line.
-    """
-
-    rule: Callable[[Scenario, AnyCharge], Layout]
-    name: str
-
-    def search(
-        self,
-        problem: LayoutProblem,
-        budget: int,
-        seed: int,
-        report: Report | None = None,  # noqa: ARG002
-    ) -> SearchResult:
-        """Return the rule's layout; budget and seed change nothing.
-
-        Raises:
-            BlastEnvError: If there is no line of sight; see `line_of_sight_wall`.
-        """
-        return SearchResult(
-            method=self.name,
-            layout=tuple(sorted(self.rule(problem.scenario, problem.charge))),
-            impulse_pa_s=None,
-            threats=0,
-            blasts=0,
-            budget=budget,
-            seed=seed,
-            history=(),
-            interrupted=False,
-        )
-
-
-RULE_SEARCHES: Final = (
-    RuleSearch(wall_near_charge, "wall_near_charge"),
-    RuleSearch(wall_near_building, "wall_near_building"),
-    RuleSearch(long_wall_near_charge, "long_wall_near_charge"),
-    RuleSearch(long_wall_near_building, "long_wall_near_building"),
-    RuleSearch(ring_around_charge, "ring_around_charge"),
-    RuleSearch(ring_around_building, "ring_around_building"),
-    RuleSearch(line_of_posts, "line_of_posts"),
-    RuleSearch(posts_and_wall, "posts_and_wall"),
-)
-"""The rules as methods; without a catalogue the long walls are the others."""
 
 
 @dataclass(frozen=True)
@@ -139,34 +77,34 @@ class GreedySearch:
 
         def explore() -> None:
             placement = Placement.empty(problem.scenario)
-            (impulse_pa_s,) = session.assess([()]).tolist()
-            gains_pa_s: dict[Element, float] = {}
+            (load,) = session.assess([()]).tolist()
+            gains: dict[Element, float] = {}
             while not placement.is_full:
                 blasts = session.exploring_left // _still_to_place(placement)
-                tried = self._elements(placement, gains_pa_s, max(1, blasts // plan.threats), rng)
+                tried = self._elements(placement, gains, max(1, blasts // plan.threats), rng)
                 impulses = session.assess([(*placement.layout, each) for each in tried])
-                gains_pa_s.update(zip(tried, (impulse_pa_s - impulses).tolist(), strict=True))
+                gains.update(zip(tried, (load - impulses).tolist(), strict=True))
                 best = int(np.argmin(impulses))
                 if placement.catalogue.has_items:
-                    worths = [self._worth(placement, each, gains_pa_s) for each in tried]
+                    worths = [self._worth(placement, each, gains) for each in tried]
                     best = int(np.argmax(worths))
                 placement = placement.place(tried[best])
-                impulse_pa_s = float(impulses[best])
+                load = float(impulses[best])
 
         return session.result(self.name, seed, session.run(explore))
 
     @staticmethod
-    def _worth(placement: Placement, element: Element, gains_pa_s: dict[Element, float]) -> float:
+    def _worth(placement: Placement, element: Element, gains: dict[Element, float]) -> float:
         """Return what something took off when it was tried last; with a catalogue, for its cost."""
         if not isinstance(element, Piece):
-            return gains_pa_s[element]
+            return gains[element]
         number = placement.catalogue.variant_number(element)
-        return gains_pa_s[element] / float(placement.costs[number, element.row, element.column])
+        return gains[element] / float(placement.costs[number, element.row, element.column])
 
     def _elements(
         self,
         placement: Placement,
-        gains_pa_s: dict[Element, float],
+        gains: dict[Element, float],
         count: int,
         rng: np.random.Generator,
     ) -> list[Element]:
@@ -174,10 +112,10 @@ class GreedySearch:
         catalogue = placement.catalogue
         free = [catalogue.element(int(action)) for action in np.flatnonzero(placement.legal)]
         known = sorted(
-            (each for each in free if each in gains_pa_s),
-            key=lambda each: -self._worth(placement, each, gains_pa_s),
+            (each for each in free if each in gains),
+            key=lambda each: -self._worth(placement, each, gains),
         )
-        new = [each for each in free if each not in gains_pa_s]
+        new = [each for each in free if each not in gains]
         promising = known[: max(round(count * self.promising_share), count - len(new))]
         fresh = rng.permutation(len(new))[: count - len(promising)]
         return [*promising, *(new[index] for index in fresh)]
@@ -244,24 +182,24 @@ class AnnealingSearch:
         return session.result(self.name, seed, session.run(explore))
 
     def _anneal(
-        self, session: SearchSession, layout: Layout, impulse_pa_s: float, rng: np.random.Generator
+        self, session: SearchSession, layout: Layout, load: float, rng: np.random.Generator
     ) -> None:
         """Go from neighbour to neighbour until the session ends it."""
         moves = Moves(session.problem.scenario)
-        scale_pa_s, begun = impulse_pa_s, session.exploring_share
+        scale, begun = load, session.exploring_share
         while True:
             share = (session.exploring_share - begun) / max(1.0 - begun, 1e-9)
-            temperature_pa_s = scale_pa_s * self.hot * (self.cold / self.hot) ** share
+            temperature = scale * self.hot * (self.cold / self.hot) ** share
             neighbour = moves.neighbour(layout, rng)
-            (neighbour_pa_s,) = session.assess([neighbour]).tolist()
-            worse_pa_s = neighbour_pa_s - impulse_pa_s
-            if worse_pa_s <= 0.0 or rng.random() < _likelihood(worse_pa_s, temperature_pa_s):
-                layout, impulse_pa_s = neighbour, neighbour_pa_s
+            (neighbour_load,) = session.assess([neighbour]).tolist()
+            worse = neighbour_load - load
+            if worse <= 0.0 or rng.random() < _likelihood(worse, temperature):
+                layout, load = neighbour, neighbour_load
 
 
-def _likelihood(worse_pa_s: float, temperature_pa_s: float) -> float:
+def _likelihood(worse: float, temperature: float) -> float:
     """Return how likely a worse layout is accepted (Metropolis); never when all is cold."""
-    return exp(-worse_pa_s / temperature_pa_s) if temperature_pa_s > 0.0 else 0.0
+    return exp(-worse / temperature) if temperature > 0.0 else 0.0
 
 
 @dataclass(frozen=True)

@@ -69,44 +69,49 @@ class LayoutProblem:
         return Placement(self.scenario, layout).cost
 
     @property
+    def told(self) -> AnyCharge | None:
+        """The charge if it is known: the same one in all threats."""
+        known = set(self.case.charges)
+        return known.pop() if len(known) == 1 else None
+
+    @property
     def charge(self) -> AnyCharge:
         """The charge if it is known, else the middle of where the scenario lets one be."""
-        known = set(self.case.charges)
-        return known.pop() if len(known) == 1 else expected_charge(self.scenario.charge)
+        return self.told or expected_charge(self.scenario.charge)
 
-    def loads_pa_s(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
-        """Return the impulse on the protected structures in each blast, Pa*s.
+    def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
+        """Return the load that counts in each blast, in the unit of the scenario's objective.
 
         Raises:
             LayoutError: If a layout does not fit the build zone.
         """
         loads = self.evaluator.loads_of_many(pairs, self.processes)
-        return [each.protected_impulse_pa_s for each in loads]
+        return [each.load(self.scenario.objective) for each in loads]
 
-    def impulse_pa_s(self, layout: Sequence[Element]) -> float:
-        """Return the impulse with a layout over all threats, Pa*s; outside any budget.
+    def load(self, layout: Sequence[Element]) -> float:
+        """Return the load with a layout over all threats, in that unit; outside any budget.
 
         Raises:
             LayoutError: If the layout does not fit the build zone.
         """
         pairs = [(tuple(layout), threat) for threat in self.threats]
-        return self.case.combined(self.loads_pa_s(pairs))
+        return self.case.combined(self.loads(pairs))
 
     @cached_property
-    def unprotected_pa_s(self) -> tuple[float, ...]:
-        """The impulse without a barrier, Pa*s, one a threat; it counts in no search's budget.
+    def unprotected(self) -> tuple[float, ...]:
+        """The load without a barrier, in that unit, one a threat; it counts in no search's budget.
 
         Raises:
             BlastEnvError: If nothing arrives: there is nothing to reduce.
         """
-        impulses_pa_s = self.loads_pa_s([((), threat) for threat in self.threats])
-        check_something_arrives([self.case], np.array(impulses_pa_s))
-        return tuple(impulses_pa_s)
+        bare = self.loads([((), threat) for threat in self.threats])
+        check_something_arrives([self.case], np.array(bare))
+        return tuple(bare)
 
     def reduction(self, candidate: "Candidate") -> float:
-        """Return by which share a layout lowers the impulse under the threats that it has met."""
-        bare_pa_s = self.case.combined(self.unprotected_pa_s[: candidate.threats])
-        return reductions(candidate.impulse_pa_s, bare_pa_s).item()
+        """Return by which share a layout lowers the load under the threats that it has met."""
+        bare = self.case.combined(self.unprotected[: candidate.threats])
+        return reductions(candidate.load, bare).item()
 
 
 @dataclass(frozen=True)
@@ -116,14 +121,14 @@ class Candidate:
     Attributes:
         blasts: Blasts that the search had spent by then.
         layout: Its cells or pieces, sorted.
-        impulse_pa_s: Impulse over the threats that it had met, Pa*s.
+        load: What the scenario's objective counts over the threats that it had met, in its unit.
         threats: How many threats that were, counted from the first.
         cost: What its modules or pieces cost, in the unit of the zone's budget.
     """
 
     blasts: int
     layout: Layout
-    impulse_pa_s: float
+    load: float
     threats: int
     cost: float
 
@@ -150,7 +155,8 @@ class SearchResult:
     Attributes:
         method: Name of the method.
         layout: The best layout, its cells sorted; empty if the search ended before it had one.
-        impulse_pa_s: Its impulse over the threats that it has met, Pa*s; `None` without a blast.
+        load: Its load over the threats that it has met, in the unit of the scenario's objective;
+            `None` without a blast.
             The search chose it by these blasts, so that on others it will be somewhat more.
         threats: How many threats it has met.
         blasts: Blasts spent: distinct pairs of layout and threat that the search asked for,
@@ -159,13 +165,13 @@ class SearchResult:
         seed: What decided everything that was drawn.
         history: The best layout each time that it changed.
         interrupted: Whether it was ended from outside (Ctrl-C) before it was through.
-        front: The layouts of which none has both less impulse and fewer modules (or, with a
+        front: The layouts of which none has both less load and fewer modules (or, with a
             catalogue, a lower cost), by that number; only of methods that search for it.
     """
 
     method: str
     layout: Layout
-    impulse_pa_s: float | None
+    load: float | None
     threats: int
     blasts: int
     budget: int
@@ -197,7 +203,7 @@ def _table(candidates: tuple[Candidate, ...]) -> pd.DataFrame:
         [
             (
                 each.blasts,
-                each.impulse_pa_s,
+                each.load,
                 each.threats,
                 len(each.layout),
                 each.cost,
@@ -205,7 +211,7 @@ def _table(candidates: tuple[Candidate, ...]) -> pd.DataFrame:
             )
             for each in candidates
         ],
-        columns=["blasts", "impulse_pa_s", "threats", "modules", "cost", "layout"],
+        columns=["blasts", "load", "threats", "modules", "cost", "layout"],
     )
 
 
@@ -274,7 +280,7 @@ Report = Callable[[Progress], None]
 
 
 class SearchMethod(Protocol):
-    """Looks for the layout with the least impulse."""
+    """Looks for the layout with the least load."""
 
     @property
     def name(self) -> str:

@@ -5,27 +5,35 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
+from blast_agents.search.by_rule import RULE_SEARCHES, BestRuleSearch, FromRulesSearch
 from blast_agents.search.evolution import GeneticSearch, Nsga2Search
 from blast_agents.search.methods import (
-    RULE_SEARCHES,
     AnnealingSearch,
     ExhaustiveSearch,
     GreedySearch,
     RandomSearch,
 )
 from blast_agents.search.problem import SearchMethod
+from blast_agents.search.winners import WinnersSearch
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Layout
 
-_FROM_LAYOUTS: Final[tuple[AnnealingSearch | GeneticSearch | Nsga2Search | RandomSearch, ...]] = (
+_FROM_LAYOUTS: Final[
+    tuple[AnnealingSearch | GeneticSearch | Nsga2Search | RandomSearch | WinnersSearch, ...]
+] = (
     RandomSearch(),
     AnnealingSearch(),
+    WinnersSearch(),
     GeneticSearch(),
     Nsga2Search(),
 )
 _OTHERS: Final[tuple[SearchMethod, ...]] = (
     GreedySearch(),
     ExhaustiveSearch(),
+    BestRuleSearch(),
+    FromRulesSearch(AnnealingSearch()),
+    FromRulesSearch(WinnersSearch()),
+    FromRulesSearch(GeneticSearch()),
     *RULE_SEARCHES,
 )
 

@@ -30,7 +30,7 @@ class SearchSession:
 
     A layout meets the threats in their order: first some of them, later perhaps more, never one
     twice. Of two layouts the one that has met more threats counts as the better known one and
-    goes before; with as many threats, the one with less impulse.
+    goes before; with as many threats, the one with less load.
 
     Args:
         problem: What is minimised.
@@ -96,7 +96,7 @@ class SearchSession:
         return False
 
     def assess(self, layouts: Sequence[Layout], threats: int | None = None) -> FloatArray:
-        """Return the impulse of layouts, Pa*s (layouts,), under the first threats.
+        """Return the load with layouts under the first threats, in the objective's unit (layouts,).
 
         Args:
             layouts: Legal layouts.
@@ -113,7 +113,7 @@ class SearchSession:
         self._simulate(affordable, count)
         if len(affordable) < len(distinct) or self._repeats > _MOST_REPEATS:
             raise SearchEndedError
-        return np.array([self._impulse_pa_s(key, count) for key in keys])
+        return np.array([self._load(key, count) for key in keys])
 
     def confirm_best(self) -> None:
         """Let the best layouts meet more threats, fewer and fewer of them (successive halving).
@@ -149,12 +149,12 @@ class SearchSession:
         self.assess(confirmed, more)
 
     def ranked(self, threats: int) -> list[Layout]:
-        """Return the layouts that have met so many threats, least impulse first."""
+        """Return the layouts that have met so many threats, least load first."""
         met = [key for key, values in self._known.items() if len(values) >= threats]
-        return sorted(met, key=lambda key: self._impulse_pa_s(key, threats))
+        return sorted(met, key=lambda key: self._load(key, threats))
 
     def front(self) -> tuple[Candidate, ...]:
-        """Return the layouts of which none has both less impulse and a lower price.
+        """Return the layouts of which none has both less load and a lower price.
 
         Among those that have met as many threats as any has, by price: the number of modules or,
         with a catalogue, the cost.
@@ -168,7 +168,7 @@ class SearchSession:
         return SearchResult(
             method=method,
             layout=() if best is None else best.layout,
-            impulse_pa_s=None if best is None else best.impulse_pa_s,
+            load=None if best is None else best.load,
             threats=0 if best is None else best.threats,
             blasts=self.blasts,
             budget=self._budget,
@@ -178,12 +178,12 @@ class SearchSession:
         )
 
     def _front_of(self, ranked: Sequence[Layout], threats: int) -> list[Layout]:
-        """Return the front of layouts that come with the least impulse first, by price."""
+        """Return the front of layouts that come with the least load first, by price."""
         front: list[Layout] = []
-        # Stable: of the same price, the least impulse first.
+        # Stable: of the same price, the least load first.
         for key in sorted(ranked, key=self.problem.price):
-            impulse_pa_s = self._impulse_pa_s(key, threats)
-            if not front or impulse_pa_s < self._impulse_pa_s(front[-1], threats):
+            load = self._load(key, threats)
+            if not front or load < self._load(front[-1], threats):
                 front.append(key)
         return front
 
@@ -214,8 +214,8 @@ class SearchSession:
             self._repeats += 1
             return
         self._repeats = 0
-        for (key, _), impulse_pa_s in zip(pairs, self.problem.loads_pa_s(pairs), strict=True):
-            self._known[key] = (*self._known.get(key, ()), impulse_pa_s)
+        for (key, _), load in zip(pairs, self.problem.loads(pairs), strict=True):
+            self._known[key] = (*self._known.get(key, ()), load)
         self.blasts += len(pairs)
         for key in layouts:
             self._consider(key)
@@ -227,15 +227,15 @@ class SearchSession:
         threats = len(self._known[key])
         candidate = self._candidate(key, threats)
         best = self.best
-        if best is None or (-threats, candidate.impulse_pa_s) < (-best.threats, best.impulse_pa_s):
+        if best is None or (-threats, candidate.load) < (-best.threats, best.load):
             if best is not None and best.blasts == self.blasts:
                 self._history.pop()  # one entry a batch
             self._history.append(candidate)
 
     def _candidate(self, key: Layout, threats: int) -> Candidate:
         """Return what is known of a layout now."""
-        impulse_pa_s = self._impulse_pa_s(key, threats)
-        return Candidate(self.blasts, key, impulse_pa_s, threats, self.problem.cost(key))
+        load = self._load(key, threats)
+        return Candidate(self.blasts, key, load, threats, self.problem.cost(key))
 
-    def _impulse_pa_s(self, key: Layout, threats: int) -> float:
+    def _load(self, key: Layout, threats: int) -> float:
         return self.problem.case.combined(self._known[key][:threats])

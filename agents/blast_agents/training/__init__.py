@@ -1,6 +1,11 @@
 """Training of agents with stable-baselines3, in run folders that survive any interruption."""
 
-from blast_agents.training.agent import TrainedAgent, load_agent, load_archive
+from blast_agents.training.agent import (
+    TrainedAgent,
+    load_agent,
+    load_archive,
+    newest_weights,
+)
 from blast_agents.training.hyperparameters import Hyperparameters, load_hyperparameters
 from blast_agents.training.run_folder import TrainingSettings
 from blast_agents.training.train import resume, train
@@ -12,6 +17,7 @@ __all__ = [
     "load_agent",
     "load_archive",
     "load_hyperparameters",
+    "newest_weights",
     "resume",
     "train",
 ]

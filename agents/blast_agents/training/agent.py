@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, TypeVar
 
 import numpy as np
 import torch
@@ -22,7 +22,11 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
 from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.hyperparameters import Hyperparameters, schedule
+from blast_agents.training.hyperparameters import (
+    SELF_LABELLING,
+    CommonHyperparameters,
+    schedule,
+)
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from blast_env.envs.arguments import check_names
 from blast_env.envs.item_observations import ItemChannels
@@ -37,6 +41,7 @@ from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout
+from blast_env.physics.engine import Engine
 from blast_env.scenario import (
     AnyCharge,
     AnyScenario,
@@ -53,7 +58,11 @@ Model = PPO | MaskablePPO
 Policy = ActorCriticPolicy | MaskableActorCriticPolicy
 
 
-_SPATIAL = {"ppo": SpatialPolicy, "maskable_ppo": SpatialMaskablePolicy}
+_SPATIAL = {
+    "ppo": SpatialPolicy,
+    "maskable_ppo": SpatialMaskablePolicy,
+    SELF_LABELLING: SpatialMaskablePolicy,
+}
 
 
 _PLAIN = {
@@ -61,6 +70,8 @@ _PLAIN = {
     ("ppo", "MlpPolicy"): ActorCriticPolicy,
     ("maskable_ppo", "CnnPolicy"): MaskableActorCriticCnnPolicy,
     ("maskable_ppo", "MlpPolicy"): MaskableActorCriticPolicy,
+    (SELF_LABELLING, "CnnPolicy"): MaskableActorCriticCnnPolicy,
+    (SELF_LABELLING, "MlpPolicy"): MaskableActorCriticPolicy,
 }
 """The policies of stable-baselines3 and sb3-contrib."""
 
@@ -68,9 +79,10 @@ _PLAIN = {
 _PLACES: Final = {"visible": 1, "hidden": 9}
 
 
-def fitted(
-    hyperparameters: Hyperparameters, settings: TrainingSettings, scenario: Scenario
-) -> Hyperparameters:
+AnyOf = TypeVar("AnyOf", bound=CommonHyperparameters)
+
+
+def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenario) -> AnyOf:
     """Return hyperparameters with what follows from the scenario's build zone and the threat.
 
     Raises:
@@ -125,8 +137,7 @@ def channels_of(observation: str) -> tuple[str, ...]:
 
 def make_model(configuration: RunConfiguration, environments: VecEnv) -> Model:
     """Return a model with fresh weights, which the seed decides."""
-    hyperparameters = configuration.hyperparameters
-    arguments = hyperparameters.model_arguments()
+    arguments = configuration.ppo.model_arguments()
     for name in ("learning_rate", "clip_range"):
         arguments[name] = schedule(arguments[name])
     policy_class, policy_arguments = _policy_class(configuration)
@@ -146,6 +157,13 @@ def make_policy(
     policy_class, arguments = _policy_class(configuration)
     policy: Policy = policy_class(observation_space, action_space, lambda _: 0.0, **arguments)
     return policy
+
+
+def policy_for(configuration: RunConfiguration, scenario: Scenario) -> Policy:
+    """Return the policy of a run on a scenario of its size, with fresh weights."""
+    space = OBSERVATIONS[configuration.settings.observation].space(scenario)
+    actions = spaces.Discrete(scenario.zone.catalogue.finish + 1)
+    return make_policy(configuration, space, actions)
 
 
 def logits_of(policy: Policy, observations: torch.Tensor) -> torch.Tensor:
@@ -207,7 +225,7 @@ class TrainedAgent:
     policy: Policy
     representative: Scenario
     observation: str = "grid"
-    engine: str = "event"
+    engine: str | Engine = "event"
 
     def __post_init__(self) -> None:
         """Refuse an observation that there is none of."""
@@ -312,6 +330,16 @@ class TrainedAgent:
         return actions
 
 
+def newest_weights(run: str | Path) -> Literal["best", "last"]:
+    """Return which weights of a run folder to use: the best, or the last before any evaluation.
+
+    Raises:
+        BlastEnvError: If it is no run folder, or damaged.
+    """
+    checkpoint = Checkpoint.load(RunFolder(Path(run)).checkpoint)
+    return "best" if checkpoint.best_policy else "last"
+
+
 def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> TrainedAgent:
     """Return the agent of a run folder.
 
@@ -337,14 +365,11 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     check_fit(configuration, scenario, folder)
     checkpoint = Checkpoint.load(folder.checkpoint)
     checkpoint.check_configuration(configuration, folder.path)
-    zone = scenario.zone
-    actions = spaces.Discrete(zone.catalogue.finish + 1)
     settings = configuration.settings
-    space = OBSERVATIONS[settings.observation].space(scenario)
-    policy = make_policy(configuration, space, actions)
+    policy = policy_for(configuration, scenario)
     checkpoint.load_policy(policy, folder.path, weights)
     policy.set_training_mode(False)
-    return TrainedAgent(policy, scenario, settings.observation, settings.engine)
+    return TrainedAgent(policy, scenario, settings.observation, settings.blast_engine)
 
 
 def load_archive(
@@ -354,7 +379,7 @@ def load_archive(
     *,
     trust_archive: bool = False,
     observation: str = "grid",
-    engine: str = "event",
+    engine: str | Engine = "event",
 ) -> TrainedAgent:
     """Return the agent of an archive that stable-baselines3 or RL Zoo wrote.
 

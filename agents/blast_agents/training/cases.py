@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from blast_agents.proposal import LayoutAgent
 from blast_agents.training.run_folder import TrainingSettings
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
@@ -20,16 +22,25 @@ class Selection:
     Attributes:
         cases: The cases.
         evaluators: Run their blasts, and remember those without a barrier.
+        processes: Worker processes for them.
     """
 
     cases: tuple[Case, ...]
     evaluators: Evaluators
+    processes: int = 1
 
     @classmethod
-    def of(cls, settings: TrainingSettings, source: ScenarioSource) -> "Selection":
+    def of(
+        cls, settings: TrainingSettings, source: ScenarioSource, processes: int = 1
+    ) -> "Selection":
         """Draw the cases of a run; they follow from the settings alone.
 
         Of generated sites they are the last of those that training never sees.
+
+        Args:
+            settings: Of the run.
+            source: Of the run.
+            processes: Worker processes for the blasts; they change nothing but the time.
 
         Raises:
             CalibrationError: If the scenario has no calibration for the engine.
@@ -42,9 +53,9 @@ class Selection:
             scenarios: Sequence[Scenario] = (source.scenario,) * count
         else:
             scenarios = tuple(SiteSource(HELD_OUT_SITES - count, count))
-        evaluators = Evaluators(settings.engine, most=count)
+        evaluators = Evaluators(settings.blast_engine, most=count)
         evaluators.of(scenarios[0])  # refuses an unknown engine before anything is written
-        return cls(_cases(settings, scenarios, seeds), evaluators)
+        return cls(_cases(settings, scenarios, seeds), evaluators, processes)
 
     def reduction(self, agent: LayoutAgent) -> Estimate:
         """Return the reduction over all cases, with its 95 % interval.
@@ -53,7 +64,38 @@ class Selection:
             BlastEnvError: If nothing arrives in a case even without a barrier.
         """
         layouts = [agent.propose(case.scenario, case.charge) for case in self.cases]
-        return compare(self.evaluators, self.cases, layouts).reduction
+        return compare(self.evaluators, self.cases, layouts, self.processes).reduction
+
+
+def training_cases(
+    settings: TrainingSettings, source: ScenarioSource, count: int
+) -> tuple[Case, ...]:
+    """Return cases to learn from; they follow from the settings alone, and none comes twice.
+
+    Args:
+        settings: Of the run; with a hidden charge, each case has `hidden_threats` charges.
+        source: Of the run: its scenario, or generated sites.
+        count: How many are drawn. There are fewer where the scenario has no more charges, as one
+            with points or vehicles alone, and only one of a known site with a hidden charge.
+    """
+    hidden = settings.threat == "hidden"
+    known_site = isinstance(source, SingleScenario)
+    threats = settings.hidden_threats if hidden else 1
+    cases: dict[object, Case] = {}
+    for index in range(1 if hidden and known_site else count):
+        sequence = np.random.SeedSequence((settings.seed, index))
+        scenario = source.sample(np.random.default_rng(sequence))
+        seeds = SeedRange.TRAINING.draw_distinct(np.random.default_rng(sequence), threats)
+        drawn = draw_threats(scenario, seeds)
+        case = Case(
+            scenario,
+            drawn,
+            charge=None if hidden else drawn[0].charge,
+            name=f"{scenario.name} {index + 1}",
+            seed=index,
+        )
+        cases.setdefault((scenario.content_hash, *case.charges), case)
+    return tuple(cases.values())
 
 
 def unseen_cases(

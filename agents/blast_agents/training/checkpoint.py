@@ -4,17 +4,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from io import BytesIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, Literal
 from zipfile import ZIP_STORED, BadZipFile, ZipFile
 
 import torch
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from torch import nn
 
 from blast_agents.training.hyperparameters import described
 from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunConfiguration
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
+from blast_env.geometry import Layout
 from blast_env.scenario.problems import value_text
 
 CHECKPOINT_FORMAT: Final = 2
@@ -49,6 +51,24 @@ class Counters:
     best_steps: int = 0
 
 
+@dataclass(frozen=True)
+class Label:
+    """The best layout of a case that self-labelling knows so far.
+
+    Attributes:
+        layout: The layout, sorted; empty where nothing is better than nothing.
+        impulse_pa_s: With it, Pa*s, one a threat of the case.
+        unprotected_pa_s: Without a barrier, likewise.
+    """
+
+    layout: Layout
+    impulse_pa_s: tuple[float, ...]
+    unprotected_pa_s: tuple[float, ...]
+
+
+_LABELS: Final = TypeAdapter(tuple[Label, ...])
+
+
 class _Content(BaseModel):
     """What is in the file; see `Checkpoint`."""
 
@@ -62,6 +82,7 @@ class _Content(BaseModel):
     best_policy: dict[str, torch.Tensor]
     rollouts: tuple[RolloutRow, ...]
     evaluations: tuple[EvaluationRow, ...]
+    labels: tuple[Label, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +100,7 @@ class Checkpoint:
         best_policy: Weights of the best evaluation; none before the first one.
         rollouts: What each rollout brought.
         evaluations: The evaluations on held-out threats.
+        labels: What self-labelling has found, a label a case.
     """
 
     configuration: RunConfiguration
@@ -88,11 +110,19 @@ class Checkpoint:
     best_policy: Weights
     rollouts: tuple[RolloutRow, ...]
     evaluations: tuple[EvaluationRow, ...]
+    labels: tuple[Label, ...] = ()
 
     @classmethod
-    def of_start(cls, configuration: RunConfiguration) -> "Checkpoint":
-        """Return the checkpoint of a run that has not done anything."""
-        return cls(configuration, Counters(), {}, {}, {}, (), ())
+    def of_start(
+        cls, configuration: RunConfiguration, weights: Weights = MappingProxyType({})
+    ) -> "Checkpoint":
+        """Return the checkpoint of a run that has not done anything.
+
+        Args:
+            configuration: Of the run.
+            weights: Those that it begins with; fresh ones unless given.
+        """
+        return cls(configuration, Counters(), weights, {}, {}, (), ())
 
     @property
     def is_start(self) -> bool:
@@ -114,6 +144,7 @@ class Checkpoint:
             "best_policy": dict(self.best_policy),
             "rollouts": [asdict(row) for row in self.rollouts],
             "evaluations": [asdict(row) for row in self.evaluations],
+            "labels": _LABELS.dump_python(self.labels, mode="json"),
         }
         # torch would say in an error of its own that the device is full.
         buffer = BytesIO()
@@ -201,6 +232,22 @@ class Checkpoint:
         for name, value in policy.state_dict().items():
             if not torch.isfinite(value).all():
                 raise BlastEnvError(f"{place}: the weights {name} are not finite")
+
+    def load_optimizer(self, optimizer: torch.optim.Optimizer, place: Path) -> None:
+        """Give an optimiser its state.
+
+        Args:
+            optimizer: That of the policy.
+            place: Where the state comes from, for the error.
+
+        Raises:
+            BlastEnvError: If it does not fit.
+        """
+        try:
+            optimizer.load_state_dict(dict(self.optimizer))
+        # torch says in errors of many kinds what does not fit.
+        except Exception as error:
+            raise BlastEnvError(f"{place}: the optimiser's state does not fit: {error}") from error
 
 
 def _check_archive(path: Path) -> None:

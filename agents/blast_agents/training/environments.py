@@ -17,10 +17,11 @@ from blast_agents.training.run_folder import RunConfiguration, TrainingSettings
 from blast_env.envs.arguments import real_number, whole_number
 from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
-from blast_env.envs.registration import WITHOUT_BUILD_ZONE, barrier_id
+from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.strategies import ScenarioSource, scenario_source
 from blast_env.evaluation import Evaluators
 from blast_env.evaluation.store import BlastCache, LoadsCache
+from blast_env.physics.engine import Engine
 from blast_env.runner import workers_told
 from blast_env.scenario import bundled_scenarios
 from blast_env.sites import SITES
@@ -116,7 +117,7 @@ def environment_id(scenario: str) -> str:
     """Return the section of the hyperparameters for a scenario's name or path."""
     if scenario == SITES:
         return SITES_ID
-    if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE:
+    if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE | FOR_GAS:
         return barrier_id(scenario)
     return DEFAULT_SECTION
 
@@ -151,7 +152,10 @@ class SharedBlastsVecEnv(DummyVecEnv):
     """
 
     def __init__(
-        self, makers: Sequence[Callable[[], gym.Env[Any, Any]]], engine: str, cache: BlastCache
+        self,
+        makers: Sequence[Callable[[], gym.Env[Any, Any]]],
+        engine: str | Engine,
+        cache: BlastCache,
     ) -> None:
         super().__init__([*makers])
         self._evaluators = Evaluators(engine, cache)
@@ -198,12 +202,12 @@ class EnvironmentMaker:
             disable_env_checker=True,
             scenario=self.source,
             realisations=1,
-            engine=settings.engine,
+            engine=settings.blast_engine,
             observation=settings.observation,
             cache=LoadsCache(_LOADS) if self.cache is None else self.cache,
             **_threat_arguments(settings),
         )
-        for name, arguments in self.configuration.hyperparameters.wrappers():
+        for name, arguments in self.configuration.ppo.wrappers():
             if name.endswith(RelativeReward.__name__):
                 env = RelativeReward(env, **arguments)
             else:
@@ -221,11 +225,11 @@ def make_environments(configuration: RunConfiguration, source: ScenarioSource) -
 
     Within `on_cluster`, in this process, and their blasts on the cluster.
     """
-    count = configuration.hyperparameters.n_envs
+    count = configuration.ppo.n_envs
     if workers_told() > 1:
         shared = LoadsCache(_LOADS * count)
         actors = [EnvironmentMaker(configuration, source, index, shared) for index in range(count)]
-        return SharedBlastsVecEnv(actors, configuration.settings.engine, shared)
+        return SharedBlastsVecEnv(actors, configuration.settings.blast_engine, shared)
     makers = [EnvironmentMaker(configuration, source, index) for index in range(count)]
     if count == 1:
         return DummyVecEnv([*makers])

@@ -129,7 +129,21 @@ def schedule(amount: float | str) -> float | Callable[[float], float]:
     return amount
 
 
-ALGORITHMS: Final = ("ppo", "maskable_ppo")
+PPO_ALGORITHMS: Final = ("ppo", "maskable_ppo")
+"""Those of stable-baselines3 and sb3-contrib."""
+
+
+SELF_LABELLING: Final = "self_labelling"
+"""Begins where the rules end and learns from its own best; see `training.self_labelling`."""
+
+
+ALGORITHMS: Final = (*PPO_ALGORITHMS, SELF_LABELLING)
+
+
+ALGORITHM_NAMES: Final[Mapping[str, str]] = MappingProxyType(
+    {"ppo": "PPO", "maskable_ppo": "MaskablePPO", SELF_LABELLING: "Self-labelling"}
+)
+"""What people call them."""
 
 
 DEFAULT_SECTION: Final = "BlastBarrier-v0"
@@ -189,28 +203,18 @@ class PolicyArguments(BaseModel):
     finish_bias: Annotated[float, Field(ge=-50.0, le=50.0)] = -3.0
 
 
-class Hyperparameters(BaseModel):
-    """Hyperparameters of PPO and MaskablePPO, named as there and in RL Zoo.
+class CommonHyperparameters(BaseModel):
+    """What all algorithms have; see each for what a step is.
 
     Attributes:
         n_timesteps: Steps of training unless others are asked for.
-        n_envs: Parallel environments unless others are asked for.
+        n_envs: Parallel environments, or worker processes, unless others are asked for.
         policy: The policy.
         policy_kwargs: Its arguments.
-        env_wrapper: Wrappers of the environment, the innermost first: a name, or a name with
-            arguments.
         learning_rate: A number, or `"lin_"` and a number for one that falls to 0 at the end.
-        n_steps: Steps of each environment between two updates.
         batch_size: Steps in a minibatch.
-        n_epochs: Passes over the steps in an update.
-        gamma: Discount; 1 for none.
-        gae_lambda: Trade-off between bias and variance of the advantages.
-        clip_range: How far an update may move a probability; as `learning_rate`.
-        ent_coef: Weight of the entropy, which keeps the agent exploring.
         vf_coef: Weight of the critic's error.
         max_grad_norm: Largest gradient.
-        normalize_advantage: Whether advantages are normalised by minibatch.
-        target_kl: An update ends where the policy has moved further; `None` for no limit.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -219,17 +223,37 @@ class Hyperparameters(BaseModel):
     n_envs: Annotated[int, Field(ge=1, le=256)]
     policy: PolicyName
     policy_kwargs: PolicyArguments = PolicyArguments()
-    env_wrapper: tuple[WrapperName | dict[WrapperName, dict[str, Any]], ...] = ()
     learning_rate: Amount
-    n_steps: Annotated[int, Field(ge=2, le=100_000)]
     batch_size: Annotated[int, Field(ge=2, le=10**8)]
+    vf_coef: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
+    max_grad_norm: Annotated[float, Field(gt=0.0, le=1000.0)] = 0.5
+
+
+class Hyperparameters(CommonHyperparameters):
+    """Hyperparameters of PPO and MaskablePPO, named as there and in RL Zoo.
+
+    A step is a step of an environment: a module or piece.
+
+    Attributes:
+        env_wrapper: Wrappers of the environment, the innermost first: a name, or a name with
+            arguments.
+        n_steps: Steps of each environment between two updates.
+        n_epochs: Passes over the steps in an update.
+        gamma: Discount; 1 for none.
+        gae_lambda: Trade-off between bias and variance of the advantages.
+        clip_range: How far an update may move a probability; as `learning_rate`.
+        ent_coef: Weight of the entropy, which keeps the agent exploring.
+        normalize_advantage: Whether advantages are normalised by minibatch.
+        target_kl: An update ends where the policy has moved further; `None` for no limit.
+    """
+
+    env_wrapper: tuple[WrapperName | dict[WrapperName, dict[str, Any]], ...] = ()
+    n_steps: Annotated[int, Field(ge=2, le=100_000)]
     n_epochs: Annotated[int, Field(ge=1, le=100)]
     gamma: Share = 1.0
     gae_lambda: Share = 0.95
     clip_range: Amount = 0.2
     ent_coef: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
-    vf_coef: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
-    max_grad_norm: Annotated[float, Field(gt=0.0, le=1000.0)] = 0.5
     normalize_advantage: bool = True
     target_kl: Annotated[float, Field(gt=0.0)] | None = None
 
@@ -259,8 +283,50 @@ class Hyperparameters(BaseModel):
         return tuple(wrappers)
 
 
-HYPERPARAMETER_KEYS: Final = tuple(option_names(Hyperparameters))
-"""Names that changes can have: `"policy_kwargs.width"` for an argument of the policy."""
+Count = Annotated[int, Field(ge=0, le=10_000)]
+
+
+class SelfLabellingHyperparameters(CommonHyperparameters):
+    """Hyperparameters of self-labelling; see `training.self_labelling`.
+
+    A step is a layout that meets a threat: a blast, unless it is known already.
+
+    Attributes:
+        cases: How many cases there are: charges, or sites, to learn from.
+        cases_per_round: How many of them, in turn, get new layouts in a round after the first.
+        samples: Layouts that the policy draws for each of these.
+        neighbours: Layouts that are the best one so far, a little changed, likewise.
+        borrowed: Layouts that are the best ones of the nearest charges, likewise.
+        first_updates: Minibatches that the policy learns from after the first round, which has the
+            layouts of the rules.
+        updates: The same after each further round.
+    """
+
+    cases: Annotated[int, Field(ge=1, le=100_000)]
+    cases_per_round: Annotated[int, Field(ge=1, le=100_000)]
+    samples: Count
+    neighbours: Count
+    borrowed: Count = 0
+    first_updates: Count
+    updates: Count
+
+
+AnyHyperparameters = Hyperparameters | SelfLabellingHyperparameters
+
+
+_MODELS: Final[Mapping[str, type[AnyHyperparameters]]] = MappingProxyType(
+    dict.fromkeys(PPO_ALGORITHMS, Hyperparameters) | {SELF_LABELLING: SelfLabellingHyperparameters}
+)
+
+
+def hyperparameter_keys(algorithm: str) -> tuple[str, ...]:
+    """Return names that changes can have: `"policy_kwargs.width"` for an argument of the policy.
+
+    Raises:
+        UnknownNameError: If there is no such algorithm; the message names the nearest one.
+    """
+    check_names("algorithm", [algorithm], ALGORITHMS)
+    return tuple(option_names(_MODELS[algorithm]))
 
 
 def hyperparameter_file(algorithm: str) -> Path:
@@ -269,8 +335,7 @@ def hyperparameter_file(algorithm: str) -> Path:
     Raises:
         UnknownNameError: If there is no such algorithm; the message names the nearest one.
     """
-    if algorithm not in ALGORITHMS:
-        raise UnknownNameError("algorithm", algorithm, ALGORITHMS)
+    check_names("algorithm", [algorithm], ALGORITHMS)
     return _FOLDER / f"{algorithm}.yml"
 
 
@@ -279,13 +344,13 @@ def load_hyperparameters(
     env_id: str,
     changes: Mapping[str, Any] = MappingProxyType({}),
     envs: int | None = None,
-) -> Hyperparameters:
+) -> AnyHyperparameters:
     """Return the hyperparameters of an algorithm for an environment.
 
     Args:
-        algorithm: `"ppo"` or `"maskable_ppo"`.
+        algorithm: One of `ALGORITHMS`.
         env_id: Section of the file; one that it does not have gets that of `BlastBarrier-v0`.
-        changes: Values in the place of those of the file, by name; see `HYPERPARAMETER_KEYS`.
+        changes: Values in the place of those of the file, by name; see `hyperparameter_keys`.
         envs: Parallel environments, in the place of `n_envs`.
 
     Raises:
@@ -294,24 +359,11 @@ def load_hyperparameters(
     """
     path = hyperparameter_file(algorithm)
     sections = yaml.safe_load(path.read_text(encoding="utf-8"))  # our own file, with aliases
-    check_names("hyperparameter", changes, HYPERPARAMETER_KEYS)
+    check_names("hyperparameter", changes, hyperparameter_keys(algorithm))
     values = with_changes(sections.get(env_id, sections[DEFAULT_SECTION]), changes)
     if envs is not None:
         values["n_envs"] = envs
-    return checked(values, "hyperparameters")
-
-
-def checked(values: Mapping[str, Any], place: str) -> Hyperparameters:
-    """Return hyperparameters from plain values.
-
-    Args:
-        values: By name.
-        place: Where they come from, for the error.
-
-    Raises:
-        BlastEnvError: If a value is of no use; the message names its bound.
-    """
     try:
-        return Hyperparameters.model_validate(values)
+        return _MODELS[algorithm].model_validate(values)
     except ValidationError as error:
-        raise BlastEnvError(described(error, place)) from error
+        raise BlastEnvError(described(error, "hyperparameters")) from error

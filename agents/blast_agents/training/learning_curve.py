@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.recorder import Progress
 from blast_agents.training.run_folder import RunConfiguration
 from blast_env.rendering.figures import save_figure
@@ -20,7 +21,6 @@ with render_extra():
 _TRAINING: Final = "#56B4E9"
 _HELD_OUT: Final = "#D55E00"
 _BEST: Final = "#000000"
-_NAMES: Final = {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
 
 
 def learning_curve(progress: Progress, configuration: RunConfiguration) -> Figure:
@@ -37,7 +37,7 @@ def learning_curve(progress: Progress, configuration: RunConfiguration) -> Figur
     settings, counters = configuration.settings, progress.counters
     write_heading(
         figure,
-        f"{_NAMES[settings.algorithm]} on {settings.scenario}, {settings.threat} threat",
+        f"{ALGORITHM_NAMES[settings.algorithm]} on {settings.scenario}, {settings.threat} threat",
         f"seed {settings.seed}, {counters.steps:,} steps, {counters.episodes:,} episodes, "
         f"{counters.blasts:,} blasts with engine {settings.engine}, {counters.seconds:,.0f} s; "
         f"{settings.evaluation_cases} held-out threats",

@@ -9,9 +9,9 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import set_random_seed
 
-from blast_agents.training.agent import Model, TrainedAgent
+from blast_agents.training.agent import Model, Policy, TrainedAgent
 from blast_agents.training.cases import Selection
-from blast_agents.training.checkpoint import Checkpoint, Counters, Weights
+from blast_agents.training.checkpoint import Checkpoint, Counters, Label, Weights
 from blast_agents.training.run_folder import (
     EvaluationRow,
     RolloutRow,
@@ -61,6 +61,36 @@ class Progress:
             list(checkpoint.rollouts),
             list(checkpoint.evaluations),
             checkpoint.best_policy,
+        )
+
+    def evaluate(self, agent: TrainedAgent, selection: Selection) -> EvaluationRow:
+        """Evaluate a policy on held-out threats, and keep its weights if they are the best."""
+        reduction, counters = selection.reduction(agent), self.counters
+        row = EvaluationRow(
+            counters.steps, counters.episodes, *reduction, counters.blasts, counters.seconds
+        )
+        self.evaluations.append(row)
+        if reduction.value > counters.best_reduction:
+            self.counters = replace(
+                counters, best_reduction=reduction.value, best_steps=counters.steps
+            )
+            weights = agent.policy.state_dict()
+            self.best_policy = {name: value.clone() for name, value in weights.items()}
+        return row
+
+    def checkpoint(
+        self, configuration: RunConfiguration, policy: Policy, labels: tuple[Label, ...] = ()
+    ) -> Checkpoint:
+        """Return the checkpoint of the run as it is now."""
+        return Checkpoint(
+            configuration=configuration,
+            counters=self.counters,
+            policy=policy.state_dict(),
+            optimizer=policy.optimizer.state_dict(),
+            best_policy=self.best_policy,
+            rollouts=tuple(self.rollouts),
+            evaluations=tuple(self.evaluations),
+            labels=labels,
         )
 
     def write_tables(self, folder: RunFolder) -> None:
@@ -167,40 +197,21 @@ class Recorder(BaseCallback):
         is_last = counters.steps >= self.settings.steps
         if is_last or counters.rollouts % self.settings.evaluation_interval == 0:
             self._evaluate()
-        self._checkpoint().save(self.folder.checkpoint)
+        checkpoint = self.progress.checkpoint(self.configuration, self.algorithm.policy)
+        checkpoint.save(self.folder.checkpoint)
         self.progress.write_tables(self.folder)
         self._is_pending = False
 
     def _evaluate(self) -> None:
         agent = TrainedAgent(
-            self.algorithm.policy, self.scenario, self.settings.observation, self.settings.engine
+            self.algorithm.policy,
+            self.scenario,
+            self.settings.observation,
+            self.settings.blast_engine,
         )
-        reduction = self.selection.reduction(agent)
-        counters = self.progress.counters
-        row = EvaluationRow(
-            counters.steps, counters.episodes, *reduction, counters.blasts, counters.seconds
-        )
-        self.progress.evaluations.append(row)
-        self.logger.record("evaluation/reduction", reduction.value)
-        self.logger.dump(counters.steps)
-        if reduction.value > counters.best_reduction:
-            self.progress.counters = replace(
-                counters, best_reduction=reduction.value, best_steps=counters.steps
-            )
-            weights = self.algorithm.policy.state_dict()
-            self.progress.best_policy = {name: value.clone() for name, value in weights.items()}
-
-    def _checkpoint(self) -> Checkpoint:
-        policy, progress = self.algorithm.policy, self.progress
-        return Checkpoint(
-            configuration=self.configuration,
-            counters=progress.counters,
-            policy=policy.state_dict(),
-            optimizer=policy.optimizer.state_dict(),
-            best_policy=progress.best_policy,
-            rollouts=tuple(progress.rollouts),
-            evaluations=tuple(progress.evaluations),
-        )
+        row = self.progress.evaluate(agent, self.selection)
+        self.logger.record("evaluation/reduction", row.reduction)
+        self.logger.dump(row.steps)
 
     def _counted(self) -> Counters:
         """Return the counters at the end of a rollout."""

@@ -12,15 +12,24 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
-from blast_agents.training.hyperparameters import ALGORITHMS, Hyperparameters, described
+from blast_agents.training.hyperparameters import (
+    ALGORITHMS,
+    SELF_LABELLING,
+    AnyHyperparameters,
+    Hyperparameters,
+    SelfLabellingHyperparameters,
+    described,
+)
 from blast_agents.training.yaml_text import parse_yaml
 from blast_env.documents import DocumentError, read_text
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import OBSERVATIONS
 from blast_env.errors import BlastEnvError
 from blast_env.files import is_temporary, make_folder, sync, write_atomically
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
 from blast_env.scenario.problems import value_text
@@ -45,12 +54,13 @@ class TrainingSettings(BaseModel):
     """What is trained on what; how is for the hyperparameters.
 
     Attributes:
-        algorithm: `"ppo"` or `"maskable_ppo"`.
+        algorithm: `"ppo"`, `"maskable_ppo"` or `"self_labelling"`.
         scenario: Bundled name, path of a scenario file, or `"sites"` for generated ones.
-        steps: Steps to train for; a rollout is always finished.
+        steps: Steps to train for; a rollout, or a round, is always finished.
         seed: Decides everything: weights, episodes, actions, minibatches.
         threat: `"visible"`: the agent sees the charge; `"hidden"`: it sees where it may be.
         engine: Engine that runs the blasts.
+        cell_m: Side of the cells of gas dynamics; that of the engine unless given.
         observation: Name of what the agent sees of the site; see `BlastBarrier-v0`.
         hidden_threats: Charges in an episode where they are hidden. The mean over episodes is the
             same for any number; with few, more layouts are tried for the same number of blasts.
@@ -59,22 +69,35 @@ class TrainingSettings(BaseModel):
         evaluation_first_seed: The seeds of these threats count from here, within those that
             belong to the choice of weights (`SeedRange.SELECTION`).
         torch_threads: Threads for the network.
+        start_from: Run folder whose best weights the training began with; `None` for fresh ones.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    algorithm: Literal["ppo", "maskable_ppo"]
+    algorithm: Literal["ppo", "maskable_ppo", "self_labelling"]
     scenario: str
     steps: Annotated[int, Field(ge=1, le=10**10)]
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     threat: Literal["visible", "hidden"] = "visible"
     engine: str = "event"
+    cell_m: Annotated[float, Field(gt=0.0)] | None = None
     observation: Literal["grid", "grid_with_load", "features"] = "grid"
     hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
     evaluation_interval: Annotated[int, Field(ge=1, le=10**6)] = 5
     evaluation_cases: Annotated[int, Field(ge=2, le=100)] = 16
     evaluation_first_seed: Annotated[int, Field(ge=0, lt=2**30)] = 0
     torch_threads: Annotated[int, Field(ge=1, le=256)] = 1
+    start_from: str | None = None
+
+    @property
+    def blast_engine(self) -> Engine:
+        """The engine itself.
+
+        Raises:
+            UnknownNameError: If there is no engine of that name.
+            BlastEnvError: If it has no such cells.
+        """
+        return find_engine(self.engine, self.cell_m)
 
 
 class RunConfiguration(BaseModel):
@@ -91,8 +114,31 @@ class RunConfiguration(BaseModel):
 
     format: Literal[1] = CONFIGURATION_FORMAT
     settings: TrainingSettings
-    hyperparameters: Hyperparameters
+    hyperparameters: AnyHyperparameters
     scenario_hash: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+    @model_validator(mode="after")
+    def _check_algorithm(self) -> "RunConfiguration":
+        """Refuse hyperparameters of another algorithm."""
+        if isinstance(self.hyperparameters, Hyperparameters) == (
+            self.settings.algorithm == SELF_LABELLING
+        ):
+            raise ValueError(f"hyperparameters are none of {self.settings.algorithm}")
+        return self
+
+    @property
+    def ppo(self) -> Hyperparameters:
+        """The hyperparameters of a run of PPO or MaskablePPO."""
+        if not isinstance(self.hyperparameters, Hyperparameters):
+            raise TypeError(f"{self.settings.algorithm} is not trained in environments")
+        return self.hyperparameters
+
+    @property
+    def self_labelling(self) -> SelfLabellingHyperparameters:
+        """The hyperparameters of a run of self-labelling."""
+        if not isinstance(self.hyperparameters, SelfLabellingHyperparameters):
+            raise TypeError(f"{self.settings.algorithm} has no labels")
+        return self.hyperparameters
 
     def document(self) -> dict[str, Any]:
         """Return plain data."""
@@ -118,14 +164,14 @@ def settings_from(values: Mapping[str, Any]) -> TrainingSettings:
 
 @dataclass(frozen=True)
 class RolloutRow:
-    """What a rollout brought.
+    """What a rollout brought; of self-labelling, what a round did.
 
     Attributes:
         steps: Steps of training at its end.
-        episodes: Episodes that ended in it.
-        reward: Mean over these episodes.
-        reduction: Mean over these episodes.
-        modules: Mean number of modules of their layouts.
+        episodes: Episodes that ended in it; or layouts that were tried.
+        reward: Mean over these episodes; or over the cases, the reduction by the best layout.
+        reduction: Mean over these episodes; or over these layouts.
+        modules: Mean number of modules or pieces of the layouts.
         blasts: Blasts simulated since training began.
         cache_hits: Loads that needed no blast, likewise.
         seconds: Time since training began.
@@ -246,6 +292,43 @@ class RunFolder:
         return self.path / "tensorboard"
 
     @property
+    def is_run(self) -> bool:
+        """Whether a run has begun in the folder."""
+        return self._configuration.exists()
+
+    @property
+    def command(self) -> str:
+        """What started the run.
+
+        Raises:
+            BlastEnvError: If the file is missing or damaged.
+        """
+        return self._said("command.txt").strip()
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """With which versions it was started.
+
+        Raises:
+            BlastEnvError: If the file is missing or damaged.
+        """
+        try:
+            return TypeAdapter(dict[str, str]).validate_json(self._said("versions.json"))
+        except ValidationError as error:
+            raise BlastEnvError(f"{self.path / 'versions.json'}: is damaged") from error
+
+    def _said(self, name: str) -> str:
+        try:
+            return read_text(self.path / name)
+        except DocumentError as error:
+            raise BlastEnvError(f"{self.path / name}: is missing or damaged: {error}") from error
+
+    @property
+    def blasts(self) -> Path:
+        """The blasts of a training that keeps them, for it to go on and for others."""
+        return self.path / "blasts"
+
+    @property
     def _configuration(self) -> Path:
         return self.path / "config.yaml"
 
@@ -299,7 +382,7 @@ class RunFolder:
 
     def _check_empty(self) -> None:
         """Refuse a folder with a run, or with anything but what an interrupted making leaves."""
-        if self._configuration.exists():
+        if self.is_run:
             raise BlastEnvError(f"{self.path}: has a run in it already; --resume goes on with it")
         if self._unfinished.exists():
             return

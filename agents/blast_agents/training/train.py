@@ -10,11 +10,12 @@ from pathlib import Path
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv
 
-from blast_agents.training.agent import Model, check_fit, fitted, make_model, torch_threads
+from blast_agents.training.agent import check_fit, fitted, make_model, policy_for, torch_threads
 from blast_agents.training.cases import Selection
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.environments import make_environments, training_source
-from blast_agents.training.hyperparameters import Hyperparameters
+from blast_agents.training.hyperparameters import SELF_LABELLING, AnyHyperparameters
+from blast_agents.training.imitation import check_observation
 from blast_agents.training.learning_curve import save_learning_curve
 from blast_agents.training.recorder import Progress, Recorder
 from blast_agents.training.run_folder import (
@@ -23,8 +24,10 @@ from blast_agents.training.run_folder import (
     TrainingSettings,
     check_scenario,
 )
+from blast_agents.training.self_labelling import SelfLabelling
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
+from blast_env.scenario import Scenario
 from blast_env.sites import SITES
 
 
@@ -45,7 +48,7 @@ class TrainingResult:
 
 def train(
     settings: TrainingSettings,
-    hyperparameters: Hyperparameters,
+    hyperparameters: AnyHyperparameters,
     run: str | Path,
     progress: Callable[[float], None] = lambda _: None,
 ) -> TrainingResult:
@@ -67,11 +70,9 @@ def train(
         hyperparameters=fitted(hyperparameters, settings, scenario),
         scenario_hash=scenario.content_hash,
     )
-    selection = Selection.of(
-        settings, source
-    )  # refuses an unknown engine before anything is written
+    selection = _selection(configuration, source)  # refuses an unknown engine before any writing
     folder = RunFolder(Path(run))
-    start = Checkpoint.of_start(configuration)
+    start = _start(configuration, scenario)
     with folder.making(configuration, scenario, shlex.join(sys.argv)):
         start.save(folder.checkpoint)
     return _run(_Run(folder, configuration, source, selection), start, progress)
@@ -104,12 +105,34 @@ def resume(
     if configuration.settings.scenario == SITES:
         source = training_source(SITES)
         check_scenario(source.representative, configuration, "generated sites")
-    selection = Selection.of(configuration.settings, source)
+    selection = _selection(configuration, source)
     job = _Run(folder, configuration, source, selection)
     checkpoint = Checkpoint.load(folder.checkpoint)
     checkpoint.check_configuration(configuration, folder.path)
     folder.clear_temporaries()
     return _run(job, checkpoint, progress)
+
+
+def _start(configuration: RunConfiguration, scenario: Scenario) -> Checkpoint:
+    """Return the checkpoint that a run begins with: fresh weights, or those of another run."""
+    if configuration.settings.start_from is None:
+        return Checkpoint.of_start(configuration)
+    folder = RunFolder(Path(configuration.settings.start_from))
+    weights = Checkpoint.load(folder.checkpoint).best_policy
+    start = Checkpoint.of_start(configuration, weights)
+    start.load_policy(policy_for(configuration, scenario), folder.path)  # refuses another size
+    return start
+
+
+def _selection(configuration: RunConfiguration, source: ScenarioSource) -> Selection:
+    """Return the cases that the best weights are chosen by.
+
+    Self-labelling runs their blasts in its worker processes.
+    """
+    if configuration.settings.algorithm != SELF_LABELLING:
+        return Selection.of(configuration.settings, source)
+    check_observation(configuration.settings.observation)
+    return Selection.of(configuration.settings, source, configuration.hyperparameters.n_envs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +157,10 @@ def _run(job: _Run, checkpoint: Checkpoint, show: Callable[[float], None]) -> Tr
     settings, so_far = job.configuration.settings, Progress.of(checkpoint)
     so_far.write_tables(job.folder)  # a killed run may not have come to it
     if so_far.counters.steps < settings.steps:
-        environments = make_environments(job.configuration, job.source)
+        learn = _learn_from_own_best if settings.algorithm == SELF_LABELLING else _learn_by_acting
         try:
             with torch_threads(settings.torch_threads):
-                _learn(job, so_far, checkpoint, environments, show)
+                learn(job, so_far, checkpoint, show)
         except (EOFError, ConnectionError) as error:
             raise BlastEnvError(
                 f"{job.folder.path}: a process with an environment has ended, for want of memory "
@@ -147,12 +170,33 @@ def _run(job: _Run, checkpoint: Checkpoint, show: Callable[[float], None]) -> Tr
             raise BlastEnvError(
                 f"{job.folder.path}: cannot be written: {error.strerror or error}; --resume goes on"
             ) from error
-        finally:
-            # After Ctrl-C the processes have ended already.
-            with suppress(EOFError, OSError):
-                environments.close()
     save_learning_curve(so_far, job.configuration, job.folder.learning_curve)
     return TrainingResult(job.folder, job.configuration, so_far)
+
+
+def _learn_from_own_best(
+    job: _Run, so_far: Progress, checkpoint: Checkpoint, show: Callable[[float], None]
+) -> None:
+    """Train by self-labelling, from a checkpoint on."""
+    training = SelfLabelling.of(
+        job.folder, job.configuration, job.source, job.selection, checkpoint, so_far
+    )
+    while so_far.counters.steps < job.configuration.settings.steps:
+        training.do_round()
+        show(min(so_far.counters.steps / job.configuration.settings.steps, 1.0))
+
+
+def _learn_by_acting(
+    job: _Run, so_far: Progress, checkpoint: Checkpoint, show: Callable[[float], None]
+) -> None:
+    """Train by PPO or MaskablePPO, from a checkpoint on."""
+    environments = make_environments(job.configuration, job.source)
+    try:
+        _learn(job, so_far, checkpoint, environments, show)
+    finally:
+        # After Ctrl-C the processes have ended already.
+        with suppress(EOFError, OSError):
+            environments.close()
 
 
 def _learn(
@@ -165,8 +209,12 @@ def _learn(
     """Train from a checkpoint on environments that are open."""
     settings = job.configuration.settings
     model = make_model(job.configuration, environments)
+    if checkpoint.policy:
+        checkpoint.load_policy(model.policy, job.folder.checkpoint)
     if not checkpoint.is_start:
-        _restore(model, checkpoint, job.folder)
+        checkpoint.load_optimizer(model.policy.optimizer, job.folder.checkpoint)
+        model.num_timesteps = checkpoint.counters.steps
+        model._n_updates = checkpoint.counters.updates
     scenario = job.source.representative
     recorder = Recorder(job.folder, job.configuration, scenario, job.selection, so_far, show)
     recorder.algorithm = model
@@ -174,17 +222,3 @@ def _learn(
     left = settings.steps - so_far.counters.steps
     model.learn(left, callback=recorder, reset_num_timesteps=checkpoint.is_start)
     model.logger.close()
-
-
-def _restore(model: Model, checkpoint: Checkpoint, folder: RunFolder) -> None:
-    """Bring a model to a checkpoint."""
-    checkpoint.load_policy(model.policy, folder.checkpoint)
-    try:
-        model.policy.optimizer.load_state_dict(dict(checkpoint.optimizer))
-    # torch says in errors of many kinds what does not fit.
-    except Exception as error:
-        raise BlastEnvError(
-            f"{folder.checkpoint}: the optimiser's state does not fit: {error}"
-        ) from error
-    model.num_timesteps = checkpoint.counters.steps
-    model._n_updates = checkpoint.counters.updates

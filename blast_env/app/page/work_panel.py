@@ -10,12 +10,13 @@ from nicegui import ui
 from blast_env.app import placing
 from blast_env.app.design import SLOTS
 from blast_env.app.editor import Editor, Tool
-from blast_env.app.offers import METHODS, PROPOSERS
+from blast_env.app.offers import METHODS, proposers
 from blast_env.app.records import Engine
 from blast_env.app.session import Session
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
 from blast_env.errors import BlastEnvError
+from blast_env.scenario import Scenario
 
 _ENGINES: Final = {
     "particles": "particles: a first look",
@@ -113,11 +114,8 @@ class WorkPanel:
             ui.space()
             propose = ui.button("Propose", icon="lightbulb", on_click=self.propose)
             propose.props("dense no-caps").mark("propose")
-        offers = {f"rule {each}": each for each in PROPOSERS}
-        offers |= {f"run {name}": f"agent of {name}" for name in self._runs}
-        offers |= {f"search {each}": f"search: {each}" for each in METHODS}
         with ui.row().classes("w-full no-wrap gap-1"):
-            self._proposer = ui.select(offers, value=f"rule {PROPOSERS[0]}", label="by")
+            self._proposer = ui.select([], label="by")
             self._proposer.props("dense outlined options-dense").classes("grow")
             self._budget = ui.number("blasts", value=100, min=1, step=50, format="%d")
             self._budget.props("dense outlined").classes("w-20")
@@ -239,11 +237,20 @@ class WorkPanel:
         chosen = next((each for each in offers if each.name == self._editor.item), None)
         self._turned.value = self._editor.turned
         self._turned.visible = chosen is not None and chosen.can_turn
+        self._offer_proposals(design.scenario)
         known = [each.name for each in threats_of(design.scenario)]
         self._threats.set_options(known, value=list(session.threats))
         engine = session.engine
         self._engine.value = f"gas {engine.cell_m:g}" if engine.is_gas else "particles"
         self._filling = False
+
+    def _offer_proposals(self, scenario: Scenario) -> None:
+        """Offer the rules for a site, agents and searches; what was chosen stays if it can."""
+        offers = {f"rule {each}": each for each in proposers(scenario)}
+        offers |= {f"run {name}": f"agent of {name}" for name in self._runs}
+        offers |= {f"search {each}": f"search: {each}" for each in METHODS}
+        chosen = self._proposer.value
+        self._proposer.set_options(offers, value=chosen if chosen in offers else next(iter(offers)))
 
     def follow(self) -> bool:
         """Show how far work has come; return whether anything is new."""

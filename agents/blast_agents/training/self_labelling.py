@@ -1,0 +1,399 @@
+"""Begin where the rules end, then learn from one's own best.
+
+Each case, a charge or a site, has a label: the best layout for it that is known. In the first round
+that is the best of the layouts of all rules, which the policy then learns to imitate. In every
+further round some of the cases get new layouts: what the policy proposes and draws, the label
+a little changed, the labels of the nearest charges. They race by blasts on the case's threats; the
+winner is the new label, from which the policy learns on.
+
+Blasts are kept in the run folder. A round has seeds of its own and ends with a checkpoint, so that
+a run that was interrupted ends as if it had not been, and repeats none of its blasts.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil, log2
+from statistics import fmean
+from time import perf_counter
+from typing import Final
+
+import numpy as np
+from stable_baselines3.common.logger import Logger, configure
+from stable_baselines3.common.utils import set_random_seed
+
+from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.search.moves import Moves, legal_part
+from blast_agents.training.agent import Policy, TrainedAgent, policy_for
+from blast_agents.training.cases import Selection, training_cases
+from blast_agents.training.checkpoint import Checkpoint, Label
+from blast_agents.training.hyperparameters import schedule
+from blast_agents.training.imitation import Demonstration, imitate
+from blast_agents.training.recorder import Progress
+from blast_agents.training.run_folder import RolloutRow, RunConfiguration, RunFolder
+from blast_env.envs.strategies import ScenarioSource
+from blast_env.evaluation import Case, Evaluators
+from blast_env.evaluation.evaluator import BlastAsked
+from blast_env.evaluation.store import BlastCache, DiskCache
+from blast_env.geometry import Layout
+from blast_env.physics.scene import Charge
+from blast_env.statistics import reductions
+
+_MOST_BYTES: Final = 2_000_000_000
+"""Most that the blasts of a run take on the disk; one takes some kilobytes."""
+
+
+@dataclass(eq=False)
+class Judge:
+    """Runs the blasts of a training, several at a time.
+
+    Attributes:
+        evaluators: Run the blasts and remember them.
+        processes: Worker processes; they change nothing but the time.
+        asked: How often a layout met a threat so far, known or not.
+    """
+
+    evaluators: Evaluators
+    processes: int = 1
+    asked: int = 0
+
+    @classmethod
+    def of(
+        cls, engine: str, cases: Sequence[Case], cache: BlastCache | None, processes: int
+    ) -> "Judge":
+        """Return the judge of cases, with an evaluator for each of their scenarios."""
+        scenarios = {case.scenario.content_hash for case in cases}
+        return cls(Evaluators(engine, cache, most=len(scenarios)), processes)
+
+    def impulses_pa_s(
+        self, asked: Sequence[tuple[Case, Layout]], threats: slice
+    ) -> list[tuple[float, ...]]:
+        """Return the impulses on the protected structures, Pa*s, one a threat, for each pair.
+
+        Args:
+            asked: Layouts with their cases.
+            threats: Which threats of each case they meet.
+        """
+        blasts = [
+            BlastAsked(case.scenario, layout, threat)
+            for case, layout in asked
+            for threat in case.threats[threats]
+        ]
+        self.asked += len(blasts)
+        self.evaluators.run_ahead(blasts, self.processes)
+        impulses = []
+        for case, layout in asked:
+            evaluator = self.evaluators.of(case.scenario)
+            pairs = [(layout, threat) for threat in case.threats[threats]]
+            loads = evaluator.loads_of_many(pairs)
+            impulses.append(tuple(each.protected_impulse_pa_s for each in loads))
+        return impulses
+
+
+Impulses = Mapping[Layout, tuple[float, ...]]
+"""Layouts and the impulses under the threats that they have met, Pa*s."""
+
+
+def race(
+    judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]]
+) -> list[Impulses]:
+    """Let the layouts of each case race on its threats, by successive halving.
+
+    All meet the first threat, the better half of them the second, the better quarter the next two,
+    and so on; the blasts of all cases run side by side.
+
+    Args:
+        judge: Runs the blasts.
+        cases: The cases, each with as many threats.
+        layouts: Of each case, none twice.
+
+    Returns:
+        For each case, what every layout met; those that met all threats are the last ones left.
+    """
+    known: list[dict[Layout, tuple[float, ...]]] = [dict.fromkeys(each, ()) for each in layouts]
+    alive = [list(each) for each in layouts]
+    met, most = 0, len(cases[0].threats)
+    for upto in [min(2**index, most) for index in range(ceil(log2(most)) + 1)]:
+        asked = [(number, each) for number, own in enumerate(alive) for each in own]
+        pairs = [(cases[number], each) for number, each in asked]
+        blasts = judge.impulses_pa_s(pairs, slice(met, upto))
+        for (number, layout), impulses_pa_s in zip(asked, blasts, strict=True):
+            known[number][layout] += impulses_pa_s
+        for number, case in enumerate(cases):
+            own = known[number]
+            alive[number].sort(key=lambda each: case.combined(own[each]))
+            alive[number] = alive[number][: ceil(len(alive[number]) / 2)]
+        met = upto
+    return [*known]
+
+
+@dataclass(eq=False)
+class Lessons:
+    """The cases of a training and their labels.
+
+    Attributes:
+        cases: The cases, each with as many threats.
+        labels: A label a case; none before the first round.
+    """
+
+    cases: tuple[Case, ...]
+    labels: list[Label] = field(default_factory=list)
+
+    def reduction(self, index: int) -> float:
+        """Return by which share a case's label lowers the impulse; 0 where nothing arrives."""
+        label, case = self.labels[index], self.cases[index]
+        return _reduction(case, label.impulse_pa_s, label.unprotected_pa_s)
+
+    @property
+    def demonstrations(self) -> list[int]:
+        """Which cases there is something to learn from: those with a layout that helps."""
+        return [index for index in range(len(self.labels)) if self.reduction(index) > 0.0]
+
+    def begin(self, judge: Judge) -> list[float]:
+        """Make the best layouts by rule the labels; return the reduction of each one tried."""
+        by_rule = [
+            [*dict.fromkeys(layouts_by_rule(case.scenario, case.charge).values())]
+            for case in self.cases
+        ]
+        whole = slice(None)
+        bare = judge.impulses_pa_s([(case, ()) for case in self.cases], whole)
+        self.labels = [Label((), each, each) for each in bare]
+        return self.improve(judge, range(len(self.cases)), by_rule)
+
+    def improve(
+        self, judge: Judge, indices: Sequence[int], layouts: Sequence[Sequence[Layout]]
+    ) -> list[float]:
+        """Let layouts race against the labels of some cases; return the reduction of each.
+
+        Args:
+            judge: Runs the blasts.
+            indices: The cases.
+            layouts: Of each of them; those that are the label already are left out.
+        """
+        fresh = [
+            [each for each in dict.fromkeys(own) if each != self.labels[index].layout]
+            for index, own in zip(indices, layouts, strict=True)
+        ]
+        tried = []
+        raced = race(judge, [self.cases[index] for index in indices], fresh)
+        for index, impulses in zip(indices, raced, strict=True):
+            case, label = self.cases[index], self.labels[index]
+            for layout, impulse_pa_s in impulses.items():
+                bare_pa_s = label.unprotected_pa_s[: len(impulse_pa_s)]
+                tried.append(_reduction(case, impulse_pa_s, bare_pa_s))
+                whole = len(impulse_pa_s) == len(case.threats)
+                best_pa_s = case.combined(self.labels[index].impulse_pa_s)
+                if whole and case.combined(impulse_pa_s) < best_pa_s:
+                    self.labels[index] = replace(label, layout=layout, impulse_pa_s=impulse_pa_s)
+        return tried
+
+    def nearest(self, index: int, count: int) -> list[Layout]:
+        """Return the labels of the charges nearest to that of a case, as far as they may stand.
+
+        Of the same scenario; none where the charge is hidden, or a vehicle's.
+        """
+        case = self.cases[index]
+        if not isinstance(case.charge, Charge):
+            return []
+        x_m, y_m = case.charge.position_m
+        away_m = {}
+        for other, each in enumerate(self.cases):
+            if isinstance(each.charge, Charge) and each.scenario is case.scenario:
+                other_x_m, other_y_m = each.charge.position_m
+                away_m[other] = np.hypot(other_x_m - x_m, other_y_m - y_m)
+        others = sorted(away_m.keys() - {index}, key=lambda other: (away_m[other], other))
+        nearest = [self.labels[other].layout for other in others[:count]]
+        return [_sorted(legal_part(case.scenario, layout).layout) for layout in nearest]
+
+
+@dataclass(eq=False)
+class SelfLabelling:
+    """A training between two rounds.
+
+    Attributes:
+        folder: Of the run.
+        configuration: Of the run.
+        agent: The agent, whose policy learns.
+        lessons: What it learns from.
+        judge: Runs the blasts of the races.
+        selection: What the best weights are chosen by.
+        progress: What the run has come to so far.
+        logger: Writes for TensorBoard.
+    """
+
+    folder: RunFolder
+    configuration: RunConfiguration
+    agent: TrainedAgent
+    lessons: Lessons
+    judge: Judge
+    selection: Selection
+    progress: Progress
+    logger: Logger
+
+    @classmethod
+    def of(
+        cls,
+        folder: RunFolder,
+        configuration: RunConfiguration,
+        source: ScenarioSource,
+        selection: Selection,
+        checkpoint: Checkpoint,
+        progress: Progress,
+    ) -> "SelfLabelling":
+        """Return the training as it was at a checkpoint.
+
+        Args:
+            folder: Of the run.
+            configuration: Of the run.
+            source: Gives the cases their scenario.
+            selection: What the best weights are chosen by.
+            checkpoint: Where it goes on from.
+            progress: What the run has come to by then; goes on from there.
+
+        Raises:
+            BlastEnvError: If the checkpoint does not fit.
+        """
+        settings, hyperparameters = configuration.settings, configuration.self_labelling
+        set_random_seed(settings.seed % 2**32)
+        scenario = source.representative
+        policy = policy_for(configuration, scenario)
+        if checkpoint.policy:
+            checkpoint.load_policy(policy, folder.checkpoint)
+        if not checkpoint.is_start:
+            checkpoint.load_optimizer(policy.optimizer, folder.checkpoint)
+        policy.set_training_mode(False)
+        cases = training_cases(settings, source, hyperparameters.cases)
+        cache = DiskCache(folder.blasts, _MOST_BYTES)
+        judge = Judge.of(settings.engine, cases, cache, hyperparameters.n_envs)
+        judge.asked = progress.counters.steps
+        return cls(
+            folder=folder,
+            configuration=configuration,
+            agent=TrainedAgent(policy, scenario, settings.observation, settings.engine),
+            lessons=Lessons(cases, [*checkpoint.labels]),
+            judge=judge,
+            selection=selection,
+            progress=progress,
+            logger=configure(str(folder.tensorboard), ["tensorboard"]),
+        )
+
+    @property
+    def _policy(self) -> Policy:
+        return self.agent.policy
+
+    def do_round(self) -> None:
+        """Let layouts race, let the policy learn, and write it all down."""
+        began, before = perf_counter(), self.progress.counters
+        blasts, hits = self.judge.evaluators.blasts, self.judge.evaluators.cache_hits
+        hyperparameters, number = self.configuration.self_labelling, before.rollouts
+        rng = np.random.default_rng((self.configuration.settings.seed, number))
+        if number == 0:
+            tried = self.lessons.begin(self.judge)
+            updates = hyperparameters.first_updates
+        else:
+            indices = self._turn(number)
+            layouts = [self._candidates(index, rng) for index in indices]
+            tried = self.lessons.improve(self.judge, indices, layouts)
+            updates = hyperparameters.updates
+        self.judge.asked = max(self.judge.asked, before.steps + 1)  # every round ends some time
+        loss = self._imitate(updates, rng)
+        counters = replace(
+            before,
+            steps=self.judge.asked,
+            rollouts=number + 1,
+            updates=before.updates + updates,
+            episodes=before.episodes + len(tried),
+            blasts=before.blasts + self.judge.evaluators.blasts - blasts,
+            cache_hits=before.cache_hits + self.judge.evaluators.cache_hits - hits,
+            seconds=before.seconds + perf_counter() - began,
+        )
+        self.progress.counters = counters
+        self._write_down(tried, loss)
+
+    def _turn(self, number: int) -> list[int]:
+        """Return the cases that get new layouts in a round after the first: one after another."""
+        count = len(self.lessons.cases)
+        size = min(self.configuration.self_labelling.cases_per_round, count)
+        first = (number - 1) * size
+        return sorted({index % count for index in range(first, first + size)})
+
+    def _candidates(self, index: int, rng: np.random.Generator) -> list[Layout]:
+        """Return new layouts for a case."""
+        hyperparameters, case = self.configuration.self_labelling, self.lessons.cases[index]
+        layouts = [_sorted(self.agent.propose(case.scenario, case.charge))]
+        if hyperparameters.samples:
+            seed = int(rng.integers(2**62))
+            drawn = self.agent.sample(case.scenario, case.charge, hyperparameters.samples, seed)
+            layouts += map(_sorted, drawn)
+        moves, best = Moves(case.scenario), self.lessons.labels[index].layout
+        for each in range(hyperparameters.neighbours):
+            layout = best
+            for _ in range(1 + each % 2):  # every other one by two moves
+                layout = moves.neighbour(layout, rng)
+            layouts.append(_sorted(layout))
+        return layouts + self.lessons.nearest(index, hyperparameters.borrowed)
+
+    def _imitate(self, updates: int, rng: np.random.Generator) -> float:
+        settings, hyperparameters = self.configuration.settings, self.configuration.self_labelling
+        demonstrations = [
+            Demonstration(
+                self.lessons.cases[index],
+                self.lessons.labels[index].layout,
+                self.lessons.reduction(index),
+                settings.observation,
+            )
+            for index in self.lessons.demonstrations
+        ]
+        if not demonstrations:
+            return float("nan")
+        left = 1.0 - self.progress.counters.steps / settings.steps
+        rate = schedule(hyperparameters.learning_rate)
+        return imitate(
+            self._policy,
+            demonstrations,
+            updates,
+            hyperparameters.batch_size,
+            rate(left) if callable(rate) else rate,
+            hyperparameters.vf_coef,
+            hyperparameters.max_grad_norm,
+            rng,
+        )
+
+    def _write_down(self, tried: Sequence[float], loss: float) -> None:
+        """Add a row, evaluate if it is time for it; the checkpoint decides, the tables follow."""
+        progress, lessons, settings = self.progress, self.lessons, self.configuration.settings
+        counters = progress.counters
+        row = RolloutRow(
+            steps=counters.steps,
+            episodes=len(tried),
+            reward=fmean(map(lessons.reduction, range(len(lessons.cases)))),
+            reduction=fmean(tried) if tried else float("nan"),
+            modules=fmean(len(label.layout) for label in lessons.labels),
+            blasts=counters.blasts,
+            cache_hits=counters.cache_hits,
+            seconds=counters.seconds,
+        )
+        progress.rollouts.append(row)
+        self.logger.record("round/best_reduction", row.reward)
+        self.logger.record("round/tried_reduction", row.reduction)
+        self.logger.record("round/loss", loss)
+        self.logger.record("blasts/simulated", row.blasts)
+        is_last = counters.steps >= settings.steps
+        if is_last or counters.rollouts % settings.evaluation_interval == 0:
+            evaluation = progress.evaluate(self.agent, self.selection)
+            self.logger.record("evaluation/reduction", evaluation.reduction)
+        self.logger.dump(counters.steps)
+        checkpoint = progress.checkpoint(self.configuration, self._policy, tuple(lessons.labels))
+        checkpoint.save(self.folder.checkpoint)
+        progress.write_tables(self.folder)
+
+
+def _sorted(layout: Layout) -> Layout:
+    return tuple(sorted(layout))
+
+
+def _reduction(
+    case: Case, impulse_pa_s: tuple[float, ...], unprotected_pa_s: tuple[float, ...]
+) -> float:
+    """Return a reduction; 0 where nothing arrives without a barrier."""
+    share = reductions(case.combined(impulse_pa_s), case.combined(unprotected_pa_s))
+    return float(np.nan_to_num(share))

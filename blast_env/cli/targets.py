@@ -1,0 +1,101 @@
+"""Where a command is to write: looked at before its work begins, tidied up after it."""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from blast_env.errors import BlastEnvError
+
+PICTURES = (".png", ".svg", ".pdf")
+"""Suffixes of pictures, as `rendering.figures.FIGURE_SUFFIXES`; known without that extra."""
+
+
+class FileTarget(NamedTuple):
+    """A file that a command is to write.
+
+    Attributes:
+        path: The file; None if the user does not want it.
+        suffixes: Those that it may have.
+    """
+
+    path: Path | None
+    suffixes: Sequence[str]
+
+
+@contextmanager
+def checked_targets(
+    files: Mapping[str, FileTarget] | None = None,
+    folders: Mapping[str, Path | None] | None = None,
+) -> Iterator[None]:
+    """Refuse targets of no use before the block, and leave no empty folders after it.
+
+    So no result is lost for want of a place, and a command that fails or is interrupted leaves no
+    folder behind that it has put nothing into.
+
+    Args:
+        files: The files, by the names of their options.
+        folders: The folders, likewise; they need not be there.
+
+    Raises:
+        BlastEnvError: If a file or folder cannot be written, or two options name one file.
+    """
+    known: dict[Path, str] = {}
+    for option, (path, suffixes) in (files or {}).items():
+        if path is None:
+            continue
+        _check_file(option, path, suffixes)
+        same = known.setdefault(path.resolve(), option)
+        if same != option:
+            raise BlastEnvError(f"{same} and {option} are the same file, {path}")
+    wanted = [(option, folder) for option, folder in (folders or {}).items() if folder is not None]
+    for option, folder in wanted:
+        _check_folder(option, folder)
+    before = {folder: _missing_above(folder) for _, folder in wanted}
+    present = {path for folder in before for path in _folders_in(folder)}
+    try:
+        yield
+    finally:
+        for folder, missing in before.items():
+            for path in (*_folders_in(folder), *missing):
+                if path not in present:
+                    with suppress(OSError):  # there is something in it, or it was never made
+                        path.rmdir()
+
+
+def _check_file(option: str, path: Path, suffixes: Sequence[str]) -> None:
+    if path.suffix.lower() not in suffixes:
+        must_be = suffixes[0] if len(suffixes) == 1 else f"one of {', '.join(suffixes)}"
+        raise BlastEnvError(f"{option} {path}: suffix is {path.suffix!r}, must be {must_be}")
+    if path.is_dir():
+        raise BlastEnvError(f"{option} {path}: is a folder, must be a file")
+    folder = path.resolve().parent
+    if not folder.is_dir():
+        raise BlastEnvError(f"{option} {path}: there is no folder {str(folder)!r} to write it to")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise BlastEnvError(f"{option} {path}: the folder {str(folder)!r} cannot be written to")
+
+
+def _check_folder(option: str, folder: Path) -> None:
+    present = folder.resolve()
+    while not present.exists():
+        present = present.parent
+    if not present.is_dir():
+        raise BlastEnvError(f"{option} {folder}: cannot be a folder: {str(present)!r} is a file")
+    if not os.access(present, os.W_OK | os.X_OK):
+        raise BlastEnvError(f"{option} {folder}: the folder {str(present)!r} cannot be written to")
+
+
+def _missing_above(folder: Path) -> list[Path]:
+    """Return a folder and those above it that are not there, the lowest first."""
+    path, missing = folder.resolve(), []
+    while not path.exists():
+        missing.append(path)
+        path = path.parent
+    return missing
+
+
+def _folders_in(folder: Path) -> list[Path]:
+    """Return the folders in a folder, the lowest first."""
+    return [Path(place) for place, _, _ in os.walk(folder.resolve(), topdown=False)]

@@ -1,0 +1,125 @@
+"""What a sound scenario is good for, and what not: which commands refuse it, and what misleads."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from blast_env.calibration.model import scenario_calibration
+from blast_env.errors import BlastEnvError
+from blast_env.physics.engines import GAS, PARTICLE_ENGINES
+from blast_env.scenario import AnyScenario, PointSource, Scenario, find_scenario
+
+_PLACING: Final = "search, train, evaluate, league, play and BlastBarrier-v0"
+_PRESETS_NOT_FOR_DESIGN: Final = {
+    "ballistic": "its air is so thin that next to nothing gets round a wall "
+    "(docs/engineers/validity.md)"
+}
+
+
+@dataclass(frozen=True)
+class Suitability:
+    """What a scenario is good for.
+
+    Attributes:
+        uses: What it can be used for, a phrase each.
+        limits: What it is not good for, a sentence each, with what to do about it.
+    """
+
+    uses: tuple[str, ...]
+    limits: tuple[str, ...]
+
+
+def suitability(scenario: AnyScenario) -> Suitability:
+    """Return what a scenario is good for; nothing is run.
+
+    Args:
+        scenario: The scenario, or its bundled name or path.
+
+    Raises:
+        ScenarioError: If it cannot be used at all.
+    """
+    found = find_scenario(scenario)
+    refusals = {engine: _refusal(found, engine) for engine in PARTICLE_ENGINES}
+    able = [GAS, *(engine for engine, refusal in refusals.items() if not refusal)]
+    uses = ["simulate with every engine"]
+    if found.particle_problems:
+        uses = [f"simulate with {GAS}"]
+    if found.build_zone is not None:
+        uses.append(f"placing barriers ({_PLACING}) with {', '.join(able)}")
+        uses.append(f"report ({GAS})")
+    limits = (
+        *_placing_limits(found),
+        *_particle_limits(found, refusals),
+        *_height_limits(found),
+        *_charge_limits(found),
+        *_gauge_limits(found),
+    )
+    return Suitability(tuple(uses), limits)
+
+
+def _refusal(scenario: Scenario, engine: str) -> str:
+    """Return why loads by an engine of particles cannot be had in Pa s; empty if they can."""
+    try:
+        scenario_calibration(scenario, engine)
+    except BlastEnvError as error:
+        return str(error)
+    return ""
+
+
+def _placing_limits(scenario: Scenario) -> Iterator[str]:
+    if scenario.build_zone is None:
+        yield f"no build zone: nothing can be placed, report, {_PLACING} refuse it ([build_zone])"
+
+
+def _particle_limits(scenario: Scenario, refusals: dict[str, str]) -> Iterator[str]:
+    problems = [str(problem) for problem in scenario.particle_problems]
+    if problems:
+        yield f"particles cannot run it, gas can: {'; '.join(problems)}"
+    if scenario.calibration is None:
+        yield (
+            "no calibration: particles give simulation units alone, and where Pa s are needed "
+            f"({_PLACING}) {' and '.join(PARTICLE_ENGINES)} refuse it; gas needs none"
+        )
+    else:
+        for reason in dict.fromkeys(refusals.values()):
+            engines = [engine for engine, each in refusals.items() if each == reason and each]
+            if engines:
+                yield f"no loads in Pa s with {' and '.join(engines)}: {reason}"
+    name = scenario.simulation.preset
+    if name in _PRESETS_NOT_FOR_DESIGN:
+        yield (
+            f"preset {name!r} is not meant for design: {_PRESETS_NOT_FOR_DESIGN[name]}; judge "
+            f"layouts with --engine {GAS}"
+        )
+
+
+def _height_limits(scenario: Scenario) -> Iterator[str]:
+    zone = scenario.build_zone
+    endless = [each.name for each in scenario.structures if each.height_m is None]
+    if zone is not None and not zone.items and zone.height_m is None:
+        endless.append("the modules of the build zone")
+    if endless:
+        yield (
+            f"no height ({', '.join(endless)}): as high as the air, {scenario.air_height_m:g} m, "
+            f"so {GAS} overrates what walls do (height_m)"
+        )
+    for note in scenario.height_notes:
+        yield f"particles: {note[0].lower()}{note[1:]}"
+
+
+def _charge_limits(scenario: Scenario) -> Iterator[str]:
+    if scenario.vehicles:
+        yield (
+            "a vehicle brings a charge, to where the layout lets it come: calibrate and simulate "
+            "--stand-off refuse it, and --charge puts the charge where no vehicle is"
+        )
+    if len(scenario.charge) == 1 and isinstance(scenario.charge[0], PointSource):
+        yield (
+            "the charge is always at one place: a hidden threat is no question here, and an agent "
+            "trained on it knows no other"
+        )
+
+
+def _gauge_limits(scenario: Scenario) -> Iterator[str]:
+    if not scenario.gauges:
+        yield f"no gauges: simulate --engine {GAS} has no --history to draw ([[gauges]])"

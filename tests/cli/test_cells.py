@@ -1,0 +1,76 @@
+"""`--cell` in training and league: it reaches the environments and what judges."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from blast_agents.training import load_agent
+from blast_agents.training.run_folder import RunFolder
+from typer.testing import CliRunner, Result
+
+from blast_env.cli import app
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.scenario import save_scenario
+from tests.gas_sites import hut
+
+COARSE = 0.5
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Path:
+    path = tmp_path / "hut.toml"
+    save_scenario(hut(), path)
+    return path
+
+
+@pytest.fixture
+def cells(monkeypatch: pytest.MonkeyPatch) -> set[float]:
+    """The sides of cells of all blasts that are run."""
+    used: set[float] = set()
+    start_on = GasEngine.start_on
+
+    def watched(self: GasEngine, *arguments: Any) -> Any:
+        used.add(self.cell_m)
+        # As fast as it gets; what comes out does not matter here.
+        return start_on(GasEngine(COARSE), *arguments)
+
+    monkeypatch.setattr(GasEngine, "start_on", watched)
+    return used
+
+
+def run(*arguments: str | Path | float) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_training_and_its_evaluations_use_the_cells(
+    site: Path, tmp_path: Path, cells: set[float]
+) -> None:
+    folder = tmp_path / "run"
+    small = ("n_steps=4", "batch_size=4", "n_epochs=1", "evaluation_cases=2")
+    options = [text for each in small for text in ("--set", each)]
+    given = ("--scenario", site, "--run", folder, "--envs", 1, "--steps", 4)
+    result = run("train", *given, "--engine", "gas", "--cell", 0.25, *options)
+    assert result.exit_code == 0, result.output
+    assert cells == {0.25}
+    assert "cells of 0.25 m" in result.stdout
+    assert RunFolder(folder).configuration().settings.cell_m == 0.25
+    engine = load_agent(folder).engine
+    assert isinstance(engine, GasEngine)
+    assert engine.cell_m == 0.25
+
+
+def test_a_league_uses_the_cells(site: Path, tmp_path: Path, cells: set[float]) -> None:
+    given = ("--scenario", site, "--out", tmp_path / "out", "--cases", 2, "--seeds", 1)
+    options = ("--methods", "random", "--budgets", 1, "--engine", "gas", "--cell", 0.25)
+    result = run("league", *given, *options)
+    assert result.exit_code == 0, result.output
+    assert cells == {0.25}
+    assert "cells of 0.25 m" in result.stdout
+
+
+def test_cells_are_for_gas_alone(site: Path, tmp_path: Path) -> None:
+    for command in (("train", "--run"), ("league", "--out")):
+        result = run(*command, tmp_path / "a", "--scenario", site, "--cell", 0.25)
+        assert result.exit_code == 2
+        assert "engine 'event' has no cells" in " ".join(result.stderr.split())
+        assert not (tmp_path / "a").exists()

@@ -1,0 +1,342 @@
+"""What users of command lines rely on, item by item."""
+
+import json
+from io import StringIO
+from pathlib import Path
+
+import pytest
+import typer
+from blast_agents.training.recorder import Progress
+from blast_agents.training.run_folder import RunFolder
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+from typer.core import TyperCommand, TyperGroup
+from typer.testing import CliRunner, Result
+
+from blast_env import load_scenario, save_scenario
+from blast_env.cli import app
+from blast_env.cli.tables import ResultTable
+from blast_env.physics.event.engine import EventRun
+from blast_env.physics.pymunk.engine import PymunkRun
+from blast_env.scenario import LayoutFile, load_layout
+from blast_env.sites import Visibility, visibility_layout
+from tests.agents.search_cases import small_scenario
+from tests.agents.training_runs import scenario_file
+from tests.gas_sites import hut
+
+NARROW = 80
+WORDS = ("structure", "protected", "first", "impulse", "(Pa", "s)", "perimeter_south", "12", "a")
+
+
+def run(*arguments: object, columns: int = NARROW) -> Result:
+    words = [str(argument) for argument in arguments]
+    return CliRunner().invoke(app, words, env={"COLUMNS": str(columns)})
+
+
+def commands() -> dict[str, TyperCommand]:
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    return {name: each for name, each in group.commands.items() if isinstance(each, TyperCommand)}
+
+
+def words_of(text: str) -> set[str]:
+    """Return the words of a text, without frames and code marks."""
+    return set(text.replace("│", " ").replace("`", "").split())
+
+
+# Help.
+
+
+@pytest.mark.parametrize("name", sorted(commands()))
+def test_every_word_of_the_help_is_shown(name: str) -> None:
+    """Rich takes `[row, column]` for a style of its own, and leaves it out."""
+    shown, command = words_of(run(name, "--help").stdout), commands()[name]
+    helps = [str(getattr(each, "help", None) or "") for each in command.params]
+    for text in [command.help or "", *helps]:
+        assert words_of(text) <= shown
+
+
+# Tables.
+
+
+@given(
+    st.lists(st.lists(st.sampled_from(WORDS), min_size=1, max_size=3), min_size=1, max_size=9),
+    st.integers(40, 130),
+    st.integers(1, 3),
+)
+def test_no_word_of_a_table_is_cut(headers: list[list[str]], width: int, text_columns: int) -> None:
+    table = ResultTable("title", [" ".join(words) for words in headers], text_columns)
+    for number in range(3):
+        table.add_row(*(" ".join(words[number:]) or "1,234.5" for words in headers))
+    console = Console(width=width, file=StringIO(), color_system=None)
+    console.print(table)
+    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert max(len(line.rstrip()) for line in lines) <= width
+    shown = {word for line in lines for word in line.split()}
+    assert {word for words in headers for word in words} <= shown
+
+
+def test_a_table_that_is_too_wide_goes_on_below_with_the_names_of_its_rows() -> None:
+    table = ResultTable("title", ["name", *(f"column_{number:02}" for number in range(20))])
+    table.add_row("this", *map(str, range(20)))
+    console = Console(width=NARROW, file=StringIO(), color_system=None)
+    console.print(table)
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert shown.count("name") == shown.count("this") > 1
+    assert all(f"column_{number:02}" in shown for number in range(20))
+
+
+@pytest.mark.parametrize("engine", ["event", "gas"])
+def test_the_loads_of_a_blast_are_readable_in_80_columns(engine: str, hut_file: Path) -> None:
+    shown = run("simulate", hut_file, "--engine", engine).stdout
+    table = shown[: shown.index(f"engine {engine} 1")].splitlines()
+    assert max(map(len, table)) <= NARROW
+    assert {"structure", "protected", "hut"} <= set(shown.split())
+    assert "…" not in shown
+
+
+# The charge, and what is said of engine and preset.
+
+
+@pytest.fixture(scope="module")
+def hut_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("hut") / "hut.toml"
+    save_scenario(hut(), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scenario with a build zone and a calibration, of which a blast takes a few ms."""
+    path = tmp_path_factory.mktemp("site") / "site.toml"
+    save_scenario(small_scenario(), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def layout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("layout") / "layout.json"
+    path.write_text("[[1, 0], [2, 0]]")
+    return path
+
+
+CHARGE = ("--charge", 5, 19, "--tnt-kg", 60)
+
+
+def test_the_charge_is_named_alike_everywhere(site: Path, layout: Path, tmp_path: Path) -> None:
+    place = "60 kg TNT at (5.00, 19.00) m"
+    shown = run("simulate", site, "--engine", "event", *CHARGE).stdout
+    assert place in shown
+    given = ("--scenario", site, "--layout", layout, "--seeds", 2)
+    shown = run("evaluate", *given, *CHARGE).stdout
+    assert place in shown
+    assert "means over 2 threats" in shown
+    options = ("--method", "random", "--budget", 4, "--held-out", 2, "--out", tmp_path / "out")
+    result = run("search", "--scenario", site, *options, *CHARGE)
+    assert result.exit_code == 0, result.output
+    threats = LayoutFile.load(tmp_path / "out" / "layout.json").provenance["threats"]
+    assert {(*each["charge_position_m"], each["tnt_kg"]) for each in threats} == {(5.0, 19.0, 60.0)}
+    assert {"--charge", "--tnt-kg"} <= words_of(run("search", "--help").stdout)
+
+
+def test_a_fixed_charge_has_one_blast_of_gas_dynamics(hut_file: Path, tmp_path: Path) -> None:
+    wall = tmp_path / "wall.json"
+    wall.write_text("[[1, 0], [2, 0]]")
+    given = ("--scenario", hut_file, "--layout", wall, "--seeds", 3, "--engine", "gas")
+    shown = run("evaluate", *given, "--charge", 2, 3.5, "--tnt-kg", 4).stdout
+    assert "4 kg TNT at (2.00, 3.50) m" in shown
+    assert "2 blasts run" in shown
+
+
+def test_each_command_says_engine_and_preset(site: Path, layout: Path) -> None:
+    given = ("--scenario", site)
+    for arguments in (
+        ("simulate", site, "--engine", "event"),
+        ("evaluate", *given, "--layout", layout, "--seeds", 1),
+        ("search", *given, "--method", "wall_near_charge", "--held-out", 1),
+    ):
+        assert "engine event 1 (numba" in run(*arguments).stdout
+        assert "preset ballistic" in " ".join(run(*arguments).stdout.split())
+
+
+def test_the_steps_of_the_event_engine_are_events(site: Path) -> None:
+    assert " events, " in run("simulate", site, "--engine", "event").stdout
+    assert " steps, " in run("simulate", site, "--engine", "pymunk").stdout
+
+
+def test_sight_lines_are_a_method_of_search(site: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    options = ("--method", "sight_lines", "--held-out", 1, "--out", out)
+    result = run("search", "--scenario", site, *options)
+    assert result.exit_code == 0, result.output
+    scenario = load_scenario(site)
+    (source,) = scenario.charge
+    expected = visibility_layout(scenario, Visibility.of(scenario))
+    assert source.kind == "point"
+    assert set(load_layout(out / "layout.json", scenario)) == set(expected)
+    assert "0 of 200 blasts spent" in result.stdout
+
+
+# JSON.
+
+
+def test_json_is_short_unless_all_is_asked_for(site: Path, layout: Path) -> None:
+    evaluate = ("evaluate", "--scenario", site, "--layout", layout, "--seeds", 2)
+    for arguments in (("simulate", site, "--engine", "event"), evaluate):
+        short, full = (
+            json.loads(run(*arguments, each).stdout) for each in ("--json", "--json-all")
+        )
+        assert set(short) < set(full)
+        assert "modules" in set(full) - set(short)
+        assert len(json.dumps(short)) < 5000
+        assert {name: full[name] for name in short if name != "run"} == {
+            name: value for name, value in short.items() if name != "run"
+        }
+    both = run("simulate", site, "--json", "--json-all")
+    assert both.exit_code == 2
+    assert "exclude each other" in both.stderr
+
+
+# Where a command writes.
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("simulate", "SITE", "--film", "a.avi"), "--film a.avi: suffix is '.avi', must be one of"),
+        (
+            ("simulate", "SITE", "--excel", "a.xls"),
+            "--excel a.xls: suffix is '.xls', must be .xlsx",
+        ),
+        (("simulate", "SITE", "--heat-map", "no/a.png"), "--heat-map no/a.png: there is no folder"),
+        (("simulate", "SITE", "--history", "folder.png"), "folder.png: is a folder"),
+        (("simulate", "SITE", "--history", "a.png", "--heat-map", "a.png"), "are the same file"),
+        (("evaluate", "--layout", "LAYOUT", "--out", "file/a"), "--out file/a: cannot be a folder"),
+        (("evaluate", "--layout", "LAYOUT", "--cache", "file"), "--cache file: cannot be a folder"),
+        (("evaluate", "--layout", "LAYOUT", "--export", "no/a.dxf"), "there is no folder"),
+        (("search", "--out", "file/a"), "--out file/a: cannot be a folder"),
+        (("league", "--out", "file"), "--out file: cannot be a folder"),
+        (("train", "--run", "file/a"), "--run file/a: cannot be a folder"),
+        (
+            ("calibrate", "--name", "a", "--reference", "paper_ufc", "--out", "file"),
+            "--out file: cannot be a folder",
+        ),
+        (("report", "SITE", "--layout", "LAYOUT", "--out", "no/a.html"), "there is no folder"),
+    ],
+)
+def test_places_to_write_are_looked_at_before_the_work(
+    arguments: tuple[str, ...],
+    words: str,
+    site: Path,
+    layout: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.png").mkdir()
+
+    def no_work(*_: object) -> None:
+        raise AssertionError("the work has begun")
+
+    for engine in (EventRun, PymunkRun):
+        monkeypatch.setattr(engine, "advance", no_work)
+    names = {"SITE": str(site), "LAYOUT": str(layout)}
+    result = run(*(names.get(each, each) for each in arguments))
+    assert result.exit_code == 2, result.output
+    assert words in " ".join(result.stderr.split())
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["file", "folder.png"]
+
+
+@pytest.fixture
+def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C at the first blast."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(EventRun, "advance", interrupt)
+
+
+@pytest.mark.usefixtures("interrupted")
+@pytest.mark.parametrize(
+    ("arguments", "resume"),
+    [
+        (("search", "--out", "a/b"), "with --cache FOLDER the blasts would have been kept"),
+        (("search", "--out", "a", "--cache", "c/d"), "the same command goes on with the blasts"),
+        (("evaluate", "--layout", "LAYOUT", "--out", "a/b"), "with --cache FOLDER the blasts"),
+        (("evaluate", "--layout", "LAYOUT", "--cache", "c"), "the same command goes on"),
+        (("league", "--out", "a", "--methods", "random"), "the same command goes on"),
+        (
+            ("calibrate", "--name", "a", "--reference", "paper_ufc", "--engine", "event"),
+            "the same command goes on from the blasts that are finished",
+        ),
+    ],
+)
+def test_an_interruption_says_how_to_go_on_and_leaves_no_empty_folder(
+    arguments: tuple[str, ...],
+    resume: str,
+    site: Path,
+    layout: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not even a layout: a search without a blast has found none."""
+    monkeypatch.chdir(tmp_path)
+    given = () if arguments[0] == "calibrate" else ("--scenario", site)
+    result = run(*(layout if each == "LAYOUT" else each for each in arguments), *given)
+    assert result.exit_code == 130, result.output
+    assert f"interrupted: no file was left half-written; {resume}" in " ".join(
+        result.stderr.split()
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_command_that_fails_leaves_no_empty_folder(
+    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there").mkdir()
+    options = (
+        "--method",
+        "random",
+        "--start-from",
+        "nowhere.json",
+        "--cache",
+        "there/c",
+        "--out",
+        "there/a/b",
+    )
+    assert run("search", "--scenario", site, *options).exit_code == 2
+    assert [each.name for each in tmp_path.iterdir()] == ["there"]
+    assert list((tmp_path / "there").iterdir()) == []
+
+
+# Runs that were interrupted.
+
+
+def test_an_interrupted_training_says_how_to_go_on_and_can_be_evaluated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before the first evaluation there are no best weights: the last ones propose."""
+    site, folder = scenario_file(tmp_path), tmp_path / "run"
+    write_tables, left = Progress.write_tables, [3]
+
+    def interrupt(self: Progress, run_folder: RunFolder) -> None:
+        write_tables(self, run_folder)
+        left[0] -= 1
+        if left[0] == 0:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Progress, "write_tables", interrupt)
+    changes = ("n_steps=8", "batch_size=8", "evaluation_interval=1000", "evaluation_cases=2")
+    options = [text for each in changes for text in ("--set", each)]
+    result = run("train", "--scenario", site, "--run", folder, "--envs", 1, *options)
+    assert result.exit_code == 130, result.output
+    assert f"blast-env train --resume {folder} goes on" in result.stderr
+    monkeypatch.undo()
+    result = run("evaluate", "--run", folder, "--seeds", 2, "--json")
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["provenance"]["weights"] == "last"
+    assert "no evaluation yet" in run("evaluate", "--run", folder, "--seeds", 1).stdout

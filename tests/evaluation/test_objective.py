@@ -1,0 +1,149 @@
+"""What a scenario's objective counts is what is rewarded, searched for and reported."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from blast_agents.search import LayoutProblem
+
+from blast_env.cli.evaluation_report import print_means
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats, evaluate_against
+from blast_env.physics.scene import Charge
+from blast_env.scenario import ObjectiveSection, Scenario, ScenarioError
+from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, WorstRisk
+from blast_env.units import PA_PER_PSI
+from tests.gas_sites import WALL, hut, site_document
+
+NEAR, FAR = (Threat(Charge(place, 5.0), 0) for place in ((2.0, 4.0), (2.0, 1.5)))
+
+
+def site(**objective: Any) -> Scenario:
+    return hut(objective=objective)
+
+
+@pytest.fixture(scope="module")
+def measured() -> tuple[dict[str, float], dict[str, float]]:
+    """Impulse (Pa s) and peak (Pa) on the hut without and with the wall, under the near threat."""
+    loads = BlastEvaluator(hut(), "gas").loads_of_many([((), NEAR), (WALL, NEAR)])
+    bare, walled = (
+        {"impulse": each.protected_impulse_pa_s, "peak": each.protected_peak_pa} for each in loads
+    )
+    return bare, walled
+
+
+def test_impulse_is_what_counts_unless_something_else_is_said() -> None:
+    assert hut().objective == ObjectiveSection()
+    assert hut().content_hash == site(quantity="impulse", charges="mean").content_hash
+    assert hut().content_hash != site(charges="worst").content_hash
+
+
+def test_peaks_count_in_pascal(measured: tuple[dict[str, float], dict[str, float]]) -> None:
+    evaluation = evaluate_against(BlastEvaluator(site(quantity="peak"), "gas"), WALL, [NEAR])
+    bare, walled = measured
+    assert evaluation.unprotected_load == pytest.approx(bare["peak"])
+    assert evaluation.load == pytest.approx(walled["peak"])
+    assert evaluation.mean_reduction == pytest.approx(1.0 - walled["peak"] / bare["peak"])
+    # Impulses stay impulses in what is reported of them.
+    assert evaluation.impulse_pa_s.value == pytest.approx(walled["impulse"])
+    (row,) = evaluation.threat_table.to_dict("records")
+    assert (row["peak_pa"], row["load"]) == pytest.approx((walled["peak"],) * 2)
+    assert row["impulse_pa_s"] == pytest.approx(walled["impulse"])
+    record = evaluation.to_dict()["result"]["objective"]
+    assert record["unit"] == "Pa"
+    assert record["load"] == evaluation.load
+
+
+def test_both_add_shares_of_their_references_by_the_weights_of_a_structure(
+    measured: tuple[dict[str, float], dict[str, float]],
+) -> None:
+    document = site_document(
+        objective={
+            "quantity": "both",
+            "reference_impulse_pa_s": 50.0,
+            "reference_peak_pa": 20_000.0,
+        }
+    )
+    document["structures"][0] |= {"weight": 2.0, "peak_weight": 3.0}
+    evaluator = BlastEvaluator(Scenario.from_document(document, "hut"), "gas")
+    (loads,) = evaluator.loads_of_many([((), NEAR)])
+    bare, _ = measured
+    expected = 2.0 * bare["impulse"] / 50.0 + 3.0 * bare["peak"] / 20_000.0
+    assert loads.load(evaluator.scenario.objective) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("charges", "risk"),
+    [
+        ({"charges": "mean"}, MeanRisk()),
+        ({"charges": "worst"}, WorstRisk()),
+        ({"charges": "cvar"}, ConditionalValueAtRisk(0.8)),
+        ({"charges": "cvar", "cvar_level": 0.5}, ConditionalValueAtRisk(0.5)),
+    ],
+)
+def test_several_charges_become_one_as_the_objective_says(
+    charges: dict[str, Any], risk: MeanRisk | WorstRisk | ConditionalValueAtRisk
+) -> None:
+    case = Case(site(**charges), (NEAR, FAR))
+    loads = np.array([3.0, 7.0])
+    assert case.combined(loads) == risk(loads)
+    assert Case(site(**charges), (NEAR, FAR), risk=MeanRisk()).combined(loads) == 5.0
+
+
+def test_the_worst_charge_decides_in_evaluation_and_search() -> None:
+    evaluator = BlastEvaluator(site(charges="worst"), "gas")
+    evaluation = evaluate_against(evaluator, WALL, [NEAR, FAR])
+    loads = [each.protected_impulse_pa_s for each in evaluation.loads]
+    bare = [each.protected_impulse_pa_s for each in evaluation.unprotected]
+    assert evaluation.load == max(loads)
+    assert evaluation.mean_reduction == pytest.approx(1.0 - max(loads) / max(bare))
+    assert np.isnan(evaluation.ci95).all()  # nothing is said of threats that were not met
+    problem = LayoutProblem(evaluator, Case(evaluator.scenario, (NEAR, FAR)))
+    assert problem.load(WALL) == max(loads)
+
+
+@pytest.mark.parametrize(("quantity", "term"), [("impulse", "impulse"), ("peak", "peak")])
+@pytest.mark.parametrize("reward", ["terminal", "incremental"])
+def test_the_reward_is_minus_what_counts(reward: str, quantity: str, term: str) -> None:
+    env = BlastBarrierEnv(scenario=site(quantity=quantity), engine="gas", reward=reward)
+    env.reset(seed=0)
+    paid = []
+    for action in (0, env.placement.catalogue.finish):
+        _, earned, ended, _, info = env.step(action)
+        assert term in info["reward_terms"]
+        paid.append(float(earned))
+    assert ended
+    si = info["impulse_pa_s"] if quantity == "impulse" else info["peak_pa"]
+    assert sum(paid) == pytest.approx(-si / PA_PER_PSI)
+    assert info["unprotected_peak_pa"] > 0.0
+
+
+def test_particles_cannot_count_peaks() -> None:
+    message = "objective.quantity is 'peak', but engine 'event' knows no overpressure"
+    with pytest.raises(BlastEnvError, match=message):
+        BlastEvaluator(site(quantity="peak"), "event")
+
+
+def test_wrong_objectives_are_named_all_at_once() -> None:
+    with pytest.raises(ScenarioError) as error:
+        site(quantity="peek", charges="worse", cvar_level=1.0)
+    text = str(error.value)
+    for place in ("objective.quantity", "objective.charges", "objective.cvar_level"):
+        assert place in text
+    with pytest.raises(ScenarioError, match=r"objective\.reference_peak_pa: missing") as error:
+        site(quantity="both", reference_impulse_pa_s=3.0, cvar_level=0.5)
+    assert "objective.cvar_level: must be left out: charges is 'mean'" in str(error.value)
+    with pytest.raises(ScenarioError, match="reference_peak_pa: must be left out"):
+        site(quantity="impulse", reference_peak_pa=3.0)
+
+
+def test_totals_are_printed_with_the_unit_of_what_counts(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    evaluator = BlastEvaluator(site(quantity="peak"), "gas")
+    evaluation = evaluate_against(evaluator, WALL, draw_threats(evaluator.scenario, [0]))
+    print_means(evaluation.comparison, evaluator.scenario.objective)
+    printed = capsys.readouterr().out
+    assert f"without barrier: mean {evaluation.unprotected_load:,.0f} Pa," in printed
+    assert "psi s" not in printed
