@@ -16,6 +16,7 @@ from blast_env.evaluation import (
     evaluate_against,
     evaluate_layout,
 )
+from blast_env.evaluation.report import PARTICLES_OVERRATE
 from blast_env.scenario import Scenario
 from tests.evaluation.cases import (
     BEHIND_SHADOW,
@@ -108,7 +109,8 @@ def test_threats_may_be_given_instead_of_seeds(evaluator: BlastEvaluator) -> Non
     assert not evaluation.in_range
     assert evaluation.threat_table.in_range.tolist() == [False, False, True]
     assert evaluation.table.threats_in_range.tolist() == [1]
-    (note,) = evaluation.notes
+    of_model, note = evaluation.notes
+    assert of_model == PARTICLES_OVERRATE
     assert note == (
         "building: 2 of 3 threats are outside the range of calibration 'collisional_kb', "
         "e.g. charge 15 kg TNT is not between 20 and 1000 kg"
