@@ -38,8 +38,8 @@ AGENT: Final = "trained agent"
 
 _CHANGES: Final[Mapping[str, Any]] = MappingProxyType(
     {
-        "cases": 24,
-        "cases_per_round": 12,
+        "cases": 16,
+        "cases_per_round": 8,
         "samples": 3,
         "neighbours": 5,
         "first_updates": 300,
@@ -69,12 +69,12 @@ class DemoSettings:
 
     out: Path = Path("out/demo")
     scenario: str = str(Path(__file__).with_name("demo_site.toml"))
-    steps: int = 700
+    steps: int = 240
     seed: int = 0
     changes: Mapping[str, Any] = field(default_factory=lambda: dict(_CHANGES))
     evaluation_interval: int = 1
     evaluation_cases: int = 8
-    threats: int = 16
+    threats: int = 8
     processes: int = 2
     film_width_px: int = 1600
     frames_per_s: float = 25.0

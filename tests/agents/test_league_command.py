@@ -40,7 +40,8 @@ def test_it_has_help_and_is_listed() -> None:
     assert "league" in CliRunner().invoke(app, ["--help"]).stdout
     result = league("--help")
     assert result.exit_code == 0
-    assert "known, hidden, sites or all" in " ".join(result.stdout.split())
+    words = result.stdout.replace("│", " ").split()
+    assert "known, hidden, vehicle, sites or all" in " ".join(words)
 
 
 def test_all_enter_and_all_is_written(run: Path, tmp_path: Path) -> None:

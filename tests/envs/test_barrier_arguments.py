@@ -59,7 +59,10 @@ def test_bad_options_are_named(options: dict, error: type, words: str) -> None:
         ({"scenario": 3}, "scenario is 3, must be a name, a path, a Scenario"),
         ({"reward": 3}, "reward is 3, must be one of 'incremental', 'terminal', or have"),
         ({"threat": 3}, "threat is 3, must be one of 'hidden', 'visible', or have the method draw"),
-        ({"risk": 3}, "risk is 3, must be one of 'cvar', 'mean', or have the method __call__"),
+        (
+            {"risk": 3},
+            "risk is 3, must be one of 'cvar', 'mean', 'worst', or have the method __call__",
+        ),
         ({"observation": None}, "or have the method episode"),
     ],
 )

@@ -13,9 +13,8 @@ from blast_env.envs.vector import ThreadedVectorEnv
 from blast_env.scenario import Scenario, load_scenario, save_scenario
 from blast_env.sites import SiteSource
 from tests.envs.small import ThinEngine, play, same, small_scenario
-from tests.gas_sites import hut
+from tests.libraries.ids import IDS, arguments
 
-IDS = sorted(name for name, spec in gym.registry.items() if "blast_env" in str(spec.entry_point))
 MODES = ("sync", "async", "vector_entry_point")
 FINISH = 40
 
@@ -26,7 +25,7 @@ def remade(env: gym.Env | gym.vector.VectorEnv) -> gym.Env:
 
 
 def test_there_are_ids() -> None:
-    assert len(IDS) == 8
+    assert len(IDS) == 14
 
 
 @pytest.mark.parametrize("name", IDS)
@@ -102,13 +101,7 @@ def test_every_mode_gives_the_same(mode: str | None, limit: dict[str, int]) -> N
 @pytest.mark.parametrize("name", IDS)
 @pytest.mark.parametrize("mode", MODES)
 def test_vectors_of_every_id_in_every_mode(name: str, mode: str | None) -> None:
-    # Sites and engines of their own would take seconds for nothing more.
-    arguments: dict[str, Any] = {"realisations": 1, "engine": "event"}
-    if name == "BlastSimulator-v0":
-        arguments = {"scenario": "free_field"}
-    elif name == "BlastBarrierGas-v0":
-        arguments = {"scenario": hut()}
-    vector = gym.make_vec(name, num_envs=2, vectorization_mode=mode, **arguments)
+    vector = gym.make_vec(name, num_envs=2, vectorization_mode=mode, **arguments(name))
     observation, _ = vector.reset(seed=0)
     assert observation in vector.observation_space
     vector.action_space.seed(0)

@@ -7,6 +7,8 @@ from typing import Any, Final
 import gymnasium as gym
 
 import blast_env  # noqa: F401  # registers the environments
+from blast_env.envs.registration import FOR_GAS, barrier_id
+from blast_env.physics.gas.engine import GasEngine
 from tests.envs.small import ThinEngine
 from tests.gas_sites import hut
 
@@ -27,4 +29,5 @@ _CHEAP: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
         "BlastBarrierGas-v0": {"scenario": hut()},
         "BlastBarrierItemSites-v0": {"engine": "event", "realisations": 1},
     }
+    | {barrier_id(name): {"engine": GasEngine(border_m=0.0, time_limit_s=0.02)} for name in FOR_GAS}
 )

@@ -200,6 +200,6 @@ def test_the_command_draws_a_layout_from_a_file(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     assert out.read_text(encoding="utf-8").count("<svg") == 1
-    result = CliRunner().invoke(app, [*arguments[:-1], str(tmp_path / "site.txt"), "--from", "up"])
+    result = CliRunner().invoke(app, [*arguments[:-1], str(tmp_path / "up.svg"), "--from", "up"])
     assert result.exit_code == 2
     assert "no corner 'up'" in result.output

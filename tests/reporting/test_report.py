@@ -84,10 +84,10 @@ def test_worth_of_a_module_is_what_comes_back_without_it(study: Study) -> None:
     assert worths.keys() == {first, second, third, last}
     assert worths[first] == pytest.approx((without - whole) / bare)
     assert [each.worth for each in study.items] == sorted(worths.values(), reverse=True)
-    # The charge is in the middle before the wall: its ends are worth alike (as far as rounding does
-    # not grow in the vortices behind it), the middle more.
+    # The charge is in the middle before the wall: both halves are worth alike, but for rounding.
     assert worths[first] == pytest.approx(worths[last], rel=0.05)
-    assert worths[second] > worths[first] > 0.0
+    assert worths[second] == pytest.approx(worths[third], rel=0.05)
+    assert min(worths.values()) > 0.0
 
 
 def test_more_mass_is_more_impulse_and_places_are_those_of_the_scenario(study: Study) -> None:
@@ -220,7 +220,7 @@ def test_command_passes_on_what_it_was_asked(
     few = ("--stills", "0", "--no-items", "--charge", "2,3,4", "--units", "psi", "--limit", "hut=9")
     done = CliRunner().invoke(app, [*files, *few])
     assert done.exit_code == 0, done.stderr
-    assert done.stdout.split() == ["wrote", out, "wrote", pdf]
+    assert done.stdout.split()[-4:] == ["wrote", out, "wrote", pdf]
     ((scenario, layout, options),) = asked
     assert (scenario, layout) == (small_hut(), LAYOUT)
     assert (options.stills, options.items, options.units.name) == (0, False, "psi")

@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.rendering.style import render_extra
+from blast_env.errors import import_extra
 from blast_env.units import MS_PER_S
 
-with render_extra():
-    import matplotlib.pyplot as plt
+if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLUMNS = 2
@@ -48,7 +48,7 @@ class Histories:
 
 def histories_figure(
     title: str, names: Sequence[str], codes: Sequence[tuple[str, Histories]]
-) -> Figure:
+) -> "Figure":
     """Draw the histories of all codes over each other, a panel for each place.
 
     Args:
@@ -56,6 +56,9 @@ def histories_figure(
         names: Of the places.
         codes: Name and histories of each code; the histories have the places as columns.
     """
+    # Here, because pictures need the extra `render`, and whoever imports the codes draws none.
+    with import_extra("render", "pictures"):
+        import matplotlib.pyplot as plt
     rows = -(-len(names) // _COLUMNS)
     figure, grid = plt.subplots(
         rows, _COLUMNS, figsize=(10.0, 2.3 * rows + 0.8), layout="constrained", squeeze=False
