@@ -23,11 +23,13 @@ def arguments(name: str) -> dict[str, Any]:
     return dict(_CHEAP.get(name, {"realisations": 1, "engine": ThinEngine()}))
 
 
+_SHORT: Final = GasEngine(border_m=0.0, time_limit_s=0.02)
+
 _CHEAP: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
     {
         "BlastSimulator-v0": {"scenario": "free_field", "engine": "event"},
         "BlastBarrierGas-v0": {"scenario": hut()},
         "BlastBarrierItemSites-v0": {"engine": "event", "realisations": 1},
+        **{barrier_id(name): {"engine": _SHORT} for name in FOR_GAS},
     }
-    | {barrier_id(name): {"engine": GasEngine(border_m=0.0, time_limit_s=0.02)} for name in FOR_GAS}
 )
