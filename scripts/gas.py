@@ -200,6 +200,29 @@ def handover(
     print_line(f"the engine's own radius is {own_m:.3g} m")
 
 
+@app.command()
+def settling(
+    scenario: str = "school_and_clinic",
+    times_s: Annotated[
+        str, typer.Option("--times", help="s, of 100 kg, separated by commas.")
+    ] = "0.02,0.04,0.06,0.09,inf",
+    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.18,
+    cell: Cell = 0.5,
+) -> None:
+    """Print how loads depend on when the products settle: never, in the last column by default.
+
+    A settled gas has a bound on its temperature, which lengthens the time step.
+    """
+    with user_errors():
+        loaded, wanted = load_scenario(scenario), _numbers(times_s)
+        engines = [GasEngine(cell_m=cell, settled_s=time_s) for time_s in wanted]
+        rows = []
+        for name, layout in _rule_layouts(loaded).items():
+            blasts = [GasBlast(loaded, layout, engine=engine) for engine in engines]
+            rows.append((name, *_against_last([impulse_until(each, until) for each in blasts])))
+    print_line(markdown_table(("layout", *(f"{1e3 * time_s:g} ms" for time_s in wanted)), rows))
+
+
 _HEIGHTS: Final = f"building {BUILDING_M:g} m, wall {BARRIER_M:g} m"
 
 

@@ -22,7 +22,7 @@ from blast_env.physics.gas.faces import Faces, exposed_faces
 from blast_env.physics.gas.grid import GasGrid, layers_to
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import FaceLoads, Gauges
-from blast_env.physics.gas.solver import GasSolver, Recorder, state_bytes
+from blast_env.physics.gas.solver import GasSolver, Recorder, Settling, state_bytes
 from blast_env.physics.gas.source import (
     GasCharge,
     clearance_m,
@@ -52,6 +52,7 @@ _SWING_S: Final = 0.11  # after sound has come all over, in which the other wave
 _WINDOW_S: Final = 0.03
 _GROWTH: Final = 0.02  # of an impulse in a window, below which it is complete then
 _TIME_LIMIT_S: Final = 0.3  # for more windows
+_HOTTEST: Final = 4.0  # that settled products are at most, in units of still air's temperature
 _SMALL_LOAD: Final = 0.05  # of the largest impulse: what counts at least
 
 Recorders = Callable[[GasGrid], Sequence[Recorder]]
@@ -70,6 +71,8 @@ class GasEngine:
         margin_m: How far the cells keep their size outside the site.
         border_m: How far the open borders are beyond that, and above the air, at least; the cells
             between grow outwards.
+        settled_s: When the products of 100 kg are no more than hot gas, see `Settling`; grows with
+            the cube root of the mass. Infinite where they never are.
         threads: Threads that share a blast; they change nothing but the time.
         time_limit_s: When a run ends at the latest; by default long after the last wave.
 
@@ -80,10 +83,11 @@ class GasEngine:
     cell_m: float = 0.5
     margin_m: float = 2.0
     border_m: float = 24.0
+    settled_s: float = 0.06
     threads: int = 1
     time_limit_s: float | None = None
     name: str = "gas"
-    version: str = f"gas 2 (numba {version('numba')})"
+    version: str = f"gas 3 (numba {version('numba')})"
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -96,6 +100,8 @@ class GasEngine:
         for name, length_m in (("margin_m", self.margin_m), ("border_m", self.border_m)):
             if not 0.0 <= length_m <= _FARTHEST_M:
                 raise BlastEnvError(f"{name} is {length_m:g}, must be 0 to {_FARTHEST_M:g}")
+        if not self.settled_s > 0.0:
+            raise BlastEnvError(f"settled_s is {self.settled_s:g}, must be above 0")
         if self.time_limit_s is not None and not self.time_limit_s > 0.0:
             raise BlastEnvError(f"time_limit_s is {self.time_limit_s:g}, must be above 0")
 
@@ -164,6 +170,7 @@ class GasRun:
         self.table = _face_table(self.grid, owner)
         self.loads = FaceLoads(len(self.table.faces))
         self.gauges = _gauges(self.grid, site)
+        scale = cbrt(self.charge.mass_kg / 100.0)
         own = [self.loads] if self.gauges is None else [self.loads, self.gauges]
         self.solver = GasSolver(
             self.grid,
@@ -171,13 +178,13 @@ class GasRun:
             recorders=(*own, *recorders(self.grid)),
             with_fuel=True,
             burning=self.charge.burning,
+            settling=Settling(engine.settled_s * scale, _HOTTEST),
             threads=engine.threads,
         )
         set_charge(self.solver, self.charge, self.handover_radius_m)
         if self.gauges is not None:
             _add_opening(self.gauges, self.grid, self.charge, self.handover_radius_m)
         self.end_reason: EndReason | None = None
-        scale = cbrt(self.charge.mass_kg / 100.0)
         self._window_s = _WINDOW_S * scale
         watched = _watched(site)
         self._groups = [_faces_of(self.table, site, index) for index in watched]

@@ -19,7 +19,7 @@ from blast_env.physics.gas.kernels import AIR, MARGIN, MIRROR, OPEN
 
 FACE_NAMES: Final = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
 
-SKIRT_GROWTH: Final = 1.5
+SKIRT_GROWTH: Final = 2.0
 """Thickness of a layer of the skirt over that of the one before."""
 
 

@@ -1,8 +1,9 @@
 """The compiled step of the gas: MUSCL-Hancock with HLLC on rows of cells.
 
-A step is two passes over the state. `advance_planes` moves the gas along x and y together, with all
+There are two passes over the state. `advance_planes` moves the gas along x and y together, with all
 fluxes from one time level, so that a quarter turn of the scene turns the result. `advance_columns`
-moves it along z. Their order alternates from step to step, which keeps second order in time.
+moves it along z. A step is half of itself in planes, the whole in columns, and the other half in
+planes, which keeps second order in time (Strang).
 
 All arithmetic is done on rows of cells along x, which the compiler turns into vector instructions.
 That takes three habits. Rows live in one flat workspace at constant distances (`PITCH`), so that
@@ -171,7 +172,7 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
         p = gamma_1 * (get(state, energy + i) - half * (mx * u + my * v + mz * w))
         sound = root(gamma * p * per_r)
         level = half * (abs(u) + abs(v)) + sound
-        upright = half * abs(w) + sound
+        upright = abs(w) + sound
         put(work, _HIGH + i, r)
         put(work, _HIGH + _U + i, u)
         put(work, _HIGH + _V + i, v)
@@ -770,8 +771,29 @@ def burn(state: Reals, box: NDArray[np.int64], share: Any, heat: Any) -> None:
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
+def cool(state: Reals, box: NDArray[np.int64], hottest: Any) -> None:
+    """Add mass to gas that is hotter than so many times still air, until it is not.
+
+    Energy and momentum stay.
+    """
+    real = state.dtype.type
+    half, one, zero, gamma_1 = real(0.5), real(1.0), real(0.0), real(GAMMA - 1.0)
+    for z in range(box[0], box[1]):
+        for y in range(box[2], box[3]):
+            for x in range(box[4], box[5]):
+                density = state[DENSITY, z, y, x]
+                if density >= one:
+                    continue
+                motion = zero
+                for k in range(X_MOMENTUM, ENERGY):
+                    motion += state[k, z, y, x] * state[k, z, y, x]
+                pressure = gamma_1 * (state[ENERGY, z, y, x] - half * motion / density)
+                state[DENSITY, z, y, x] = max(density, pressure / hottest)
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
 def fastest_signal(state: Reals) -> float:
-    """Return what the time step follows from: sound, and motion by half, in x and y together."""
+    """Return what the time step follows from: sound, and motion, of x and y the mean."""
     fastest = 0.0
     for z in range(state.shape[1]):
         for y in range(state.shape[2]):
@@ -782,7 +804,7 @@ def fastest_signal(state: Reals) -> float:
                 w = state[Z_MOMENTUM, z, y, x] / density
                 inner = state[ENERGY, z, y, x] / density - 0.5 * (u * u + v * v + w * w)
                 sound = sqrt(GAMMA * (GAMMA - 1.0) * inner)
-                fastest = max(fastest, 0.5 * (abs(u) + abs(v)) + sound, 0.5 * abs(w) + sound)
+                fastest = max(fastest, 0.5 * (abs(u) + abs(v)) + sound, abs(w) + sound)
     return fastest
 
 

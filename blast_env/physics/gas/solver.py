@@ -19,11 +19,14 @@ AIR_PRESSURE_PA: Final = 101_325.0
 AIR_DENSITY_KG_M3: Final = 1.225
 
 COURANT: Final = 0.45
-"""Of a step, in x and y together at most twice this; the scheme is stable to 0.5."""
+"""Of half a step in x and y, of a quarter in z; the scheme is stable to 0.5."""
 
 _FIRST_STEPS: Final = 10
 _FIRST_SHARE: Final = 0.2
 """Share of the full step at the first one; grows evenly over the first steps."""
+
+_COOL_EVERY: Final = 4
+"""Steps from one look for gas that is too hot to the next."""
 
 _CELLS_PER_CALL: Final = 1_000_000
 """That compiled code moves on before Python hears of signals: a tenth of a second."""
@@ -71,6 +74,22 @@ class Burning(NamedTuple):
     heat_j_kg: float
 
 
+class Settling(NamedTuple):
+    """From when the products of a charge are nothing but hot gas.
+
+    Euler's equations keep them as hot as they were, up to 20 times still air, while real ones mix
+    with air and cool. That does nothing to their pressure, hence little to any load, but the time
+    step follows from the sound in them.
+
+    Attributes:
+        time_s: When the rest of the passive scalar burns at once, and hot gas begins to get mass.
+        hottest: Temperature that it has at most from then on, in units of still air's.
+    """
+
+    time_s: float
+    hottest: float
+
+
 class Recorder(Protocol):
     """Something that looks at the gas after every step."""
 
@@ -89,8 +108,8 @@ class GasSolver:
         faces: Faces on which the pressure is known after every step, see `wall_pressure`.
         time_s: Simulated time so far.
         steps: Steps so far.
-        cell_updates: Cells moved on by a step so far, all directions counted as one; cells of air
-            that was left out as still do not count.
+        cell_updates: Cells moved on so far, twice by each step: along x and y in its halves, along
+            z for both at once. Cells of air that was left out as still do not count.
         state: The state in the solver's units (5 or 6, z, y, x), margin included.
         wall_pressure: Mean pressures on `faces` during the last step, in the solver's units (n,).
             These are the fluxes of momentum, so that an impulse from them is exactly the momentum
@@ -107,6 +126,7 @@ class GasSolver:
         precision: Literal["single", "double"] = "single",
         with_fuel: bool = False,
         burning: Burning | None = None,
+        settling: Settling | None = None,
         threads: int = 1,
         courant: float = COURANT,
         skip_still_air: bool = True,
@@ -128,6 +148,8 @@ class GasSolver:
             raise BlastEnvError(
                 f"burning is {burning}, but needs with_fuel=True and a time above 0 s"
             )
+        if settling is not None and not settling.hottest > 1.0:
+            raise BlastEnvError(f"hottest is {settling.hottest}, but must be above 1, still air's")
         self.grid = grid
         self.faces = faces
         self.recorders = tuple(recorders)
@@ -139,6 +161,7 @@ class GasSolver:
         self.velocity_m_s = sqrt(pressure_pa / density_kg_m3)
         self._courant = courant
         self._burning = burning
+        self._settling = settling
         self._skip = skip_still_air
         self._threads = threads
         dtype = _DTYPES[precision]
@@ -151,6 +174,7 @@ class GasSolver:
         self.state[:] = self._still[:, None, None, None]
         self.wall_pressure: Reals = np.ones(len(faces), dtype=dtype)
         self._walls, self._first_wall = faces.kernel_table(grid)
+        self._upright = faces.axis < 2
         self._work = [np.zeros(kernels.WORK_SIZE, dtype=dtype) for _ in range(threads)]
         self._narrow = [
             np.pad(grid.narrowness(axis), (0, kernels.LANES), mode="edge").astype(dtype)
@@ -221,20 +245,25 @@ class GasSolver:
         if self._signal == 0.0:
             self._signal = float(kernels.fastest_signal(self.state))
         share = min(1.0, _FIRST_SHARE + (1.0 - _FIRST_SHARE) * self.steps / _FIRST_STEPS)
-        reduced = share * self._courant * self.grid.cell_m / self._signal
+        reduced = 2.0 * share * self._courant * self.grid.cell_m / self._signal
         step_s = min(reduced / self.velocity_m_s, most_s)
         ratio = self.state.dtype.type(step_s * self.velocity_m_s / self.grid.cell_m)
+        half = self.state.dtype.type(0.5) * ratio
         self._notes[:] = 0.0
-        passes: tuple[Callable[[Any], None], ...] = (self._move_planes, self._move_columns)
-        for move in passes if self.steps % 2 == 0 else passes[::-1]:
-            move(ratio)
+        self._move_planes(half)
+        before = self.wall_pressure.copy()
+        self._move_columns(ratio)
+        self._move_planes(half)
+        walls = self._upright
+        self.wall_pressure[walls] = 0.5 * (before[walls] + self.wall_pressure[walls])
         if self._burning is not None:
             self._burn(self._burning, step_s)
         self._signal = max(float(self._notes[:, 0].max()), sqrt(GAMMA))
         self._lifted += int(self._notes[:, 1].sum())
-        self.cell_updates += self._cells_in_box()
         self.steps += 1
         self.time_s = self.time_s + step_s
+        if self._settling is not None and self.time_s >= self._settling.time_s:
+            self._settle(self._settling)
         for recorder in self.recorders:
             recorder.record(self, step_s)
 
@@ -254,7 +283,9 @@ class GasSolver:
         return self.pressure_pa * (GAMMA - 1.0) * inner
 
     def fuel(self) -> NDArray[np.float64]:
-        """Return the density of the passive scalar, kg/m^3 (nx, ny, nz)."""
+        """Return the density of the passive scalar, kg/m^3 (nx, ny, nz); 0 once it has settled."""
+        if len(self.state) <= kernels.FUEL:
+            return np.zeros(self.grid.shape)
         return self.density_kg_m3 * self._get(kernels.FUEL)
 
     def wall_overpressure_pa(self) -> NDArray[np.float64]:
@@ -310,6 +341,7 @@ class GasSolver:
             )
 
         self._share_out(move, int(self.box[0]), int(self.box[1]))
+        self.cell_updates += self._cells_in_box()
 
     def _move_columns(self, ratio: Any) -> None:
         self._widen((0, 1))
@@ -337,6 +369,17 @@ class GasSolver:
         share = real(-expm1(-step_s / burning.time_s))
         heat = real(burning.heat_j_kg / self.velocity_m_s**2)
         kernels.burn(self.state, self.box, share, heat)
+
+    def _settle(self, settling: Settling) -> None:
+        real = self.state.dtype.type
+        if self._burning is not None:
+            heat = real(self._burning.heat_j_kg / self.velocity_m_s**2)
+            kernels.burn(self.state, self.box, real(1.0), heat)
+            self._burning = None
+            # Without a scalar the gas is a sixth less to move.
+            self.state, self._still = self.state[: kernels.FUEL], self._still[: kernels.FUEL]
+        if self.steps % _COOL_EVERY == 0:
+            kernels.cool(self.state, self.box, real(settling.hottest))
 
     def _share_out(self, move: Callable[[int, int, int], None], first: int, end: int) -> None:
         """Give each thread its part of the layers from first to end, then leave still air out."""

@@ -8,7 +8,7 @@ import pytest
 from blast_env.physics.gas.faces import Faces, exposed_faces, ground_faces
 from blast_env.physics.gas.grid import FaceKind, GasGrid
 from blast_env.physics.gas.probes import FaceLoads
-from blast_env.physics.gas.solver import Burning
+from blast_env.physics.gas.solver import Burning, Settling
 from tests.physics.gas.flows import CLOSED, blast, street
 
 
@@ -159,3 +159,25 @@ def test_fuel_changes_nothing_else() -> None:
     plain.advance(0.01)
     fuelled.advance(0.01)
     assert (fuelled.state[:5] == plain.state).all()
+
+
+def test_settled_products_keep_their_energy_and_have_burnt() -> None:
+    """What settles is burnt, and not hotter than told; momentum and energy stay."""
+    burning, settling = Burning(time_s=0.01, heat_j_kg=1e6), Settling(time_s=0.01, hottest=4.0)
+    options: dict[str, Any] = {"faces": CLOSED, "precision": "double", "with_fuel": True}
+    hot = blast(street(), (6, 9, 0), burning=burning, **options)
+    settled = blast(street(), (6, 9, 0), burning=burning, settling=settling, **options)
+    before = settled.totals()
+    settled.advance(0.03)
+    hot.advance(0.03)
+    after = settled.totals()
+    temperature = settled.pressure() / settled.density()
+    still = settled.pressure_pa / settled.density_kg_m3
+    assert (hot.pressure() / hot.density()).max() > 8.0 * still
+    assert temperature[~settled.grid.solid].max() <= 6.0 * still  # waves between two looks
+    assert after.fuel_kg == 0.0
+    assert (settled.fuel() == 0.0).all()
+    heat = 1e6 * before.fuel_kg
+    assert after.energy_j - before.energy_j == pytest.approx(heat, rel=1e-10)
+    assert after.mass_kg > before.mass_kg
+    assert settled.steps < 0.9 * hot.steps

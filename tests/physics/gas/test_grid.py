@@ -9,7 +9,7 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import LoadTable, Snapshots
-from blast_env.physics.gas.solver import Burning, GasSolver, state_bytes
+from blast_env.physics.gas.solver import Burning, GasSolver, Settling, state_bytes
 
 WRONG: Any = "wall"
 AIR = np.zeros((4, 3, 2), dtype=bool)
@@ -32,6 +32,7 @@ GRID = GasGrid(0.5, AIR, origin_m=(1.0, 2.0, 0.0))
         (lambda: GasSolver(GRID, courant=0.6), "courant is 0.6, but must be above 0"),
         (lambda: GasSolver(GRID, pressure_pa=0.0), "0.0 Pa"),
         (lambda: GasSolver(GRID, burning=Burning(1.0, 1.0)), "needs with_fuel=True"),
+        (lambda: GasSolver(GRID, settling=Settling(0.1, 1.0)), "hottest is 1.0, but must be above"),
         (
             lambda: GasSolver(GRID).set_state(density_kg_m3=1.0, pressure_pa=-1.0),
             "pressure_pa falls to -1.0",
