@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
-from blast_env.physics.gas.kernels import AIR, MARGIN, MIRROR, OPEN
+from blast_env.physics.gas.state import AIR, MARGIN, MIRROR, OPEN
 
 FACE_NAMES: Final = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
 

@@ -11,10 +11,10 @@ the compiler knows that they do not overlap. Loops count from 0, so that no inde
 Where cells differ (solid or air, which side of the wave) values are selected, not branched to.
 
 A cell beside a solid one sees its own mirror image there, beside an open face its own copy.
-Everything here works in the precision of the state.
+Everything here works in the precision of the state. It is one file because Numba keeps what it has
+compiled until the file of the function that Python calls has changed, whatever others it calls.
 """
 
-from math import sqrt
 from typing import Any, Final
 
 import numpy as np
@@ -22,23 +22,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from blast_env.physics.gas.lanes import get, larger, put, root, select, smaller
-
-Reals = NDArray[Any]
-
-GAMMA: Final = 1.4
-"""Ratio of the heats, of air and of the products alike."""
-
-MARGIN: Final = 2
-"""Layers of cells around the grid that belong to the arrays, but not to the gas."""
-
-DENSITY, X_MOMENTUM, Y_MOMENTUM, Z_MOMENTUM, ENERGY, FUEL = 0, 1, 2, 3, 4, 5
-"""Components of the state, each per volume."""
-
-_FUSED: Final = {"contract"}
-"""Products and sums in one instruction: a quarter faster, and nothing is reordered."""
-
-AIR, MIRROR, OPEN = 0, -1, 1
-"""Codes of cells: gas, solid (normal velocity changes its sign), beyond an open face."""
+from blast_env.physics.gas.state import (
+    DENSITY,
+    ENERGY,
+    FUEL,
+    FUSED,
+    GAMMA,
+    MARGIN,
+    X_MOMENTUM,
+    Y_MOMENTUM,
+    Z_MOMENTUM,
+    Reals,
+)
 
 LANES: Final = 8
 """Rows are worked on in so many cells at once; what is done beyond their end is not used."""
@@ -102,7 +97,7 @@ WORK_SIZE: Final = _WORST + PITCH
 """Length of a workspace."""
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _slope(back: Any, ahead: Any, limit: Any, half: Any, zero: Any) -> Any:
     """Return the limited difference across a cell."""
     centre = half * (back + ahead)
@@ -113,20 +108,20 @@ def _slope(back: Any, ahead: Any, limit: Any, half: Any, zero: Any) -> Any:
     return larger(least, zero) + smaller(most, zero)
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _whole(n: int) -> int:
     """Return a number of cells rounded up: single cells at the end would cost as much as eight."""
     return (n + LANES - 1) & -LANES
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _copy_rows(work: Reals, count: int, source: int, target: int, n: int) -> None:
     for k in range(count):
         for i in range(_whole(n)):
             put(work, target + k * PITCH + i, get(work, source + k * PITCH + i))
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _load_row(
     state: Reals, code: NDArray[np.int8], work: Reals, z: int, y: int, x: int, n: int
 ) -> int:
@@ -146,13 +141,13 @@ def _load_row(
     return bad
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _place(state: Reals, k: int, z: int, y: int, x: int) -> int:
     """Return where a cell lies in memory, in numbers."""
     return ((k * state.shape[1] + z) * state.shape[2] + y) * state.shape[3] + x
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> int:
     real = work.dtype.type
     half, one = real(0.5), real(1.0)
@@ -190,7 +185,7 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
     return bad
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _lift_row(state: Reals, z: int, y: int, x: int, n: int) -> None:
     """Give the cells of a row at least the floor's density and pressure; motion stays."""
     real = state.dtype.type
@@ -211,7 +206,7 @@ def _lift_row(state: Reals, z: int, y: int, x: int, n: int) -> None:
             state[ENERGY, z, y, i] = least
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _predict_plane_row(work: Reals, n: int, ratio: Any, along: Reals, x: int, across: Any) -> None:
     """Set the states at the four upright faces of n cells from x on, half a step on."""
     real = work.dtype.type
@@ -309,7 +304,7 @@ def _predict_plane_row(work: Reals, n: int, ratio: Any, along: Reals, x: int, ac
         put(work, _ABOVE + _P + 1 + i, p + py)
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _predict_column_row(work: Reals, n: int, ratio: Any) -> None:
     """Set the states at the lower and the upper faces of n cells, half a step on."""
     real = work.dtype.type
@@ -364,7 +359,7 @@ def _predict_column_row(work: Reals, n: int, ratio: Any) -> None:
         put(work, _ABOVE + _P + i, p + pz)
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _hllc_row(
     work: Reals,
     n: int,
@@ -451,7 +446,7 @@ def _hllc_row(
         put(work, out + _P + i, speed * (select(outside, energy, e_star) + p_face))
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _predict_plane_fuel(work: Reals, n: int, ratio: Any, along: Reals, x: int, across: Any) -> None:
     """Set the share of fuel at the four upright faces of n cells from x on, half a step on."""
     real = work.dtype.type
@@ -475,7 +470,7 @@ def _predict_plane_fuel(work: Reals, n: int, ratio: Any, along: Reals, x: int, a
         put(work, _ABOVE + _Y + 1 + i, y + yy)
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _predict_column_fuel(work: Reals, n: int, ratio: Any) -> None:
     """Set the share of fuel at the lower and the upper faces of n cells, half a step on."""
     real = work.dtype.type
@@ -492,7 +487,7 @@ def _predict_column_fuel(work: Reals, n: int, ratio: Any) -> None:
         put(work, _ABOVE + _Y + i, y + yz)
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _fuel_row(work: Reals, n: int, left: int, right: int, out: int) -> None:
     """Set the fluxes of fuel from those of mass; what comes in through open faces has none."""
     zero = work.dtype.type(0.0)
@@ -502,7 +497,7 @@ def _fuel_row(work: Reals, n: int, left: int, right: int, out: int) -> None:
         put(work, out + _Y + i, mass * share)
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _shift_rows(work: Reals, count: int, n: int) -> None:
     """Go on to the next row: what was high is now in the middle, what was there is low."""
     _copy_rows(work, count, _MID, _LOW, n)
@@ -512,7 +507,7 @@ def _shift_rows(work: Reals, count: int, n: int) -> None:
     _copy_rows(work, 2, _CODE_MID, _CODE_LOW, n)
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _record_walls(
     work: Reals,
     pressure: Reals,
@@ -530,13 +525,13 @@ def _record_walls(
             pressure[walls[k, 1]] = get(work, flux + i)
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _forget_signals(work: Reals) -> None:
     for i in range(PITCH):
         put(work, _SIGNAL + i, work.dtype.type(0.0))
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _fastest(work: Reals, n: int) -> float:
     """Return the fastest signal of the first n cells of the rows loaded since."""
     fastest = 0.0
@@ -545,7 +540,7 @@ def _fastest(work: Reals, n: int) -> float:
     return fastest
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def advance_planes(
     state: Reals,
     code: NDArray[np.int8],
@@ -652,7 +647,7 @@ def advance_planes(
     notes[1] += lifted
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=_FUSED)
+@njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _join_tiles(work: Reals, edges: Reals, y: int, tile: int, width: int) -> None:
     """Give the row the cells of the tile before as they were, and keep those for the next one."""
     for k in range(_VARIABLES):
@@ -663,7 +658,7 @@ def _join_tiles(work: Reals, edges: Reals, y: int, tile: int, width: int) -> Non
             edges[y, k * MARGIN + i] = get(work, at + width)
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _update_plane_row(
     state: Reals,
     work: Reals,
@@ -689,7 +684,7 @@ def _update_plane_row(
             put(state, row + i, select(get(work, _CODE_LOW + 2 + i) == zero, new, old))
 
 
-@njit(error_model="numpy", fastmath=_FUSED)
+@njit(error_model="numpy", fastmath=FUSED)
 def _update_column_row(
     state: Reals, work: Reals, z: int, y: int, x: int, n: int, ratio: Any
 ) -> None:
@@ -706,7 +701,7 @@ def _update_column_row(
             put(state, row + i, select(get(work, _CODE_LOW + i) == zero, new, old))
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def advance_columns(
     state: Reals,
     code: NDArray[np.int8],
@@ -757,99 +752,3 @@ def advance_columns(
                     _update_column_row(state, work, z - 2, y, x, n, ratio * upright[z - 2])
             notes[0] = max(notes[0], _fastest(work, n))
     notes[1] += lifted
-
-
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
-def burn(state: Reals, box: NDArray[np.int64], share: Any, heat: Any) -> None:
-    """Turn a share of the fuel in every cell of a box into energy, so much per mass."""
-    for z in range(box[0], box[1]):
-        for y in range(box[2], box[3]):
-            for x in range(box[4], box[5]):
-                burnt = share * state[FUEL, z, y, x]
-                state[FUEL, z, y, x] -= burnt
-                state[ENERGY, z, y, x] += heat * burnt
-
-
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
-def cool(state: Reals, box: NDArray[np.int64], hottest: Any) -> None:
-    """Add mass to gas that is hotter than so many times still air, until it is not.
-
-    Energy and momentum stay.
-    """
-    real = state.dtype.type
-    half, one, zero, gamma_1 = real(0.5), real(1.0), real(0.0), real(GAMMA - 1.0)
-    for z in range(box[0], box[1]):
-        for y in range(box[2], box[3]):
-            for x in range(box[4], box[5]):
-                density = state[DENSITY, z, y, x]
-                if density >= one:
-                    continue
-                motion = zero
-                for k in range(X_MOMENTUM, ENERGY):
-                    motion += state[k, z, y, x] * state[k, z, y, x]
-                pressure = gamma_1 * (state[ENERGY, z, y, x] - half * motion / density)
-                state[DENSITY, z, y, x] = max(density, pressure / hottest)
-
-
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
-def fastest_signal(state: Reals) -> float:
-    """Return what the time step follows from: sound, and motion, of x and y the mean."""
-    fastest = 0.0
-    for z in range(state.shape[1]):
-        for y in range(state.shape[2]):
-            for x in range(state.shape[3]):
-                density = state[DENSITY, z, y, x]
-                u = state[X_MOMENTUM, z, y, x] / density
-                v = state[Y_MOMENTUM, z, y, x] / density
-                w = state[Z_MOMENTUM, z, y, x] / density
-                inner = state[ENERGY, z, y, x] / density - 0.5 * (u * u + v * v + w * w)
-                sound = sqrt(GAMMA * (GAMMA - 1.0) * inner)
-                fastest = max(fastest, 0.5 * (abs(u) + abs(v)) + sound, abs(w) + sound)
-    return fastest
-
-
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
-def largest_excess(state: Reals, box: NDArray[np.int64]) -> float:
-    """Return the largest distance of the pressure from that of still air in a box."""
-    largest = 0.0
-    for z in range(box[0], box[1]):
-        for y in range(box[2], box[3]):
-            for x in range(box[4], box[5]):
-                motion = 0.0
-                for k in range(X_MOMENTUM, ENERGY):
-                    motion += state[k, z, y, x] ** 2
-                inner = state[ENERGY, z, y, x] - 0.5 * motion / state[DENSITY, z, y, x]
-                largest = max(largest, abs((GAMMA - 1.0) * inner - 1.0))
-    return largest
-
-
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FUSED)
-def tighten(state: Reals, still: Reals, box: NDArray[np.int64], most: int) -> None:
-    """Take layers of still air off the six sides of a box, at most so many from each."""
-    for side in range(6):
-        for _ in range(most):
-            axis = side // 2
-            if box[2 * axis] >= box[2 * axis + 1]:
-                break
-            layer = box[side] if side % 2 == 0 else box[side] - 1
-            if not _is_still(state, still, box, axis, layer):
-                break
-            box[side] += 1 if side % 2 == 0 else -1
-
-
-@njit(error_model="numpy", fastmath=_FUSED)
-def _is_still(state: Reals, still: Reals, box: NDArray[np.int64], axis: int, layer: int) -> bool:
-    z0, z1, y0, y1, x0, x1 = box
-    if axis == 0:
-        z0, z1 = layer, layer + 1
-    elif axis == 1:
-        y0, y1 = layer, layer + 1
-    else:
-        x0, x1 = layer, layer + 1
-    for k in range(len(still)):
-        for z in range(z0, z1):
-            for y in range(y0, y1):
-                for x in range(x0, x1):
-                    if state[k, z, y, x] != still[k]:
-                        return False
-    return True

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.kernels import Reals
 from blast_env.physics.gas.solver import GasSolver
+from blast_env.physics.gas.state import Reals
 
 ARRIVAL_PA: Final = 1000.0
 """Overpressure at which a wave has arrived, unless said otherwise."""

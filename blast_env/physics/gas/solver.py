@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blast_env.errors import BlastEnvError
-from blast_env.physics.gas import kernels
+from blast_env.physics.gas import kernels, state
 from blast_env.physics.gas.faces import NO_FACES, Faces
 from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.kernels import ENERGY, GAMMA, MARGIN, Reals
+from blast_env.physics.gas.state import ENERGY, GAMMA, MARGIN, Reals
 
 AIR_PRESSURE_PA: Final = 101_325.0
 AIR_DENSITY_KG_M3: Final = 1.225
@@ -168,7 +168,7 @@ class GasSolver:
         self._code = grid.codes()
         components = 6 if with_fuel else 5
         self._still = np.zeros(components, dtype=dtype)
-        self._still[kernels.DENSITY] = 1.0
+        self._still[state.DENSITY] = 1.0
         self._still[ENERGY] = 1.0 / (GAMMA - 1.0)
         self.state: Reals = np.empty((components, *self._code.shape), dtype=dtype)
         self.state[:] = self._still[:, None, None, None]
@@ -215,18 +215,18 @@ class GasSolver:
         density = density / self.density_kg_m3
         pressure = pressure / self.pressure_pa
         energy = pressure / (GAMMA - 1.0)
-        self._put(kernels.DENSITY, density)
+        self._put(state.DENSITY, density)
         for k, component in enumerate(velocity_m_s):
             velocity = np.asarray(component, dtype=np.float64) / self.velocity_m_s
-            self._put(kernels.X_MOMENTUM + k, density * velocity)
+            self._put(state.X_MOMENTUM + k, density * velocity)
             energy = energy + 0.5 * density * velocity * velocity
         self._put(ENERGY, energy)
-        if len(self.state) > kernels.FUEL:
-            self._put(kernels.FUEL, np.asarray(fuel_kg_m3) / self.density_kg_m3)
+        if len(self.state) > state.FUEL:
+            self._put(state.FUEL, np.asarray(fuel_kg_m3) / self.density_kg_m3)
         self._signal = 0.0
         if self._skip:
             self.box = self._whole.copy()
-            kernels.tighten(self.state, self._still, self.box, max(self._code.shape))
+            state.tighten(self.state, self._still, self.box, max(self._code.shape))
 
     def advance(self, until_s: float, *, land: bool = False) -> None:
         """Go on until the simulated time is at least `until_s`.
@@ -243,7 +243,7 @@ class GasSolver:
     def step(self, most_s: float = np.inf) -> None:
         """Make one time step, of at most `most_s`."""
         if self._signal == 0.0:
-            self._signal = float(kernels.fastest_signal(self.state))
+            self._signal = float(state.fastest_signal(self.state))
         share = min(1.0, _FIRST_SHARE + (1.0 - _FIRST_SHARE) * self.steps / _FIRST_STEPS)
         reduced = 2.0 * share * self._courant * self.grid.cell_m / self._signal
         step_s = min(reduced / self.velocity_m_s, most_s)
@@ -269,24 +269,24 @@ class GasSolver:
 
     def density(self) -> NDArray[np.float64]:
         """Return the density, kg/m^3 (nx, ny, nz)."""
-        return self.density_kg_m3 * self._get(kernels.DENSITY)
+        return self.density_kg_m3 * self._get(state.DENSITY)
 
     def velocity(self) -> NDArray[np.float64]:
         """Return the velocity, m/s (3, nx, ny, nz)."""
-        momentum = np.stack([self._get(kernels.X_MOMENTUM + k) for k in range(3)])
-        return self.velocity_m_s * momentum / self._get(kernels.DENSITY)
+        momentum = np.stack([self._get(state.X_MOMENTUM + k) for k in range(3)])
+        return self.velocity_m_s * momentum / self._get(state.DENSITY)
 
     def pressure(self) -> NDArray[np.float64]:
         """Return the pressure, Pa (nx, ny, nz)."""
-        motion = sum(self._get(kernels.X_MOMENTUM + k) ** 2 for k in range(3))
-        inner = self._get(ENERGY) - 0.5 * motion / self._get(kernels.DENSITY)
+        motion = sum(self._get(state.X_MOMENTUM + k) ** 2 for k in range(3))
+        inner = self._get(ENERGY) - 0.5 * motion / self._get(state.DENSITY)
         return self.pressure_pa * (GAMMA - 1.0) * inner
 
     def fuel(self) -> NDArray[np.float64]:
         """Return the density of the passive scalar, kg/m^3 (nx, ny, nz); 0 once it has settled."""
-        if len(self.state) <= kernels.FUEL:
+        if len(self.state) <= state.FUEL:
             return np.zeros(self.grid.shape)
-        return self.density_kg_m3 * self._get(kernels.FUEL)
+        return self.density_kg_m3 * self._get(state.FUEL)
 
     def wall_overpressure_pa(self) -> NDArray[np.float64]:
         """Return the mean overpressures on `faces` during the last step (n,)."""
@@ -304,7 +304,7 @@ class GasSolver:
 
     def largest_overpressure_pa(self) -> float:
         """Return the largest distance from the pressure of still air, anywhere in the gas."""
-        return self.pressure_pa * float(kernels.largest_excess(self.state, self.box))
+        return self.pressure_pa * float(state.largest_excess(self.state, self.box))
 
     def totals(self) -> Totals:
         """Return mass, momentum and energy of the gas in the grid, without the skirt."""
@@ -313,10 +313,10 @@ class GasSolver:
         sums = [float(self._get(k)[air].sum()) * volume for k in range(len(self.state))]
         along = self.density_kg_m3 * self.velocity_m_s
         return Totals(
-            mass_kg=self.density_kg_m3 * sums[kernels.DENSITY],
+            mass_kg=self.density_kg_m3 * sums[state.DENSITY],
             momentum_kg_m_s=(along * sums[1], along * sums[2], along * sums[3]),
             energy_j=self.pressure_pa * sums[ENERGY],
-            fuel_kg=self.density_kg_m3 * sums[kernels.FUEL] if len(sums) > kernels.FUEL else 0.0,
+            fuel_kg=self.density_kg_m3 * sums[state.FUEL] if len(sums) > state.FUEL else 0.0,
         )
 
     def _move_planes(self, ratio: Any) -> None:
@@ -368,18 +368,18 @@ class GasSolver:
         real = self.state.dtype.type
         share = real(-expm1(-step_s / burning.time_s))
         heat = real(burning.heat_j_kg / self.velocity_m_s**2)
-        kernels.burn(self.state, self.box, share, heat)
+        state.burn(self.state, self.box, share, heat)
 
     def _settle(self, settling: Settling) -> None:
         real = self.state.dtype.type
         if self._burning is not None:
             heat = real(self._burning.heat_j_kg / self.velocity_m_s**2)
-            kernels.burn(self.state, self.box, real(1.0), heat)
+            state.burn(self.state, self.box, real(1.0), heat)
             self._burning = None
             # Without a scalar the gas is a sixth less to move.
-            self.state, self._still = self.state[: kernels.FUEL], self._still[: kernels.FUEL]
+            self.state, self._still = self.state[: state.FUEL], self._still[: state.FUEL]
         if self.steps % _COOL_EVERY == 0:
-            kernels.cool(self.state, self.box, real(settling.hottest))
+            state.cool(self.state, self.box, real(settling.hottest))
 
     def _share_out(self, move: Callable[[int, int, int], None], first: int, end: int) -> None:
         """Give each thread its part of the layers from first to end, then leave still air out."""
@@ -401,7 +401,7 @@ class GasSolver:
         finally:  # of Ctrl-C too: the others need not go on
             broken_off.set()
         if self._skip:
-            kernels.tighten(self.state, self._still, self.box, 2)
+            state.tighten(self.state, self._still, self.box, 2)
 
     def _cells_in_box(self) -> int:
         z0, z1, y0, y1, x0, x1 = self.box.tolist()
@@ -425,7 +425,7 @@ class GasSolver:
         """Return the pressure above that of still air, exactly 0 in still air, from the state."""
         real = self.state.dtype.type
         motion = values[1] * values[1] + values[2] * values[2] + values[3] * values[3]
-        inner = values[ENERGY] - real(0.5) * motion / values[kernels.DENSITY]
+        inner = values[ENERGY] - real(0.5) * motion / values[state.DENSITY]
         return (real(GAMMA - 1.0) * inner - real(1.0)).astype(np.float64)
 
     def _put(self, component: int, values: NDArray[np.float64]) -> None:

@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.kernels import GAMMA
 from blast_env.physics.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA, Burning, GasSolver
 from blast_env.physics.gas.spherical import PRODUCTS, Floats, SphericalBlast
+from blast_env.physics.gas.state import GAMMA
 
 LEAST_RADIUS_CELLS: Final = 2
 """Cells that the front must have run before it is laid onto a grid."""

@@ -13,8 +13,8 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from blast_env.errors import BlastEnvError
-from blast_env.physics.gas.kernels import GAMMA
 from blast_env.physics.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA
+from blast_env.physics.gas.state import GAMMA
 
 Floats = NDArray[np.float64]
 

@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.kernels import GAMMA
 from blast_env.physics.gas.probes import Gauges
 from blast_env.physics.gas.solver import AIR_PRESSURE_PA, GasSolver
 from blast_env.physics.gas.source import Explosive, GasCharge, set_charge
+from blast_env.physics.gas.state import GAMMA
 from blast_env.studies.gas.histories import Histories
 
 PROGRAMS: Final = ("blockMesh", "topoSet", "subsetMesh", "rhoCentralFoam")

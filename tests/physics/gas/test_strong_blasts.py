@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blast_env.physics.gas.kernels import ENERGY
+from blast_env.physics.gas.state import ENERGY
 from tests.physics.gas.flows import CLOSED, blast
 
 

@@ -1,0 +1,124 @@
+"""The state of the gas as compiled code has it, and what is done to it cell by cell.
+
+The state is an array (5 or 6, z, y, x) in units of still air, with a margin of cells around it.
+"""
+
+from math import sqrt
+from typing import Any, Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Reals = NDArray[Any]
+
+GAMMA: Final = 1.4
+"""Ratio of the heats, of air and of the products alike."""
+
+MARGIN: Final = 2
+"""Layers of cells around the grid that belong to the arrays, but not to the gas."""
+
+DENSITY, X_MOMENTUM, Y_MOMENTUM, Z_MOMENTUM, ENERGY, FUEL = 0, 1, 2, 3, 4, 5
+"""Components of the state, each per volume."""
+
+AIR, MIRROR, OPEN = 0, -1, 1
+"""Codes of cells: gas, solid (normal velocity changes its sign), beyond an open face."""
+
+FUSED: Final = {"contract"}
+"""Products and sums in one instruction: a quarter faster, and nothing is reordered."""
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+def burn(state: Reals, box: NDArray[np.int64], share: Any, heat: Any) -> None:
+    """Turn a share of the fuel in every cell of a box into energy, so much per mass."""
+    for z in range(box[0], box[1]):
+        for y in range(box[2], box[3]):
+            for x in range(box[4], box[5]):
+                burnt = share * state[FUEL, z, y, x]
+                state[FUEL, z, y, x] -= burnt
+                state[ENERGY, z, y, x] += heat * burnt
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+def cool(state: Reals, box: NDArray[np.int64], hottest: Any) -> None:
+    """Add mass to gas that is hotter than so many times still air, until it is not.
+
+    Energy and momentum stay.
+    """
+    real = state.dtype.type
+    half, one, zero, gamma_1 = real(0.5), real(1.0), real(0.0), real(GAMMA - 1.0)
+    for z in range(box[0], box[1]):
+        for y in range(box[2], box[3]):
+            for x in range(box[4], box[5]):
+                density = state[DENSITY, z, y, x]
+                if density >= one:
+                    continue
+                motion = zero
+                for k in range(X_MOMENTUM, ENERGY):
+                    motion += state[k, z, y, x] * state[k, z, y, x]
+                pressure = gamma_1 * (state[ENERGY, z, y, x] - half * motion / density)
+                state[DENSITY, z, y, x] = max(density, pressure / hottest)
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+def fastest_signal(state: Reals) -> float:
+    """Return what the time step follows from: sound, and motion, of x and y the mean."""
+    fastest = 0.0
+    for z in range(state.shape[1]):
+        for y in range(state.shape[2]):
+            for x in range(state.shape[3]):
+                density = state[DENSITY, z, y, x]
+                u = state[X_MOMENTUM, z, y, x] / density
+                v = state[Y_MOMENTUM, z, y, x] / density
+                w = state[Z_MOMENTUM, z, y, x] / density
+                inner = state[ENERGY, z, y, x] / density - 0.5 * (u * u + v * v + w * w)
+                sound = sqrt(GAMMA * (GAMMA - 1.0) * inner)
+                fastest = max(fastest, 0.5 * (abs(u) + abs(v)) + sound, abs(w) + sound)
+    return fastest
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+def largest_excess(state: Reals, box: NDArray[np.int64]) -> float:
+    """Return the largest distance of the pressure from that of still air in a box."""
+    largest = 0.0
+    for z in range(box[0], box[1]):
+        for y in range(box[2], box[3]):
+            for x in range(box[4], box[5]):
+                motion = 0.0
+                for k in range(X_MOMENTUM, ENERGY):
+                    motion += state[k, z, y, x] ** 2
+                inner = state[ENERGY, z, y, x] - 0.5 * motion / state[DENSITY, z, y, x]
+                largest = max(largest, abs((GAMMA - 1.0) * inner - 1.0))
+    return largest
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
+def tighten(state: Reals, still: Reals, box: NDArray[np.int64], most: int) -> None:
+    """Take layers of still air off the six sides of a box, at most so many from each."""
+    for side in range(6):
+        for _ in range(most):
+            axis = side // 2
+            if box[2 * axis] >= box[2 * axis + 1]:
+                break
+            layer = box[side] if side % 2 == 0 else box[side] - 1
+            if not _is_still(state, still, box, axis, layer):
+                break
+            box[side] += 1 if side % 2 == 0 else -1
+
+
+@njit(error_model="numpy", fastmath=FUSED)
+def _is_still(state: Reals, still: Reals, box: NDArray[np.int64], axis: int, layer: int) -> bool:
+    z0, z1, y0, y1, x0, x1 = box
+    if axis == 0:
+        z0, z1 = layer, layer + 1
+    elif axis == 1:
+        y0, y1 = layer, layer + 1
+    else:
+        x0, x1 = layer, layer + 1
+    for k in range(len(still)):
+        for z in range(z0, z1):
+            for y in range(y0, y1):
+                for x in range(x0, x1):
+                    if state[k, z, y, x] != still[k]:
+                        return False
+    return True
