@@ -7,6 +7,7 @@ scale.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import dist
+from textwrap import wrap
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -169,6 +170,7 @@ def loads_and_solids() -> Colormap:
 # Facades.
 
 _FACADES_IN: Final = 11.0
+_ROW_LETTERS: Final = 26  # beside a row of walls
 _LEAST_WALL_SHARE: Final = 0.13  # of all walls, for its title
 _WALL_HEIGHTS_IN: Final = (1.0, 4.0)
 
@@ -227,7 +229,7 @@ def facades(
             _draw_wall(axes, outline, wall, walls[row][wall], scale, height_m)
             before = walls[0][wall] if row else None
             axes.set_title(_wall_title(outline, wall, walls[row][wall], before, kind), fontsize=9.5)
-        words = f"{layout_words(each.blast)}\n" if beside is not None else ""
+        words = f"{_row_words(each.blast)}\n" if beside is not None else ""
         panels[row][0].set_ylabel(f"{words}z (m)")
     for axes, wall in zip(panels[-1], _LEFT_TO_RIGHT, strict=True):
         axes.set_xlabel(f"{_LEFT_TO_RIGHT[wall][0]} (m)")
@@ -242,6 +244,11 @@ def facades(
     title, subtitle = gas_heading(results, f"{kind.name} on the walls of {outline.name}")
     write_heading(figure, title, f"{subtitle}; walls seen from outside")
     return figure
+
+
+def _row_words(blast: GasBlast) -> str:
+    """Return what barrier a blast has, in words as long as a wall is high."""
+    return "\n".join(wrap(layout_words(blast), _ROW_LETTERS))
 
 
 def full_load(result: GasResult, structure: str, quantity: Quantity) -> float:
@@ -322,6 +329,11 @@ def _draw_wall(
         spine.set_color(unit_interval(QUIET_INK))
 
 
+def _figures(load: float) -> str:
+    """Return a load in three figures, never as a power of ten."""
+    return f"{float(f'{load:.3g}'):,g}"
+
+
 def _wall_title(
     outline: StructureOutline,
     wall: WallName,
@@ -333,7 +345,7 @@ def _wall_title(
     if not np.isfinite(values).any():
         return f"{name}\nno air before it"
     now = kind.of_all(values)
-    words = f"{kind.summary} {now:.3g} {kind.unit}"
+    words = f"{kind.summary} {_figures(now)} {kind.unit}"
     if before is not None and np.isfinite(before).any() and kind.of_all(before) > 0.0:
         change = f"{_PERCENT * (now / kind.of_all(before) - 1.0):+.0f} %"
         words += f" ({change.replace('-', MINUS)})"
@@ -381,8 +393,8 @@ def gauge_history(
             (upper, lower),
             (time_s, overpressure, _positive_impulse(time_s, overpressure)),
             (
-                f"{words}: peak {row['peak_pa'] / PA_PER_KPA:.3g} kPa",
-                f"{words}: {row['positive_impulse_pa_s']:.3g} Pa·s",
+                f"{words}: peak {_figures(row['peak_pa'] / PA_PER_KPA)} kPa",
+                f"{words}: {_figures(row['positive_impulse_pa_s'])} Pa·s",
             ),
             color=colour,
             linestyle="-" if of_result else "--",
@@ -398,8 +410,8 @@ def gauge_history(
             (upper, lower),
             (time_s, wave.pressure(time_s), wave.impulse_until(time_s)),
             (
-                f"{words}: peak {wave.peak / PA_PER_KPA:.3g} kPa",
-                f"{words}: {wave.impulse():.3g} Pa·s",
+                f"{words}: peak {_figures(wave.peak / PA_PER_KPA)} kPa",
+                f"{words}: {_figures(wave.impulse())} Pa·s",
             ),
             color=_REFERENCE,
             linestyle=(0, (1.2, 1.2)),

@@ -37,7 +37,8 @@ def learning_curve(progress: Progress, configuration: RunConfiguration) -> Figur
     settings, counters = configuration.settings, progress.counters
     write_heading(
         figure,
-        f"{ALGORITHM_NAMES[settings.algorithm]} on {settings.scenario}, {settings.threat} threat",
+        f"{ALGORITHM_NAMES[settings.algorithm]} on {Path(settings.scenario).stem}, "
+        f"{settings.threat} threat",
         f"seed {settings.seed}, {counters.steps:,} steps, {counters.episodes:,} episodes, "
         f"{counters.blasts:,} blasts with engine {settings.engine}, {counters.seconds:,.0f} s; "
         f"{settings.evaluation_cases} held-out threats",
