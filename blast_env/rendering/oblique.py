@@ -68,6 +68,10 @@ _ITEM_COLOURS: Final = (
 _DARKER: Final = 0.6
 
 
+_OVER_STAR_PT: Final = 13.0
+"""How far above the middle of a short stand-off its length is written."""
+
+
 Colour = tuple[float, float, float]
 
 
@@ -246,7 +250,7 @@ def draw_oblique(
     site_m = scenario.site.rectangle_m
     view = ObliqueView(site_m, corner or corner_towards(scenario))
     boxes = boxes_of(scenario, layout)
-    _set_up(axes, view, max(box.height_m for box in boxes))
+    _set_up(axes, view, boxes)
     _draw_ground(axes, view, scenario, layout)
     _draw_boxes(axes, view, boxes)
     _draw_stand_offs(axes, view, scenario, layout)
@@ -291,13 +295,14 @@ def _lighter(colour: Colour, share: float = 0.45) -> Colour:
     return red, green, blue
 
 
-def _set_up(axes: Axes, view: ObliqueView, highest_m: float) -> None:
+def _set_up(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
     ground = view.on_ground(view.site_m)
     left, bottom = ground.min(axis=0)
     right, top = ground.max(axis=0)
+    roofs = [view.on_ground(box.rectangle_m, box.height_m)[:, 1].max() for box in boxes]
     margin_m = 0.06 * (right - left)
     axes.set(xlim=(left - margin_m, right + margin_m), aspect="equal")
-    axes.set_ylim(bottom - 1.6 * margin_m, max(top, bottom + highest_m) + margin_m)
+    axes.set_ylim(bottom - 1.6 * margin_m, max(top, *roofs) + margin_m)
     axes.axis("off")
 
 
@@ -435,7 +440,9 @@ def _draw_stand_offs(
         _add_line(axes, view, (place_m, wall_m), zorder=5.0, **dashed)
         ends_m = np.array([place_m, wall_m])
         middle = view.places(np.array([(*ends_m.mean(axis=0), 0.0)]))[0]
-        _write(axes, f"{np.hypot(*np.diff(ends_m, axis=0)[0]):.1f} m", middle)
+        _write(
+            axes, f"{np.hypot(*np.diff(ends_m, axis=0)[0]):.1f} m", middle, lift_pt=_OVER_STAR_PT
+        )
         draw_star(axes, view, place_m, source.height_m)
 
 
@@ -459,9 +466,19 @@ def _write_names(axes: Axes, view: ObliqueView, scenario: Scenario) -> None:
         _write(axes, words, place, bold=structure.protected)
 
 
-def _write(axes: Axes, words: str, place: FloatArray, bold: bool = False) -> None:
-    """Write over everything, on a white rim."""
-    text = axes.text(place[0], place[1], words, ha="center", va="center", zorder=6.0)
+def _write(
+    axes: Axes, words: str, place: FloatArray, *, bold: bool = False, lift_pt: float = 0.0
+) -> None:
+    """Write over everything, on a white rim, at a place or a little above it."""
+    text = axes.annotate(
+        words,
+        (place[0], place[1]),
+        xytext=(0.0, lift_pt),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        zorder=6.0,
+    )
     text.set(fontsize=8, color=unit_interval(INK), fontweight="bold" if bold else "normal")
     text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
 

@@ -284,10 +284,17 @@ def write_names(axes: Axes, obstacles: Sequence[Obstacle], below: bool = False) 
     if figure is None or not texts:
         return
     figure.draw_without_rendering()
-    taken = [_pixels(axes, obstacle) for obstacle in obstacles]
+    taken = [_pixels(axes, obstacle) for obstacle in obstacles] + _stars_and_texts(axes, texts)
     site = axes.patches[0].get_window_extent()
     for text, obstacle in zip(texts, named, strict=True):
         taken.append(_settle(text, _pixels(axes, obstacle), taken, site, below))
+
+
+def _stars_and_texts(axes: Axes, names: Sequence[Annotation]) -> list[Bbox]:
+    """Return where charges and texts other than the names are."""
+    texts = [text for text in axes.texts if text not in names and text.get_text()]
+    stars = [line for line in axes.lines if line.get_marker() == "*"]
+    return [each.get_window_extent() for each in (*texts, *stars)]
 
 
 def what_stands(structures: Sequence[StructureOutline]) -> list[StructureOutline]:
