@@ -7,14 +7,17 @@ STAMP := $(VENV)/.installed
 export SDL_VIDEODRIVER ?= dummy
 export PYGAME_HIDE_SUPPORT_PROMPT := 1
 
-.PHONY: demo test test-browser quick docs lint types compiled check setup clean
+.PHONY: demo test suite test-browser quick docs lint types compiled check setup clean
 
 demo: $(STAMP)
 	$(BIN)/python scripts/demo.py
 
-# Types are checked beside compiling: each keeps one core busy for about a minute.
+# Types are checked beside everything else: they keep one core busy for two minutes.
 test: $(STAMP)
-	$(MAKE) --jobs 2 lint types compiled
+	$(MAKE) --jobs 2 types suite
+
+suite: lint
+	$(MAKE) compiled
 	$(MAKE) check
 
 # What a change of the model most often breaks. Neither types, nor agents, commands and studies.
