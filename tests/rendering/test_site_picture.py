@@ -203,3 +203,15 @@ def test_the_command_draws_a_layout_from_a_file(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, [*arguments[:-1], str(tmp_path / "up.svg"), "--from", "up"])
     assert result.exit_code == 2
     assert "no corner 'up'" in result.output
+
+
+def test_a_high_building_at_the_back_is_drawn_whole() -> None:
+    """Its roof is the highest thing in the picture, and no name lies on a star."""
+    figure = site_picture("hotel_forecourt")
+    plan, oblique = figure.axes
+    roofs = [path.vertices[:, 1].max() for each in oblique.collections for path in each.get_paths()]
+    assert max(roofs) < oblique.get_ylim()[1]
+    figure.draw_without_rendering()
+    (name,) = (text for text in plan.texts if text.get_text() == "hotel")
+    (star,) = (line for line in plan.lines if line.get_marker() == "*")
+    assert not name.get_window_extent().overlaps(star.get_window_extent())
