@@ -1,7 +1,7 @@
 """In what unit the loads of a blast of particles are shown."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from blast_env.calibration.model import ScaledImpulse, seen_width_m
@@ -63,6 +63,13 @@ class LoadUnit:
         width_m = seen_width_m(main.rectangle.scaled(1.0 / UNITS_PER_M), charge.position_m)
         factor = loads[main.name].factor * width_m / MODULE_SIDE_M
         return cls(factor, f"impulse per module (Pa s, calibrated on {main.name})", loads)
+
+    def with_loads_of(self, other: "LoadUnit") -> "LoadUnit":
+        """Return this unit of modules with the loads on structures of another blast.
+
+        A law need not be linear, so each blast has its own factor of a structure's load.
+        """
+        return replace(self, of_structures={**self.of_structures, **other.of_structures})
 
     def factor_of(self, structure: str) -> float | None:
         """Return the factor from m|v| on a structure to Pa s, None where there is none."""

@@ -554,7 +554,7 @@ def _painters(
     """Return a painter a panel, all with the colours of the largest load on what is protected."""
     loads = [largest_load(result) or 0.0 for result in results]
     largest = max(loads)
-    unit = results[loads.index(largest)].load_unit  # one for all, so that they compare
+    unit = results[loads.index(largest)].load_unit  # one scale for all, so that they compare
     full_impulse = nice_load(unit, largest) if largest > 0.0 else None
     return [
         FramePainter(
@@ -564,10 +564,10 @@ def _painters(
             width_px=width_px - width_px % 2,
             full_impulse=full_impulse,
             build_zone=panel.blast.scenario.build_zone,
-            unit=unit,
+            unit=unit.with_loads_of(result.load_unit),
             remark=ONE_SEED,
         )
-        for panel in panels
+        for panel, result in zip(panels, results, strict=True)
     ]
 
 

@@ -94,3 +94,14 @@ def test_frames_say_what_has_come_so_far_and_what_one_seed_is(bare: BlastResult)
     assert len(changed) > 0
     assert changed[:, 1].min() > painter.size_px[0] / 2  # on the right
     assert "mean over seeds" in ONE_SEED
+
+
+def test_films_beside_each_other_say_each_blast_s_own_load(
+    bare: BlastResult, walled: BlastResult
+) -> None:
+    """The law of a calibration is no straight line: one factor for both would be wrong."""
+    shared = bare.load_unit.with_loads_of(walled.load_unit)
+    (building,) = (each for each in walled.obstacles if each.protected)
+    assert shared.of_structure(building) == f"{walled.impulse('building').pa_s:,.0f} Pa s"
+    assert bare.load_unit.of_structure(building) != shared.of_structure(building)
+    assert (shared.factor, shared.label) == (bare.load_unit.factor, bare.load_unit.label)
