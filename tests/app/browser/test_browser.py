@@ -414,7 +414,7 @@ def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
     page.until(lambda: "/design/" in page.driver.current_url)
     page.until(lambda: page.all(".be-plan svg text"))
     reached("the site of the map")
-    page.choose("by", "most sight lines cut")
+    page.choose("by", "wall in the middle")
     page.button("Propose").click()
     page.button("take it").click()
     page.sees("8 of 8 modules")
