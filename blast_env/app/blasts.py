@@ -157,13 +157,22 @@ def _particles(
 ) -> dict[str, Any]:
     blast = Blast(scenario, layout, 0, "event", charge)
     bare = Blast(scenario, (), 0, "event", charge).run()
-    painter = FramePainter.for_blast(blast, width_px=_FILM_PX, full_impulse=largest_load(bare))
+    unit = bare.load_unit
+    painter = FramePainter.for_blast(
+        blast,
+        width_px=_FILM_PX,
+        full_impulse=largest_load(bare, unit),
+        unit=unit.with_loads_of(blast.run().load_unit) if layout else unit,
+    )
     plan = plan_film(bare)
     times_s = np.linspace(0.0, plan.end_s, FRAMES).tolist()
     run = blast.start()
     frames = (paint_at(run, painter, time_s, plan.real_time_factor) for time_s in times_s)
     _write_film(frames, times_s, folder, share_of(tell, 0, 10, 5) or tell)
     notes = [*scenario.height_notes]
+    if scenario.objective.needs_peaks:
+        noun = scenario.objective.noun
+        return {"loads": (), "notes": (*notes, f"no loads: {noun} counts here; blast it with gas")}
     try:
         loads = _particle_loads(task, scenario, layout, charge, share_of(tell, 5, 10, 5) or tell)
     except CalibrationError as error:

@@ -1,21 +1,28 @@
 """What is kept of a blast, and the table in which layouts stand beside each other."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from hashlib import sha256
 from math import nan
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
+from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.statistics import reductions
+from blast_env.units import PA_PER_KPA, PA_PER_PSI
 
 RECORD: Final = "record.json"
 """Name of the file in the folder of a blast; it is there when all of it is."""
+
+_DASH: Final = "\N{EN DASH}"
+_TOGETHER: Final = "all protected"
 
 FILM: Final = "film.json"
 FRAME: Final = "{:03}.jpg"
@@ -179,12 +186,13 @@ class Row(Kept):
 
     Attributes:
         layout: Name of the layout, or "no barrier".
-        threat: Name of the threat.
+        threat: Name of the threat, or what all of them together come to.
         structure: Name of the structure, or "all protected".
         impulse: Impulse in Pa s, with its interval where there is one.
         peak: Peak in kPa.
+        load: What the site's objective counts, in its unit.
         cost: Cost of the layout.
-        reduction: Reduction against no barrier under the same threat.
+        reduction: Reduction of the load that counts, against no barrier under the same threat.
         engine: The engine in words.
     """
 
@@ -193,41 +201,123 @@ class Row(Kept):
     structure: str
     impulse: str
     peak: str
+    load: str
     cost: str
     reduction: str
     engine: str
 
 
+@dataclass(frozen=True)
+class Judge:
+    """Says what counts of the loads on a site, as rewards, searches and reports do.
+
+    Attributes:
+        scenario: The site, with its objective and the weights of its structures.
+    """
+
+    scenario: Scenario
+
+    @property
+    def objective(self) -> ObjectiveSection:
+        """What the site's layouts are to lower."""
+        return self.scenario.objective
+
+    def counted(self, record: BlastRecord, load: Load) -> float:
+        """Return the load that counts of a structure, or of all protected ones, in its unit.
+
+        NaN where a peak counts and the engine knows none.
+        """
+        if not load.structure:
+            own = {each.name for each in self.scenario.structures if each.protected}
+            return sum(self.counted(record, each) for each in record.loads if each.structure in own)
+        structure = next(each for each in self.scenario.structures if each.name == load.structure)
+        peak_pa = PA_PER_KPA * load.peak_kpa if self.objective.needs_peaks else 0.0
+        counted = self.objective.counted(
+            load.impulse_pa_s / PA_PER_PSI,
+            peak_pa,
+            structure.weight,
+            structure.counted_peak_weight,
+        )
+        return self.objective.in_si(counted)
+
+    def together(self, record: BlastRecord) -> float:
+        """Return the load that counts of all protected structures."""
+        return self.counted(record, record.loads[0])
+
+    def text(self, load: float) -> str:
+        """Return a load that counts, with its unit; a dash for one that does not exist."""
+        return _DASH if load != load else self.objective.text(load)
+
+
 def comparison(
-    records: Sequence[tuple[str, float, BlastRecord]], bare: Mapping[str, BlastRecord]
+    records: Sequence[tuple[str, float, BlastRecord]],
+    bare: Mapping[str, BlastRecord],
+    scenario: Scenario,
 ) -> list[Row]:
     """Return the comparison of layouts, threat by threat and structure by structure.
+
+    Where there are several threats, rows at the end have the load that the site's objective makes
+    of all of them, for each layout that was blasted under all.
 
     Args:
         records: Name, cost and blast of each layout.
         bare: The blast without a barrier, by the name of the threat.
+        scenario: The site.
     """
+    judge = Judge(scenario)
     rows = []
     for name, cost, record in records:
         unprotected = {load.structure: load for load in _loads_of(bare.get(record.threat))}
         for load in record.loads:
+            counted, share = judge.counted(record, load), nan
             without = unprotected.get(load.structure)
-            share = nan
             if without is not None and record.layout:
-                share = reductions(load.impulse_pa_s, without.impulse_pa_s).item()
+                share = reductions(counted, judge.counted(bare[record.threat], without)).item()
             rows.append(
                 Row(
                     layout=name,
                     threat=record.threat,
-                    structure=load.structure or "all protected",
+                    structure=load.structure or _TOGETHER,
                     impulse=_impulse_text(load),
                     peak=_number(load.peak_kpa),
+                    load=judge.text(counted),
                     cost=f"{cost:g}",
                     reduction=_percent(share),
                     engine=record.engine.label,
                 )
             )
-    return rows
+    return rows + list(_all_threats(records, judge))
+
+
+def _all_threats(records: Sequence[tuple[str, float, BlastRecord]], judge: Judge) -> Iterator[Row]:
+    """Yield what the loads of all threats come to, for layouts that met all of them."""
+    threats = dict.fromkeys(record.threat for _, _, record in records)
+    if len(threats) < 2:
+        return
+    found: dict[str, list[tuple[float, BlastRecord]]] = {}
+    for name, cost, record in records:
+        if record.loads:
+            found.setdefault(name, []).append((cost, record))
+    whole = {name: own for name, own in found.items() if len(own) == len(threats)}
+    loads = {
+        name: judge.objective.risk(np.array([judge.together(record) for _, record in own]))
+        for name, own in whole.items()
+    }
+    for name, own in whole.items():
+        cost, last = own[-1]
+        without = next((loads[each] for each in whole if not whole[each][-1][1].layout), nan)
+        share = reductions(loads[name], without).item() if last.layout else nan
+        yield Row(
+            layout=name,
+            threat=f"all {len(threats)}: {judge.objective.charges}",
+            structure=_TOGETHER,
+            impulse=_number(loads[name]) if judge.objective.quantity == "impulse" else _DASH,
+            peak=_DASH,
+            load=judge.text(loads[name]),
+            cost=f"{cost:g}",
+            reduction=_percent(share),
+            engine=last.engine.label,
+        )
 
 
 def _loads_of(record: BlastRecord | None) -> tuple[Load, ...]:
@@ -244,13 +334,13 @@ def _impulse_text(load: Load) -> str:
 def _number(value: float) -> str:
     """Return three digits of a number, a dash for one that does not exist."""
     if value != value:
-        return "\N{EN DASH}"
+        return _DASH
     return f"{float(f'{value:.3g}'):,g}"
 
 
 def _percent(share: float) -> str:
     if share != share:
-        return "\N{EN DASH}"
+        return _DASH
     return f"{100.0 * share:.1f} %".replace("-", "\N{MINUS SIGN}")
 
 

@@ -306,7 +306,7 @@ class Session:
                 if each.name == BARE:
                     bare[record.threat] = record
                 records.append((each.name, placing.cost_of(self.scenario, each.layout), record))
-        return comparison(records, bare)
+        return comparison(records, bare, self.scenario)
 
     def waves(self, threat: NamedThreat) -> Sequence[tuple[str, BlastRecord]]:
         """Return the blasts with gauges under a threat, by the names of the layouts."""

@@ -1,6 +1,7 @@
 """Where a site comes from: bundled, generated, or a file by its ending."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
@@ -51,7 +52,7 @@ def imported_site(name: str, content: bytes, options: "ImportOptions") -> "Impor
     Args:
         name: Name of the file.
         content: What is in it.
-        options: What the user decides.
+        options: What the user decides; a build zone of the map comes before one around buildings.
 
     Raises:
         BlastEnvError: If it cannot be imported, or a package that this needs is not installed.
@@ -59,6 +60,9 @@ def imported_site(name: str, content: bytes, options: "ImportOptions") -> "Impor
     from blast_env.importing import import_site  # here, because it needs the extra `maps`
 
     def read(path: Path) -> "ImportedSite":
+        own = import_site(path, replace(options, zone_around_m=None))
+        if options.zone_around_m is None or own.scenario.build_zone is not None:
+            return own
         return import_site(path, options)
 
     return _from_file(name, content, dict.fromkeys(MAPS, read), "a map")

@@ -10,6 +10,7 @@ from blast_env.calibration.laws import (
     fit_power_law,
     fit_proportional,
 )
+from blast_env.calibration.load_unit import CalibratedLoad, LoadUnit
 from blast_env.calibration.metrics import (
     FitMetrics,
     Interval,
@@ -40,6 +41,7 @@ from blast_env.calibration.references import (
 __all__ = [
     "PAPER_COLUMNS",
     "PAPER_UFC_LABEL",
+    "CalibratedLoad",
     "Calibration",
     "CalibrationError",
     "FewDistancesWarning",
@@ -48,6 +50,7 @@ __all__ = [
     "Interval",
     "LeaveOneOut",
     "LinearLaw",
+    "LoadUnit",
     "PowerLaw",
     "ProportionalLaw",
     "ScaledImpulse",

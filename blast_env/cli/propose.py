@@ -9,7 +9,16 @@ import typer
 from blast_agents.rules import expected_charge
 from blast_agents.search.by_rule import layouts_by_rule
 
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
+from blast_env.cli.options import ChargePlace, Processes, TntMass
+from blast_env.cli.output import (
+    engine_text,
+    make_table,
+    print_line,
+    progress_bar,
+    result_console,
+    user_errors,
+)
+from blast_env.cli.targets import FileTarget, checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
 from blast_env.geometry import Layout, layout_counts
@@ -39,35 +48,32 @@ _NOTHING: Final = "no barrier"
 
 def propose(
     scenario: Annotated[str, typer.Argument(help="Bundled name, or a scenario file.")],
-    charge: Annotated[
-        tuple[float, float] | None,
-        typer.Option(help="Where the charge is, x and y in m; unless given, it is not known."),
-    ] = None,
-    tnt_kg: Annotated[
-        float | None, typer.Option(help="Its mass, kg of TNT; else that of the scenario.")
-    ] = None,
+    charge: ChargePlace = None,
+    tnt_kg: TntMass = None,
     verify: Annotated[
         bool,
         typer.Option("--verify", help="Judge it by gas dynamics, beside no barrier and all rules."),
     ] = False,
     out: Annotated[Path | None, typer.Option(help="JSON file for the layout.")] = None,
-    processes: Annotated[int, typer.Option(min=1, help="Worker processes for the blasts.")] = 1,
+    processes: Processes = 1,
 ) -> None:
     """Propose a layout with trained weights that come with the package; no blast is run for it.
 
     Where there are no weights for the scenario, it is the best rule's layout, which takes a blast
-    of gas dynamics for each rule and threat.
+    of gas dynamics for each rule and threat. Without --charge it is for all places where the charge
+    may be.
     """
-    with user_errors():
+    with user_errors(), checked_targets({"--out": FileTarget(out, (".json",))}):
         chosen = load_scenario(scenario)
         chosen.zone  # noqa: B018  # refuses a scenario without one
         told = _charge(chosen, charge, tnt_kg)
         case = _case(chosen, told)
+        evaluator = BlastEvaluator(chosen, GAS)
         rules = layouts_by_rule(chosen, told)
         began_s = perf_counter()
         found = _by_agent(chosen, told)
         if found is None:
-            loads = _loads(case, {_NOTHING: (), **rules}, processes)
+            loads = _loads(evaluator, case, {_NOTHING: (), **rules}, processes)
             name = min(rules, key=lambda rule: loads[rule])
             layout, how = rules[name], f"the best rule by gas dynamics: {name}"
             provenance: dict[str, object] = {"rule": name}
@@ -81,8 +87,10 @@ def propose(
         cost = "" if chosen.zone.budget is None else f", cost {placement.cost:g}"
         print_line(f"{chosen.name}: {layout_counts(layout)}{cost}, by {how}")
         if verify:
-            loads = _loads(case, {_NOTHING: (), **rules, _PROPOSAL: layout}, processes)
+            loads = _loads(evaluator, case, {_NOTHING: (), **rules, _PROPOSAL: layout}, processes)
             _print_verdict(loads, case)
+        if verify or found is None:
+            print_line(engine_text(evaluator.engine))
         if out is not None:
             provenance |= {"command": command(), "versions": versions()}
             print_line(f"wrote {LayoutFile.of(chosen, layout, provenance).save(out)}")
@@ -153,9 +161,10 @@ def _why_not(scenario: Scenario, charge: Charge | None) -> str:
     return f"no weights come with the package for {scenario.name}"
 
 
-def _loads(case: Case, layouts: Mapping[str, Layout], processes: int) -> dict[str, float]:
+def _loads(
+    evaluator: BlastEvaluator, case: Case, layouts: Mapping[str, Layout], processes: int
+) -> dict[str, float]:
     """Return the load that counts with each layout, by gas dynamics, in the objective's unit."""
-    evaluator = BlastEvaluator(case.scenario, GAS)
     objective = case.scenario.objective
     pairs = [(layout, threat) for layout in layouts.values() for threat in case.threats]
     with progress_bar(f"{len(set(pairs))} blasts of gas dynamics") as progress:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from blast_env.calibration.model import Calibration
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scenario import AnyScenario, AnyStructure, ObjectiveSection, find_scenario
+from blast_env.scenario import AnyScenario, ObjectiveSection, find_scenario
 from blast_env.simulation import BlastResult
 from blast_env.units import PA_PER_PSI
 
@@ -143,7 +143,9 @@ def gas_loads(result: "GasResult") -> BlastLoads:
     """Return the loads of a blast of gas dynamics, which has no simulation units (NaN)."""
     table = result.structures
     structures = []
-    peak_weights = {each.name: _peak_weight(each) for each in result.blast.scenario.structures}
+    peak_weights = {
+        each.name: each.counted_peak_weight for each in result.blast.scenario.structures
+    }
     for row in table.to_dict("records"):
         scaled = result.impulse(row["structure"])
         structures.append(
@@ -179,8 +181,3 @@ def _structure_load(
         in_range=scaled.in_range,
         notes=scaled.notes,
     )
-
-
-def _peak_weight(structure: AnyStructure) -> float:
-    """Return how much the peak on a structure counts: as much as its impulse unless it says so."""
-    return structure.weight if structure.peak_weight is None else structure.peak_weight

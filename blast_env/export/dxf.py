@@ -1,11 +1,12 @@
 """What a drawing has to say beside its lines: conditions of the site, and how far they reach."""
 
 from collections import Counter
-from math import ceil, pi, tan
+from math import floor, pi, tan
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from blast_env.errors import import_extra
+from blast_env.export.labels import Label, key_of, labels_of, wrapped
 from blast_env.export.plan import Feature, FeatureKind, LayoutPlan
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
@@ -24,7 +25,7 @@ CornerM = tuple[float, float, float]
 
 
 def note_lines(plan: LayoutPlan) -> tuple[str, ...]:
-    """Return the notes of a drawing, a line a subject; none has a sign that drawings read."""
+    """Return the notes of a drawing, a line a subject, without the key to the letters."""
     lines = [
         f"Scenario: {plan.scenario.name}",
         "Units: metres, from the lower left corner of the site",
@@ -150,6 +151,9 @@ _STRING: Final = 1000  # group code of a text in extended data
 _TEXT_HEIGHT_M: Final = 0.4
 
 
+_ROUNDING: Final = 1e-6  # of a count of signs
+
+
 _LINE_SPACING: Final = 5.0 / 3.0  # of lines of text, in heights of the text
 
 
@@ -211,7 +215,10 @@ def drawing(plan: LayoutPlan) -> Drawing:
     for feature in plan.features:
         _draw(space, feature)
     _draw_clearance(space, plan)
-    shown = _write_notes(space, plan)
+    height_m = text_height_m(plan)
+    for label in labels_of(plan, height_m):
+        _write(space, label)
+    shown = _write_notes(space, plan, height_m)
     document.set_modelspace_vport(height=1.1 * max(shown.right, shown.top), center=shown.centre)
     return document
 
@@ -227,7 +234,7 @@ def write_dxf(plan: LayoutPlan, path: Path) -> None:
 
 
 def _draw(space: Modelspace, feature: Feature) -> None:
-    """Draw a point, a line or a closed outline, and write the name of what has one."""
+    """Draw a point, a line or a closed outline."""
     attributes = {"layer": layer_name(feature.kind)}
     places = feature.places_m
     if len(places) == 1:
@@ -241,55 +248,26 @@ def _draw(space: Modelspace, feature: Feature) -> None:
             outline.dxf.thickness = height_m  # what stands is drawn as high as it is
         if feature.kind is FeatureKind.BARRIER:
             outline.set_xdata(APPLICATION, [(_STRING, text) for text in _barrier_texts(feature)])
-            if "item" in feature.properties:
-                _write_item(space, feature)
-            return
-    _write_name(space, feature)
 
 
 def _barrier_texts(feature: Feature) -> list[str]:
     """Return what is said of a module or piece: its name, and for a piece its item and height."""
     if "item" not in feature.properties:
         return [feature.name]
-    return [feature.name, f"item={feature.properties['item']}", f"height_m={_height(feature)}"]
+    height = f"{feature.properties['height_m']:g}"
+    return [feature.name, f"item={feature.properties['item']}", f"height_m={height}"]
 
 
-def _height(feature: Feature) -> str:
-    return f"{feature.properties['height_m']:g}"
-
-
-def _write_item(space: Modelspace, feature: Feature) -> None:
-    """Write item and height of a piece along its middle."""
-    (left_m, bottom_m), (right_m, top_m) = feature.places_m[0], feature.places_m[2]
-    upright = top_m - bottom_m > right_m - left_m
+def _write(space: Modelspace, label: Label) -> None:
+    """Write a text; those of pieces are on a layer of their own."""
+    kind = label.feature.kind
     text = space.add_text(
-        f"{feature.properties['item']} {_height(feature)} m",
-        height=0.5 * MODULE_SIDE_M,
-        rotation=90.0 if upright else 0.0,
-        dxfattribs={"layer": ITEMS_LAYER},
+        label.text,
+        height=label.height_m,
+        rotation=90.0 if label.upright else 0.0,
+        dxfattribs={"layer": ITEMS_LAYER if kind is FeatureKind.BARRIER else layer_name(kind)},
     )
-    middle = ((left_m + right_m) / 2.0, (bottom_m + top_m) / 2.0)
-    text.set_placement(middle, align=TextEntityAlignment.MIDDLE_CENTER)
-
-
-def _write_name(space: Modelspace, feature: Feature) -> None:
-    """Write a name in the middle of a structure, and beside the first place of anything else."""
-    # A line break would end the text in the middle of the file.
-    text = space.add_text(
-        " ".join(feature.name.split()),
-        height=_TEXT_HEIGHT_M,
-        dxfattribs={"layer": layer_name(feature.kind)},
-    )
-    x_m, y_m = feature.places_m[0]
-    if feature.kind in (FeatureKind.STRUCTURE, FeatureKind.PROTECTED_STRUCTURE):
-        right_m, top_m = feature.places_m[2]
-        middle = ((x_m + right_m) / 2.0, (y_m + top_m) / 2.0)
-        text.set_placement(middle, align=TextEntityAlignment.MIDDLE_CENTER)
-    else:
-        gap_m = _TEXT_HEIGHT_M / 2.0
-        # The charge is where one may be: its name goes below that of the place.
-        up_m = -gap_m - _TEXT_HEIGHT_M if feature.kind is FeatureKind.CHARGE else gap_m
-        text.set_placement((x_m + gap_m, y_m + up_m))
+    text.set_placement(label.centre_m, align=TextEntityAlignment.MIDDLE_CENTER)
 
 
 def _draw_clearance(space: Modelspace, plan: LayoutPlan) -> None:
@@ -299,22 +277,31 @@ def _draw_clearance(space: Modelspace, plan: LayoutPlan) -> None:
         space.add_lwpolyline(outline, format="xyb", close=True, dxfattribs=attributes)
 
 
-def _write_notes(space: Modelspace, plan: LayoutPlan) -> Rectangle:
+def text_height_m(plan: LayoutPlan) -> float:
+    """Return the height of the notes: as high as fits the width of the site, but readable."""
+    # Signs are at most as wide as high, whatever typeface a program has.
+    return max(plan.scenario.site.width_m / max(map(len, note_lines(plan))), _TEXT_HEIGHT_M)
+
+
+def _write_notes(space: Modelspace, plan: LayoutPlan, height_m: float) -> Rectangle:
     """Write the notes above everything; return the site with them.
 
-    They are as high as fits the width of the site. Where that would be too small to read, lines
-    wrap; the text grows upwards, so it never covers the site.
+    Lines that are longer than the site is wide are broken here, not by the program that shows
+    them. The text grows upwards, so it never covers the site.
     """
-    lines = note_lines(plan)
     site, width_m = plan.scenario.site.rectangle_m, plan.scenario.site.width_m
-    # Signs are at most as wide as high, whatever typeface a program has.
-    height_m = max(width_m / max(map(len, lines)), _TEXT_HEIGHT_M)
+    key = [f"{letter}: {name}" for name, letter in key_of(plan).items()]
+    lines = wrapped([*note_lines(plan), *key], floor(width_m / height_m + _ROUNDING))
     ends_m = [y for outline in clearance_outlines(plan) for _, y, _ in outline]
     bottom_m = max([site.top, *ends_m]) + 2.0 * height_m
     notes = space.add_mtext(
-        "\\P".join(lines),
+        "\\P".join(map(_escaped, lines)),
         {"layer": NOTES_LAYER, "char_height": height_m, "width": width_m},
     )
     notes.set_location((site.left, bottom_m), attachment_point=MTextEntityAlignment.BOTTOM_LEFT)
-    count = sum(ceil(len(line) * height_m / width_m) for line in lines)
-    return site._replace(top=bottom_m + count * _LINE_SPACING * height_m)
+    return site._replace(top=bottom_m + len(lines) * _LINE_SPACING * height_m)
+
+
+def _escaped(line: str) -> str:
+    """Return a line in which no sign is a command to the program that shows it."""
+    return line.replace("\\", "\\\\").replace("{", "\\{").replace("}", "\\}")

@@ -14,15 +14,17 @@ import xlsxwriter
 from pandas.api import types
 from xlsxwriter.exceptions import XlsxFileError
 
+from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.recording.tables import (
     COLLISION_COLUMNS,
     MODULE_COLUMNS,
-    STRUCTURE_COLUMNS,
     RecordedBlast,
     RunRecord,
+    modules_in_pa_s,
+    structures_in_pa_s,
 )
 from blast_env.tables import Column
 
@@ -63,7 +65,8 @@ def header(column: Column) -> str:
     """Return the heading of a column, with its unit: `first hit (s)`."""
     label = _LABELS.get(column.name)
     if label is None:
-        label = column.name.removesuffix(f"_{column.unit}").replace("_", " ")
+        suffix = "_" + column.unit.replace(" ", "_").lower()
+        label = column.name.removesuffix(suffix).replace("_", " ")
     return f"{label} ({column.unit})" if column.unit else label
 
 
@@ -198,12 +201,14 @@ class ChartData(NamedTuple):
     """What the charts of a workbook show.
 
     Attributes:
+        label: What the bars are, with the unit.
         rankings: One a chart.
-        structures: The structures of the ranked modules.
+        structures: The structures of the ranked modules, as the legend names them.
         columns: The columns of the table; the last ones belong to the structures.
         table: One row a module, chart after chart; its impulse is in its structure's column.
     """
 
+    label: str
     rankings: tuple[Ranking, ...]
     structures: tuple[str, ...]
     columns: tuple[Column, ...]
@@ -218,14 +223,28 @@ def chart_data(blast: RecordedBlast) -> ChartData:
     # In the order of the scenario, so that the colours do not depend on who is hit most.
     present = blast.structures["structure"].isin(ranked["structure"])
     structures = tuple(blast.structures.loc[present, "structure"])
+    unit = blast.load_unit
     impulses = tuple(
-        Column(f"impulse_on_{structure}_sim", "sim", "sum of m |v| over the collisions")
+        Column(f"impulse_on_{structure}_pa_s", "Pa s", unit.label)
+        if unit.is_calibrated
+        else Column(f"impulse_on_{structure}_sim", "sim", "sum of m |v| over the collisions")
         for structure in structures
     )
     table = ranked[[column.name for column in _LABEL_COLUMNS]].copy()
+    impulse = unit.factor * ranked["impulse_sim"]
     for structure, column in zip(structures, impulses, strict=True):
-        table[column.name] = ranked["impulse_sim"].where(ranked["structure"] == structure)
-    return ChartData(rankings, structures, _LABEL_COLUMNS + impulses, table)
+        table[column.name] = impulse.where(ranked["structure"] == structure)
+    label = unit.label if unit.is_calibrated else "impulse, m|v| (sim)"
+    return ChartData(label, rankings, _names(structures, unit), _LABEL_COLUMNS + impulses, table)
+
+
+def _names(structures: Sequence[str], unit: LoadUnit) -> tuple[str, ...]:
+    """Return what structures are called in the legend: with their loads, where known."""
+    loads = (unit.of_structures.get(structure) for structure in structures)
+    return tuple(
+        structure if load is None else f"{structure}: {load.scaled.pa_s:,.1f} Pa s"
+        for structure, load in zip(structures, loads, strict=True)
+    )
 
 
 def add_charts(workbook: Any, sheet: Any, column: int, data_sheet: str, data: ChartData) -> None:
@@ -244,7 +263,7 @@ def add_charts(workbook: Any, sheet: Any, column: int, data_sheet: str, data: Ch
     for number, ranking in enumerate(data.rankings):
         chart = workbook.add_chart({"type": "bar", "subtype": "stacked"})
         _add_series(chart, data_sheet, data, slice(first, first + len(ranking.modules)))
-        _add_labels(chart, ranking)
+        _add_labels(chart, ranking, data.label)
         place = {"object_position": 3, "x_offset": 20 + number * (_WIDTH + 20), "y_offset": 5}
         sheet.insert_chart(1, column, chart, place)
         first += len(ranking.modules)
@@ -262,18 +281,19 @@ def _rankings(blast: RecordedBlast) -> Iterator[Ranking]:
         in_group = blast.modules["structure"].isin(structures.loc[rows, "structure"])
         hit = blast.modules[in_group & (blast.modules["hits"] > 0)]
         if len(hit):
-            yield _ranking(name, hit)
+            yield _ranking(name, hit, blast.load_unit)
 
 
-def _ranking(name: str, hit: pd.DataFrame) -> Ranking:
+def _ranking(name: str, hit: pd.DataFrame, unit: LoadUnit) -> Ranking:
     """Return the ranking of the modules that were hit in a group of structures."""
     # Stable, so that equal loads keep the order of the module table.
     ranked = hit.sort_values("impulse_sim", ascending=False, kind="stable")
     top = ranked.head(CHARTED_MODULES)
     which = "" if len(top) == len(hit) else f"the {len(top)} most loaded of "
-    total = f"{hit['impulse_sim'].sum():,.0f}"
+    # In Pa s there is no sum over structures; the legend has the load on each.
+    total = "" if unit.is_calibrated else f": {hit['impulse_sim'].sum():,.0f} (sim)"
     modules = "module" if len(hit) == 1 else "modules"
-    return Ranking(f"Impulse on the {name}: {total} (sim), {which}{len(hit)} {modules} hit", top)
+    return Ranking(f"Impulse on the {name}{total}, {which}{len(hit)} {modules} hit", top)
 
 
 def _add_series(chart: Any, sheet: str, data: ChartData, rows: slice) -> None:
@@ -300,12 +320,12 @@ def _add_series(chart: Any, sheet: str, data: ChartData, rows: slice) -> None:
         )
 
 
-def _add_labels(chart: Any, ranking: Ranking) -> None:
+def _add_labels(chart: Any, ranking: Ranking, label: str) -> None:
     """Add the title, the titles of the axes and the legend, and set the size."""
     chart.set_title({"name": ranking.title, "name_font": {"size": 12}})
     chart.set_x_axis(
         {
-            "name": "impulse, m|v| (sim)",
+            "name": label,
             "num_format": "#,##0",
             "major_gridlines": {"visible": True, "line": {"color": "#D9D9D9"}},
         }
@@ -474,8 +494,8 @@ class _WorkbookWriter:
         self._set_properties(record, f"Blast {record['scenario']}, seed {record['seed']}")
         run = self._write_run(record)
         tables = (
-            SheetTable("Structures", blast.structures, STRUCTURE_COLUMNS),
-            SheetTable("Modules", blast.modules, MODULE_COLUMNS),
+            SheetTable("Structures", *structures_in_pa_s(blast.structures, blast.load_unit)),
+            SheetTable("Modules", *modules_in_pa_s(blast.modules, blast.load_unit)),
             SheetTable("Collisions", blast.collisions, COLLISION_COLUMNS),
         )
         for each in tables:

@@ -6,11 +6,14 @@ from typing import Final, Protocol
 import numpy as np
 import pandas as pd
 
+from blast_env.calibration import LoadUnit
 from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import ModularObstacle
 from blast_env.tables import Column
 from blast_env.units import UNITS_PER_M
+
+Columns = tuple[Column, ...]
 
 RunRecord = dict[str, str | int | float]
 """What was run, with which versions, and how it ended; names and plain values."""
@@ -30,6 +33,10 @@ class RecordedBlast(Protocol):
     @property
     def structures(self) -> pd.DataFrame:
         """One row a structure; the columns are `STRUCTURE_COLUMNS`."""
+
+    @property
+    def load_unit(self) -> LoadUnit:
+        """The unit of the loads: Pa s where a calibration gives them."""
 
     @property
     def run_record(self) -> RunRecord:
@@ -85,6 +92,48 @@ STRUCTURE_COLUMNS: Final = (
     Column("first_hit_s", "s", "time of the first collision"),
     Column("modules_destroyed", "", "modules whose impulse passed their capacity"),
 )
+
+
+STRUCTURE_PA_S_COLUMNS: Final = (
+    Column("impulse_pa_s", "Pa s", "impulse per area through the scenario's calibration"),
+    Column("calibration_in_range", "", "yes if the calibration was made for it, or why not"),
+)
+
+
+def structures_in_pa_s(structures: pd.DataFrame, unit: LoadUnit) -> tuple[pd.DataFrame, Columns]:
+    """Return a structure table with the loads in Pa s, and its columns.
+
+    Args:
+        structures: The structure table of a blast.
+        unit: Its unit; without a calibration nothing is added.
+    """
+    if not unit.is_calibrated:
+        return structures, STRUCTURE_COLUMNS
+    loads = [unit.of_structures.get(name) for name in structures["structure"]]
+    added = structures.assign(
+        impulse_pa_s=[np.nan if load is None else load.scaled.pa_s for load in loads],
+        calibration_in_range=pd.array(
+            ["" if load is None else "; ".join(load.scaled.notes) or "yes" for load in loads],
+            dtype="str",
+        ),
+    )
+    return added, (*STRUCTURE_COLUMNS, *STRUCTURE_PA_S_COLUMNS)
+
+
+def modules_in_pa_s(modules: pd.DataFrame, unit: LoadUnit) -> tuple[pd.DataFrame, Columns]:
+    """Return a module table with the loads in Pa s, and its columns.
+
+    Args:
+        modules: The module table of a blast.
+        unit: Its unit; without a calibration nothing is added.
+    """
+    if not unit.is_calibrated:
+        return modules, MODULE_COLUMNS
+    column = Column("impulse_pa_s", "Pa s", unit.label)
+    return modules.assign(impulse_pa_s=unit.factor * modules["impulse_sim"]), (
+        *MODULE_COLUMNS,
+        column,
+    )
 
 
 def collision_table(

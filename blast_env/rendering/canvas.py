@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.calibration import LoadUnit
 from blast_env.geometry import Rectangle
 from blast_env.physics.scene import Scene, StructureOutline
 from blast_env.physics.structure import Colour, ModularObstacle, ModularPart, load_colour
@@ -21,7 +22,6 @@ from blast_env.rendering.style import (
     QUIET_INK,
     SITE,
     STRUCTURE,
-    LoadUnit,
     nice_floor,
     render_extra,
     short_number,

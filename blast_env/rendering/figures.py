@@ -34,7 +34,6 @@ from blast_env.rendering.style import (
     INK,
     QUIET_INK,
     STRUCTURE,
-    LoadUnit,
     blast_title,
     count_of,
     number_on_axis,
@@ -268,10 +267,10 @@ def impulse_over_time(result: BlastResult) -> Figure:
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
     table = result.collisions.assign(facade=faces_hit(result.collisions))
     end_ms = shown_until_s(result) * MS_PER_S
-    unit = LoadUnit.of(result)
+    unit = result.load_unit
     for axes, obstacle in zip(panels, shown, strict=False):
         hits = table[table["structure"] == obstacle.name]
-        _draw_structure(axes, obstacle, hits, end_ms, unit.of_structures.get(obstacle.name))
+        _draw_structure(axes, obstacle, hits, end_ms, unit.factor_of(obstacle.name))
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
     title, subtitle = blast_title(result.blast)

@@ -12,13 +12,14 @@ from typing import Final, Protocol, Self
 
 import numpy as np
 
+from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.engine import BlastRun
 from blast_env.rendering.frames import ONE_SEED, SIMULATION_UNITS, Frame, FramePainter
 from blast_env.rendering.style import (
     PAGE,
-    LoadUnit,
+    nice_load,
     nice_numbers,
     render_extra,
     shown_until_s,
@@ -345,7 +346,7 @@ def write_film(
         plan = plan_film(result, frames_per_s, slow_motion)
         if suffix == ".gif":
             plan, width_px = for_gif(plan, width_px)
-        unit = LoadUnit.of(result)
+        unit = result.load_unit
         if full_impulse is None:
             full_impulse = largest_load(result, unit)
         even_px = width_px - width_px % 2
@@ -457,7 +458,7 @@ def largest_load(result: BlastResult, unit: LoadUnit = SIMULATION_UNITS) -> floa
     ):
         loads = [part.impulse for obstacle in obstacles for part in obstacle.parts]
         if max(loads, default=0.0) > 0.0:
-            return unit.nice_ceiling(max(loads))
+            return nice_load(unit, max(loads))
     return None
 
 
@@ -553,8 +554,8 @@ def _painters(
     """Return a painter a panel, all with the colours of the largest load on what is protected."""
     loads = [largest_load(result) or 0.0 for result in results]
     largest = max(loads)
-    unit = LoadUnit.of(results[loads.index(largest)])  # one for all, so that they compare
-    full_impulse = unit.nice_ceiling(largest) if largest > 0.0 else None
+    unit = results[loads.index(largest)].load_unit  # one scale for all, so that they compare
+    full_impulse = nice_load(unit, largest) if largest > 0.0 else None
     return [
         FramePainter(
             panel.blast.scene,
@@ -563,10 +564,10 @@ def _painters(
             width_px=width_px - width_px % 2,
             full_impulse=full_impulse,
             build_zone=panel.blast.scenario.build_zone,
-            unit=unit,
+            unit=unit.with_loads_of(result.load_unit),
             remark=ONE_SEED,
         )
-        for panel in panels
+        for panel, result in zip(panels, results, strict=True)
     ]
 
 

@@ -6,6 +6,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import BallStates
 from blast_env.physics.particles import CollisionType
@@ -32,7 +33,6 @@ from blast_env.rendering.style import (
     PAGE,
     QUIET_INK,
     SITE,
-    LoadUnit,
     blast_title,
     free_flight_impulse,
     nice_ceiling,

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isqrt
 
+from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.physics.structure import ModularObstacle
 from blast_env.rendering.site_plan import (
@@ -22,7 +23,6 @@ from blast_env.rendering.site_plan import (
 from blast_env.rendering.style import (
     INK,
     PROTECTED,
-    LoadUnit,
     blast_title,
     count_of,
     nice_ceiling,
@@ -127,7 +127,7 @@ def common_scale(results: Sequence[BlastResult], structure: str | None = None) -
         for result in results
     ]
     largest = max(loads)
-    unit = LoadUnit.of(results[loads.index(largest)])
+    unit = results[loads.index(largest)].load_unit
     return LoadScale(nice_ceiling(unit.factor * largest) if largest > 0.0 else 1.0, unit)
 
 

@@ -6,6 +6,7 @@ from blast_env.importing import FittedBuilding, ImportedSite
 from blast_env.importing.plane import rotated
 from blast_env.rendering.site_plan import draw_site, draw_zone, rectangle_patch, write_heading
 from blast_env.rendering.style import (
+    BORDER,
     EXPLOSIVE,
     INK,
     PROTECTED,
@@ -137,6 +138,8 @@ def _legend(imported: ImportedSite) -> list[Patch | Line2D]:
         handles.append(Patch(fill=False, edgecolor=quiet, linestyle="--", label="build zone"))
         if zone.keep_outs:
             handles.append(Patch(fill=False, edgecolor=quiet, hatch="////", label="keep-out"))
+    border = unit_interval(BORDER)
+    handles.append(Patch(fill=False, edgecolor=border, linewidth=2.0, label="site border"))
     return handles
 
 

@@ -1,22 +1,21 @@
 """Colours, fonts, and the extra that pictures need."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from math import ceil, floor, log10, pi
 from typing import Final
 
 import numpy as np
 
-from blast_env.calibration.model import seen_width_m
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.calibration import LoadUnit
+from blast_env.errors import import_extra
 from blast_env.geometry import layout_counts
 from blast_env.physics.particles import CollisionType, distance_to_rectangle
 from blast_env.physics.scene import Scene
-from blast_env.physics.structure import Colour, ModularObstacle
+from blast_env.physics.structure import Colour
 from blast_env.simulation import Blast, BlastResult
-from blast_env.units import MODULE_SIDE_M, MODULE_SIDE_UNITS, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_UNITS
 
 
 @contextmanager
@@ -65,67 +64,6 @@ PROTECTED: Final[Colour] = (0, 128, 112)
 BARRIER: Final[Colour] = (12, 12, 14)
 
 
-LOAD_LABEL: Final = "impulse per module (simulation units)"
-
-
-@dataclass(frozen=True)
-class LoadUnit:
-    """In what unit the loads of a blast of particles are shown: Pa s where a calibration gives it.
-
-    A calibration converts the load on a whole structure. A module's is its share of that, by m|v|
-    a metre of facade, with the factor of the protected structure that is loaded most.
-
-    Attributes:
-        factor: From a module's m|v| to the unit.
-        label: What a module's load is, with the unit.
-        of_structures: From the m|v| on each structure to the unit, by its name.
-    """
-
-    factor: float = 1.0
-    label: str = LOAD_LABEL
-    of_structures: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Whether it is Pa s."""
-        return bool(self.of_structures)
-
-    @classmethod
-    def of(cls, result: BlastResult) -> "LoadUnit":
-        """Return the unit for a blast and those that are compared with it.
-
-        Simulation units where the scenario has no calibration for the engine, or nothing was hit.
-        """
-        structures = [obstacle for obstacle in result.obstacles if obstacle.cells is None]
-        protected = [obstacle for obstacle in structures if obstacle.protected] or structures
-        main = max(protected, key=lambda obstacle: obstacle.impulse)
-        if main.impulse == 0.0:
-            return cls()
-        try:
-            of_structures = {
-                each.name: result.impulse(each.name).pa_s / each.impulse
-                for each in structures
-                if each.impulse > 0.0
-            }
-        except BlastEnvError:
-            return cls()
-        charge_m = result.blast.scene.charge.position_m
-        width_m = seen_width_m(main.rectangle.scaled(1.0 / UNITS_PER_M), charge_m)
-        factor = of_structures[main.name] * width_m / MODULE_SIDE_M
-        return cls(factor, f"impulse per module (Pa s, calibrated on {main.name})", of_structures)
-
-    def nice_ceiling(self, impulse: float) -> float:
-        """Return the least m|v| of few digits in the unit that is at least a positive one."""
-        return nice_ceiling(self.factor * impulse) / self.factor
-
-    def of_structure(self, obstacle: ModularObstacle) -> str:
-        """Return the load on a structure so far, in words."""
-        factor = self.of_structures.get(obstacle.name)
-        if factor is None:
-            return f"{obstacle.impulse:,.0f} (sim)"
-        return f"{factor * obstacle.impulse:,.0f} Pa s"
-
-
 _NICE_STEPS: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
@@ -139,6 +77,11 @@ def nice_numbers(lowest: float, highest: float) -> list[float]:
 def nice_ceiling(value: float) -> float:
     """Return the smallest number of few digits that is at least a positive value."""
     return nice_numbers(value * (1.0 - 1e-9), 2.0 * value)[0]
+
+
+def nice_load(unit: LoadUnit, impulse: float) -> float:
+    """Return the least m|v| of few digits in a unit that is at least a positive one."""
+    return nice_ceiling(unit.factor * impulse) / unit.factor
 
 
 def nice_floor(value: float) -> float:

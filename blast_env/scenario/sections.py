@@ -328,6 +328,11 @@ class StructureSection(Section):
     ] = WALLS
     building: Name | None = None
 
+    @property
+    def counted_peak_weight(self) -> float:
+        """How much its peak counts: `peak_weight`, or `weight` where that is not given."""
+        return self.weight if self.peak_weight is None else self.peak_weight
+
 
 class ModularObstacleSection(StructureSection):
     """A `ModularObstacle`: a rectangle of rows x columns modules."""

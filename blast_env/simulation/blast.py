@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal, overload
 import numpy as np
 import pandas as pd
 
+from blast_env.calibration.load_unit import LoadUnit
 from blast_env.calibration.model import (
     Calibration,
     CalibrationError,
@@ -239,6 +240,18 @@ class BlastResult:
             return scaled
         notes = (*scaled.notes, f"the blast was cut off: {self.end_reason}")
         return ScaledImpulse(scaled.psi_s, False, notes)
+
+    @cached_property
+    def load_unit(self) -> LoadUnit:
+        """The unit of the loads in tables and pictures.
+
+        Pa s where the scenario has a calibration for the engine and anything was hit.
+        """
+        charge = self.blast.scene.charge
+        try:
+            return LoadUnit.of(self.obstacles, charge, lambda each: self.impulse(each.name))
+        except BlastEnvError:
+            return LoadUnit()
 
     @cached_property
     def digest(self) -> str:

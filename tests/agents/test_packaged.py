@@ -118,6 +118,7 @@ def test_without_weights_the_best_rule_is_proposed_and_that_is_said(
     assert done.exit_code == 0, done.output
     assert "note: no weights come with the package for walled_yard; the best rule" in done.output
     assert "by the best rule by gas dynamics:" in done.output
+    assert "engine gas" in done.output
 
 
 @pytest.mark.parametrize(
@@ -127,6 +128,8 @@ def test_without_weights_the_best_rule_is_proposed_and_that_is_said(
         (["yard", "--tnt-kg", 5], "--tnt-kg is given without --charge"),
         (["yard", "--charge", 9.0, 6.0], "charge"),
         (["courtyrd"], "did you mean 'courtyard'"),
+        (["yard", "--out", "nowhere/layout.json"], "there is no folder"),
+        (["yard", "--out", "layout.toml"], "suffix is '.toml', must be .json"),
     ],
 )
 def test_what_is_of_no_use_is_refused_with_the_reason(

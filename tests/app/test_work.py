@@ -15,7 +15,8 @@ from blast_env.app.blasts import FRAMES
 from blast_env.app.design import SLOTS
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers, settle
-from blast_env.app.records import Engine, blast_key, read_film
+from blast_env.app.placing import plain
+from blast_env.app.records import BlastRecord, Engine, Load, blast_key, comparison, read_film
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status, ThreatOf, read_status, write_status
@@ -102,6 +103,66 @@ def test_the_table_holds_layouts_against_no_barrier(particles: Session) -> None:
     assert rows[0].reduction == "\N{EN DASH}"
     assert rows[2].cost == "10"
     assert {row.engine for row in rows} == {"particles (first look)"}
+
+
+def test_the_table_counts_what_the_site_s_objective_says() -> None:
+    """Peaks have weights of their own; with both, shares of the references are added up."""
+    objective = {
+        "quantity": "both",
+        "reference_impulse_pa_s": 200.0,
+        "reference_peak_pa": 50e3,
+        "charges": "worst",
+    }
+    site = hut(objective=objective)
+    site = site.model_copy(
+        update={
+            "structures": (
+                site.structures[0].model_copy(update={"weight": 2.0, "peak_weight": 3.0}),
+            )
+        }
+    )
+
+    def blast(threat: str, layout: Layout, impulse_pa_s: float, peak_kpa: float) -> BlastRecord:
+        loads = [
+            Load(structure=name, protected=True, impulse_pa_s=impulse_pa_s, peak_kpa=peak_kpa)
+            for name in ("", "hut")
+        ]
+        return BlastRecord(
+            key="k",
+            threat=threat,
+            engine=Engine(name="gas"),
+            layout=plain(layout),
+            loads=tuple(loads),
+            seconds=1.0,
+            repeat={},
+        )
+
+    bare = {"near": blast("near", (), 400.0, 100.0), "far": blast("far", (), 100.0, 50.0)}
+    own = {"near": blast("near", WALL, 200.0, 50.0), "far": blast("far", WALL, 100.0, 100.0)}
+    records = [("no barrier", 0.0, each) for each in bare.values()]
+    records += [("A", 6.0, each) for each in own.values()]
+    rows = {(row.layout, row.threat): row for row in comparison(records, bare, site)}
+    counted = {key: float(row.load) for key, row in rows.items()}
+    assert counted[("no barrier", "near")] == 2.0 * 2.0 + 3.0 * 2.0
+    assert counted[("A", "near")] == 2.0 + 3.0
+    assert counted[("A", "far")] == 1.0 + 6.0
+    assert counted[("no barrier", "all 2: worst")] == 10.0
+    assert counted[("A", "all 2: worst")] == 7.0
+    assert rows[("A", "all 2: worst")].reduction == "30.0 %"
+    assert rows[("A", "near")].reduction == "50.0 %"
+
+
+def test_particles_show_a_film_and_say_that_peaks_need_gas(tmp_path: Path) -> None:
+    session = session_on(tmp_path, hut(objective={"quantity": "peak"}))
+    session.blast([0])
+    (threat,) = session.chosen_threats()
+    record = session.folder.record_of(session.shown(threat)[0].key)
+    assert record is not None
+    assert record.loads == ()
+    assert "no loads: peak overpressure counts here; blast it with gas" in record.notes
+    film = read_film(session.folder.blast_of(record.key))
+    assert film is not None
+    assert film.count == FRAMES
 
 
 def test_an_edit_takes_results_away_and_undo_brings_them_back(particles: Session) -> None:

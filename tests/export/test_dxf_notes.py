@@ -1,11 +1,12 @@
 """What a drawing says beside its lines, read back as a CAD program reads it."""
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import hypot, pi
 from pathlib import Path
 
 import numpy as np
 import pytest
+from blast_agents.rules import random_layout
 from ezdxf.document import Drawing
 from ezdxf.entities.lwpolyline import LWPolyline
 from ezdxf.entities.mtext import MText
@@ -15,6 +16,8 @@ from ezdxf.math import bulge_to_arc
 from blast_env import load_scenario
 from blast_env.export import LayoutPlan, export_layout
 from blast_env.export.dxf import note_lines
+from blast_env.export.labels import key_of, labels_of
+from blast_env.export.plan import FeatureKind
 from blast_env.geometry import Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement, Scenario
@@ -88,6 +91,12 @@ def test_notes_say_what_has_no_place_on_the_site(tmp_path: Path) -> None:
         "Modules: 3 of a stock of 16, 0.5 m x 0.5 m each",
         "Clearance: 1.5 m at least between modules and structures",
         "Access way: 6 m wide, from left to right of the build zone, to be kept open",
+        "A: build zone",
+        "B: the lane through the gap, and room to wait for the check",
+        "C: the lane turns off to the car park here",
+        "D: charge of 500 kg TNT may be here",
+        "E: charge of 100 kg TNT may be here",
+        "F: charge of 500 kg TNT",
     ]
 
 
@@ -95,8 +104,8 @@ def test_the_budget_is_there_with_what_the_modules_take(tmp_path: Path) -> None:
     plan = LayoutPlan(JUNCTION, some_cells(JUNCTION, 4))
     cost = Placement.of(JUNCTION, plan.layout).cost
     lines = notes_of(drawn(plan, tmp_path)).plain_text(split=True)
-    assert lines[-1] == f"Budget: 16, of which the modules take {cost:g}"
-    assert lines[-3:-1] == ["Clearance: none required", "Access way: none required"]
+    budget = lines.index(f"Budget: 16, of which the modules take {cost:g}")
+    assert lines[budget - 2 : budget] == ["Clearance: none required", "Access way: none required"]
 
 
 def test_without_a_charge_the_notes_name_every_mass_that_there_may_be() -> None:
@@ -135,7 +144,7 @@ def test_notes_are_above_everything_and_in_the_first_view(name: str, tmp_path: P
 
 
 def test_notes_on_a_narrow_site_are_readable_all_the_same(tmp_path: Path) -> None:
-    """They wrap rather than shrink, and the first view has room for that."""
+    """Lines are broken rather than shrunk, and the first view has room for that."""
     document = load_scenario("free_field").model_dump()
     document["site"] = {"width_m": 8.0, "height_m": 8.0}
     document["charge"] = [{"kind": "point", "position_m": (2.0, 4.0), "tnt_kg": 100.0}]
@@ -144,11 +153,38 @@ def test_notes_on_a_narrow_site_are_readable_all_the_same(tmp_path: Path) -> Non
     drawing = drawn(LayoutPlan(Scenario.from_document(document, "narrow"), ()), tmp_path)
     notes = notes_of(drawing)
     assert notes.dxf.char_height == 0.4
-    longest = max(map(len, notes.plain_text(split=True)))
-    assert longest * notes.dxf.char_height > 8.0
+    lines = notes.plain_text(split=True)
+    assert max(map(len, lines)) * notes.dxf.char_height <= 8.0
+    assert lines[1:4] == ["Units: metres, from", "the lower left", "corner of the site"]
     (view,) = drawing.viewports.get_config("*Active")
-    wrapped_m = notes.dxf.insert.y + 5 * 5.0 / 3.0 * 0.4  # three lines, two of them in two
+    wrapped_m = notes.dxf.insert.y + len(lines) * 5.0 / 3.0 * 0.4
     assert view.dxf.center.y + view.dxf.height / 2.0 > wrapped_m
+
+
+@pytest.mark.parametrize("name", ["control_room", "hotel_forecourt", *NAMES, "school_and_clinic"])
+def test_no_text_covers_another_or_a_module(name: str) -> None:
+    scenario = load_scenario(name)
+    layout = random_layout(scenario, np.random.default_rng(0)) if scenario.build_zone else ()
+    plan = LayoutPlan(scenario, layout)
+    labels = labels_of(plan, 0.6)
+    for one, other in combinations([label.box_m for label in labels], 2):
+        assert not one.overlaps(other)
+    pieces = [each for each in plan.features if each.kind is FeatureKind.BARRIER]
+    for label in labels:
+        if label.feature not in pieces:
+            outlines = [Rectangle(*piece.places_m[0], *piece.places_m[2]) for piece in pieces]
+            assert not any(label.box_m.overlaps(outline) for outline in outlines)
+        elif label.text:
+            outline = Rectangle(*label.feature.places_m[0], *label.feature.places_m[2])
+            assert outline.contains(label.box_m)
+
+
+def test_every_letter_is_explained_once() -> None:
+    plan = LayoutPlan(load_scenario("control_room"), ())  # three places of one charge
+    key = key_of(plan)
+    letters = [label.text for label in labels_of(plan, 0.5) if len(label.text) == 1]
+    assert set(letters) == set(key.values())
+    assert letters.count(key["charge of 100 kg TNT may be here"]) == 3
 
 
 def test_the_clearance_is_a_dashed_line_at_its_distance_from_every_structure(

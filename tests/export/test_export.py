@@ -155,11 +155,12 @@ def test_every_part_of_a_site_is_in_every_drawing(name: str, tmp_path: Path) -> 
 
 def test_a_reason_with_a_line_break_leaves_the_drawing_whole(tmp_path: Path) -> None:
     document = COURTYARD.model_dump()
-    document["build_zone"]["keep_outs"][0]["reason"] = "a door\nand 0\nEOF, größer"
+    document["build_zone"]["keep_outs"][0]["reason"] = "a door\nand 0\nEOF, {größer}"
     scenario = Scenario.from_document(document, "courtyard")
     drawing = readfile(export_layout(plan(scenario), tmp_path / "layout.dxf"))
-    texts = [each.dxf.text for each in drawing.modelspace().query('TEXT[layer=="KEEP_OUT"]')]
-    assert "a door and 0 EOF, größer" in texts
+    (notes,) = drawing.modelspace().query('MTEXT[layer=="NOTES"]')
+    lines = notes.plain_text(split=True)  # type: ignore[attr-defined]
+    assert "B: a door and 0 EOF, {größer}" in lines
 
 
 def test_a_folder_gets_every_layout_in_every_form(tmp_path: Path) -> None:

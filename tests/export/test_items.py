@@ -119,7 +119,7 @@ def test_dxf_has_pieces_as_high_as_they_are_with_their_names(tmp_path: Path) -> 
     texts = [(each.dxf.text, each.dxf.rotation) for each in space.query('TEXT[layer=="ITEMS"]')]
     assert texts == [("wall 2 m", 90.0), ("wall 2 m", 90.0), ("post 1 m", 0.0)]
     (notes,) = space.query('*[layer=="NOTES"]')
-    lines = notes.plain_text(split=True)  # type: ignore[attr-defined]
+    lines = " ".join(notes.plain_text(split=True))  # type: ignore[attr-defined]
     assert "wall: 2 of a stock of 3, 1.5 m x 0.5 m, 2 m high" in lines
     assert "Budget: 20, of which the pieces take 13" in lines
 

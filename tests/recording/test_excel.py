@@ -21,8 +21,9 @@ from blast_env.recording.tables import (
     STRUCTURE_COLUMNS,
     RunRecord,
 )
-from blast_env.simulation import BlastResult
+from blast_env.simulation import BlastResult, simulate
 from blast_env.tables import Column
+from tests.agents.search_cases import small_scenario
 from tests.recording import workbooks
 from tests.recording.conftest import SEED
 
@@ -321,3 +322,30 @@ def test_a_long_table_prints_on_few_pages(tmp_path: Path) -> None:
     assert 'fitToHeight="0"' in sheet
     assert sheet.count("<row ") == 3001
     assert "of 3,000 rows" in sheet
+
+
+@pytest.fixture(scope="module")
+def calibrated() -> BlastResult:
+    """A charge that stands nearer than the calibration was made for."""
+    return simulate(small_scenario(), seed=0, engine="event")
+
+
+def test_a_calibrated_blast_has_pa_s_beside_simulation_units(
+    calibrated: BlastResult, tmp_path: Path
+) -> None:
+    workbook = workbooks.load(calibrated.to_excel(tmp_path / "blast.xlsx"))
+    structures = workbooks.table(workbook["Structures"])
+    building = next(row for row in structures if row["structure"] == "building")
+    scaled = calibrated.impulse("building")
+    assert building["impulse (Pa s)"] == pytest.approx(scaled.pa_s)
+    assert building["calibration in range"] == ("; ".join(scaled.notes) or "yes")
+    unit = calibrated.load_unit
+    for row in workbooks.table(workbook["Modules"]):
+        assert row["impulse (Pa s)"] == pytest.approx(unit.factor * row["impulse, m|v| (sim)"])
+    chart = workbook["Run"]._charts[0]
+    assert "Pa s" in workbooks.title(chart.y_axis)
+    assert "sim" not in workbooks.title(chart)
+    assert chart.series[0].tx.v == f"building: {scaled.pa_s:,.1f} Pa s"
+    shown = workbooks.cells(workbook, workbooks.reference(chart.series[0], "val"))
+    largest = calibrated.modules["impulse_sim"].max()
+    assert max(filter(None, shown)) == pytest.approx(unit.factor * largest)

@@ -17,6 +17,12 @@ def rows(sheet: Any) -> list[list[Any]]:
     return [list(row) for row in sheet.iter_rows(values_only=True)]
 
 
+def table(sheet: Any) -> list[dict[str, Any]]:
+    """Return the rows of a sheet below its headings, by heading."""
+    headings, *values = rows(sheet)
+    return [dict(zip(headings, row, strict=True)) for row in values]
+
+
 def expected(table: pd.DataFrame) -> list[list[Any]]:
     """Return what the rows of a table must look like in a workbook."""
     return [[_expected_cell(value) for value in row] for row in table.itertuples(index=False)]

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 
 from blast_env import simulate
+from blast_env.calibration import LoadUnit
 from blast_env.calibration.model import seen_width_m
 from blast_env.rendering.figures import common_scale, heat_map, impulse_over_time
 from blast_env.rendering.film import largest_load
 from blast_env.rendering.frames import ONE_SEED, FramePainter
-from blast_env.rendering.style import LoadUnit, nice_ceiling
+from blast_env.rendering.style import nice_ceiling
 from blast_env.simulation import BlastResult
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 from tests.agents.search_cases import small_scenario
@@ -42,7 +43,7 @@ def texts(figure: matplotlib.figure.Figure) -> str:
 def test_a_load_spread_evenly_over_the_seen_width_is_that_of_the_structure(
     bare: BlastResult,
 ) -> None:
-    unit = LoadUnit.of(bare)
+    unit = bare.load_unit
     (building,) = (each for each in bare.obstacles if each.protected)
     pa_s = bare.impulse(building.name).pa_s
     width_m = seen_width_m(
@@ -54,7 +55,7 @@ def test_a_load_spread_evenly_over_the_seen_width_is_that_of_the_structure(
 
 
 def test_without_a_calibration_loads_stay_in_simulation_units(uncalibrated: BlastResult) -> None:
-    unit = LoadUnit.of(uncalibrated)
+    unit = uncalibrated.load_unit
     assert unit == LoadUnit()
     assert not unit.is_calibrated
     assert "simulation units" in texts(heat_map(uncalibrated))
@@ -75,7 +76,7 @@ def test_maps_without_and_with_a_barrier_have_one_scale_in_pa_s(
 
 
 def test_the_scale_of_a_film_ends_at_a_nice_number_of_pa_s(bare: BlastResult) -> None:
-    unit = LoadUnit.of(bare)
+    unit = bare.load_unit
     full = largest_load(bare, unit)
     assert full is not None
     assert unit.factor * full == pytest.approx(nice_ceiling(unit.factor * full))
@@ -83,7 +84,7 @@ def test_the_scale_of_a_film_ends_at_a_nice_number_of_pa_s(bare: BlastResult) ->
 
 def test_frames_say_what_has_come_so_far_and_what_one_seed_is(bare: BlastResult) -> None:
     """The line with the loads changes from frame to frame; the site below it is the same."""
-    unit = LoadUnit.of(bare)
+    unit = bare.load_unit
     painter = FramePainter.for_blast(bare.blast, unit=unit)
     balls = bare.final_balls
     begun = painter.paint(balls, bare.blast.scene.obstacles(), 0.0)
@@ -93,3 +94,14 @@ def test_frames_say_what_has_come_so_far_and_what_one_seed_is(bare: BlastResult)
     assert len(changed) > 0
     assert changed[:, 1].min() > painter.size_px[0] / 2  # on the right
     assert "mean over seeds" in ONE_SEED
+
+
+def test_films_beside_each_other_say_each_blast_s_own_load(
+    bare: BlastResult, walled: BlastResult
+) -> None:
+    """The law of a calibration is no straight line: one factor for both would be wrong."""
+    shared = bare.load_unit.with_loads_of(walled.load_unit)
+    (building,) = (each for each in walled.obstacles if each.protected)
+    assert shared.of_structure(building) == f"{walled.impulse('building').pa_s:,.0f} Pa s"
+    assert bare.load_unit.of_structure(building) != shared.of_structure(building)
+    assert (shared.factor, shared.label) == (bare.load_unit.factor, bare.load_unit.label)

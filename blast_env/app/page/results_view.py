@@ -5,9 +5,10 @@ from typing import Any, Final
 
 from nicegui import ui
 
-from blast_env.app.records import BlastRecord, Row, read_film
+from blast_env.app.records import BlastRecord, Judge, Row, read_film
 from blast_env.app.session import Session
 from blast_env.app.threats import NamedThreat
+from blast_env.scenario import ObjectiveSection
 
 _FILM: Final = "film"
 _GAUGES: Final = "gauges"
@@ -17,6 +18,7 @@ _COLUMNS: Final = (
     ("structure", "structure", "left"),
     ("impulse", "impulse (Pa\N{NO-BREAK SPACE}s)", "right"),
     ("peak", "peak (kPa)", "right"),
+    ("load", "", "right"),  # what the site's objective counts: its heading is that of the objective
     ("reduction", "reduction", "right"),
     ("cost", "cost", "right"),
     ("engine", "engine", "left"),
@@ -68,10 +70,7 @@ class ResultsView:
             self._bar = ui.html(_BAR, sanitize=False).classes("w-full")
             self._cards = ui.element("div").classes("be-cards")
             self._chart = ui.column().classes("w-full")
-            columns = [
-                {"name": name, "field": name, "label": label, "align": align}
-                for name, label, align in _COLUMNS
-            ]
+            columns = _columns(self._session.scenario.objective)
             self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full mt-2")
             self._table.props("dense flat bordered")
             self._notes = ui.column().classes("gap-0 mt-1")
@@ -115,6 +114,8 @@ class ResultsView:
         self._show_cards(shown)
         self._show_chart(threats[self._threat])
         rows = session.comparison()
+        judge = Judge(session.scenario)
+        self._table.columns = _columns(judge.objective)
         self._table.rows = [_row(each, k) for k, each in enumerate(rows)]
         self._table.visible = bool(rows)
         self._empty.visible = not found
@@ -175,7 +176,9 @@ class ResultsView:
     def _summary(self, record: BlastRecord | None) -> str:
         if record is None or not record.loads:
             return "" if record is not None else "loads to come"
-        return f"{record.loads[0].impulse_pa_s:,.0f} Pa s on what is protected"
+        judge = Judge(self._session.scenario)
+        noun = "" if judge.objective.quantity == "impulse" else f"{judge.objective.noun} "
+        return f"{noun}{judge.text(judge.together(record))} on what is protected"
 
     def _show_chart(self, threat: NamedThreat) -> None:
         self._chart.clear()
@@ -193,6 +196,16 @@ class ResultsView:
         with self._notes:
             for note in dict.fromkeys(note for each in records for note in each.notes):
                 ui.label(f"note: {note}").classes("be-quiet")
+
+
+def _columns(objective: ObjectiveSection) -> list[dict[str, str]]:
+    """Return the columns of the table; what counts has one unless it is the impulse."""
+    counts = f"counts: {objective.noun}" + (f" ({objective.unit})" if objective.unit else "")
+    return [
+        {"name": name, "field": name, "label": label or counts, "align": align}
+        for name, label, align in _COLUMNS
+        if label or objective.quantity != "impulse"
+    ]
 
 
 def _row(row: Row, number: int) -> dict[str, Any]:

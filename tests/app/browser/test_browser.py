@@ -29,7 +29,8 @@ from blast_env.app.plan import View
 from blast_env.scenario import Scenario, load_scenario, save_scenario
 
 WIDTH, HEIGHT = 1280, 800
-PICTURES = Path(__file__).parents[3] / "out" / "app"
+REPOSITORY = Path(__file__).parents[3]
+PICTURES, DATA = REPOSITORY / "out" / "app", REPOSITORY / "docs" / "data"
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 
 pytestmark = pytest.mark.skipif(
@@ -168,9 +169,23 @@ class Page:
         sleep(0.4)
         self.press(Keys.ESCAPE)
 
+    def fill(self, label: str, text: str) -> None:
+        """Write into the field of a label, in the place of what is there."""
+        for each in self.all(".q-field"):
+            if each.is_displayed() and label in each.text:
+                field = each.find_element(By.TAG_NAME, "input")
+                field.send_keys(Keys.CONTROL, "a")
+                field.send_keys(text)
+                return
+        raise AssertionError(f"there is no field {label!r}")
+
     def press(self, *keys: str) -> None:
         ActionChains(self.driver).send_keys(*keys).perform()
         sleep(0.15)
+
+    def film_widths(self) -> list[int]:
+        """Return how wide the frames are that are shown; 0 for one that is still to come."""
+        return [each.get_property("naturalWidth") for each in self.all("img[data-film]")]
 
     def shoot(self, name: str) -> None:
         PICTURES.mkdir(parents=True, exist_ok=True)
@@ -254,9 +269,7 @@ def test_place_blast_and_compare_by_particles(page: Page) -> None:
         "arguments[0].value = 14; arguments[0].dispatchEvent(new Event('input', {bubbles: true}))",
         slider,
     )
-    sleep(1.0)
-    widths = [each.get_property("naturalWidth") for each in page.all("img[data-film]")]
-    assert widths == [640, 640, 640]
+    page.until(lambda: page.film_widths() == [640, 640, 640])
     frames = {each.get_attribute("src").rpartition("/")[2] for each in page.all("img[data-film]")}
     assert frames == {"014.jpg"}  # all films at the same moment
     page.shoot("results_particles")
@@ -295,8 +308,7 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
         "arguments[0].value = 20; arguments[0].dispatchEvent(new Event('input', {bubbles: true}))",
         slider,
     )
-    sleep(0.7)
-    assert [each.get_property("naturalWidth") for each in page.all("img[data-film]")] == [640, 640]
+    page.until(lambda: page.film_widths() == [640, 640])
     page.shoot("results_gas_film")
     for number, picture in enumerate(("peak over", "impulse on the walls", "gauges")):
         page.choose("picture", picture)
@@ -380,3 +392,79 @@ def test_two_tabs_do_not_mix_and_a_second_server_is_refused(page: Page, server: 
         )
         assert done.returncode == 2
         assert words in done.stderr
+
+
+def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
+    """Import, proposal, gas verdict and report by the page; the minutes are written down."""
+    began_s = monotonic()
+    stages: list[str] = []
+
+    def reached(stage: str) -> None:
+        stages.append(f"{monotonic() - began_s:.0f} s: {stage}")
+
+    page.open()
+    page.all("input[type=file]")[0].send_keys(str(DATA / "pump_house.geojson"))
+    page.sees("protected buildings")
+    page.fill("protected buildings", "Pump House")
+    page.fill("stock of modules", "8")
+    page.button("import").click()
+    page.sees("its modules miss")
+    page.shoot("import_deviations")
+    page.button("take this site").click()
+    page.until(lambda: "/design/" in page.driver.current_url)
+    page.until(lambda: page.all(".be-plan svg text"))
+    reached("the site of the map")
+    page.choose("by", "wall in the middle")
+    page.button("Propose").click()
+    page.button("take it").click()
+    page.sees("8 of 8 modules")
+    reached("a layout by rule")
+    page.choose("engine", "gas, cells of 0.5 m")
+    page.button("Blast").click()
+    page.until(lambda: len(page.all(".q-table tbody tr")) == 4, 300.0)
+    page.shoot("map_verdict")
+    reached("the verdict of gas dynamics")
+    page.button("Save as").click()
+    sleep(0.5)
+    page.button("report on this layout (.html)").click()
+    page.until(lambda: "wrote pump_house_A.html" in page.text(), 1800.0)
+    page.shoot("map_report_done")
+    page.button("download").click()
+    (report,) = page.until(lambda: [*(tmp_path / "downloads").glob("*.html")])
+    assert "In short" in report.read_text(encoding="utf-8")
+    reached("the report")
+    (PICTURES / "map_to_report.txt").write_text("\n".join(stages) + "\n")
+    assert not page.faults()
+
+
+def test_a_site_too_large_for_gas_is_told_and_kept(page: Page, tmp_path: Path) -> None:
+    document = high_courtyard().model_dump(mode="json", exclude_none=True)
+    document["site"] |= {"width_m": 2000.0, "height_m": 2000.0}
+    save_scenario(Scenario.from_document(document, "wide"), tmp_path / "wide.toml")
+    page.open()
+    page.all("input[type=file]")[0].send_keys(str(tmp_path / "wide.toml"))
+    page.until(lambda: "/design/" in page.driver.current_url)
+    page.choose("engine", "gas, cells of 0.5 m")
+    page.button("Blast").click()
+    page.sees("GiB, must be at most 8: take larger cells", 120.0)
+    page.shoot("too_large")
+    page.driver.refresh()
+    page.sees("GiB, must be at most 8: take larger cells")
+
+
+def test_a_closed_tab_leaves_its_work_running(page: Page) -> None:
+    page.begin("courtyard")
+    address = page.driver.current_url
+    page.choose("by", "search: random")
+    page.button("Propose").click()
+    page.sees("search", 120.0)
+    page.driver.switch_to.new_window("tab")
+    first, second = page.driver.window_handles
+    page.driver.switch_to.window(first)
+    page.driver.close()
+    page.driver.switch_to.window(second)
+    sleep(2.0)
+    page.driver.get(address)
+    page.sees("after 100 of 100", 300.0)
+    page.button("take it").click()
+    page.sees("16 of 16 modules")
