@@ -6,14 +6,16 @@ import os
 import re
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from stat import S_ISREG
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 from blast_env.errors import BlastEnvError
+
+T = TypeVar("T")
 
 
 def make_folder(folder: str | Path) -> None:
@@ -185,6 +187,21 @@ class FolderStore:
             with suppress(OSError):
                 os.utime(path)
         return content
+
+    def read(self, key: str, decode: Callable[[bytes], T]) -> T | None:
+        """Return what the content of a key says, or `None` if it is not there in one piece.
+
+        Args:
+            key: The key.
+            decode: Says it; `ValueError` is for content that is what was written, as the checksum
+                shows, and yet something else: it counts as damaged.
+        """
+        content = self.get(key)
+        try:
+            return None if content is None else decode(content)
+        except ValueError:
+            self.discard(key)
+            return None
 
     def put(self, key: str, content: bytes) -> None:
         """Keep the content of a key; the ones that were asked for longest ago may have to go.

@@ -6,8 +6,9 @@ from math import nan
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
+from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
@@ -18,6 +19,9 @@ RECORD: Final = "record.json"
 """Name of the file in the folder of a blast; it is there when all of it is."""
 
 FILM: Final = "film.json"
+MOST_BYTES: Final = 50_000_000
+"""Most that a file of the work folder may have."""
+
 FRAME: Final = "{:03}.jpg"
 
 
@@ -149,16 +153,16 @@ def write_kept(record: Kept, path: Path) -> None:
 def read_record(folder: Path) -> BlastRecord | None:
     """Return the record of a blast, or `None` if it is not there or damaged."""
     try:
-        return BlastRecord.model_validate_json((folder / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return BlastRecord.model_validate_json(read_text(folder / RECORD, MOST_BYTES))
+    except ValueError:
         return None
 
 
 def read_film(folder: Path) -> Film | None:
     """Return what there is of the film of a blast, or `None` if nothing is."""
     try:
-        return Film.model_validate_json((folder / FILM).read_text(encoding="utf-8"))
-    except (OSError, ValidationError, ValueError):
+        return Film.model_validate_json(read_text(folder / FILM, MOST_BYTES))
+    except ValueError:
         return None
 
 

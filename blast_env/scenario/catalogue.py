@@ -13,16 +13,10 @@ from typing import Annotated, Any, Final, NamedTuple
 import numpy as np
 from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 
-from blast_env.errors import LayoutError, suggestion
+from blast_env.errors import LayoutError, suggestion, type_word, value_text
 from blast_env.geometry import Cell, Element, Piece
 from blast_env.scenario.barriers import stock_barriers
-from blast_env.scenario.problems import (
-    Problem,
-    ScenarioError,
-    type_word,
-    unknown_name,
-    value_text,
-)
+from blast_env.scenario.problems import Problem, ScenarioError, unknown_name
 from blast_env.scenario.sections import Count, Height, Name, Section
 
 Cost = Annotated[StrictFloat, Field(gt=0.0, le=1e9)]

@@ -9,14 +9,13 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from blast_env.documents import MAX_BYTES, DocumentError, parse_json, read_text
-from blast_env.errors import LayoutError, suggestion
+from blast_env.errors import LayoutError, key_path, suggestion, type_word, value_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout, Piece
 from blast_env.scenario.catalogue import cell_from
 from blast_env.scenario.files import AnyScenario, find_scenario
 from blast_env.scenario.models import Scenario
 from blast_env.scenario.placement import check_layout
-from blast_env.scenario.problems import key_path, type_word, value_text
 
 CELLS_VERSION: Final = 1
 """The version of a file whose layout consists of cells; it need not say so."""

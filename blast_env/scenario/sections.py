@@ -22,6 +22,7 @@ from pydantic import (
     ValidationError,
 )
 
+from blast_env.errors import type_word
 from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import PRESETS, preset
@@ -30,7 +31,6 @@ from blast_env.scenario.problems import (
     Problem,
     ScenarioError,
     problems_from,
-    type_word,
     unknown_key,
     unknown_name,
 )
