@@ -30,12 +30,14 @@ class UnknownNameError(BlastEnvError):
         known: The names that exist.
     """
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         names = sorted(known)
-        super().__init__(f"no {kind} {name!r}{suggestion(name, names)}; known: {', '.join(names)}")
+        super().__init__(
+            f"no {kind} {value_text(name)}{suggestion(name, names)}; known: {', '.join(names)}"
+        )
         self._arguments = (kind, name, names)
 
-    def __reduce__(self) -> tuple[type["UnknownNameError"], tuple[str, str, list[str]]]:
+    def __reduce__(self) -> tuple[type["UnknownNameError"], tuple[str, object, list[str]]]:
         return type(self), self._arguments
 
 
@@ -57,7 +59,7 @@ class UnknownArgumentError(BlastEnvError, TypeError):
         """
         names = sorted(known)
         return cls(
-            f"{function}() got an unexpected keyword argument {name!r}"
+            f"{function}() got an unexpected keyword argument {value_text(name)}"
             f"{suggestion(name, names)}; known: {', '.join(names)}"
         )
 
@@ -84,8 +86,10 @@ def import_extra(extra: str, what: str) -> Iterator[None]:
         ) from error
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
+def suggestion(name: object, known: Iterable[str]) -> str:
     """Return `", did you mean 'x'?"` for the nearest known name, or an empty string."""
+    if not isinstance(name, str) or len(name) > MAX_TEXT:  # longer ones take long to compare
+        return ""
     nearest = get_close_matches(name, list(known), n=1, cutoff=0.6)
     return f", did you mean {nearest[0]!r}?" if nearest else ""
 

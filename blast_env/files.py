@@ -14,6 +14,7 @@ from stat import S_ISREG
 from typing import Final, NamedTuple, TypeVar
 
 from blast_env.errors import BlastEnvError
+from blast_env.values import path_of
 
 T = TypeVar("T")
 
@@ -25,7 +26,7 @@ def make_folder(folder: str | Path) -> None:
         BlastEnvError: If something else is there, or it cannot be made.
     """
     try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
+        path_of(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BlastEnvError(f"{folder}: cannot be a folder: {error.strerror or error}") from error
 
@@ -51,7 +52,7 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
         BlastEnvError: If the folder does not exist or cannot be written to, if `target` is
             itself a folder, or if the block raises `OSError`: the device is full, for example.
     """
-    path = Path(os.path.realpath(target))
+    path = Path(os.path.realpath(path_of(target)))
     if os.path.isdir(path):
         raise BlastEnvError(f"{target}: is a folder, must be a file")
     if not os.path.isdir(path.parent):

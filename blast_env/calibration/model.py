@@ -24,6 +24,7 @@ from blast_env.physics.scene import Charge
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Scenario
 from blast_env.units import PA_PER_PSI, UNITS_PER_M
+from blast_env.values import path_of
 
 SimulatedQuantity = Literal["impulse", "transferred_impulse"]
 """The paper's sum of m |v|, or the momentum really transferred along the normals."""
@@ -276,7 +277,7 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
         CalibrationError: If there is none for that engine, or the file cannot be read, was cut
             short or was edited.
     """
-    path = Path(name_or_path)
+    path = path_of(name_or_path)
     if path.suffix != SUFFIX:
         name, known = str(name_or_path), stored_calibrations()
         if name not in known:

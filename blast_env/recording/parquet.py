@@ -14,6 +14,7 @@ from blast_env.errors import BlastEnvError, shortened
 from blast_env.files import write_atomically
 from blast_env.recording.tables import COLLISION_COLUMNS, RecordedBlast, RunRecord
 from blast_env.tables import Column
+from blast_env.values import path_of
 
 METADATA_KEY: Final = b"blast_env"
 """Key of the run record, as JSON, in the metadata of the file."""
@@ -57,7 +58,7 @@ def write_table(
     Raises:
         BlastEnvError: If the suffix is another one or the file cannot be written there.
     """
-    path = Path(path)
+    path = path_of(path)
     if path.suffix.lower() != SUFFIX:
         raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
     table = _arrow_table(frame, columns, record)
@@ -82,7 +83,7 @@ def read_parquet(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
         BlastEnvError: If there is no such file, if it is damaged or no Parquet, or if something
             else wrote it.
     """
-    path = Path(path)
+    path = path_of(path)
     frame, metadata = _read(path)
     return frame, _run_record(path, metadata)
 

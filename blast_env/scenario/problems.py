@@ -119,6 +119,9 @@ def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Proble
         parts, annotation = _followed(model, detail["loc"][:-1])
         yield unknown_key((*parts, detail["loc"][-1]), _options(annotation)[0].model_fields)
         return
+    if kind == "invalid_key":
+        yield Problem("", f"has the key {value_text(detail['input'])}, keys must be strings")
+        return
     parts, annotation = _followed(model, detail["loc"])
     if kind == "value_error" and isinstance(cause := context["error"], ScenarioError):
         yield from (problem.below(parts) for problem in cause.problems)
