@@ -198,7 +198,7 @@ def run_study(
     )
     for threat in threats:
         check_layout(scenario.with_possible_charges([threat.charge]), cells)
-    front = _front_layouts(options.front, scenario)
+    front = front_layouts(options.front, scenario)
     bill = bill_of_quantities(LayoutPlan(scenario, cells))
     runs = Runs(scenario, cells, options, targets, threats, progress)
     runs.run_threats()
@@ -374,7 +374,7 @@ class _FrontRow:
     layout: str
 
 
-def _front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
+def front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
     """Return the layouts of a front that a search wrote.
 
     Raises:
