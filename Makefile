@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 export SDL_VIDEODRIVER ?= dummy
 export PYGAME_HIDE_SUPPORT_PROMPT := 1
 
-.PHONY: demo test suite test-browser quick docs lint types compiled check setup clean
+.PHONY: demo test suite test-browser attack quick docs lint types compiled check setup clean
 
 demo: $(STAMP)
 	$(BIN)/python scripts/demo.py
@@ -29,6 +29,10 @@ quick: $(STAMP)
 # The page in a real browser, headless; needs chromium and chromium-driver. Screenshots: out/app/.
 test-browser: $(STAMP)
 	$(BIN)/pytest tests/app/browser
+
+# Thousands of wrong files of every format that is read; some minutes on one core.
+attack: $(STAMP)
+	$(BIN)/python -m tests.attack.run
 
 # The site: out/docs/html/index.html. Warnings are errors; notebooks run when they have changed.
 docs: $(VENV)/.docs

@@ -1,12 +1,18 @@
 """Reading text files that people write or edit: small, not deep, and without surprises."""
 
+import csv
 import json
 import re
 import tomllib
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from io import StringIO
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
-from blast_env.errors import BlastEnvError
+from pydantic import TypeAdapter, ValidationError
+
+from blast_env.errors import BlastEnvError, key_path, shortened, value_text
 
 MAX_BYTES: Final = 1_000_000
 """Larger files are refused: they are something else that was named by mistake."""
@@ -18,8 +24,13 @@ square of it, or fail in ways of their own."""
 MAX_DIGITS: Final = 1000
 """Digits of an integer."""
 
+MOST_CLAUSES: Final = 10
+"""Problems that one message names; the others are counted."""
+
 _SHOWN: Final = 60
 """Characters of a text from a file in a message."""
+
+T = TypeVar("T")
 
 
 class DocumentError(BlastEnvError):
@@ -127,12 +138,14 @@ def _toml_error(message: str, text: str) -> DocumentError:
         # The only error without a place: an integer that Python refuses to read.
         digits = re.search(r"[0-9_]{1000,}", text)
         number = text.count("\n", 0, digits.start() if digits else len(text)) + 1
-        return DocumentError(f"line {number}", f"is not usable: {_cut(message.split(';')[0], 200)}")
+        return DocumentError(
+            f"line {number}", f"is not usable: {shortened(message.split(';')[0], 200)}"
+        )
     what, line, column = match.groups()
     if line is None:
         lines = text.split("\n")
         line, column = str(len(lines)), str(len(lines[-1]) + 1)
-    return DocumentError(f"line {line}, column {column}", f"is not TOML: {_cut(what, 200)}")
+    return DocumentError(f"line {line}, column {column}", f"is not TOML: {shortened(what, 200)}")
 
 
 _JSON_TOKEN: Final = re.compile(r'"(?:[^"\\]|\\.)*+"|([\[{])|([\]}])', re.DOTALL)
@@ -173,7 +186,7 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _integer(digits: str) -> int:
     """Read an integer, refusing one so long that Python would refuse it without saying where."""
     if len(digits) > MAX_DIGITS:
-        shown = _cut(digits, _SHOWN)
+        shown = shortened(digits, _SHOWN)
         raise DocumentError("", f"{shown} has {len(digits)} digits, which is too large")
     return int(digits)
 
@@ -182,5 +195,92 @@ def _no_number(name: str) -> float:
     raise DocumentError("", f"{name} is not a number of JSON")
 
 
-def _cut(text: str, length: int) -> str:
-    return text if len(text) <= length else text[: length - 3] + "..."
+@lru_cache(maxsize=64)
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+def checked_as(kind: type[T], content: Any) -> T:
+    """Return plain data as what it must be.
+
+    Args:
+        kind: The type: a model, a dataclass, or anything else that pydantic knows.
+        content: What a file holds.
+
+    Raises:
+        DocumentError: If it is anything else; the message has key, value and bound.
+    """
+    hashable: Any = kind
+    try:
+        found: T = _adapter(hashable).validate_python(content)
+    except ValidationError as error:
+        raise DocumentError("", described(error)) from error
+    return found
+
+
+def described(error: ValidationError) -> str:
+    """Return what is wrong with values, a clause each: where, what it is, and the bound."""
+    details = error.errors(include_url=False)
+    clauses = []
+    for each in details[:MOST_CLAUSES]:
+        where = key_path([part if isinstance(part, int) else str(part) for part in each["loc"]])
+        what = shortened(each["msg"].removeprefix("Value error, "), 500)
+        if each["type"] == "missing":
+            clauses.append(f"{where} is missing")
+        else:
+            clauses.append(f"{where} is {value_text(each['input'])}: {what}" if where else what)
+    if len(details) > MOST_CLAUSES:
+        clauses.append(f"{len(details) - MOST_CLAUSES} more problems")
+    return "; ".join(clauses)
+
+
+def parse_json_lines(text: str, kind: type[T]) -> Iterator[T]:
+    """Yield what each line of a text holds, JSON each.
+
+    A last line without its end is left out: it is one that was being written.
+
+    Args:
+        text: The text.
+        kind: What each line must be; see `checked_as`.
+
+    Raises:
+        DocumentError: If a line is anything else; its place is the line.
+    """
+    for number, line in enumerate(text.split("\n")[:-1], start=1):
+        try:
+            yield checked_as(kind, parse_json(line))
+        except DocumentError as error:
+            raise DocumentError(f"line {number}", error.message) from error
+
+
+def parse_csv(text: str, kind: type[T]) -> Iterator[T]:
+    """Yield the rows of a table, whose first line has the names of its columns.
+
+    Args:
+        text: The text; its last line has an end.
+        kind: What a row must be, by the names of the columns; see `checked_as`.
+
+    Raises:
+        DocumentError: If it is no table, was cut within a line, or a row is anything else; the
+            place is the line.
+    """
+    if not text:
+        raise DocumentError("", "is empty, must have a line with the names of columns")
+    if not text.endswith("\n"):
+        raise DocumentError(f"line {text.count(chr(10)) + 1}", "has no end: was it cut short?")
+    reader = csv.reader(StringIO(text, newline=""), strict=True)
+    try:
+        names = next(reader, [])
+        for cells in _full_rows(reader, len(names)):
+            yield checked_as(kind, dict(zip(names, cells, strict=True)))
+    except csv.Error as error:
+        raise DocumentError(f"line {reader.line_num}", f"is no row of a table: {error}") from error
+    except DocumentError as error:
+        raise DocumentError(f"line {reader.line_num}", error.message) from error
+
+
+def _full_rows(rows: Iterable[list[str]], columns: int) -> Iterator[list[str]]:
+    for row in rows:
+        if len(row) != columns:
+            raise DocumentError("", f"has {len(row)} cells, must have {columns}")
+        yield row

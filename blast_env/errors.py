@@ -1,8 +1,12 @@
-"""The errors that a user can cause, each with a message that says what to change."""
+"""The errors that a user can cause, each with a message that says what to change; their words."""
 
-from collections.abc import Iterable, Iterator
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import date, datetime, time
 from difflib import get_close_matches
+from typing import Final
 
 
 class BlastEnvError(ValueError):
@@ -26,12 +30,14 @@ class UnknownNameError(BlastEnvError):
         known: The names that exist.
     """
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         names = sorted(known)
-        super().__init__(f"no {kind} {name!r}{suggestion(name, names)}; known: {', '.join(names)}")
+        super().__init__(
+            f"no {kind} {value_text(name)}{suggestion(name, names)}; known: {', '.join(names)}"
+        )
         self._arguments = (kind, name, names)
 
-    def __reduce__(self) -> tuple[type["UnknownNameError"], tuple[str, str, list[str]]]:
+    def __reduce__(self) -> tuple[type["UnknownNameError"], tuple[str, object, list[str]]]:
         return type(self), self._arguments
 
 
@@ -53,7 +59,7 @@ class UnknownArgumentError(BlastEnvError, TypeError):
         """
         names = sorted(known)
         return cls(
-            f"{function}() got an unexpected keyword argument {name!r}"
+            f"{function}() got an unexpected keyword argument {value_text(name)}"
             f"{suggestion(name, names)}; known: {', '.join(names)}"
         )
 
@@ -80,7 +86,83 @@ def import_extra(extra: str, what: str) -> Iterator[None]:
         ) from error
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
+def suggestion(name: object, known: Iterable[str]) -> str:
     """Return `", did you mean 'x'?"` for the nearest known name, or an empty string."""
+    if not isinstance(name, str) or len(name) > MAX_TEXT:  # longer ones take long to compare
+        return ""
     nearest = get_close_matches(name, list(known), n=1, cutoff=0.6)
     return f", did you mean {nearest[0]!r}?" if nearest else ""
+
+
+MAX_TEXT: Final = 60
+"""Characters after which a value or a key is cut."""
+
+
+def shortened(text: str, length: int = MAX_TEXT) -> str:
+    """Return the text, its end replaced by dots if it is too long."""
+    return text if len(text) <= length else text[: length - 3] + "..."
+
+
+KeyParts = tuple[str | int, ...]
+
+
+def key_path(parts: Sequence[str | int]) -> str:
+    """Return keys and indices as they would be read aloud: `structures[1].rows`."""
+    text = ""
+    for part in parts:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            key = part if re.fullmatch(r"[A-Za-z0-9_-]+", part) else _quoted(part)
+            text += ("." if text else "") + shortened(key)
+    return text
+
+
+def value_text(value: object) -> str:
+    """Return a value as a file would have it, shortened."""
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int):
+        # Python refuses to write out integers of more than some thousand digits.
+        digits = value.bit_length() * math.log10(2.0)
+        return f"an integer of about {digits:.0f} digits" if digits > MAX_TEXT else f"{value}"
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, datetime | date | time):
+        return value.isoformat()
+    return type_word(value)
+
+
+def type_word(value: object) -> str:
+    """Return a value and its type: `'ten' (a string)`; only the type for what has parts."""
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return "an array"
+    if value is None:
+        return "nothing"
+    words = {
+        bool: "a truth value",
+        str: "a string",
+        datetime: "a date",
+        date: "a date",
+        time: "a time",
+    }
+    if type(value) in words:
+        return f"{value_text(value)} ({words[type(value)]})"
+    if isinstance(value, int | float):
+        return value_text(value)
+    return f"a {type(value).__name__}"
+
+
+def alternatives(values: Iterable[object]) -> str:
+    """Return `'a', 'b' or 'c'`."""
+    texts = [value_text(value) for value in values]
+    return " or ".join(filter(None, (", ".join(texts[:-1]), texts[-1])))
+
+
+def _quoted(text: str) -> str:
+    """Return the text in quotes, with all but printable characters escaped."""
+    return repr(shortened(text))

@@ -6,14 +6,17 @@ import os
 import re
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from stat import S_ISREG
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 from blast_env.errors import BlastEnvError
+from blast_env.values import path_of
+
+T = TypeVar("T")
 
 
 def make_folder(folder: str | Path) -> None:
@@ -23,7 +26,7 @@ def make_folder(folder: str | Path) -> None:
         BlastEnvError: If something else is there, or it cannot be made.
     """
     try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
+        path_of(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BlastEnvError(f"{folder}: cannot be a folder: {error.strerror or error}") from error
 
@@ -49,7 +52,7 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
         BlastEnvError: If the folder does not exist or cannot be written to, if `target` is
             itself a folder, or if the block raises `OSError`: the device is full, for example.
     """
-    path = Path(os.path.realpath(target))
+    path = Path(os.path.realpath(path_of(target)))
     if os.path.isdir(path):
         raise BlastEnvError(f"{target}: is a folder, must be a file")
     if not os.path.isdir(path.parent):
@@ -185,6 +188,21 @@ class FolderStore:
             with suppress(OSError):
                 os.utime(path)
         return content
+
+    def read(self, key: str, decode: Callable[[bytes], T]) -> T | None:
+        """Return what the content of a key says, or `None` if it is not there in one piece.
+
+        Args:
+            key: The key.
+            decode: Says it; `ValueError` is for content that is what was written, as the checksum
+                shows, and yet something else: it counts as damaged.
+        """
+        content = self.get(key)
+        try:
+            return None if content is None else decode(content)
+        except ValueError:
+            self.discard(key)
+            return None
 
     def put(self, key: str, content: bytes) -> None:
         """Keep the content of a key; the ones that were asked for longest ago may have to go.

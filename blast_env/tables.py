@@ -7,6 +7,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from blast_env.files import write_atomically
+from blast_env.values import path_of
 
 
 class Column(NamedTuple):
@@ -58,4 +59,4 @@ def write_csv(table: pd.DataFrame, path: str | Path, float_format: str | None = 
     """
     with write_atomically(path) as temporary:
         table.to_csv(temporary, index=False, float_format=float_format, lineterminator="\n")
-    return Path(path)
+    return path_of(path)

@@ -4,16 +4,32 @@ python -m scripts.pack_agent RUN NAME --league out/league --track known_NAME
 """
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
-import pandas as pd
 import typer
 from blast_agents.league.report import PAGE
 from blast_agents.training.packaged import LeagueResult, pack
+from pydantic import ConfigDict, Field
 
 from blast_env.cli.output import print_line, user_errors
+from blast_env.documents import DocumentError, parse_csv, read_text
 from blast_env.errors import BlastEnvError
+
+
+@dataclass(frozen=True)
+class SummaryRow:
+    """What is read of a row of a league's summary."""
+
+    __pydantic_config__: ClassVar = ConfigDict(allow_inf_nan=False)
+
+    entry: str
+    is_rule: bool
+    cases: Annotated[int, Field(ge=1)]
+    reduction: float
+    reduction_low: float
+    reduction_high: float
 
 
 def main(
@@ -41,27 +57,28 @@ def league_result(folder: Path, track: str, run: str) -> LeagueResult:
         BlastEnvError: If the league has no such track, or the agent did not enter it.
     """
     try:
-        table = pd.read_csv(folder / f"{track}_summary.csv").set_index("entry")
-        page = (folder / PAGE).read_text(encoding="utf-8")
-    except OSError as error:
+        rows = list(parse_csv(read_text(folder / f"{track}_summary.csv"), SummaryRow))
+        page = read_text(folder / PAGE)
+    except DocumentError as error:
         raise BlastEnvError(f"{folder}: has no league with a track {track!r}: {error}") from error
-    entries = [entry for entry in table.index if entry.endswith(f"({run})")]
+    entries = [row for row in rows if row.entry.endswith(f"({run})")]
+    rules = {row.entry: row.reduction for row in rows if row.is_rule}
     said = re.search(r"^Engine (\S+), blast-env \S+: `(.+)`$", page, re.MULTILINE)
     if len(entries) != 1 or said is None:
         raise BlastEnvError(f"{folder}: {run!r} did not enter {track!r} once, or {PAGE} is damaged")
-    agent, rules = table.loc[entries[0]], table[table["is_rule"]]
-    of_rules = {str(name): float(value) for name, value in rules["reduction"].items()}
-    best = max(of_rules, key=lambda name: of_rules[name])
+    if not rules:
+        raise BlastEnvError(f"{folder}: no rule entered {track!r}")
+    (agent,), best = entries, max(rules, key=lambda name: rules[name])
     return LeagueResult(
         command=said[2],
         engine=said[1],
         track=track,
-        cases=int(agent["cases"]),
-        reduction=float(agent["reduction"]),
-        low=float(agent["reduction_low"]),
-        high=float(agent["reduction_high"]),
+        cases=agent.cases,
+        reduction=agent.reduction,
+        low=agent.reduction_low,
+        high=agent.reduction_high,
         best_rule=best,
-        best_rule_reduction=of_rules[best],
+        best_rule_reduction=rules[best],
     )
 
 

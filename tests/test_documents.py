@@ -2,14 +2,25 @@
 
 import json
 import time
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import Field
 
-from blast_env.documents import MAX_DEPTH, DocumentError, parse_json, parse_toml, read_text
+from blast_env.documents import (
+    MAX_DEPTH,
+    DocumentError,
+    checked_as,
+    parse_csv,
+    parse_json,
+    parse_toml,
+    read_text,
+)
 from tests.scenario.documents import all_documents
 
 DEEP = MAX_DEPTH + 1
@@ -72,6 +83,44 @@ def test_any_text_is_toml_or_an_error_with_a_place(text: str) -> None:
 def test_what_json_may_not_hold_is_named(text: str, words: str) -> None:
     with pytest.raises(DocumentError, match=words):
         parse_json(text)
+
+
+@dataclass(frozen=True)
+class Row:
+    name: str
+    count: int
+    share: Annotated[float, Field(ge=0.0)]
+
+
+def test_rows_of_a_table_are_what_they_must_be() -> None:
+    text = 'share,more,name,count\n0.5,x,"a\nb",3\n1e-3,,c,4\n'
+    assert list(parse_csv(text, Row)) == [Row("a\nb", 3, 0.5), Row("c", 4, 1e-3)]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("name,count,share\na,1,0.5", "line 2: has no end: was it cut short"),
+        ("name,count,share\na,1\n", "line 2: has 2 cells, must have 3"),
+        ("name,count,share\na,1,2,3\n", "line 2: has 4 cells, must have 3"),
+        ("name,count\na,1\n", "line 2: share is missing"),
+        ("name,count,share\na,1,0.5\nb,1.5,0.5\n", "line 3: count is '1.5': .* integer"),
+        ("name,count,share\na,1,-1\n", "line 2: share is '-1': .* greater than or equal to 0"),
+        (f"name,count,share\na,{'9' * 6000},1\n", "line 2: count is '9999"),
+        ('name,count,share\n"a,1,2\n', "is no row of a table: unexpected end"),
+        (f"name,count,share\n{'a' * 200_000},1,2\n", "is no row of a table: field larger"),
+    ],
+)
+def test_what_is_no_table_is_named_with_its_line(text: str, words: str) -> None:
+    with pytest.raises(DocumentError, match=words):
+        list(parse_csv(text, Row))
+
+
+def test_many_problems_are_counted() -> None:
+    with pytest.raises(DocumentError, match=r"; 90 more problems$") as caught:
+        checked_as(tuple[int, ...], ["x"] * 100)
+    assert len(str(caught.value)) < 2000
 
 
 def test_a_file_may_have_a_bound_of_its_own(tmp_path: Path) -> None:

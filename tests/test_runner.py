@@ -65,7 +65,7 @@ def test_an_error_says_which_blast(threads: int) -> None:
 
 
 def test_a_wrong_seed_says_which_blast() -> None:
-    with pytest.raises(BlastEnvError, match=r"^blasts\[1\]: seed is -1, must be at least 0"):
+    with pytest.raises(BlastEnvError, match=r"^blasts\[1\]: seed is -1, must be an integer from 0"):
         simulate_many([Blast(COURTYARD, engine="event"), Blast(COURTYARD, seed=-1)], threads=2)
 
 

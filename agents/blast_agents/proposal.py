@@ -4,7 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from time import perf_counter, process_time
-from typing import Protocol
+from typing import Annotated, ClassVar, Protocol
+
+from pydantic import ConfigDict, Field
 
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
@@ -22,11 +24,13 @@ class Proposal:
         cpu_s: Processor time that it took, of this process.
     """
 
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
+
     layout: Layout
-    seconds: float
-    blasts: int = 0
-    other_blasts: int = 0
-    cpu_s: float = 0.0
+    seconds: Annotated[float, Field(ge=0.0)]
+    blasts: Annotated[int, Field(ge=0)] = 0
+    other_blasts: Annotated[int, Field(ge=0)] = 0
+    cpu_s: Annotated[float, Field(ge=0.0)] = 0.0
 
 
 class LayoutAgent(Protocol):

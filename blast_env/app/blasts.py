@@ -11,12 +11,12 @@ from time import perf_counter
 from typing import Any, Final
 
 import numpy as np
-from pydantic import ValidationError
 
 from blast_env.app import placing
 from blast_env.app.records import (
     FILM,
     FRAME,
+    MOST_BYTES,
     RECORD,
     BlastRecord,
     Film,
@@ -31,6 +31,7 @@ from blast_env.app.records import (
 )
 from blast_env.app.work import BlastTask, ThreatOf, scenario_of
 from blast_env.calibration.model import CalibrationError
+from blast_env.documents import read_text
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
@@ -244,8 +245,8 @@ def _gas(
 def _scale(result: GasResult, kept: Path) -> Scale:
     """Return the scale that was kept with the blast without a barrier; this one's without it."""
     try:
-        return Scale.model_validate_json(kept.read_text(encoding="utf-8"))
-    except (OSError, ValidationError):
+        return Scale.model_validate_json(read_text(kept, MOST_BYTES))
+    except ValueError:
         names = _facades_of(result)
         return Scale(
             film_kpa=scale_end_kpa([result]),

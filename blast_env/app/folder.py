@@ -12,10 +12,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import time
-from typing import Any, Final
+from typing import Annotated, Any, Final
+
+from pydantic import Field
 
 from blast_env.app.design import Design, History, Step
-from blast_env.app.records import RECORD, BlastRecord, check_key, read_record
+from blast_env.app.records import MOST_BYTES, RECORD, BlastRecord, Kept, check_key, read_record
+from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
 from blast_env.scenario import Scenario
@@ -121,8 +124,8 @@ class DesignFolder:
     def _content(self) -> Any:
         path = self.path / _DESIGN
         try:
-            return json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            return parse_json(read_text(path, MOST_BYTES))
+        except DocumentError as error:
             raise BlastEnvError(f"{path}: cannot be read: {error}") from error
 
 
@@ -199,8 +202,8 @@ class WorkFolder:
                 " (--folder)"
             )
         with write_atomically(mark) as temporary:
-            content = {"process": os.getpid(), "url": url, "since_s": time()}
-            temporary.write_text(json.dumps(content), encoding="utf-8")
+            holder = _Holder(process=os.getpid(), url=url, since_s=time())
+            temporary.write_text(holder.model_dump_json(), encoding="utf-8")
         try:
             yield
         finally:
@@ -211,19 +214,26 @@ class WorkFolder:
         return self.path / "designs"
 
 
+class _Holder(Kept):
+    """The server that holds a folder."""
+
+    process: Annotated[int, Field(ge=1, lt=2**31)]
+    url: str
+    since_s: float
+
+
 def _holder(mark: Path) -> str | None:
     """Return where the server is that holds a folder, or `None` if none does any more."""
     try:
-        content = json.loads(mark.read_text(encoding="utf-8"))
-        process, url = int(content["process"]), str(content["url"])
-    except (OSError, ValueError, LookupError, TypeError):
+        holder = checked_as(_Holder, parse_json(read_text(mark)))
+    except DocumentError:
         return None
-    if process == os.getpid():
-        return url
+    if holder.process == os.getpid():
+        return holder.url
     try:
-        os.kill(process, 0)
+        os.kill(holder.process, 0)
     except ProcessLookupError:
         return None
     except OSError:  # it is there, but another user's
-        return url
-    return url
+        return holder.url
+    return holder.url

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
+from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
@@ -25,6 +26,9 @@ _DASH: Final = "\N{EN DASH}"
 _TOGETHER: Final = "all protected"
 
 FILM: Final = "film.json"
+MOST_BYTES: Final = 50_000_000
+"""Most that a file of the work folder may have."""
+
 FRAME: Final = "{:03}.jpg"
 
 
@@ -156,16 +160,16 @@ def write_kept(record: Kept, path: Path) -> None:
 def read_record(folder: Path) -> BlastRecord | None:
     """Return the record of a blast, or `None` if it is not there or damaged."""
     try:
-        return BlastRecord.model_validate_json((folder / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return BlastRecord.model_validate_json(read_text(folder / RECORD, MOST_BYTES))
+    except ValueError:
         return None
 
 
 def read_film(folder: Path) -> Film | None:
     """Return what there is of the film of a blast, or `None` if nothing is."""
     try:
-        return Film.model_validate_json((folder / FILM).read_text(encoding="utf-8"))
-    except (OSError, ValidationError, ValueError):
+        return Film.model_validate_json(read_text(folder / FILM, MOST_BYTES))
+    except ValueError:
         return None
 
 

@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter
 
-from blast_env.app.records import Engine, Kept
+from blast_env.app.records import MOST_BYTES, Engine, Kept
+from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.scene import Charge
@@ -204,8 +205,8 @@ def read_task(folder: Path) -> Task:
         BlastEnvError: If there is none.
     """
     try:
-        return _TASK.validate_json((folder / TASK).read_text(encoding="utf-8"))
-    except (OSError, ValidationError) as error:
+        return _TASK.validate_json(read_text(folder / TASK, MOST_BYTES))
+    except ValueError as error:
         raise BlastEnvError(f"{folder}: holds no work: {error}") from error
 
 
@@ -218,8 +219,8 @@ def write_status(status: Status, folder: Path) -> None:
 def read_status(folder: Path) -> Status:
     """Return how far work has come; where that cannot be read, that it failed."""
     try:
-        return Status.model_validate_json((folder / STATUS).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        return Status.model_validate_json(read_text(folder / STATUS, MOST_BYTES))
+    except ValueError as error:
         return Status(state="failed", title=folder.name, text=f"cannot be read: {error}")
 
 

@@ -235,7 +235,7 @@ def checked_array(
     """
     try:
         array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise BlastEnvError(f"{name} must be made of numbers: {error}") from error
     if dimensions is not None and array.ndim != dimensions:
         raise BlastEnvError(f"{name} has {array.ndim} dimensions, must have {dimensions}")

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import fields
 from hashlib import sha256
 from importlib.resources import files
 from math import hypot
@@ -10,10 +11,11 @@ from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from blast_env.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.documents import DocumentError, checked_as, parse_json, read_text
+from blast_env.errors import BlastEnvError, UnknownNameError, alternatives, type_word
 from blast_env.files import write_atomically
 from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import SimulationParameters, parameters_digest
@@ -22,6 +24,7 @@ from blast_env.physics.scene import Charge
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Scenario
 from blast_env.units import PA_PER_PSI, UNITS_PER_M
+from blast_env.values import path_of
 
 SimulatedQuantity = Literal["impulse", "transferred_impulse"]
 """The paper's sum of m |v|, or the momentum really transferred along the normals."""
@@ -53,6 +56,9 @@ class ScaledImpulse(NamedTuple):
     def pa_s(self) -> float:
         """Impulse per area, Pa*s."""
         return self.psi_s * PA_PER_PSI
+
+
+Amount = Annotated[float, Field(ge=0.0)]
 
 
 class Section(BaseModel):
@@ -132,11 +138,31 @@ class Calibration(Section):
     tnt_kg: Annotated[float, Field(gt=0.0)]
     tnt_range_kg: tuple[float, float] | None = None
     distances_m: Annotated[tuple[float, ...], Field(min_length=2)]
-    seeds: Annotated[tuple[int, ...], Field(min_length=1)]
-    i_sim: tuple[float, ...]
-    i_sim_ci95: tuple[float, ...]
-    i_reference_psi_s: tuple[float, ...]
+    seeds: Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1)]
+    i_sim: tuple[Amount, ...]
+    i_sim_ci95: tuple[Amount, ...]
+    i_reference_psi_s: tuple[Amount, ...]
     metrics: MetricsSection
+
+    @model_validator(mode="after")
+    def _check_parts(self) -> "Calibration":
+        """Refuse parts that do not fit each other."""
+        names = {field.name for field in fields(LAWS[self.law])}
+        for key in ("coefficients", "coefficient_intervals"):
+            if set(getattr(self, key)) != names:
+                raise ValueError(f"{key} must be {alternatives(sorted(names))} of a {self.law} law")
+        count = len(self.distances_m)
+        for key in ("i_sim", "i_sim_ci95", "i_reference_psi_s"):
+            if len(getattr(self, key)) != count:
+                raise ValueError(f"{key} must have {count} values, one for each of distances_m")
+        pairs = zip(self.distances_m, self.distances_m[1:], strict=False)
+        if self.distances_m[0] <= 0.0 or not all(before < after for before, after in pairs):
+            raise ValueError("distances_m must be above 0 and ascending")
+        low_kg, high_kg = self.tnt_range_kg or (self.tnt_kg, self.tnt_kg)
+        if not 0.0 < low_kg <= self.tnt_kg <= high_kg:
+            raise ValueError("tnt_range_kg must be around tnt_kg, and above 0")
+        self.scaling_law  # noqa: B018  # refuses coefficients that are none
+        return self
 
     @property
     def scaling_law(self) -> ScalingLaw:
@@ -251,7 +277,7 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
         CalibrationError: If there is none for that engine, or the file cannot be read, was cut
             short or was edited.
     """
-    path = Path(name_or_path)
+    path = path_of(name_or_path)
     if path.suffix != SUFFIX:
         name, known = str(name_or_path), stored_calibrations()
         if name not in known:
@@ -266,9 +292,10 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
         entry = files("blast_env.calibration") / "stored" / calibration_file(name, engine)
         return _parse(entry.read_text(encoding="utf-8"), f"{name} for {engine}")
     try:
-        return _parse(path.read_text(encoding="utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise CalibrationError(f"{path}: cannot be read: {error}") from error
+        text = read_text(path)
+    except DocumentError as error:
+        raise CalibrationError(f"{path}: {error}") from error
+    return _parse(text, str(path))
 
 
 def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:
@@ -315,24 +342,17 @@ def _stored_files() -> tuple[tuple[str, str], ...]:
 
 def _parse(text: str, source: str) -> Calibration:
     try:
-        document = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise CalibrationError(
-            f"{source}: line {error.lineno}: is not JSON ({error.msg}): was it cut short?"
-        ) from error
-    if not isinstance(document, dict):
-        raise CalibrationError(f"{source}: is not a calibration")
-    checksum = document.pop("checksum", None)
-    if checksum != _checksum(document):
-        raise CalibrationError(
-            f"{source}: the checksum does not match: the file was edited after it was made"
-        )
-    try:
-        return Calibration.model_validate_json(json.dumps(document))
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise CalibrationError(f"{source}: {key}: {first['msg']}") from error
+        document = parse_json(text)
+        if not isinstance(document, dict):
+            raise DocumentError("", f"is {type_word(document)}, must be a calibration, a table")
+        checksum = document.pop("checksum", None)
+        if checksum != _checksum(document):
+            raise DocumentError(
+                "", "the checksum does not match: the file was edited after it was made"
+            )
+        return checked_as(Calibration, document)
+    except DocumentError as error:
+        raise CalibrationError(f"{source}: {error}") from error
 
 
 def _checksum(content: dict[str, Any]) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from blast_env.cli.output import message_console
+from blast_env.cli.output import message_console, printable
 from blast_env.cluster import on_cluster
 
 ClusterAddress = Annotated[
@@ -31,5 +31,5 @@ def running_on(cluster: str | None) -> Iterator[None]:
     with on_cluster(cluster) as size:
         now = f"{size.workers} workers with {size.threads} threads now"
         text = f"cluster {cluster}: {now if size.workers else 'waits for the first worker'}"
-        message_console().print(text, markup=False)
+        message_console().print(printable(text))
         yield

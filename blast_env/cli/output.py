@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import typer
 from rich.console import Console
@@ -16,6 +17,7 @@ from blast_env.errors import BlastEnvError, MissingExtraError
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import is_gas
 from blast_env.scenario import Scenario
+from blast_env.values import STEERING
 
 _PIPE_COLUMNS = 120
 
@@ -27,17 +29,27 @@ def result_console() -> Console:
     """
     known = sys.stdout.isatty() or "COLUMNS" in os.environ
     width = None if known else _PIPE_COLUMNS
-    return Console(highlight=False, width=width)
+    return _plain(width=width)
 
 
 def print_line(text: str, style: str | None = None) -> None:
     """Print a line to standard output as it is: not wrapped, no markup in it."""
-    result_console().print(text, markup=False, soft_wrap=True, style=style)
+    result_console().print(printable(text), soft_wrap=True, style=style)
 
 
 def message_console() -> Console:
     """Return the console for messages and progress (standard error)."""
-    return Console(stderr=True, highlight=False, soft_wrap=True)
+    return _plain(stderr=True, soft_wrap=True)
+
+
+def _plain(**options: Any) -> Console:
+    """Return a console that shows texts as they are: a path may look like markup or an emoji."""
+    return Console(highlight=False, markup=False, emoji=False, **options)
+
+
+def printable(text: str) -> str:
+    """Return a text with escapes for the characters that would steer the terminal."""
+    return STEERING.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 @contextmanager
@@ -50,7 +62,7 @@ def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
     try:
         yield
     except BlastEnvError as error:
-        message_console().print(f"error: {error}", markup=False, style="red")
+        message_console().print(printable(f"error: {error}"), style="red")
         raise typer.Exit(2) from error
     except KeyboardInterrupt:
         show_interruption("no file was left half-written", "" if resume is None else resume())
@@ -60,7 +72,7 @@ def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
 def show_interruption(*parts: str) -> None:
     """Say on standard error that the command was interrupted, what is kept and how to go on."""
     text = "; ".join(part for part in parts if part)
-    message_console().print(f"interrupted: {text}", markup=False, style="yellow")
+    message_console().print(printable(f"interrupted: {text}"), style="yellow")
 
 
 def resume_with_cache(cache: Path | None) -> str:
@@ -119,7 +131,7 @@ def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:
     try:
         return save()
     except MissingExtraError as error:
-        message_console().print(f"note: {error}", markup=False, style="yellow")
+        message_console().print(printable(f"note: {error}"), style="yellow")
         return []
 
 
@@ -133,9 +145,9 @@ def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
     Yields:
         A function to call with the share that is done.
     """
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=message_console(), transient=True) as progress:
-        task = progress.add_task(label, total=1.0)
+        task = progress.add_task(printable(label), total=1.0)
         yield lambda share: progress.update(task, completed=share)
 
 

@@ -4,15 +4,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import wraps
 from inspect import signature
-from math import isfinite
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, Final, ParamSpec, TypeVar
 
-import numpy as np
-
-from blast_env.errors import BlastEnvError, UnknownArgumentError, UnknownNameError
+from blast_env.errors import BlastEnvError, UnknownArgumentError, UnknownNameError, value_text
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, VehicleCharge
+from blast_env.values import MOST_SEED, finite_number, number_pair, whole_number
 
 _Parameters = ParamSpec("_Parameters")
 
@@ -43,7 +41,7 @@ def checked_keywords(
     return checked
 
 
-def check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
+def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> None:
     """Refuse a name that is not known.
 
     Args:
@@ -57,7 +55,7 @@ def check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
     known = list(known)
     for name in names:
         if name not in known:
-            raise UnknownNameError(kind, str(name), known)
+            raise UnknownNameError(kind, name, known)
 
 
 def strategy(kind: str, value: str | _Strategy, known: Mapping[str, _Strategy]) -> _Strategy:
@@ -91,28 +89,25 @@ def _common_methods(strategies: Iterable[object]) -> list[str]:
     return sorted(name for name in common if name == "__call__" or not name.startswith("_"))
 
 
-def whole_number(name: str, value: int, least: int, most: int) -> int:
-    """Return a count as a plain integer.
+def checked_options(options: Mapping[str, Any] | None, known: Iterable[str]) -> Mapping[str, Any]:
+    """Return the options of a call of `reset`.
+
+    Args:
+        options: As given.
+        known: The names that exist.
 
     Raises:
-        BlastEnvError: If it is no integer or out of bounds.
+        UnknownNameError: If there is no such option; the message names the nearest one.
+        BlastEnvError: If they are no mapping.
     """
-    is_integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not is_integer or not least <= value <= most:
-        raise BlastEnvError(f"{name} is {value!r}, must be an integer from {least} to {most}")
-    return int(value)
+    options = {} if options is None else options
+    if not isinstance(options, Mapping):
+        raise BlastEnvError(f"options is {value_text(options)}, must be a mapping")
+    check_names("option of reset", options, known)
+    return options
 
 
-def real_number(name: str, value: float, least: float, most: float) -> float:
-    """Return a number as a plain float.
-
-    Raises:
-        BlastEnvError: If it is no number or out of bounds.
-    """
-    is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not is_number or not least <= value <= most:
-        raise BlastEnvError(f"{name} is {value!r}, must be a number from {least:g} to {most:g}")
-    return float(value)
+_MOST_BLAST_SEED: Final = MOST_SEED - 10**6  # the other blasts of an episode have the next ones
 
 
 @dataclass(frozen=True)
@@ -141,18 +136,23 @@ class ResetOptions:
             UnknownNameError: If there is no such option; the message names the nearest one.
             BlastEnvError: If the value of an option is of no use.
         """
-        options = options or {}
-        check_names("option of reset", options, (field.name for field in fields(cls)))
+        options = checked_options(options, [field.name for field in fields(cls)])
         seed = options.get("blast_seed")
         tnt_kg = options.get("tnt_kg")
         height_m = options.get("charge_height_m")
         position_m = options.get("charge_position_m")
         return cls(
-            charge_position_m=None if position_m is None else _position_m(position_m),
-            tnt_kg=None if tnt_kg is None else _number("tnt_kg", tnt_kg),
-            charge_height_m=None if height_m is None else _number("charge_height_m", height_m),
+            charge_position_m=None
+            if position_m is None
+            else number_pair("charge_position_m", position_m),
+            tnt_kg=None if tnt_kg is None else finite_number("tnt_kg", tnt_kg),
+            charge_height_m=None
+            if height_m is None
+            else finite_number("charge_height_m", height_m),
             layout=options.get("layout", ()),
-            blast_seed=None if seed is None else whole_number("blast_seed", seed, 0, 2**63),
+            blast_seed=None
+            if seed is None
+            else whole_number("blast_seed", seed, 0, _MOST_BLAST_SEED),
         )
 
     @property
@@ -175,23 +175,3 @@ class ResetOptions:
             drawn.tnt_kg if self.tnt_kg is None else self.tnt_kg,
             drawn.height_m if self.charge_height_m is None else self.charge_height_m,
         )
-
-
-def _position_m(value: Any) -> tuple[float, float]:
-    try:
-        x_m, y_m = (_number("charge_position_m", coordinate) for coordinate in value)
-    except (TypeError, ValueError):
-        raise BlastEnvError(
-            f"charge_position_m is {value!r}, must be a pair of numbers (x, y)"
-        ) from None
-    return x_m, y_m
-
-
-def _number(name: str, value: Any) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise BlastEnvError(f"{name} is {value!r}, must be a number") from None
-    if not isfinite(number):
-        raise BlastEnvError(f"{name} is {value!r}, must be a finite number")
-    return number

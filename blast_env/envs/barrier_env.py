@@ -14,9 +14,7 @@ from blast_env.envs.arguments import (
     ResetOptions,
     check_names,
     checked_keywords,
-    real_number,
     strategy,
-    whole_number,
 )
 from blast_env.envs.display import Display
 from blast_env.envs.episode import (
@@ -37,7 +35,7 @@ from blast_env.envs.strategies import (
     ThreatModel,
     scenario_source,
 )
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.evaluation.store import BlastCache
 from blast_env.geometry import Cell, Element
@@ -45,6 +43,7 @@ from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
 from blast_env.scenario import AnyScenario, Placement
 from blast_env.statistics import CVAR_LEVEL, Risk
+from blast_env.values import real_number, whole_number
 
 
 class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
@@ -297,7 +296,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             gymnasium.error.ResetNeeded: If `reset` has not been called, or the episode has ended.
         """
         if not self.action_space.contains(action):
-            raise gym.error.InvalidAction(f"action is {action!r}, must be in {self.action_space}")
+            raise gym.error.InvalidAction(
+                f"action is {value_text(action)}, must be in {self.action_space}"
+            )
         episode = self._episode
         if episode.ended:
             return self._show_blast()
@@ -415,7 +416,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             gymnasium.error.InvalidAction: If the action is not in the action space.
         """
         if action is not None and not self.action_space.contains(action):
-            raise gym.error.InvalidAction(f"action is {action!r}, must be in {self.action_space}")
+            raise gym.error.InvalidAction(
+                f"action is {value_text(action)}, must be in {self.action_space}"
+            )
         self._display.marked = action
 
     def cell_at(self, place_px: tuple[int, int]) -> Cell | None:

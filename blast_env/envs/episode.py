@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from blast_env.envs.arguments import (
     ResetOptions,
-    real_number,
     strategy,
-    whole_number,
 )
 from blast_env.envs.observations import (
     Array,
@@ -40,6 +38,7 @@ from blast_env.physics.engines import is_gas
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
+from blast_env.values import real_number, whole_number
 
 ILLEGAL_TERM: Final = "illegal_actions"
 """The name of the reward term for illegal actions."""

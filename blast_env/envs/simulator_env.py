@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from blast_env.envs.arguments import ResetOptions, check_names, checked_keywords
+from blast_env.envs.arguments import ResetOptions, check_names, checked_keywords, checked_options
 from blast_env.envs.spec import PlainSpec
 from blast_env.envs.unfolding import (
     Observation,
@@ -17,17 +17,18 @@ from blast_env.envs.unfolding import (
     UnfoldingParticles,
     observation_space,
 )
-from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine, is_gas
 from blast_env.scenario import AnyScenario, check_layout, find_scenario
 from blast_env.scenario.build_scene import draw_threat
 from blast_env.simulation import Blast, BlastResult
+from blast_env.values import real_number
 
 if TYPE_CHECKING:  # drawing is an optional extra, and Numba takes half a second to import
     from blast_env.rendering.window import Window
-    from blast_env.simulation.gas import GasResult
+    from blast_env.values import real_number
+from blast_env.simulation.gas import GasResult
 
 _OPTIONS: Final = ("layout", "charge_position_m")
 
@@ -136,14 +137,12 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         render_mode: str | None = None,
         cell_m: float | None = None,
     ) -> None:
-        if not 1e-6 <= step_s <= 10.0:
-            raise BlastEnvError(f"step_s is {step_s} s, must be between 1e-06 and 10 s")
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.scenario = find_scenario(scenario)
-        self.layout: Sequence[Element] = layout
+        self.layout: Sequence[Element] = check_layout(self.scenario, layout)
         self.engine = engine
-        self.step_s = step_s
+        self.step_s = real_number("step_s", step_s, 1e-6, 10.0)
         self.cell_m = cell_m
         self.render_mode = render_mode
         self._engine = find_engine(engine, cell_m)
@@ -163,7 +162,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         """
         super().reset(seed=seed)
         drawn_seed = int(self.np_random.integers(2**31)) if seed is None else seed
-        blast = self._lay_out(drawn_seed, options or {})
+        blast = self._lay_out(drawn_seed, checked_options(options, _OPTIONS))
         self._blast, self._target_s = blast, blast.time_s
         if self.render_mode == "human":
             self.render()
@@ -236,7 +235,6 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
             self._window = None
 
     def _lay_out(self, seed: int, options: Mapping[str, Any]) -> Unfolding:
-        check_names("option of reset", options, _OPTIONS)
         layout = check_layout(self.scenario, options.get("layout", self.layout))
         position_m = options.get("charge_position_m")
         if is_gas(self._engine):

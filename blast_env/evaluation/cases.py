@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
@@ -21,6 +21,7 @@ from blast_env.scenario import (
 from blast_env.scenario.build_scene import charge_against, draw_threat
 from blast_env.scenario.vehicles import ranked
 from blast_env.statistics import MeanRisk, Risk
+from blast_env.values import checked_seed, generator
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Threat:
             BlastEnvError: If the seed is not an integer of at least 0, or the charge is not a
                 pair of coordinates and a mass.
         """
-        object.__setattr__(self, "seed", _seed(self.seed, "seed"))
+        object.__setattr__(self, "seed", checked_seed(self.seed, "seed"))
         if isinstance(self.charge, VehicleCharge):
             return
         try:
@@ -78,7 +79,9 @@ def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, .
     Raises:
         BlastEnvError: If there are no seeds, or one is repeated, negative or no integer.
     """
-    plain = [_seed(seed, f"seeds[{index}]") for index, seed in enumerate(seeds)]
+    if not isinstance(seeds, Iterable):
+        raise BlastEnvError(f"seeds is {value_text(seeds)}, must be integers")
+    plain = [checked_seed(seed, f"seeds[{index}]") for index, seed in enumerate(seeds)]
     if not plain:
         raise BlastEnvError("seeds: there are none, must be at least one")
     for index, seed in enumerate(plain):
@@ -237,7 +240,7 @@ def practice_visible(
         BlastEnvError: If there are to be none.
     """
     _at_least_one("realisations", realisations)
-    drawn = SeedRange.SEARCH.draw_distinct(np.random.default_rng(seed), realisations)
+    drawn = SeedRange.SEARCH.draw_distinct(generator(seed), realisations)
     return replace(visible_case(scenario, charge, drawn, risk), seed=seed)
 
 
@@ -264,7 +267,7 @@ def practice_hidden(
     """
     _at_least_one("charges", charges)
     _at_least_one("realisations", realisations)
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     found = find_scenario(scenario)
     drawn = _spread_first(found.sample_charges(rng, charges))
     seeds = SeedRange.SEARCH.draw_distinct(rng, realisations * charges)
@@ -306,12 +309,3 @@ def _spread_places(charges: Sequence[Charge]) -> list[Charge]:
 def _at_least_one(name: str, count: int) -> None:
     if count < 1:
         raise BlastEnvError(f"{name} is {count}, must be at least 1")
-
-
-def _seed(seed: int, place: str) -> int:
-    """Return a seed as a plain integer; `place` says where it came from."""
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
-        raise BlastEnvError(f"{place} is {seed!r}, must be an integer")
-    if seed < 0:
-        raise BlastEnvError(f"{place} is {seed}, must be at least 0")
-    return int(seed)

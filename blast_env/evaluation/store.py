@@ -144,15 +144,7 @@ class DiskCache:
 
     def get(self, key: BlastKey) -> BlastLoads | None:
         """Return the loads of a blast, or `None` if they are not there in one piece."""
-        text = _key_text(key)
-        content = self._store.get(text)
-        if content is None:
-            return None
-        try:
-            return _decoded(content)
-        except ValueError:  # what the checksum says is what was written, which is something else
-            self._store.discard(text)
-            return None
+        return self._store.read(_key_text(key), _decoded)
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast; the ones that were asked for longest ago may have to go."""

@@ -16,6 +16,7 @@ from blast_env.export.plan import Feature, LayoutPlan, PlaceM
 from blast_env.files import make_folder, write_atomically
 from blast_env.scenario import write_layout
 from blast_env.scenario.georeference import AnyGeoreference
+from blast_env.values import path_of
 
 _DIGITS: Final = 9  # of a coordinate on a map: a tenth of a millimetre in degrees
 
@@ -179,7 +180,7 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
         BlastEnvError: If the suffix is another one, the file cannot be written, or a package
             that it needs is not installed.
     """
-    path = Path(path)
+    path = path_of(path)
     check_target(path, 1)
     suffix = _suffix(path)
     if suffix not in _WRITERS:

@@ -28,6 +28,7 @@ from blast_env.provenance import package_version
 from blast_env.scenario import Scenario, SimulationSection
 from blast_env.scenario.checks import charge_radius_m
 from blast_env.scenario.versions import SCHEMA_VERSION
+from blast_env.values import path_of
 
 _MOST_DESCRIPTION: Final = 2000
 _HASH_DIGITS: Final = 12
@@ -66,7 +67,7 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> Impor
             scenario would not be sound (`ScenarioError`).
     """
     options = options or ImportOptions()
-    path = Path(path)
+    path = path_of(path)
     site_map = _read(path, options)
     things, unclear = things_of(
         site_map, _selectors(site_map, options), options.level_height_m, options.height_from

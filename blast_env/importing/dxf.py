@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from blast_env.errors import BlastEnvError, import_extra, suggestion
+from blast_env.errors import BlastEnvError, import_extra, shortened, suggestion
 from blast_env.importing.site_map import (
     MOST_FEATURES,
     DrawingCoordinates,
@@ -62,12 +62,19 @@ def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
     Raises:
         BlastEnvError: If it cannot be read, or nobody says its unit.
     """
-    document = _opened(checked_file(path))
-    metres = _metres_per_unit(path, document, unit)
     skipped: Counter[str] = Counter()
-    features = tuple(
-        islice(_features(path, document, _SAG_M / metres, metres, skipped), MOST_FEATURES + 1)
-    )
+    try:
+        document = readfile(checked_file(path))
+        metres = _metres_per_unit(path, document, unit)
+        features = tuple(
+            islice(_features(path, document, _SAG_M / metres, metres, skipped), MOST_FEATURES + 1)
+        )
+    except BlastEnvError:
+        raise
+    # ezdxf says what is wrong with a file in errors of many kinds, wherever it comes to it.
+    except Exception as error:
+        what = shortened(" ".join(str(error).split()) or type(error).__name__, 300)
+        raise BlastEnvError(f"{path}: cannot be read as DXF: {what}") from error
     if len(features) > MOST_FEATURES:
         raise too_many(path)
     notes = tuple(
@@ -75,13 +82,6 @@ def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
         for kind, count in skipped.items()
     )
     return SiteMap(path, DrawingCoordinates(metres), features, notes)
-
-
-def _opened(path: Path) -> Drawing:
-    try:
-        return readfile(path)
-    except (OSError, DXFError, ValueError, KeyError, IndexError) as error:
-        raise BlastEnvError(f"{path}: cannot be read as DXF: {error}") from error
 
 
 def _metres_per_unit(path: Path, document: Drawing, unit: str | None) -> float:

@@ -45,7 +45,7 @@ def read_osm(path: Path) -> SiteMap:
             features.append(feature)
             if len(features) > MOST_FEATURES:
                 raise too_many(path)
-    except RuntimeError as error:
+    except (RuntimeError, osmium.InvalidLocationError) as error:
         raise BlastEnvError(f"{path}: cannot be read as OpenStreetMap data: {error}") from error
     return SiteMap(path, MapCoordinates(_WGS84), tuple(features), skipped.notes)
 

@@ -6,7 +6,7 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, cast
 
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.physics.engine import Engine, ParticleEngine
 
 if TYPE_CHECKING:
@@ -49,10 +49,14 @@ def find_engine(engine: str | Engine, cell_m: float | None = None) -> Engine:
             that has no cells.
     """
     found = engine if not isinstance(engine, str) else _made(engine)
+    if not hasattr(found, "version") or not hasattr(found, "name"):
+        raise BlastEnvError(f"engine is {value_text(engine)}, must be a name or an engine")
     if cell_m is None:
         return found
     if not is_gas(found):
-        raise BlastEnvError(f"cell_m is {cell_m:g}, but engine {found.name!r} has no cells")
+        raise BlastEnvError(
+            f"cell_m is {value_text(cell_m)}, but engine {found.name!r} has no cells"
+        )
     return replace(found, cell_m=cell_m)
 
 

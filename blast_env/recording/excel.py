@@ -27,6 +27,7 @@ from blast_env.recording.tables import (
     structures_in_pa_s,
 )
 from blast_env.tables import Column
+from blast_env.values import path_of
 
 LONGEST_VALUE: Final = 400
 """The most characters of the run record in one cell; the rest goes on in the next row."""
@@ -413,7 +414,7 @@ def write_workbook(
         )
     with _workbook(path) as workbook:
         _WorkbookWriter(workbook, max_rows_per_sheet).write(blast)
-    return Path(path)
+    return path_of(path)
 
 
 class SheetTable(NamedTuple):
@@ -446,13 +447,13 @@ def write_tables(
     title = title or f"Blast {record['scenario']}, engine {record['engine']}"
     with _workbook(path) as workbook:
         _WorkbookWriter(workbook, EXCEL_ROWS).write_tables(record, tables, title)
-    return Path(path)
+    return path_of(path)
 
 
 @contextmanager
 def _workbook(path: str | Path) -> Iterator[Any]:
     """Give an empty workbook that becomes the file when the block ends well."""
-    path = Path(path)
+    path = path_of(path)
     if path.suffix.lower() != SUFFIX:
         raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
     with write_atomically(path) as temporary:

@@ -9,10 +9,12 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from blast_env.errors import BlastEnvError
+from blast_env.documents import parse_json
+from blast_env.errors import BlastEnvError, shortened
 from blast_env.files import write_atomically
 from blast_env.recording.tables import COLLISION_COLUMNS, RecordedBlast, RunRecord
 from blast_env.tables import Column
+from blast_env.values import path_of
 
 METADATA_KEY: Final = b"blast_env"
 """Key of the run record, as JSON, in the metadata of the file."""
@@ -56,7 +58,7 @@ def write_table(
     Raises:
         BlastEnvError: If the suffix is another one or the file cannot be written there.
     """
-    path = Path(path)
+    path = path_of(path)
     if path.suffix.lower() != SUFFIX:
         raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
     table = _arrow_table(frame, columns, record)
@@ -81,16 +83,39 @@ def read_parquet(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
         BlastEnvError: If there is no such file, if it is damaged or no Parquet, or if something
             else wrote it.
     """
-    path = Path(path)
+    path = path_of(path)
+    frame, metadata = _read(path)
+    return frame, _run_record(path, metadata)
+
+
+def read_frame(path: Path, columns: Sequence[str]) -> pd.DataFrame:
+    """Read a Parquet file without a run record.
+
+    Args:
+        path: The file.
+        columns: The names of its columns.
+
+    Raises:
+        BlastEnvError: If there is no such file, if it is damaged, no Parquet, or another table.
+    """
+    frame, _ = _read(path)
+    if list(frame.columns) != list(columns):
+        found = shortened(", ".join(map(str, frame.columns)))
+        raise BlastEnvError(f"{path}: has the columns {found}, must have {', '.join(columns)}")
+    return frame
+
+
+def _read(path: Path) -> tuple[pd.DataFrame, dict[bytes, bytes]]:
     if not path.is_file():
         raise BlastEnvError(f"{path}: there is no such file")
     try:
         # Not read_table: it takes the folder's name for a partition, "seed=3" for a column.
         with pq.ParquetFile(path) as file:
             table = file.read()
-    except (OSError, pa.ArrowException) as error:
-        raise BlastEnvError(f"{path}: damaged or not a Parquet file: {error}") from error
-    return table.to_pandas(), _run_record(path, table.schema.metadata or {})
+        return table.to_pandas(), table.schema.metadata or {}
+    except (OSError, ValueError, pa.ArrowException) as error:
+        reason = shortened(str(error), 300)
+        raise BlastEnvError(f"{path}: damaged or not a Parquet file: {reason}") from error
 
 
 def _arrow_table(frame: pd.DataFrame, columns: Sequence[Column], record: RunRecord) -> pa.Table:
@@ -115,7 +140,7 @@ def _run_record(path: Path, metadata: dict[bytes, bytes]) -> dict[str, Any]:
             f"{path}: has no run record, so it is not a collision table that blast_env wrote"
         )
     try:
-        record = json.loads(metadata[METADATA_KEY])
+        record = parse_json(metadata[METADATA_KEY].decode())
     except ValueError as error:
         raise BlastEnvError(f"{path}: its run record is damaged: {error}") from error
     if not isinstance(record, dict):

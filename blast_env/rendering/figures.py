@@ -44,6 +44,7 @@ from blast_env.rendering.style import (
 )
 from blast_env.simulation import BlastResult
 from blast_env.units import MS_PER_S, UNITS_PER_M
+from blast_env.values import path_of
 
 with render_extra():
     from matplotlib.axes import Axes
@@ -363,7 +364,7 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
         BlastEnvError: If the suffix is none of `FIGURE_SUFFIXES` or the file cannot be written;
             nothing is left behind then.
     """
-    path = Path(path)
+    path = path_of(path)
     suffix = path.suffix.lower()
     if suffix not in FIGURE_SUFFIXES:
         raise BlastEnvError(

@@ -26,6 +26,7 @@ from blast_env.rendering.style import (
 )
 from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MS_PER_S
+from blast_env.values import path_of
 
 with render_extra():
     import imageio_ffmpeg
@@ -365,7 +366,7 @@ def known_suffix(path: str | Path) -> str:
     Raises:
         BlastEnvError: If no film with that suffix can be written.
     """
-    suffix = Path(path).suffix
+    suffix = path_of(path).suffix
     if suffix.lower() not in SUFFIXES:
         raise BlastEnvError(
             f"{path}: cannot write a film with the suffix {suffix!r}, "
@@ -516,8 +517,8 @@ def write_side_by_side(
     """
     if len(panels) < 2:
         raise BlastEnvError(f"panels: there are {len(panels)}, must be at least 2")
-    if Path(path).suffix.lower() != _SUFFIX:
-        raise BlastEnvError(f"{path}: suffix is {Path(path).suffix!r}, must be {_SUFFIX!r}")
+    if path_of(path).suffix.lower() != _SUFFIX:
+        raise BlastEnvError(f"{path}: suffix is {path_of(path).suffix!r}, must be {_SUFFIX!r}")
     with write_atomically(path) as temporary:
         results = tuple(_first_runs(panels, progress))
         plan = _common_plan(results, frames_per_s, slow_motion)

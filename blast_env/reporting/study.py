@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError
+from blast_env.documents import parse_csv, read_text
+from blast_env.errors import BlastEnvError, shortened
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.export.bill import bill_of_quantities
 from blast_env.export.plan import LayoutPlan
@@ -197,7 +198,7 @@ def run_study(
     )
     for threat in threats:
         check_layout(scenario.with_possible_charges([threat.charge]), cells)
-    front = _front_layouts(options.front, scenario)
+    front = front_layouts(options.front, scenario)
     bill = bill_of_quantities(LayoutPlan(scenario, cells))
     runs = Runs(scenario, cells, options, targets, threats, progress)
     runs.run_threats()
@@ -366,7 +367,14 @@ class Runs:
         return np.asarray(np.reshape(counted, (len(layouts), len(charges))))
 
 
-def _front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
+@dataclass(frozen=True)
+class _FrontRow:
+    """What is read of a row of a front."""
+
+    layout: str
+
+
+def front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
     """Return the layouts of a front that a search wrote.
 
     Raises:
@@ -375,10 +383,8 @@ def _front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
     if path is None:
         return ()
     try:
-        table = pd.read_csv(path, dtype={"layout": str}, keep_default_na=False)
-        texts = table["layout"].tolist()
-        layouts = [layout_from(text) for text in texts]
-    except (OSError, KeyError, TypeError, ValueError) as error:
+        layouts = [layout_from(row.layout) for row in parse_csv(read_text(path), _FrontRow)]
+    except ValueError as error:
         raise BlastEnvError(
             f"{path}: is not the front.csv of a search (column `layout`, cells as row,column or "
             f"pieces as row,column,item): {error}"
@@ -390,12 +396,16 @@ def _front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
 
 def layout_from(text: str) -> Layout:
     """Return a layout from what `layout_text` writes: `3,4 3,5`, `3,4,t_wall 7,4,t_wall,turned`."""
-    return tuple(_element_from(*element.split(",")) for element in text.split())
+    return tuple(_element_from(element) for element in text.split())
 
 
-def _element_from(row: str, column: str, item: str = "", turned: str = "") -> Element:
+def _element_from(text: str) -> Element:
+    parts = text.split(",")
+    if not 2 <= len(parts) <= 4:
+        raise ValueError(f"{shortened(text)!r} must have 2 to 4 parts")
+    row, column, item, turned = (*parts, "", "")[:4]
     if turned not in ("", "turned"):
-        raise ValueError(f"{turned!r} must be 'turned'")
+        raise ValueError(f"{shortened(turned)!r} must be 'turned'")
     if not item:
         return int(row), int(column)
     return Piece(int(row), int(column), item, turned == "turned")

@@ -35,6 +35,7 @@ from blast_env.scenario.vehicles import (
 )
 from blast_env.scenario.zone import TOLERANCE_M, distance_m
 from blast_env.units import UNITS_PER_M
+from blast_env.values import checked_seed
 
 
 def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
@@ -43,11 +44,10 @@ def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
     Separate streams, so that a charge fixed by hand leaves fan and air as they were.
 
     Raises:
-        ValueError: If the seed is negative.
+        BlastEnvError: If the seed is no integer, negative or too large.
     """
-    if seed < 0:
-        raise ValueError(f"seed is {seed}, must be at least 0")
-    return tuple(np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3))
+    children = np.random.SeedSequence(checked_seed(seed)).spawn(3)
+    return tuple(np.random.default_rng(child) for child in children)
 
 
 def draw_charge(scenario: Scenario, seed: int, layout: Sequence[Element] = ()) -> Charge:

@@ -13,17 +13,11 @@ from typing import Annotated, Any, Final, NamedTuple
 import numpy as np
 from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 
-from blast_env.errors import LayoutError, suggestion
+from blast_env.errors import LayoutError, suggestion, type_word, value_text
 from blast_env.geometry import Cell, Element, Piece
 from blast_env.scenario.barriers import stock_barriers
-from blast_env.scenario.problems import (
-    Problem,
-    ScenarioError,
-    type_word,
-    unknown_name,
-    value_text,
-)
-from blast_env.scenario.sections import Count, Height, Name, Section
+from blast_env.scenario.problems import Problem, ScenarioError, unknown_name
+from blast_env.scenario.sections import FOR_PEOPLE, Count, Height, Name, Section
 
 Cost = Annotated[StrictFloat, Field(gt=0.0, le=1e9)]
 
@@ -55,7 +49,7 @@ class Item(Section):
     """
 
     name: Name
-    description: Annotated[str, Field(max_length=200)] = ""
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE] = ""
     length_modules: Count
     thickness_modules: Count = 1
     height_m: Height

@@ -12,6 +12,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.scenario.models import Scenario
 from blast_env.scenario.problems import Problem, ScenarioError, unknown_name
+from blast_env.values import path_of
 
 SUFFIX: Final = ".toml"
 
@@ -137,7 +138,7 @@ def save_scenario(scenario: AnyScenario, path: str | Path) -> None:
             `model_copy` made unsound, or a name that is not a `.toml` file's.
         BlastEnvError: If the file cannot be written.
     """
-    if Path(path).suffix != SUFFIX:
+    if path_of(path).suffix != SUFFIX:
         raise ScenarioError(str(path), [Problem("", f"must be a {SUFFIX} file")])
     document = find_scenario(scenario).model_dump(mode="json", exclude_none=True)
     Scenario.from_document(document, str(path))
@@ -164,7 +165,10 @@ def _bundled_folder() -> Path:
 
 def _located(name_or_path: str | Path) -> Path:
     """Return the path of the file that a name or path stands for."""
-    path = Path(name_or_path)
+    try:
+        path = path_of(name_or_path)
+    except BlastEnvError as error:
+        raise ScenarioError("scenario", [Problem("", str(error))]) from error
     is_folder = os.path.isdir(path)
     if path.name == str(name_or_path) and not path.suffix:
         known = bundled_scenarios()

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StrictFloat
 
-from blast_env.scenario.sections import Section
+from blast_env.scenario.sections import FOR_PEOPLE, Section
 
 Degrees = Annotated[StrictFloat, Field(ge=-180.0, le=180.0)]
 
@@ -35,7 +35,7 @@ class MapGeoreference(Georeference):
     kind: Literal["map"] = "map"
     longitude_deg: Degrees
     latitude_deg: Annotated[StrictFloat, Field(ge=-89.0, le=89.0)]
-    crs: Annotated[str, Field(min_length=1, max_length=500)] = "EPSG:4326"
+    crs: Annotated[str, Field(min_length=1, max_length=500), FOR_PEOPLE] = "EPSG:4326"
 
 
 class DrawingGeoreference(Georeference):

@@ -9,14 +9,14 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from blast_env.documents import MAX_BYTES, DocumentError, parse_json, read_text
-from blast_env.errors import LayoutError, suggestion
+from blast_env.errors import LayoutError, key_path, suggestion, type_word, value_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout, Piece
 from blast_env.scenario.catalogue import cell_from
 from blast_env.scenario.files import AnyScenario, find_scenario
 from blast_env.scenario.models import Scenario
 from blast_env.scenario.placement import check_layout
-from blast_env.scenario.problems import key_path, type_word, value_text
+from blast_env.values import path_of
 
 CELLS_VERSION: Final = 1
 """The version of a file whose layout consists of cells; it need not say so."""
@@ -66,7 +66,7 @@ class LayoutFile:
             LayoutError: If the file cannot be read or is anything else.
         """
         try:
-            content = parse_json(read_text(Path(path)))
+            content = parse_json(read_text(path_of(path)))
         except DocumentError as error:
             raise LayoutError(f"{path}: {error}") from error
         return _parse(content, str(path))
@@ -137,7 +137,7 @@ class LayoutFile:
             )
         with write_atomically(path) as temporary:
             temporary.write_bytes(content)
-        return Path(path)
+        return path_of(path)
 
     def _text(self, path: str | Path) -> str:
         """Return the file as JSON, the cells on one line, or each piece on one."""

@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.geometry import Cell
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.scene import Charge
@@ -39,6 +39,7 @@ from blast_env.scenario.heights import air_height_m, default_air_height_m, heigh
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, ScenarioError, problems_from
 from blast_env.scenario.sections import (
+    FOR_PEOPLE,
     AnySource,
     AnyStructure,
     ChargeSource,
@@ -130,7 +131,7 @@ class Scenario(Section):
 
     schema_version: Annotated[StrictInt, AfterValidator(check_version)]
     name: Name
-    description: Annotated[str, Field(max_length=2000)] = ""
+    description: Annotated[str, Field(max_length=2000), FOR_PEOPLE] = ""
     site: Site
     charge: Sources
     structures: Annotated[tuple[AnyStructure, ...], Field(min_length=1, max_length=100)]
@@ -270,6 +271,8 @@ class Scenario(Section):
         Raises:
             ScenarioError: If the charge would not be clear of a structure or the border.
         """
+        if not isinstance(charge, Charge):
+            raise BlastEnvError(f"charge is {value_text(charge)}, must be a Charge")
         return self._with_points((), (charge,))
 
     def with_possible_charges(self, charges: Sequence[AnyCharge]) -> "Scenario":

@@ -1,10 +1,7 @@
 """Problems of a scenario file, each in words that name key, value and bound."""
 
-import math
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import date, datetime, time
 from difflib import get_close_matches
 from types import UnionType
 from typing import Any, Final, Literal, Union, get_args, get_origin
@@ -12,87 +9,22 @@ from typing import Any, Final, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from blast_env.errors import BlastEnvError, suggestion
+from blast_env.errors import (
+    BlastEnvError,
+    KeyParts,
+    alternatives,
+    key_path,
+    suggestion,
+    type_word,
+    value_text,
+)
 from blast_env.geometry import Rectangle
-
-MAX_TEXT: Final = 60
-"""Characters after which a value or a key is cut."""
-
-
-def shortened(text: str, length: int = MAX_TEXT) -> str:
-    """Return the text, its end replaced by dots if it is too long."""
-    return text if len(text) <= length else text[: length - 3] + "..."
-
-
-def key_path(parts: Sequence[str | int]) -> str:
-    """Return keys and indices as they would be read aloud: `structures[1].rows`."""
-    text = ""
-    for part in parts:
-        if isinstance(part, int):
-            text += f"[{part}]"
-        else:
-            key = part if re.fullmatch(r"[A-Za-z0-9_-]+", part) else _quoted(part)
-            text += ("." if text else "") + shortened(key)
-    return text
-
-
-def value_text(value: object) -> str:
-    """Return a value as a file would have it, shortened."""
-    if isinstance(value, str):
-        return _quoted(value)
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int):
-        # Python refuses to write out integers of more than some thousand digits.
-        digits = value.bit_length() * math.log10(2.0)
-        return f"an integer of about {digits:.0f} digits" if digits > MAX_TEXT else f"{value}"
-    if isinstance(value, float):
-        return repr(float(value))
-    if isinstance(value, datetime | date | time):
-        return value.isoformat()
-    return type_word(value)
-
-
-def type_word(value: object) -> str:
-    """Return a value and its type: `'ten' (a string)`; only the type for what has parts."""
-    if isinstance(value, Mapping):
-        return "a table"
-    if isinstance(value, list | tuple):
-        return "an array"
-    if value is None:
-        return "nothing"
-    words = {
-        bool: "a truth value",
-        str: "a string",
-        datetime: "a date",
-        date: "a date",
-        time: "a time",
-    }
-    if type(value) in words:
-        return f"{value_text(value)} ({words[type(value)]})"
-    if isinstance(value, int | float):
-        return value_text(value)
-    return f"a {type(value).__name__}"
-
-
-def alternatives(values: Iterable[object]) -> str:
-    """Return `'a', 'b' or 'c'`."""
-    texts = [value_text(value) for value in values]
-    return " or ".join(filter(None, (", ".join(texts[:-1]), texts[-1])))
 
 
 def extent(rectangle: Rectangle) -> str:
     """Return the extent of a rectangle in words."""
     left, bottom, right, top = rectangle
     return f"x {left:g} to {right:g} m, y {bottom:g} to {top:g} m"
-
-
-def _quoted(text: str) -> str:
-    """Return the text in quotes, with all but printable characters escaped."""
-    return repr(shortened(text))
-
-
-KeyParts = tuple[str | int, ...]
 
 
 MAX_PROBLEMS: Final = 1000
@@ -186,6 +118,9 @@ def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Proble
     if kind == "extra_forbidden":
         parts, annotation = _followed(model, detail["loc"][:-1])
         yield unknown_key((*parts, detail["loc"][-1]), _options(annotation)[0].model_fields)
+        return
+    if kind == "invalid_key":
+        yield Problem("", f"has the key {value_text(detail['input'])}, keys must be strings")
         return
     parts, annotation = _followed(model, detail["loc"])
     if kind == "value_error" and isinstance(cause := context["error"], ScenarioError):

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -22,6 +22,7 @@ from pydantic import (
     ValidationError,
 )
 
+from blast_env.errors import type_word
 from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import PRESETS, preset
@@ -30,11 +31,11 @@ from blast_env.scenario.problems import (
     Problem,
     ScenarioError,
     problems_from,
-    type_word,
     unknown_key,
     unknown_name,
 )
 from blast_env.units import MODULE_SIDE_M
+from blast_env.values import STEERING
 
 Coordinate = Annotated[StrictFloat, Field(ge=0.0, le=2000.0)]
 
@@ -55,7 +56,19 @@ Height = Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0)]
 Count = Annotated[StrictInt, Field(ge=1, le=1000)]
 
 
-Reason = Annotated[str, Field(min_length=1, max_length=200)]
+def _check_text(text: str) -> str:
+    """Refuse characters that would steer whatever shows the text; lines may end."""
+    wrong = STEERING.search(text)
+    if wrong is not None:
+        raise ValueError(f"must not have the character {wrong[0]!r}")
+    return text
+
+
+FOR_PEOPLE: Final = AfterValidator(_check_text)
+"""Annotation of what somebody wrote for people."""
+
+
+Reason = Annotated[str, Field(min_length=1, max_length=200), FOR_PEOPLE]
 
 
 def _check_name(name: str) -> str:

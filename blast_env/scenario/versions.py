@@ -5,7 +5,8 @@ from typing import Any, Final
 
 from pydantic import BaseModel
 
-from blast_env.scenario.problems import KeyParts, Problem, key_path
+from blast_env.errors import KeyParts, key_path
+from blast_env.scenario.problems import Problem
 
 SCHEMA_VERSION: Final = 2
 """The newest version of the file format; this release reads all of them."""

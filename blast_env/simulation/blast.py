@@ -1,6 +1,6 @@
 """Blasts of the particle engines, and `simulate` for all engines."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
@@ -17,7 +17,7 @@ from blast_env.calibration.model import (
     ScaledImpulse,
     scenario_calibration,
 )
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, layout_text
 from blast_env.physics.collisions import CollisionArray
 from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, ParticleEngine
@@ -41,6 +41,7 @@ from blast_env.recording.tables import (
 from blast_env.runner import check_workers, in_order
 from blast_env.scenario import AnyCharge, AnyScenario, ScenarioField
 from blast_env.scenario.build_scene import build_scene, draw_threat
+from blast_env.values import number_pair, path_of
 
 if TYPE_CHECKING:
     from blast_env.physics.gas.engine import GasEngine
@@ -78,12 +79,7 @@ class Blast:
         Raises:
             BlastEnvError: If that is not a pair of finite numbers.
         """
-        try:
-            x_m, y_m = (float(coordinate) for coordinate in position_m)
-        except (TypeError, ValueError):
-            raise BlastEnvError(
-                f"charge_position_m is {position_m!r}, must be a pair of numbers (x, y)"
-            ) from None
+        x_m, y_m = number_pair("charge_position_m", position_m)
         drawn = draw_threat(self.scenario, self.seed) if self.charge is None else self.charge
         return replace(self, charge=Charge((x_m, y_m), drawn.tnt_kg, drawn.height_m))
 
@@ -235,7 +231,10 @@ class BlastResult:
         obstacle = self.obstacle(structure)
         if obstacle.cells is not None:
             raise CalibrationError(f"{structure!r} is no structure: it has no facade of one width")
-        scaled = (calibration or self.calibration).convert_load(obstacle, self.blast.scene.charge)
+        law = self.calibration if calibration is None else calibration
+        if not isinstance(law, Calibration):
+            raise CalibrationError(f"calibration is {value_text(law)}, must be a Calibration")
+        scaled = law.convert_load(obstacle, self.blast.scene.charge)
         if self.end_reason is not EndReason.EVENT_LIMIT:
             return scaled
         notes = (*scaled.notes, f"the blast was cut off: {self.end_reason}")
@@ -313,7 +312,7 @@ class BlastResult:
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
-        return write_workbook(self, Path(path))
+        return write_workbook(self, path_of(path))
 
     def to_parquet(self, path: str | Path) -> Path:
         """Write the collision table as Parquet, the run record in its metadata.
@@ -324,7 +323,7 @@ class BlastResult:
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
-        return write_parquet(self, Path(path))
+        return write_parquet(self, path_of(path))
 
 
 @overload
@@ -383,14 +382,16 @@ def simulate(
         ScenarioError: If the charge is not clear of a structure or the border.
         BlastEnvError: If `cell_m` does not divide the side of a module, or is given for an engine
             that has no cells.
-        ValueError: If the seed is negative.
+        BlastEnvError: If the seed is no integer, negative or too large.
     """
     found = find_engine(engine, cell_m)
+    # Anything else is refused where it is read.
+    cells = tuple(layout) if isinstance(layout, Iterable) else layout
     if is_gas(found):
         from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
 
-        return GasBlast(scenario, tuple(layout), seed, found, charge).run(progress)
-    return Blast(scenario, tuple(layout), seed, found, charge).run(progress)
+        return GasBlast(scenario, cells, seed, found, charge).run(progress)
+    return Blast(scenario, cells, seed, found, charge).run(progress)
 
 
 def simulate_many(

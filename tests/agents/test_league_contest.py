@@ -1,5 +1,6 @@
 """Entries on a track: the same blasts for all, and nothing is done twice."""
 
+import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -31,6 +32,7 @@ from blast_agents.search import (
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, evaluate_against
+from blast_env.files import FolderStore
 from blast_env.physics.scene import Charge
 from blast_env.scenario import PointSource
 from blast_env.sites import Visibility
@@ -198,6 +200,33 @@ def test_a_damaged_result_is_found_again(tmp_path: Path, damage: bytes) -> None:
     first = Contest(TRACK, entries, store(tmp_path)).play()
     for path in (tmp_path / "results").iterdir():
         path.write_bytes(damage)
+    again = Contest(TRACK, entries, store(tmp_path))
+    assert again.outlook().kept_searches == 0
+    for one, other in zip(first.results, again.play().results, strict=True):
+        assert np.array_equal(one.loads, other.loads)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"[1e999]",
+        b"[-1.0]",
+        b"[1.0]",
+        b'{"layout": [[999, 999]], "seconds": 1.0}',
+        b'{"layout": [[0, 0], [0, 0]], "seconds": 1.0}',
+        b'{"layout": [], "seconds": "2026-01-01"}',
+        b"[" * 1000,
+        b"\xff",
+    ],
+)
+def test_a_result_with_a_right_checksum_that_does_not_fit_is_done_again(
+    content: bytes, tmp_path: Path
+) -> None:
+    entries = (NoBarrier(), Search(RandomSearch(), BUDGET))
+    first = Contest(TRACK, entries, store(tmp_path)).play()
+    for path in store(tmp_path).folder.iterdir():
+        key = json.loads(path.read_bytes()[32:].partition(b"\n")[0])
+        FolderStore(path.parent, ".result").put(key, content)
     again = Contest(TRACK, entries, store(tmp_path))
     assert again.outlook().kept_searches == 0
     for one, other in zip(first.results, again.play().results, strict=True):

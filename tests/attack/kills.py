@@ -23,8 +23,9 @@ from typer.testing import CliRunner
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.files import FolderStore, is_temporary
+from blast_env.journal import Journal
 from blast_env.scenario import load_scenario
-from blast_env.studies.calibration.study import FreeFieldStudy, read_store
+from blast_env.studies.calibration.study import FreeFieldRun, FreeFieldStudy
 from tests.agents.league_cases import road_scenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings
 
@@ -118,7 +119,7 @@ def _study(folder: Path) -> None:
 
 
 def _study_outcome(folder: Path) -> Any:
-    return sorted(map(str, read_store(folder / "runs.jsonl").values()))
+    return sorted(map(str, Journal(folder / "runs.jsonl", FreeFieldRun).read()))
 
 
 JOBS: Final = {

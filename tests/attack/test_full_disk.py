@@ -7,7 +7,8 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.files import FolderStore, is_temporary, write_atomically
-from blast_env.studies.calibration.study import FreeFieldRun, append_to_store, read_store
+from blast_env.journal import Journal
+from blast_env.studies.calibration.study import FreeFieldRun
 from tests.attack.disks import file_size_limit
 from tests.attack.writers import WRITERS
 
@@ -34,13 +35,14 @@ def test_what_was_there_outlives_a_full_device(name: str, tmp_path: Path) -> Non
 
 def test_a_study_goes_on_after_a_full_device(tmp_path: Path) -> None:
     store = tmp_path / "runs.jsonl"
+    journal = Journal(store, FreeFieldRun)
     runs = [FreeFieldRun(f"key {seed}", 10.0, seed, 1.0, 1.0, None) for seed in range(3)]
-    append_to_store(store, runs[0])
+    journal.add(runs[0])
     limit = store.stat().st_size + 20
     with file_size_limit(limit), pytest.raises(BlastEnvError, match="cannot be written"):
-        append_to_store(store, runs[1])
-    append_to_store(store, runs[2])
-    assert list(read_store(store).values()) == [runs[0], runs[2]]
+        journal.add(runs[1])
+    journal.add(runs[2])
+    assert journal.read() == [runs[0], runs[2]]
 
 
 def test_a_store_keeps_what_it_had_on_a_full_device(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Stored calibrations: conversion per metre of facade, refusals, damaged files."""
 
 import json
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -231,7 +232,10 @@ def damage(content: dict) -> dict[str, str]:
     return {
         "is not JSON": whole[: len(whole) // 2],
         "was edited": json.dumps(content | {"facade_width_m": 99.0}),
-        "is not a calibration": "[]",
+        "must be a calibration": "[]",
+        "nested too deeply": "[" * 1000,
+        "has 6000 digits": whole.replace("{", '{"law": ' + "9" * 6000 + ",", 1),
+        "a key occurs twice": whole.replace("{", '{"law": 1,', 1),
         "the checksum does not match": json.dumps({}),
     }
 
@@ -246,8 +250,30 @@ def test_damaged_files_are_refused(words: str, tmp_path: Path) -> None:
     assert "mine.json" in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"i_sim": [1.0]}, "i_sim must have 8 values"),
+        ({"coefficients": {"A": 1.0}}, "coefficients must be 'A' or 'B' of a power law"),
+        ({"coefficients": {"A": -1.0, "B": 1.0}}, "A is -1.0, must be above 0"),
+        ({"distances_m": [1.0]}, "distances_m is an array: .* at least 2 items"),
+        ({"facade_width_m": "2026-01-01"}, "facade_width_m is '2026-01-01'"),
+        ({"tnt_range_kg": [200.0, 100.0]}, "tnt_range_kg must be around tnt_kg"),
+        ({"seeds": []}, "seeds is an array"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(changes: dict, words: str, tmp_path: Path) -> None:
+    """Also with the right checksum, which anybody can make."""
+    path = tmp_path / "mine.json"
+    content = CALIBRATION.model_dump(mode="json") | changes
+    checksum = sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    path.write_text(json.dumps(content | {"checksum": checksum}))
+    with pytest.raises(CalibrationError, match=f"mine.json: .*{words}"):
+        load_calibration(path)
+
+
 def test_missing_files_and_names_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(CalibrationError, match="cannot be read"):
+    with pytest.raises(CalibrationError, match="there is no such file"):
         load_calibration(tmp_path / "none.json")
     with pytest.raises(UnknownNameError, match="did you mean 'ballistic_ufc'"):
         load_calibration("balistic_ufc")

@@ -38,9 +38,9 @@ def test_numbers_of_other_types_make_the_same_threat() -> None:
     [
         ([], "there are none, must be at least one"),
         ([4, 2, 4], r"seeds\[2\] is 4, is there already"),
-        ([0, -7], r"seeds\[1\] is -7, must be at least 0"),
+        ([0, -7], r"seeds\[1\] is -7, must be an integer from 0"),
         ([0.5], r"seeds\[0\] is 0.5, must be an integer"),
-        ([True], r"seeds\[0\] is True, must be an integer"),
+        ([True], r"seeds\[0\] is true, must be an integer"),
     ],
 )
 def test_unusable_seeds_are_named(seeds: list, words: str) -> None:
@@ -52,7 +52,7 @@ def test_unusable_seeds_are_named(seeds: list, words: str) -> None:
 def test_unusable_charges_are_named(charge: Any) -> None:
     with pytest.raises(BlastEnvError, match="must be"):
         Threat(charge, 0)
-    with pytest.raises(BlastEnvError, match="seed is -1, must be at least 0"):
+    with pytest.raises(BlastEnvError, match="seed is -1, must be an integer from 0"):
         Threat(Charge((5.0, 15.0), 100.0), -1)
 
 

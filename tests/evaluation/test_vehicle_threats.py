@@ -104,5 +104,5 @@ def test_a_search_meets_the_worst_places_first() -> None:
 
 
 def test_a_threat_needs_a_sound_seed() -> None:
-    with pytest.raises(BlastEnvError, match="seed is -1, must be at least 0"):
+    with pytest.raises(BlastEnvError, match="seed is -1, must be an integer from 0"):
         Threat(VehicleCharge(SOURCE), -1)

@@ -1,14 +1,20 @@
 """The candidates for the collisional presets: what the search makes of their scores."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from blast_env.errors import BlastEnvError
+from blast_env.journal import Journal
 from blast_env.physics.presets import preset
 from blast_env.studies.calibration.candidates import (
     HIGH,
     LOW,
     Candidate,
     Score,
+    ScoredCandidate,
+    Store,
     candidate_table,
     front,
     front_figure,
@@ -56,6 +62,19 @@ def test_a_candidate_is_balls_of_its_radius_in_the_air_that_it_names() -> None:
     assert air.mass / air.spacing_units**2 == pytest.approx(each.air_density)
     assert explosive.mass * explosive.ball_count == pytest.approx(720.0)
     assert explosive.charge_scaling == preset("collisional").explosive.charge_scaling
+
+
+def test_a_search_goes_on_with_what_it_has_and_refuses_what_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "candidates.jsonl"
+    journal = Journal(path, ScoredCandidate)
+    for each, score in SCORES.items():
+        journal.add(ScoredCandidate(each, score))
+    whole = path.read_text()
+    path.write_text(f"{whole}{whole[:50]}")  # killed in the middle of a line
+    assert Store(path, (0,), 1).scores == SCORES
+    path.write_text(whole.replace('"loss"', '"los"', 1))
+    with pytest.raises(BlastEnvError, match=r"jsonl: line 1: candidate.loss is missing; candidate"):
+        Store(path, (0,), 1)
 
 
 def test_the_figure_shows_every_candidate_and_the_presets() -> None:

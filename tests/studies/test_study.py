@@ -1,5 +1,8 @@
 """The free-field study: resumable, parallel, summed up with intervals."""
 
+import json
+import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import pandas as pd
@@ -8,13 +11,12 @@ from scipy import stats
 
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
+from blast_env.journal import Journal
 from blast_env.studies.calibration import study as study_module
 from blast_env.studies.calibration.study import (
     FreeFieldRun,
     FreeFieldStudy,
-    append_to_store,
     impulse_by_seed,
-    read_store,
     summarise,
 )
 
@@ -56,7 +58,7 @@ def test_an_interrupted_study_goes_on_without_repeating(
     monkeypatch.setattr(study_module, "_run_one", counted)
     with pytest.raises(KeyboardInterrupt):
         STUDY.run(store=store)
-    assert len(read_store(store)) == 4
+    assert len(Journal(store, FreeFieldRun).read()) == 4
     with store.open("a") as file:
         file.write('{"key": "cut sho')  # what a killed process leaves
     first, ran[:] = list(ran), []
@@ -74,7 +76,7 @@ def test_runs_of_other_parameters_are_not_believed(tmp_path: Path) -> None:
     FreeFieldStudy(SMALL, (8.0,), (5,)).run(store=store)
     heavier = SMALL.with_simulation(overrides={"air": {"mass": 0.5}})
     other = FreeFieldStudy(heavier, (8.0,), (5,)).run(store=store)
-    assert len(read_store(store)) == 2
+    assert len(Journal(store, FreeFieldRun).read()) == 2
     expected = simulate(heavier.at_stand_off(8.0), seed=5).impulse_sim("building")
     assert other.impulse_sim.tolist() == [expected]
 
@@ -107,14 +109,47 @@ def test_bad_studies_are_refused(
         FreeFieldStudy(SMALL, distances, seeds)
 
 
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"impulse_sim": -1.0}, "impulse_sim is -1.0: .* greater than or equal to 0"),
+        ({"impulse_sim": "much"}, "impulse_sim is 'much': .* number"),
+        ({"first_hit_s": 10**5000}, "1000.* has 5001 digits"),
+        ({"seed": 1.5}, "seed is 1.5: .* integer"),
+        ({"more": 1}, "more is 1: "),
+        ({"distance_m": [[[[1.0]]]]}, "distance_m is an array: .* number"),
+    ],
+)
+def test_a_run_that_is_none_is_refused_with_its_key_and_bound(
+    changed: dict, words: str, tmp_path: Path
+) -> None:
+    run = asdict(FreeFieldRun("key", 8.0, 1, 2.0, 3.0, None))
+    sys.set_int_max_str_digits(10_000)
+    line = json.dumps(run | changed)
+    sys.set_int_max_str_digits(4300)
+    (tmp_path / "runs.jsonl").write_text(f"{line}\n")
+    with pytest.raises(BlastEnvError, match=f"runs.jsonl: line 1: {words}"):
+        Journal(tmp_path / "runs.jsonl", FreeFieldRun).read()
+
+
+def test_a_run_with_the_key_of_another_is_refused(tmp_path: Path) -> None:
+    """Its distance would stand in the table beside the impulse of another."""
+    study = FreeFieldStudy(SMALL, (8.0,), (5,))
+    study.run(store=tmp_path / "runs.jsonl")
+    text = (tmp_path / "runs.jsonl").read_text()
+    (tmp_path / "runs.jsonl").write_text(text.replace('"distance_m": 8.0', '"distance_m": 9.0'))
+    with pytest.raises(BlastEnvError, match=r"9 m with seed 5 has the key of one at 8 m"):
+        study.run(store=tmp_path / "runs.jsonl")
+
+
 def test_a_store_that_is_none_is_refused_with_its_line(tmp_path: Path) -> None:
     store = tmp_path / "runs.jsonl"
-    append_to_store(store, FreeFieldRun("key", 8.0, 1, 2.0, 3.0, None))
+    Journal(store, FreeFieldRun).add(FreeFieldRun("key", 8.0, 1, 2.0, 3.0, None))
     with store.open("a") as file:
         file.write("nonsense\n")
-    with pytest.raises(BlastEnvError, match="line 2 is not a run"):
-        read_store(store)
+    with pytest.raises(BlastEnvError, match=r"runs.jsonl: line 2: is not JSON"):
+        Journal(store, FreeFieldRun).read()
     store.write_bytes(b"\xff\xfe\n")
-    with pytest.raises(BlastEnvError, match="cannot be read"):
-        read_store(store)
-    assert read_store(tmp_path / "none.jsonl") == {}
+    with pytest.raises(BlastEnvError, match=r"line 1: is not UTF-8 text"):
+        Journal(store, FreeFieldRun).read()
+    assert Journal(tmp_path / "none.jsonl", FreeFieldRun).read() == []

@@ -244,7 +244,7 @@ class Contest:
             for entry in self.entries
             if isinstance(entry, Search)
             for case in self.track.cases
-            if self.store.proposal(search_key(case, entry, self.engine)) is None
+            if self._found(case, entry) is None
         ]
         return sorted(jobs, key=lambda job: -job.blasts)
 
@@ -267,8 +267,10 @@ class Contest:
         """Return what an entry proposes, one a case; `None` where it has not searched yet."""
         if not isinstance(entry, Search):
             return self._instant[entry.name]
-        cases = self.track.cases
-        return [self.store.proposal(search_key(case, entry, self.engine)) for case in cases]
+        return [self._found(case, entry) for case in self.track.cases]
+
+    def _found(self, case: Case, entry: Search) -> Proposal | None:
+        return self.store.proposal(search_key(case, entry, self.engine), case.scenario)
 
     def _loads(self, case: Case, layout: Layout) -> tuple[float, ...] | None:
         return self.store.loads(evaluation_key(case, layout, self.engine))

@@ -8,15 +8,16 @@ import re
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
-from pydantic import TypeAdapter
+from pydantic import Field, TypeAdapter
 
 import blast_agents
 from blast_agents.league.entries import Search
 from blast_agents.league.tracks import practice_of
 from blast_agents.proposal import Proposal
 from blast_env.calibration.model import scenario_calibration
+from blast_env.documents import checked_as, parse_json
 from blast_env.evaluation import Case, Threat
 from blast_env.evaluation.store import calibration_digest, engine_text
 from blast_env.files import FolderStore
@@ -24,7 +25,7 @@ from blast_env.geometry import Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine, is_gas
 from blast_env.provenance import code_version, versions
-from blast_env.scenario import AnyCharge, VehicleCharge
+from blast_env.scenario import AnyCharge, AnyScenario, VehicleCharge, check_layout
 
 _PACKAGES: Final = ("numpy", "pymoo")
 """What a search draws its numbers with."""
@@ -114,7 +115,8 @@ def evaluation_key(case: Case, layout: Layout, engine: str | Engine) -> Evaluati
 
 
 _PROPOSAL: Final = TypeAdapter(Proposal)
-_LOADS: Final = TypeAdapter(tuple[float, ...])
+Load = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_LOADS: Final = TypeAdapter(tuple[Load, ...])
 
 
 class ResultStore:
@@ -135,10 +137,15 @@ class ResultStore:
         """The folder, as an absolute path."""
         return self._store.folder
 
-    def proposal(self, key: SearchKey) -> Proposal | None:
-        """Return what a search proposed, or `None` if that is not known."""
-        content = self._store.get(_text(key))
-        return None if content is None else _PROPOSAL.validate_json(content)
+    def proposal(self, key: SearchKey, scenario: AnyScenario) -> Proposal | None:
+        """Return what a search proposed for a scenario, or `None` if that is not known."""
+
+        def decode(content: bytes) -> Proposal:
+            proposal = checked_as(Proposal, parse_json(content.decode()))
+            check_layout(scenario, proposal.layout)
+            return proposal
+
+        return self._store.read(_text(key), decode)
 
     def keep_proposal(self, key: SearchKey, proposal: Proposal) -> None:
         """Keep what a search proposed.
@@ -150,8 +157,14 @@ class ResultStore:
 
     def loads(self, key: EvaluationKey) -> tuple[float, ...] | None:
         """Return the loads under the threats, in the objective's unit, or `None` if not known."""
-        content = self._store.get(_text(key))
-        return None if content is None else _LOADS.validate_json(content)
+
+        def decode(content: bytes) -> tuple[float, ...]:
+            loads = checked_as(tuple[Load, ...], parse_json(content.decode()))
+            if len(loads) != len(key.threats):
+                raise ValueError(f"{len(loads)} loads of {len(key.threats)} threats")
+            return loads
+
+        return self._store.read(_text(key), decode)
 
     def keep_loads(self, key: EvaluationKey, loads: tuple[float, ...]) -> None:
         """Keep the loads under the threats, in the unit of the objective.

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from blast_env.envs.arguments import check_names, whole_number
+from blast_env.envs.arguments import check_names
 from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, SeedRange, draw_threats
@@ -18,6 +18,7 @@ from blast_env.scenario import (
 )
 from blast_env.scenario.build_scene import draw_threat
 from blast_env.sites import SiteSource
+from blast_env.values import whole_number
 
 TRACKS: Final = ("known", "hidden", "vehicle", "sites")
 """The tracks by name."""

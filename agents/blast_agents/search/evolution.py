@@ -10,6 +10,7 @@ from blast_agents.search.moves import Draw, Moves, random_part, random_walls
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
 from blast_agents.search.session import SearchSession
 from blast_env.geometry import Layout
+from blast_env.values import generator
 
 _LEAST_POPULATION: Final = 6
 
@@ -63,7 +64,7 @@ class GeneticSearch:
         plan = Plan.of(problem, budget)
         session = SearchSession(problem, budget, plan, report)
         size = population_size(plan.exploring_layouts)
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
 
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
             return session.assess(layouts)[:, np.newaxis]
@@ -127,7 +128,7 @@ class Nsga2Search:
         plan = Plan.of(problem, budget)
         session = SearchSession(problem, budget, plan, report)
         size = 2 * population_size(plan.exploring_layouts)
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
 
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
             prices = [problem.price(each) for each in layouts]

@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-import numpy as np
-
 from blast_agents.search.by_rule import layouts_by_rule
 from blast_agents.search.moves import Moves
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
 from blast_agents.search.session import SearchSession
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Scenario
+from blast_env.values import generator
 
 
 class SamplingAgent(Protocol):
@@ -51,7 +50,7 @@ class PolicySearch:
         self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
     ) -> SearchResult:
         """Return the best layout that was met."""
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
         plan = Plan.of(problem, budget)
         session = SearchSession(problem, budget, plan, report)
         told = problem.told

@@ -15,6 +15,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Element, Layout, Piece
 from blast_env.scenario import Placement
+from blast_env.values import generator
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class RandomSearch:
         self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
     ) -> SearchResult:
         """Return the best of as many random layouts as the budget pays for."""
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
         session = SearchSession(problem, budget, Plan.of(problem, budget), report)
 
         def explore() -> None:
@@ -71,7 +72,7 @@ class GreedySearch:
         self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
     ) -> SearchResult:
         """Return the best layout that was met on the way."""
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
         plan = Plan.of(problem, budget)
         session = SearchSession(problem, budget, plan, report)
 
@@ -167,7 +168,7 @@ class AnnealingSearch:
         self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
     ) -> SearchResult:
         """Return the best layout that was met on the way."""
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
         plan = Plan.of(problem, budget)
         session = SearchSession(problem, budget, plan, report)
 

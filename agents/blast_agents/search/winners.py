@@ -9,6 +9,7 @@ from blast_agents.search.moves import Draw, Moves, random_walls
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
 from blast_agents.search.session import SearchSession
 from blast_env.geometry import Layout
+from blast_env.values import generator
 
 _LEAST_WALKERS: Final = 3
 
@@ -47,7 +48,7 @@ class WinnersSearch:
         self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
     ) -> SearchResult:
         """Return the best layout that was met on the way."""
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
         plan = Plan.of(problem, budget)
         session = SearchSession(problem, budget, plan, report)
         walkers = round(0.4 * plan.exploring_layouts**0.5)

@@ -12,12 +12,11 @@ import torch
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from torch import nn
 
-from blast_agents.training.hyperparameters import described
 from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunConfiguration
-from blast_env.errors import BlastEnvError
+from blast_env.documents import described
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
-from blast_env.scenario.problems import value_text
 
 CHECKPOINT_FORMAT: Final = 2
 
@@ -161,14 +160,7 @@ class Checkpoint:
         """
         if not path.is_file():
             raise BlastEnvError(f"{path}: there is no such checkpoint")
-        try:
-            _check_archive(path)
-            content = torch.load(path, map_location="cpu", weights_only=True)
-            _check_tensors(content)
-        # torch says what is wrong with a file in errors of many kinds.
-        except Exception as error:
-            first_line = str(error).partition("\n")[0]
-            raise BlastEnvError(f"{path}: is damaged, or no checkpoint: {first_line}") from error
+        content = load_archive(path, "no checkpoint")
         found = content.get("format") if isinstance(content, dict) else None
         if found != CHECKPOINT_FORMAT:
             raise BlastEnvError(
@@ -178,7 +170,7 @@ class Checkpoint:
             checked = _Content.model_validate(content)
         except ValidationError as error:
             raise BlastEnvError(
-                described(error, f"{path}: is damaged, or no checkpoint")
+                f"{path}: is damaged, or no checkpoint: {described(error)}"
             ) from error
         values = {name: getattr(checked, name) for name in _Content.model_fields}
         del values["format"]
@@ -224,14 +216,7 @@ class Checkpoint:
                 f"{place}: has no weights yet, before its first {what}; "
                 f"blast-env train --resume {place} goes on"
             )
-        try:
-            policy.load_state_dict(values)
-        except RuntimeError as error:
-            problem = " ".join(str(error).split())
-            raise BlastEnvError(f"{place}: weights and configuration differ: {problem}") from error
-        for name, value in policy.state_dict().items():
-            if not torch.isfinite(value).all():
-                raise BlastEnvError(f"{place}: the weights {name} are not finite")
+        load_weights(policy, values, place)
 
     def load_optimizer(self, optimizer: torch.optim.Optimizer, place: Path) -> None:
         """Give an optimiser its state.
@@ -248,6 +233,49 @@ class Checkpoint:
         # torch says in errors of many kinds what does not fit.
         except Exception as error:
             raise BlastEnvError(f"{place}: the optimiser's state does not fit: {error}") from error
+
+
+def load_weights(policy: nn.Module, values: Weights, place: Path) -> None:
+    """Give a policy weights.
+
+    Args:
+        policy: The policy.
+        values: The weights, by name.
+        place: Where they come from, for the error.
+
+    Raises:
+        BlastEnvError: If they are those of another policy, or not finite.
+    """
+    try:
+        policy.load_state_dict(values)
+    # torch says in errors of many kinds what does not fit.
+    except Exception as error:
+        problem = " ".join(str(error).split())
+        raise BlastEnvError(f"{place}: weights and configuration differ: {problem}") from error
+    for name, value in policy.state_dict().items():
+        if not torch.isfinite(value).all():
+            raise BlastEnvError(f"{place}: the weights {name} are not finite")
+
+
+def load_archive(path: Path, otherwise: str) -> Any:
+    """Return what torch has saved; nothing but tensors and plain data is accepted.
+
+    Args:
+        path: The file.
+        otherwise: What it is if it is not damaged, for the error.
+
+    Raises:
+        BlastEnvError: If it is anything else.
+    """
+    try:
+        _check_archive(path)
+        content = torch.load(path, map_location="cpu", weights_only=True)
+        _check_tensors(content)
+    # torch says what is wrong with a file in errors of many kinds.
+    except Exception as error:
+        first_line = str(error).partition("\n")[0]
+        raise BlastEnvError(f"{path}: is damaged, or {otherwise}: {first_line}") from error
+    return content
 
 
 def _check_archive(path: Path) -> None:

@@ -14,7 +14,6 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from blast_agents.training.hyperparameters import DEFAULT_SECTION
 from blast_agents.training.run_folder import RunConfiguration, TrainingSettings
-from blast_env.envs.arguments import real_number, whole_number
 from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
 from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
@@ -25,6 +24,7 @@ from blast_env.physics.engine import Engine
 from blast_env.runner import workers_told
 from blast_env.scenario import bundled_scenarios
 from blast_env.sites import FAMILIES
+from blast_env.values import checked_seed, real_number, whole_number
 
 _Env = gym.Env[Array, np.int64]
 
@@ -84,7 +84,7 @@ class ThreatPool(_Wrapper):
 
     def __init__(self, env: _Env, size: int, seed: int = 0) -> None:
         super().__init__(env)
-        sequence = np.random.SeedSequence(whole_number("seed", seed, 0, 2**63))
+        sequence = np.random.SeedSequence(checked_seed(seed))
         self.seeds = sequence.generate_state(whole_number("size", size, 1, 100_000)).tolist()
         self._rng = np.random.default_rng(sequence)
 

@@ -10,10 +10,9 @@ import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from blast_agents.training.yaml_text import parse_yaml
-from blast_env.documents import DocumentError
+from blast_env.documents import DocumentError, described
 from blast_env.envs.arguments import check_names
-from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.scenario.problems import shortened, value_text
+from blast_env.errors import BlastEnvError, UnknownNameError, shortened
 
 
 def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
@@ -48,16 +47,6 @@ def with_changes(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[
         else:
             result[name] = value
     return result
-
-
-def described(error: ValidationError, place: str) -> str:
-    """Return what is wrong with values, a clause each: where, what it is, and the bound."""
-    clauses = []
-    for each in error.errors():
-        where = ".".join(str(part) for part in each["loc"])
-        what = each["msg"].removeprefix("Value error, ")
-        clauses.append(f"{where} is {value_text(each['input'])}: {what}" if where else what)
-    return f"{place}: {'; '.join(clauses)}"
 
 
 def option_names(model: type[BaseModel]) -> list[str]:
@@ -366,4 +355,4 @@ def load_hyperparameters(
     try:
         return _MODELS[algorithm].model_validate(values)
     except ValidationError as error:
-        raise BlastEnvError(described(error, "hyperparameters")) from error
+        raise BlastEnvError(f"hyperparameters: {described(error)}") from error

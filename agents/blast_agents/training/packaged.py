@@ -4,16 +4,15 @@ import json
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 import torch
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from blast_agents.training.agent import TrainedAgent, policy_for
-from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.hyperparameters import described
+from blast_agents.training.checkpoint import Checkpoint, load_archive, load_weights
 from blast_agents.training.run_folder import RunConfiguration, RunFolder
-from blast_env.documents import DocumentError, read_text
+from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.scenario import Scenario
@@ -133,10 +132,9 @@ def records(folder: Path | None = None) -> Iterator[tuple[Path, Record]]:
     """
     for path in sorted((folder or WEIGHTS).glob("*.json")):
         try:
-            yield path.with_suffix(".pt"), Record.model_validate_json(read_text(path))
-        except (ValidationError, DocumentError) as error:
-            what = described(error, "") if isinstance(error, ValidationError) else str(error)
-            raise BlastEnvError(f"{path}: is damaged: {what}") from error
+            yield path.with_suffix(".pt"), checked_as(Record, parse_json(read_text(path)))
+        except DocumentError as error:
+            raise BlastEnvError(f"{path}: is damaged: {error}") from error
 
 
 def packaged_agent(
@@ -164,13 +162,7 @@ def packaged_agent(
 
 def _agent(path: Path, configuration: RunConfiguration, scenario: Scenario) -> TrainedAgent:
     policy = policy_for(configuration, scenario)
-    try:
-        weights: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
-        policy.load_state_dict(weights)
-    # torch says what is wrong with a file in errors of many kinds.
-    except Exception as error:
-        first_line = str(error).partition("\n")[0]
-        raise BlastEnvError(f"{path}: is damaged, or no weights: {first_line}") from error
+    load_weights(policy, load_archive(path, "no weights"), path)
     policy.set_training_mode(False)
     settings = configuration.settings
     return TrainedAgent(policy, scenario, settings.observation, settings.engine)

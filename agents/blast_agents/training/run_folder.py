@@ -7,12 +7,11 @@ import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
-from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from blast_agents.training.hyperparameters import (
     ALGORITHMS,
@@ -20,19 +19,24 @@ from blast_agents.training.hyperparameters import (
     AnyHyperparameters,
     Hyperparameters,
     SelfLabellingHyperparameters,
-    described,
 )
 from blast_agents.training.yaml_text import parse_yaml
-from blast_env.documents import DocumentError, read_text
+from blast_env.documents import (
+    DocumentError,
+    checked_as,
+    described,
+    parse_csv,
+    parse_json,
+    read_text,
+)
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import OBSERVATIONS
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import is_temporary, make_folder, sync, write_atomically
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
-from blast_env.scenario.problems import value_text
 
 CONFIGURATION_FORMAT: Final = 1
 
@@ -159,7 +163,7 @@ def settings_from(values: Mapping[str, Any]) -> TrainingSettings:
     try:
         return TrainingSettings.model_validate(values)
     except ValidationError as error:
-        raise BlastEnvError(described(error, "training")) from error
+        raise BlastEnvError(f"training: {described(error)}") from error
 
 
 @dataclass(frozen=True)
@@ -234,13 +238,9 @@ def read_rows(path: Path, kind: type[Row]) -> list[Row]:
     Raises:
         BlastEnvError: If there is no such file, or it is damaged.
     """
-    adapter = TypeAdapter(kind)
     try:
-        rows = csv.DictReader(StringIO(read_text(path)), strict=True)
-        return [adapter.validate_python(row) for row in rows]
-    except ValidationError as error:
-        raise BlastEnvError(described(error, f"{path}: is damaged")) from error
-    except (DocumentError, csv.Error) as error:
+        return list(parse_csv(read_text(path), kind))
+    except DocumentError as error:
         raise BlastEnvError(f"{path}: is missing or damaged: {error}") from error
 
 
@@ -313,9 +313,9 @@ class RunFolder:
             BlastEnvError: If the file is missing or damaged.
         """
         try:
-            return TypeAdapter(dict[str, str]).validate_json(self._said("versions.json"))
-        except ValidationError as error:
-            raise BlastEnvError(f"{self.path / 'versions.json'}: is damaged") from error
+            return checked_as(dict[str, str], parse_json(self._said("versions.json")))
+        except DocumentError as error:
+            raise BlastEnvError(f"{self.path / 'versions.json'}: is damaged: {error}") from error
 
     def _said(self, name: str) -> str:
         try:
@@ -412,9 +412,9 @@ class RunFolder:
                 f"{path}: format is {value_text(found)}, must be {CONFIGURATION_FORMAT}"
             )
         try:
-            return RunConfiguration.model_validate(document)
-        except ValidationError as error:
-            raise BlastEnvError(described(error, f"{path}: is damaged")) from error
+            return checked_as(RunConfiguration, document)
+        except DocumentError as error:
+            raise BlastEnvError(f"{path}: is damaged: {error}") from error
 
     def scenario(self, configuration: RunConfiguration) -> Scenario:
         """Return the scenario of the run.

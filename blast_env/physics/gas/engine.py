@@ -32,6 +32,7 @@ from blast_env.physics.gas.source import (
 )
 from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+from blast_env.values import finite_number
 
 ROOF: Final = "roof"
 FACE_NAMES: Final = (*WALLS, ROOF)
@@ -45,6 +46,7 @@ CHECKED_CELLS: Final = 9.2
 _SOUND_M_S: Final = 340.0
 _MOST_BYTES: Final = 8 * 2**30
 _FARTHEST_M: Final = 10_000.0
+_LEAST_CELL_M: Final = 0.001
 # A charge sends more than one wave: its products swing between too wide and too narrow. All times
 # are those of 100 kg, and grow with the cube root of the mass. A run ends at one of few times that
 # are the same for all layouts, so that their loads can be compared.
@@ -91,19 +93,21 @@ class GasEngine:
 
     def __post_init__(self) -> None:
         """Check the arguments."""
-        cells = MODULE_SIDE_M / self.cell_m if self.cell_m > 0.0 else 0.0
+        cell_m = finite_number("cell_m", self.cell_m)
+        cells = MODULE_SIDE_M / cell_m if cell_m >= _LEAST_CELL_M else 0.0
         if not (cells >= 1.0 and isclose(cells, round(cells), rel_tol=1e-9)):
             raise BlastEnvError(
                 f"cell_m is {self.cell_m:g}, must be {MODULE_SIDE_M:g} m, the side of a module, "
-                "divided by a whole number"
+                f"divided by a whole number, and at least {_LEAST_CELL_M:g} m"
             )
         for name, length_m in (("margin_m", self.margin_m), ("border_m", self.border_m)):
-            if not 0.0 <= length_m <= _FARTHEST_M:
+            if not 0.0 <= finite_number(name, length_m) <= _FARTHEST_M:
                 raise BlastEnvError(f"{name} is {length_m:g}, must be 0 to {_FARTHEST_M:g}")
         if not self.settled_s > 0.0:
             raise BlastEnvError(f"settled_s is {self.settled_s:g}, must be above 0")
-        if self.time_limit_s is not None and not self.time_limit_s > 0.0:
-            raise BlastEnvError(f"time_limit_s is {self.time_limit_s:g}, must be above 0")
+        limit_s = self.time_limit_s
+        if limit_s is not None and not finite_number("time_limit_s", limit_s) > 0.0:
+            raise BlastEnvError(f"time_limit_s is {limit_s:g}, must be above 0")
 
     def start_on(self, site: BlastSite, recorders: Recorders = _none) -> "GasRun":
         """Return a run at time 0, independent of every other run.

@@ -22,6 +22,7 @@ from blast_env.geometry import Layout
 from blast_env.physics.collisions import incidence_angle_rad
 from blast_env.physics.engines import find_engine
 from blast_env.physics.scene import Charge
+from blast_env.recording.parquet import read_frame
 from blast_env.rendering.site_plan import write_heading
 from blast_env.rendering.style import render_extra
 from blast_env.runner import run_all
@@ -327,6 +328,9 @@ def compare(
     )
 
 
+COLLISIONS: Final = ("seed", "structure", "time_ms", "angle_deg", "impulse", "transferred")
+"""Columns of what `BlastSet.collisions` returns."""
+
 _POOLED: Final = ("time_ms", "angle_deg")
 
 
@@ -384,14 +388,14 @@ def collisions_of(
     """Return the collisions of a set of blasts, from its file if it has one already.
 
     Raises:
-        BlastEnvError: If the file cannot be written.
+        BlastEnvError: If the file cannot be written, or is damaged.
     """
     path = blasts.path(folder)
     if not path.exists():
         tables = run_all(blasts.collisions, range(blasts.seeds), processes, progress)
         with write_atomically(path) as temporary:
             pd.concat(tables, ignore_index=True).to_parquet(temporary)
-    return pd.read_parquet(path)
+    return read_frame(path, COLLISIONS)
 
 
 # Okabe and Ito's colours, which people with any colour vision can tell apart.

@@ -5,19 +5,20 @@ with measured shielding behind a box, and few events a blast. The base impulse I
 contact it feeds in energy that the charge does not have.
 """
 
-import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import partial
 from math import pi, sqrt
 from pathlib import Path
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from pydantic import ConfigDict
 
 from blast_env.calibration import fit_metrics, fit_power_law, kingery_bulmash
+from blast_env.journal import Journal
 from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import preset, with_resolution
@@ -59,6 +60,8 @@ class Candidate:
         ball_count: Balls of the charge.
         facade_modules: Width of the calibration's facade.
     """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     packing_fraction: float
     radius_units: float
@@ -127,6 +130,8 @@ class Score:
         events: Events of a blast in `courtyard` without a barrier.
     """
 
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
+
     mape_percent: float
     integral_error_percent: float
     exponent: float
@@ -193,16 +198,27 @@ def _score_candidate(seeds: tuple[int, ...], candidate: Candidate) -> Score:
     return score(candidate.parameters(), candidate.facade_modules, seeds)
 
 
+@dataclass(frozen=True)
+class ScoredCandidate:
+    """A line of the file of a search."""
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
+    candidate: Candidate
+    score: Score
+
+
 class Store:
-    """Scores on disk, one a line, so that a search can go on."""
+    """Scores on disk, one a line, so that a search can go on.
+
+    Raises:
+        BlastEnvError: If the file is anything else.
+    """
 
     def __init__(self, path: Path, seeds: tuple[int, ...], processes: int) -> None:
-        self._path, self._seeds, self._processes = path, seeds, processes
-        self.scores: dict[Candidate, Score] = {}
-        if path.exists():
-            for line in path.read_text(encoding="utf-8").splitlines():
-                row = json.loads(line)
-                self.scores[Candidate(**row["candidate"])] = Score(**row["score"])
+        self._journal = Journal(path, ScoredCandidate)
+        self._seeds, self._processes = seeds, processes
+        self.scores = {each.candidate: each.score for each in self._journal.read()}
 
     def score_all(self, candidates: Iterable[Candidate]) -> list[Score]:
         """Return the scores of candidates, running those that are new."""
@@ -211,9 +227,7 @@ class Store:
         found = in_order(partial(_score_candidate, self._seeds), new, self._processes)
         for candidate, its_score in zip(new, found, strict=True):
             self.scores[candidate] = its_score
-            row = {"candidate": asdict(candidate), "score": asdict(its_score)}
-            with self._path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+            self._journal.add(ScoredCandidate(candidate, its_score))
         return [self.scores[each] for each in wanted]
 
 

@@ -1,16 +1,15 @@
 """The free-field study: blasts at many distances with many seeds, resumable."""
 
-import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from pydantic import ConfigDict, Field
 from scipy.special import stdtrit
 
 from blast_env.calibration.laws import Fit, ScalingLaw, fit_linear, fit_power_law, fit_proportional
@@ -28,7 +27,7 @@ from blast_env.calibration.model import (
 )
 from blast_env.calibration.references import kingery_bulmash, paper_ufc_column
 from blast_env.errors import BlastEnvError
-from blast_env.files import sync
+from blast_env.journal import Journal
 from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import parameters_digest
 from blast_env.provenance import package_version
@@ -38,6 +37,9 @@ from blast_env.simulation import simulate
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
 RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")
+
+
+Amount = Annotated[float, Field(ge=0.0)]
 
 
 @dataclass(frozen=True)
@@ -53,12 +55,14 @@ class FreeFieldRun:
         first_hit_s: Time of the first hit; None where nothing hit it.
     """
 
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
+
     key: str
-    distance_m: float
-    seed: int
-    impulse_sim: float
-    transferred_impulse_sim: float
-    first_hit_s: float | None
+    distance_m: Annotated[float, Field(gt=0.0)]
+    seed: Annotated[int, Field(ge=0)]
+    impulse_sim: Amount
+    transferred_impulse_sim: Amount
+    first_hit_s: Amount | None
 
 
 @dataclass(frozen=True)
@@ -114,19 +118,27 @@ class FreeFieldStudy:
         Raises:
             BlastEnvError: If the store is not one, or cannot be written.
         """
-        finished = {} if store is None else read_store(store)
+        journal = None if store is None else Journal(store, FreeFieldRun)
+        finished = {} if journal is None else {each.key: each for each in journal.read()}
         wanted = {
             self._key(scenario, seed): (scenario, distance_m, seed)
             for distance_m in self.distances_m
             for scenario in (self.scenario.at_stand_off(distance_m),)
             for seed in self.seeds
         }
+        for key, (_, distance_m, seed) in wanted.items():
+            known = finished.get(key)
+            if known is not None and (known.distance_m, known.seed) != (distance_m, seed):
+                raise BlastEnvError(
+                    f"{store}: a run at {known.distance_m:g} m with seed {known.seed} has the key"
+                    f" of one at {distance_m:g} m with seed {seed}: the file was edited"
+                )
         missing = [key for key in wanted if key not in finished]
         jobs = [(key, *wanted[key], self.engine) for key in missing]
         for done, (_, run) in enumerate(as_completed(_run_one, jobs, processes), start=1):
             finished[run.key] = run
-            if store is not None:
-                append_to_store(store, run)
+            if journal is not None:
+                journal.add(run)
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(wanted))
         rows = [asdict(finished[key]) for key in wanted]
@@ -188,61 +200,6 @@ def summarise(runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse") -> p
     t = stdtrit(np.maximum(table.seeds - 1, 1), 0.975)
     table.insert(2, "ci95", t * table.sd / np.sqrt(table.seeds))
     return table.reset_index()
-
-
-def read_store(path: Path) -> dict[str, FreeFieldRun]:
-    """Return the runs in a store by their keys; none if there is no such file.
-
-    Raises:
-        BlastEnvError: If a line other than an unfinished last one is not a run.
-    """
-    if not path.exists():
-        return {}
-    try:
-        lines = path.read_text(encoding="utf-8").split("\n")
-    except (OSError, UnicodeDecodeError) as error:
-        raise BlastEnvError(f"{path}: cannot be read: {error}") from error
-    runs: dict[str, FreeFieldRun] = {}
-    for number, line in enumerate(lines[:-1], start=1):
-        try:
-            run = FreeFieldRun(**json.loads(line))
-        except (TypeError, ValueError) as error:
-            raise BlastEnvError(
-                f"{path}: line {number} is not a run of a study: {error}"
-            ) from error
-        runs[run.key] = run
-    return runs
-
-
-def append_to_store(path: Path, run: FreeFieldRun) -> None:
-    """Add a run to a store, after cutting off a last line that was left unfinished.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
-    """
-    line = json.dumps(asdict(run)) + "\n"
-    is_new = not path.exists()
-    try:
-        with path.open("ab+") as file:
-            _cut_unfinished_line(file)
-            file.write(line.encode())
-            file.flush()
-            os.fsync(file.fileno())
-        if is_new:
-            sync(path.parent)
-    except OSError as error:
-        raise BlastEnvError(f"{path}: cannot be written: {error.strerror or error}") from error
-
-
-def _cut_unfinished_line(file: Any) -> None:
-    size = file.seek(0, os.SEEK_END)
-    if size == 0:
-        return
-    file.seek(size - 1)
-    if file.read(1) == b"\n":
-        return
-    file.seek(0)
-    file.truncate(file.read().rfind(b"\n") + 1)
 
 
 def _run_one(job: tuple[str, Scenario, float, int, str]) -> FreeFieldRun:

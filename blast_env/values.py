@@ -1,0 +1,127 @@
+"""Plain values that a user gives, numbers and paths, checked where they come in."""
+
+import os
+import re
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError, value_text
+
+MOST_SEED: Final = 2**63 - 1
+"""The largest seed: tables and files keep it in 64 bits."""
+
+
+STEERING: Final = re.compile(
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+"""Characters that steer a terminal or a page, turn the direction of a line, or are none."""
+
+_MOST_PATH: Final = 4096
+"""Characters; no system takes longer ones."""
+
+
+def whole_number(name: str, value: Any, least: int, most: int) -> int:
+    """Return a count as a plain integer.
+
+    Args:
+        name: What it is, for the error.
+        value: What was given.
+        least: Lower bound, which is allowed itself.
+        most: Upper bound, likewise.
+
+    Raises:
+        BlastEnvError: If it is no integer or out of bounds.
+    """
+    is_integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not is_integer or not least <= value <= most:
+        raise BlastEnvError(
+            f"{name} is {value_text(value)}, must be an integer from {least} to {most}"
+        )
+    return int(value)
+
+
+def checked_seed(value: Any, name: str = "seed") -> int:
+    """Return a seed as a plain integer.
+
+    Raises:
+        BlastEnvError: If it is no integer, negative or too large.
+    """
+    return whole_number(name, value, 0, MOST_SEED)
+
+
+def generator(seed: Any) -> np.random.Generator:
+    """Return the random numbers of a seed.
+
+    Raises:
+        BlastEnvError: If it is no integer, negative or too large.
+    """
+    return np.random.default_rng(checked_seed(seed))
+
+
+def finite_number(name: str, value: Any) -> float:
+    """Return a number as a plain float.
+
+    Raises:
+        BlastEnvError: If it is no number, or one that is not finite as a float.
+    """
+    if isinstance(value, bool | str):
+        raise BlastEnvError(f"{name} is {value_text(value)}, must be a number")
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise BlastEnvError(f"{name} is {value_text(value)}, must be a number") from None
+    except OverflowError:  # an integer of hundreds of digits
+        number = float("inf")
+    if not isfinite(number):
+        raise BlastEnvError(f"{name} is {value_text(value)}, must be a finite number")
+    return number
+
+
+def number_pair(name: str, value: Any) -> tuple[float, float]:
+    """Return two finite numbers (x, y).
+
+    Raises:
+        BlastEnvError: If it is anything else.
+    """
+    is_listed = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    parts = list(value) if is_listed else []
+    try:
+        x, y = (finite_number(name, part) for part in parts)
+    except ValueError:
+        shown = f"({', '.join(map(value_text, parts[:3]))})" if is_listed else value_text(value)
+        raise BlastEnvError(f"{name} is {shown}, must be a pair of finite numbers (x, y)") from None
+    return x, y
+
+
+def real_number(name: str, value: Any, least: float, most: float) -> float:
+    """Return a number as a plain float.
+
+    Raises:
+        BlastEnvError: If it is no number or out of bounds.
+    """
+    number = finite_number(name, value)
+    if not least <= number <= most:
+        raise BlastEnvError(f"{name} is {number:g}, must be a number from {least:g} to {most:g}")
+    return number
+
+
+def path_of(value: Any) -> Path:
+    """Return the path of a file or folder.
+
+    Raises:
+        BlastEnvError: If it is no path, or has a character that no name can have.
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise BlastEnvError(f"path is {value_text(value)}, must be a path")
+    text = os.fspath(value)
+    if not isinstance(text, str) or "\0" in text:
+        raise BlastEnvError(f"path is {value_text(text)}, must be a text without null characters")
+    if len(text) > _MOST_PATH:
+        raise BlastEnvError(
+            f"path is {value_text(text)} of {len(text)} characters, must have at most {_MOST_PATH}"
+        )
+    return Path(text)

@@ -1,0 +1,335 @@
+"""Every kind of file that the packages read: sound ones, and what reads them."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+import torch
+from blast_agents.league.report import PAGE
+from blast_agents.league.store import EvaluationKey, Model, ResultStore
+from blast_agents.training import load_hyperparameters
+from blast_agents.training.checkpoint import Checkpoint
+from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
+from blast_agents.training.packaged import Record, records
+from blast_agents.training.run_folder import (
+    RolloutRow,
+    RunConfiguration,
+    RunFolder,
+    read_rows,
+    write_rows,
+)
+from ezdxf.filemanagement import new
+
+from blast_env.app.design import Design, History, Step
+from blast_env.app.folder import DesignFolder
+from blast_env.app.work import ReportTask, ThreatOf, read_task, write_task
+from blast_env.calibration.model import load_calibration, save_calibration
+from blast_env.evaluation import Threat
+from blast_env.evaluation.loads import BlastLoads, StructureLoad
+from blast_env.evaluation.store import BlastKey, DiskCache
+from blast_env.importing import ImportOptions, import_site
+from blast_env.journal import Journal
+from blast_env.physics.scene import Charge
+from blast_env.recording.parquet import read_parquet
+from blast_env.reporting.study import front_layouts
+from blast_env.scenario import LayoutFile, Scenario, load_scenario, save_scenario, write_layout
+from blast_env.simulation import simulate
+from blast_env.studies.calibration.candidates import HIGH, LOW, Candidate, Score, ScoredCandidate
+from blast_env.studies.calibration.study import FreeFieldRun
+from scripts.pack_agent import league_result
+from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
+from tests.importing.maps import BLOCK, charge, outline, rectangle, written
+from tests.scenario.documents import full_document
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file.
+
+    Attributes:
+        samples: Sound files.
+        read: Reads one as the packages do: `BlastEnvError` or `None` for one that is refused.
+        has_checksum: Whether whatever is read must be what a sample says.
+    """
+
+    samples: tuple[bytes, ...]
+    read: Callable[[bytes], Any]
+    has_checksum: bool = False
+
+
+def _from_file(path: Path, read: Callable[[Path], Any]) -> Callable[[bytes], Any]:
+    def from_content(content: bytes) -> Any:
+        path.write_bytes(content)
+        return read(path)
+
+    return from_content
+
+
+def _scenario(folder: Path) -> Format:
+    samples = []
+    for scenario in (
+        small_scenario(),
+        load_scenario("courtyard"),
+        load_scenario("hotel_forecourt"),
+        Scenario.from_document(full_document(), "full"),
+    ):
+        save_scenario(scenario, folder / "a.toml")
+        samples.append((folder / "a.toml").read_bytes())
+    return Format(tuple(samples), _from_file(folder / "a.toml", load_scenario))
+
+
+def _layout(folder: Path) -> Format:
+    path = folder / "a.json"
+    write_layout(path, small_scenario(), [(0, 0), (1, 0), (1, 1)], {"method": "mine", "seed": 1})
+    pieces = {
+        "version": 2,
+        "pieces": [{"item": "t_wall", "row": 3, "column": 4, "turned": True}] * 2,
+    }
+    samples = (path.read_bytes(), b"[[0, 0], [0, 1]]", json.dumps(pieces, indent=1).encode())
+
+    scenario = small_scenario()
+
+    def read(path: Path) -> Any:
+        file = LayoutFile.load(path)
+        return file if any(len(each) > 2 for each in file.layout) else file.layout_for(scenario)
+
+    return Format(samples, _from_file(path, read))
+
+
+def _calibration(folder: Path) -> Format:
+    samples = []
+    for name in ("ballistic_ufc", "collisional_kb_20kg"):
+        engine = "event"
+        save_calibration(load_calibration(name, engine), folder / "a.json")
+        samples.append((folder / "a.json").read_bytes())
+    return Format(tuple(samples), _from_file(folder / "a.json", load_calibration), True)
+
+
+def _run_configuration(folder: Path) -> RunConfiguration:
+    return RunConfiguration(
+        settings=settings(folder / "a.toml"),
+        hyperparameters=hyperparameters(),
+        scenario_hash=small_scenario().content_hash,
+    )
+
+
+def _configuration(folder: Path) -> Format:
+    run = RunFolder(folder / "run")
+    with run.making(_run_configuration(folder), small_scenario(), "command"):
+        pass
+    path = run.path / "config.yaml"
+    return Format((path.read_bytes(),), _from_file(path, lambda _: run.configuration()))
+
+
+def _versions(folder: Path) -> Format:
+    path = folder / "versions.json"
+    sample = json.dumps({"blast-env": "0.1.0", "numpy": "2.4"}, indent=2).encode()
+    return Format((sample,), _from_file(path, lambda _: RunFolder(folder).versions))
+
+
+def _rollouts(folder: Path) -> Format:
+    path = folder / "rollouts.csv"
+    rows = [RolloutRow(16 * n, n, 0.1, 0.25, 3.5, 10 * n, n, 1.5 * n) for n in range(1, 8)]
+    write_rows(path, RolloutRow, rows)
+    return Format((path.read_bytes(),), _from_file(path, lambda path: read_rows(path, RolloutRow)))
+
+
+def _checkpoint(folder: Path) -> Format:
+    path = folder / "checkpoint.pt"
+    rng = np.random.default_rng(0)
+    weights = {"a": torch.from_numpy(rng.random(40)), "b": torch.zeros(3)}
+    Checkpoint.of_start(_run_configuration(folder), weights).save(path)
+
+    def read(path: Path) -> Any:
+        found = Checkpoint.load(path)
+        policy = {name: each.numpy().tobytes() for name, each in found.policy.items()}
+        return found.configuration, found.counters, policy, found.rollouts, found.evaluations
+
+    return Format((path.read_bytes(),), _from_file(path, read), True)
+
+
+def _packaged(folder: Path) -> Format:
+    record = Record(
+        configuration=_run_configuration(folder),
+        scenario="small",
+        command="blast-env train",
+        versions={"torch": "2"},
+        steps=100,
+        blasts=10,
+        seconds=1.5,
+    )
+    sample = json.dumps(record.model_dump(mode="json"), indent=2).encode()
+    (folder / "weights").mkdir()
+    path = folder / "weights" / "a.json"
+    return Format((sample,), _from_file(path, lambda path: list(records(path.parent))))
+
+
+def _setting(_: Path) -> Format:
+    samples = tuple(f"{key}={value}".encode() for key, value in SMALL.items())
+    samples += (b"learning_rate=lin_3e-4", b"env_wrapper=[]", b"gamma=0.5", b"target_kl=null")
+    known = hyperparameter_keys("maskable_ppo")
+
+    def read(content: bytes) -> Any:
+        changes = parse_options([content.decode("utf-8", "surrogateescape")], known)
+        return load_hyperparameters("maskable_ppo", "BlastBarrier-v0", SMALL | changes)
+
+    return Format(samples, read)
+
+
+def _runs(folder: Path) -> Format:
+    journal = Journal(folder / "runs.jsonl", FreeFieldRun)
+    for seed in range(5):
+        journal.add(FreeFieldRun(f"{'0' * 64} {seed} event 1", 8.0, seed, 12.5, 3.25, 0.004))
+    sample = journal.path.read_bytes()
+    return Format((sample,), _from_file(journal.path, lambda _: journal.read()))
+
+
+def _candidates(folder: Path) -> Format:
+    journal = Journal(folder / "candidates.jsonl", ScoredCandidate)
+    for share in (0.1, 0.4, 0.7):
+        candidate = Candidate.from_point(LOW + share * (HIGH - LOW))
+        journal.add(ScoredCandidate(candidate, Score(3.0, 0.5, 1.0, 0.57, 0.49, 1e5)))
+    sample = journal.path.read_bytes()
+    return Format((sample,), _from_file(journal.path, lambda _: journal.read()))
+
+
+def _front(folder: Path) -> Format:
+    rows = ('1.5,0.25,"0,0 0,1"', '2.5,0.5,"0,0 0,1 0,2"', '3,0.6,"1,1"')
+    sample = "\n".join(("cost,reduction,layout", *rows, "")).encode()
+    scenario = small_scenario()
+    path = folder / "front.csv"
+    return Format((sample,), _from_file(path, lambda path: front_layouts(path, scenario)))
+
+
+def _summary(folder: Path) -> Format:
+    (folder / PAGE).write_text("Engine event, blast-env 0.1.0: `blast-env league`\n")
+    rows = ("agent (run),,0,False,4,0.25,0.1,0.4", "wall,,0,True,4,0.2,0.1,0.3")
+    header = "entry,method,budget,is_rule,cases,reduction,reduction_low,reduction_high"
+    sample = "\n".join((header, *rows, "")).encode()
+
+    def read(path: Path) -> Any:
+        return league_result(path.parent, "track", "run")
+
+    return Format((sample,), _from_file(folder / "track_summary.csv", read))
+
+
+def _loads(folder: Path) -> Format:
+    cache = DiskCache(folder / "cache")
+    key = BlastKey("0" * 64, ((0, 0),), Charge((1.0, 2.0), 100.0), 1, "event 1", "1" * 64, "2" * 64)
+    load = StructureLoad("building", True, 1.0, 5.0, 2.0, 0.01, None, 0.0, True, ("a note",))
+    cache.add(key, BlastLoads((load,), np.arange(8.0)))
+    (path,) = cache.folder.iterdir()
+
+    def read(_: Path) -> Any:
+        loads = cache.get(key)
+        return None if loads is None else (loads.structures, loads.module_impulse_sim.tobytes())
+
+    return Format((path.read_bytes(),), _from_file(path, read), True)
+
+
+def _result(folder: Path) -> Format:
+    store = ResultStore(folder / "results")
+    threats = tuple(Threat(Charge((1.0, 2.0), 100.0), seed) for seed in range(3))
+    key = EvaluationKey(Model("0" * 64, "event 1", "1" * 64, "2" * 64), threats, ((0, 0),))
+    store.keep_loads(key, (1.5, 2.5, 3.5))
+    (path,) = store.folder.iterdir()
+    return Format((path.read_bytes(),), _from_file(path, lambda _: store.loads(key)), True)
+
+
+def _geojson(folder: Path) -> Format:
+    return _map(folder, (BLOCK.read_bytes(),), ".geojson", _HALL)
+
+
+def _local_geojson(folder: Path) -> Format:
+    site = (outline(rectangle(0, 0, 6, 4), name="House", protected=True), charge(12.0, 2.0))
+    return _map(folder, (written(folder, *site).read_bytes(),), ".geojson", ImportOptions())
+
+
+def _osm(folder: Path) -> Format:
+    return _map(folder, (BLOCK.with_suffix(".osm").read_bytes(),), ".osm", _HALL)
+
+
+def _dxf(folder: Path) -> Format:
+    document = new("R12", units=6)
+    space = document.modelspace()
+    space.add_polyline2d([(0, 0), (6, 0), (6, 4), (0, 4)], close=True, dxfattribs={"layer": "B"})
+    space.add_text("House", dxfattribs={"layer": "B"}).set_placement((3, 2))
+    space.add_circle((12, 2), 1.0, dxfattribs={"layer": "S"})
+    space.add_point((12, 2), dxfattribs={"layer": "S"})
+    document.saveas(folder / "a.dxf")
+    options = ImportOptions(
+        units="m", buildings_from=("B",), charges_from=("S",), protect=("House",)
+    )
+    return _map(folder, ((folder / "a.dxf").read_bytes(),), ".dxf", options)
+
+
+_HALL: Final = ImportOptions(protect=("Town Hall",))
+
+
+def _map(folder: Path, samples: tuple[bytes, ...], suffix: str, options: ImportOptions) -> Format:
+    def read(path: Path) -> Any:
+        return import_site(path, options).scenario
+
+    return Format(samples, _from_file(folder / f"map{suffix}", read))
+
+
+def _parquet(folder: Path) -> Format:
+    path = folder / "a.parquet"
+    simulate(small_scenario(), engine="event").to_parquet(path)
+    return Format((path.read_bytes(),), _from_file(path, read_parquet))
+
+
+def _design(folder: Path) -> Format:
+    design = DesignFolder(folder)
+    history = History(Step("begin", Design(small_scenario())))
+    history = history.then("layout", history.design.with_layout(((0, 0), (1, 0))))
+    design.save(history)
+    path = folder / "design.json"
+
+    def read(_: Path) -> Any:
+        design.entry()
+        return design.load()
+
+    return Format((path.read_bytes(),), _from_file(path, read))
+
+
+def _task(folder: Path) -> Format:
+    threat = ThreatOf.of("here", Charge((1.0, 2.0), 100.0))
+    document = small_scenario().model_dump(mode="json", exclude_none=True)
+    task = ReportTask(scenario=document, layout=((0, 0),), threats=(threat,), cache="c", path="p")
+    write_task(task, folder, "report")
+    path = folder / "task.json"
+    return Format((path.read_bytes(),), _from_file(path, lambda _: read_task(folder)))
+
+
+FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
+    {
+        "scenario": _scenario,
+        "layout": _layout,
+        "calibration": _calibration,
+        "run: config.yaml": _configuration,
+        "run: versions.json": _versions,
+        "run: rollouts.csv": _rollouts,
+        "run: checkpoint.pt": _checkpoint,
+        "packaged weights' record": _packaged,
+        "--set": _setting,
+        "runs of a study": _runs,
+        "candidates of a search": _candidates,
+        "front.csv": _front,
+        "league summary": _summary,
+        "cache entry": _loads,
+        "league result": _result,
+        "GeoJSON": _geojson,
+        "GeoJSON, local": _local_geojson,
+        "OpenStreetMap": _osm,
+        "DXF": _dxf,
+        "collisions (Parquet)": _parquet,
+        "page: design": _design,
+        "page: task": _task,
+    }
+)
+"""By names for a table; each is made in a folder of its own."""
