@@ -393,8 +393,8 @@ def gauge_history(
             (upper, lower),
             (time_s, overpressure, _positive_impulse(time_s, overpressure)),
             (
-                f"{words}: peak {_figures(row['peak_pa'] / PA_PER_KPA)} kPa",
-                f"{words}: {_figures(row['positive_impulse_pa_s'])} Pa·s",
+                f"{words}: peak {_figures(float(row['peak_pa']) / PA_PER_KPA)} kPa",
+                f"{words}: {_figures(float(row['positive_impulse_pa_s']))} Pa·s",
             ),
             color=colour,
             linestyle="-" if of_result else "--",

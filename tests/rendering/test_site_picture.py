@@ -209,8 +209,8 @@ def test_a_high_building_at_the_back_is_drawn_whole() -> None:
     """Its roof is the highest thing in the picture, and no name lies on a star."""
     figure = site_picture("hotel_forecourt")
     plan, oblique = figure.axes
-    roofs = [path.vertices[:, 1].max() for each in oblique.collections for path in each.get_paths()]
-    assert max(roofs) < oblique.get_ylim()[1]
+    paths = [path for each in oblique.collections for path in each.get_paths()]
+    assert max(np.asarray(path.vertices)[:, 1].max() for path in paths) < oblique.get_ylim()[1]
     figure.draw_without_rendering()
     (name,) = (text for text in plan.texts if text.get_text() == "hotel")
     (star,) = (line for line in plan.lines if line.get_marker() == "*")
