@@ -329,7 +329,7 @@ def _draw_wall(
         spine.set_color(unit_interval(QUIET_INK))
 
 
-def _figures(load: float) -> str:
+def _figures(load: Any) -> str:
     """Return a load in three figures, never as a power of ten."""
     return f"{float(f'{load:.3g}'):,g}"
 
@@ -393,8 +393,8 @@ def gauge_history(
             (upper, lower),
             (time_s, overpressure, _positive_impulse(time_s, overpressure)),
             (
-                f"{words}: peak {_figures(float(row['peak_pa']) / PA_PER_KPA)} kPa",
-                f"{words}: {_figures(float(row['positive_impulse_pa_s']))} Pa·s",
+                f"{words}: peak {_figures(row['peak_pa'] / PA_PER_KPA)} kPa",
+                f"{words}: {_figures(row['positive_impulse_pa_s'])} Pa·s",
             ),
             color=colour,
             linestyle="-" if of_result else "--",
