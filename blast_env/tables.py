@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -33,6 +33,13 @@ def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) ->
     """
     names = [column.name for column in columns]
     return pd.DataFrame([[row[name] for name in names] for row in rows], columns=names)
+
+
+def as_types(table: pd.DataFrame, types: Mapping[str, str]) -> pd.DataFrame:
+    """Return a table with some columns of other types, by their names."""
+    wanted: Any = types  # the stubs of pandas take mypy seconds for each dict that is written out
+    converted: pd.DataFrame = table.astype(wanted)
+    return converted
 
 
 def markdown_table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

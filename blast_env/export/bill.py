@@ -12,7 +12,7 @@ from blast_env.geometry import Element, Piece
 from blast_env.provenance import package_version
 from blast_env.recording.excel import SheetTable, write_tables
 from blast_env.scenario import Placement
-from blast_env.tables import Column, table_of
+from blast_env.tables import Column, as_types, table_of
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
 MODULE_COLUMNS: Final = (
@@ -157,7 +157,7 @@ def bill_of_quantities(plan: LayoutPlan) -> pd.DataFrame:
     everything = [cost for costs in of_items.values() for cost in costs]
     nothing = dict.fromkeys(("length_m", "thickness_m", "height_m", "unit_cost", "in_stock"))
     total = {"item": TOTAL, "description": "", "count": len(everything), "cost": fsum(everything)}
-    return table_of([*rows, {**nothing, **total}], BILL_COLUMNS).astype({"in_stock": "Int64"})
+    return as_types(table_of([*rows, {**nothing, **total}], BILL_COLUMNS), {"in_stock": "Int64"})
 
 
 def _lines(plan: LayoutPlan) -> Sequence[_Line]:

@@ -1,7 +1,7 @@
 """The tables of a blast as data frames, with the unit and the meaning of every column."""
 
 from collections.abc import Sequence
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 import pandas as pd
@@ -10,7 +10,7 @@ from blast_env.calibration import LoadUnit
 from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import ModularObstacle
-from blast_env.tables import Column
+from blast_env.tables import Column, as_types
 from blast_env.units import UNITS_PER_M
 
 Columns = tuple[Column, ...]
@@ -149,7 +149,7 @@ def collision_table(
     module_ids = np.array([part.module_id for part in parts], dtype=object)
     structures = np.array([part.structure for part in parts], dtype=object)
     angle = incidence_angle_rad(collisions)
-    values = {
+    values: dict[str, Any] = {
         "time_s": collisions["time_s"],
         "particle_type": [CollisionType(kind).name for kind in collisions["kind"]],
         "particle_id": collisions["ball"],
@@ -169,7 +169,7 @@ def collision_table(
         "first_contact": collisions["first_contact"],
     }
     table = pd.DataFrame(values)[[column.name for column in COLLISION_COLUMNS]]
-    return table.astype({"particle_type": "str"})
+    return as_types(table, {"particle_type": "str"})
 
 
 def faces_hit(collisions: pd.DataFrame) -> pd.Series:
@@ -206,7 +206,7 @@ def module_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
         for part in obstacle.parts
     ]
     table = pd.DataFrame(rows, columns=[column.name for column in MODULE_COLUMNS])
-    return table.astype({"module_id": "str", "structure": "str", "piece": "str"})
+    return as_types(table, {"module_id": "str", "structure": "str", "piece": "str"})
 
 
 def structure_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
@@ -227,7 +227,7 @@ def structure_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
         for obstacle in obstacles
     ]
     table = pd.DataFrame(rows, columns=[column.name for column in STRUCTURE_COLUMNS])
-    return table.astype({"structure": "str", "kind": "str"})
+    return as_types(table, {"structure": "str", "kind": "str"})
 
 
 def _or_nan(value: float | None) -> float:

@@ -38,7 +38,7 @@ from blast_env.recording.parquet import write_table
 from blast_env.recording.tables import RunRecord
 from blast_env.scenario import AnyCharge, ScenarioField
 from blast_env.scenario.build_scene import build_site, draw_threat
-from blast_env.tables import Column, table_of
+from blast_env.tables import Column, as_types, table_of
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
 _PROGRESS_CALLS: Final = 100
@@ -218,7 +218,7 @@ class GasResult:
                 "column": table.column,
             }
         )
-        return frame.astype({"structure": "str", "face": "str", "module_id": "str"})
+        return as_types(frame, {"structure": "str", "face": "str", "module_id": "str"})
 
     @cached_property
     def modules(self) -> pd.DataFrame:

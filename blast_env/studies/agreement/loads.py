@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -116,16 +116,15 @@ class BlastSet:
         result = simulate(self.stepped_scenario, self.scene.layout, seed, self.engine)
         log = result.collision_array
         names = [o.name for o in result.obstacles for _ in o.parts]
-        table = pd.DataFrame(
-            {
-                "seed": np.full(len(log), seed, dtype=np.int32),
-                "structure": pd.Categorical(np.array(names)[log["module"]]),
-                "time_ms": 1000.0 * log["time_s"],
-                "angle_deg": np.degrees(incidence_angle_rad(log)),
-                "impulse": log["impulse"],
-                "transferred": log["transferred_impulse"],
-            }
-        )
+        columns: dict[str, Any] = {
+            "seed": np.full(len(log), seed, dtype=np.int32),
+            "structure": pd.Categorical(np.array(names)[log["module"]]),
+            "time_ms": 1000.0 * log["time_s"],
+            "angle_deg": np.degrees(incidence_angle_rad(log)),
+            "impulse": log["impulse"],
+            "transferred": log["transferred_impulse"],
+        }
+        table = pd.DataFrame(columns)
         return table[table.structure.isin(self.scene.structures)]
 
     def path(self, folder: Path) -> Path:
