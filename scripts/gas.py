@@ -317,7 +317,7 @@ def cells(
     random_layouts: Annotated[int, typer.Option(min=0)] = 2,
     sizes: Annotated[str, typer.Option(help="Sides of cells, m, all layouts.")] = "0.5,0.25",
     finest: Annotated[
-        float | None, typer.Option(help="m, for none and the first layout only.")
+        float | None, typer.Option(help="m, for none and the first three layouts only.")
     ] = None,
     until: Annotated[
         float | None, typer.Option(help="When loads are looked at, s; at the end of the runs.")
@@ -338,7 +338,8 @@ def _cells_site(scenario: str, endless: bool) -> Scenario:
     if scenario == YARD:
         return yard()
     loaded = load_scenario(scenario)
-    return loaded if endless else with_heights(loaded)
+    has_heights = any(each.height_m is not None for each in loaded.structures)
+    return loaded if endless or has_heights else with_heights(loaded)
 
 
 def _print_cells(
@@ -357,7 +358,7 @@ def _print_cells(
     all_sizes, finest = sizes
     jobs = [(size, list(layouts.values())) for size in all_sizes]
     if finest is not None:
-        jobs.append((finest, list(layouts.values())[:1]))
+        jobs.append((finest, list(layouts.values())[:3]))
     found = []
     for size, tried in jobs:
         with progress_bar(f"{site.name}, {size:g} m") as progress:
