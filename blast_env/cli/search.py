@@ -179,6 +179,7 @@ def _provenance(
         "threats": [
             {
                 "charge_position_m": charge.position_m,
+                "charge_height_m": charge.height_m,
                 "tnt_kg": charge.tnt_kg,
                 "seed": threat.seed,
             }
