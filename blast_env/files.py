@@ -223,6 +223,18 @@ class FolderStore:
             except OSError as error:  # a folder that may not be listed
                 raise _cannot_write(self.folder, error) from error
 
+    def items(self) -> Iterator[tuple[str, bytes]]:
+        """Yield keys and contents in the order of the files' names; damaged ones are left out."""
+        for path in sorted(entry.path for entry in self._entries()):
+            try:
+                stored = Path(path).read_bytes()
+                key = json.loads(stored[_CHECKSUM_BYTES:].partition(b"\n")[0])
+            except (OSError, ValueError):
+                continue
+            content = _unpacked(stored, key) if isinstance(key, str) else None
+            if content is not None:
+                yield key, content
+
     def discard(self, key: str) -> None:
         """Count the content of a key as damaged, and delete it if that is allowed."""
         self.damaged += 1

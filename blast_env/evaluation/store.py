@@ -4,6 +4,8 @@ import dataclasses
 import json
 import warnings
 from collections import OrderedDict
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
@@ -153,6 +155,12 @@ class DiskCache:
         except BlastEnvError as error:
             warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=2)
 
+    def items(self) -> Iterator[tuple[BlastKey, BlastLoads]]:
+        """Yield all blasts that are there in one piece, always in the same order."""
+        for text, content in self._store.items():
+            with suppress(ValueError):
+                yield _key_of(text), _decoded(content)
+
     def __len__(self) -> int:
         return len(self._store)
 
@@ -175,6 +183,18 @@ def find_cache(value: str | Path | BlastCache | None) -> BlastCache | None:
 
 def _key_text(key: BlastKey) -> str:
     return json.dumps(key)
+
+
+_KEY: Final = TypeAdapter(BlastKey)
+
+
+def _key_of(text: str) -> BlastKey:
+    """Return the key of a text.
+
+    Raises:
+        ValueError: If it is that of no key.
+    """
+    return _KEY.validate_python(json.loads(text))
 
 
 def _encoded(loads: BlastLoads) -> bytes:

@@ -1,0 +1,82 @@
+"""All blasts of a folder of the cache as one table: what was asked, and what came of it.
+
+Studies, searches, leagues and trainings keep their blasts (`--cache`, `--blasts`, a run folder's
+`blasts`). As a table they are data to fit a surrogate to, and they outlive the version of the code
+that a cache is bound to.
+"""
+
+import json
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from blast_env import load_scenario
+from blast_env.cli.output import print_line, user_errors
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastKey, DiskCache, StructureLoad
+from blast_env.provenance import versions
+from blast_env.recording.parquet import write_table
+from blast_env.scenario import bundled_scenarios
+from blast_env.tables import Column, table_of
+
+COLUMNS: Final = (
+    Column("scenario", "", "bundled scenario of that hash; empty: one of a file"),
+    Column("scenario_hash", "", "content hash of the scenario"),
+    Column("layout", "", "JSON: [row, column] a module, [row, column, item, turned] a piece"),
+    Column("charge_x_m", "m", "where the charge went off, from the left border"),
+    Column("charge_y_m", "m", "from the lower border"),
+    Column("charge_height_m", "m", "height of its centre; 0: it lay on the ground"),
+    Column("tnt_kg", "kg", "its mass"),
+    Column("seed", "", "of fan and air; 0 for gas dynamics, which draws none"),
+    Column("engine", "", "engine with its version and fields"),
+    Column("structure", "", "name of the structure"),
+    Column("protected", "", "whether its load counts"),
+    Column("impulse_pa_s", "Pa s", "mean impulse on the walls that count"),
+    Column("peak_pa", "Pa", "largest overpressure on them; missing for particles"),
+)
+"""A row a structure of a blast."""
+
+
+def main(
+    folders: Annotated[list[Path], typer.Argument(help="Folders with blasts.")],
+    out: Annotated[Path, typer.Option(help="The table, .parquet.")] = Path("out/blasts.parquet"),
+) -> None:
+    """Write the table, each blast once."""
+    with user_errors():
+        names = {load_scenario(name).content_hash: name for name in bundled_scenarios()}
+        rows: dict[str, list[dict[str, object]]] = {}
+        for folder in folders:
+            if not folder.is_dir():
+                raise BlastEnvError(f"{folder}: is no folder of blasts")
+            for key, loads in DiskCache(folder).items():
+                rows[json.dumps(key)] = [_row(names, key, each) for each in loads.structures]
+        if not rows:
+            raise BlastEnvError(f"no blasts in {', '.join(map(str, folders))}")
+        table = table_of([row for own in rows.values() for row in own], COLUMNS)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_table(table, COLUMNS, {"blasts": len(rows), **versions()}, out)
+    print_line(f"{len(rows):,} blasts; wrote {out}")
+
+
+def _row(names: dict[str, str], key: BlastKey, load: StructureLoad) -> dict[str, object]:
+    x_m, y_m = key.charge.position_m
+    return {
+        "scenario": names.get(key.scenario_hash, ""),
+        "scenario_hash": key.scenario_hash,
+        "layout": json.dumps(key.layout),
+        "charge_x_m": x_m,
+        "charge_y_m": y_m,
+        "charge_height_m": key.charge.height_m,
+        "tnt_kg": key.charge.tnt_kg,
+        "seed": key.seed,
+        "engine": key.engine,
+        "structure": load.name,
+        "protected": load.protected,
+        "impulse_pa_s": load.impulse_pa_s,
+        "peak_pa": load.peak_pa,
+    }
+
+
+if __name__ == "__main__":
+    typer.run(main)
