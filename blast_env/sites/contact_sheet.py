@@ -19,10 +19,11 @@ from blast_env.rendering.style import (
     render_extra,
     unit_interval,
 )
-from blast_env.scenario import BuildZone, Scenario
+from blast_env.scenario import BuildZone, Scenario, VehicleSource
 from blast_env.scenario.zone import source_bounds_m
 
 with render_extra():
+    from matplotlib import patheffects
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -39,6 +40,7 @@ _WAY_PLACES: Final = (0.5, 0.75, 0.25, 0.875, 0.125)
 
 _GROUND: Final = "site"
 _CHARGE: Final = "where the charge may be"
+_ENTRY: Final = "where a vehicle enters"
 _PROTECTED: Final = "protected building"
 _OTHER: Final = "other building"
 _DEARER: Final = "modules cost more"
@@ -55,6 +57,7 @@ _AREAS: Final[Mapping[str, Style]] = MappingProxyType(
             "linewidth": 0.8,
         },
         _CHARGE: {"facecolor": unit_interval(EXPLOSIVE)},
+        _ENTRY: {"facecolor": (0.80, 0.47, 0.65)},
         _PROTECTED: {"facecolor": unit_interval(PROTECTED)},
         _OTHER: {"facecolor": unit_interval(STRUCTURE)},
         _DEARER: {"facecolor": (0.99, 0.84, 0.48)},
@@ -113,9 +116,15 @@ def _draw(axes: Axes, site: Scenario) -> None:
     _add(axes, _GROUND, ground)
     for structure in site.structures:
         _add(axes, _PROTECTED if structure.protected else _OTHER, structure.rectangle_m)
+        if structure.height_m is not None:
+            words = f"{structure.height_m:g} m"
+            text = axes.text(*structure.rectangle_m.centre, words, ha="center", va="center")
+            text.set(fontsize=_FONT - 2.5, color=unit_interval(INK), zorder=2.5)
+            text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
     for source in site.charge:
         # A stretch of road has no width, and would not be seen.
-        _add(axes, _CHARGE, source_bounds_m(source).grown(0.4))
+        what = _ENTRY if isinstance(source, VehicleSource) else _CHARGE
+        _add(axes, what, source_bounds_m(source).grown(0.4))
     if site.build_zone is not None:
         _draw_zone(axes, site.build_zone)
         _draw_way(axes, site.build_zone, [each.rectangle_m for each in site.structures])
@@ -174,6 +183,11 @@ def _title(site: Scenario) -> str:
     if zone is None:
         return f"{site.name}\n{charge}"
     budget = "" if zone.budget is None else f", budget {zone.budget:g}"
+    if zone.items:
+        return (
+            f"{site.name}: {count_of('item', len(zone.items))}{budget}\n"
+            f"{charge}, clearance {zone.clearance_m:g} m"
+        )
     return (
         f"{site.name}: {count_of('module', zone.stock)}, {charge}\n"
         f"clearance {zone.clearance_m:g} m{budget}"

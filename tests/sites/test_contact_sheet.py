@@ -9,6 +9,7 @@ from matplotlib.patches import Rectangle as RectanglePatch
 
 from blast_env.errors import BlastEnvError
 from blast_env.rendering.figures import save_figure
+from blast_env.rendering.style import EXPLOSIVE, unit_interval
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.sites.contact_sheet import contact_sheet
 
@@ -32,6 +33,15 @@ def test_everything_on_a_site_is_drawn_where_it_is(sites: tuple[Scenario, ...]) 
         assert len(drawn) == len(areas) + 2  # the ground, and where the charge may be
         ways = [patch for patch in axes.patches if isinstance(patch, FancyArrowPatch)]
         assert len(ways) == (zone.access_way is not None)
+
+
+def test_heights_items_and_entries_of_vehicles_are_shown() -> None:
+    site = load_scenario("hotel_forecourt")
+    (axes,) = (axes for axes in contact_sheet([site]).axes if axes.get_visible())
+    assert axes.get_title() == ("hotel_forecourt: 4 items, budget 54\n100 kg TNT, clearance 0 m")
+    assert {text.get_text() for text in axes.texts} >= {"9 m"}
+    colours = [patch.get_facecolor() for patch in axes.patches]
+    assert not any(colour[:3] == pytest.approx(unit_interval(EXPLOSIVE)) for colour in colours)
 
 
 def test_the_access_way_is_drawn_where_no_structure_stands(sites: tuple[Scenario, ...]) -> None:
