@@ -252,12 +252,6 @@ def test_place_blast_and_compare_by_particles(page: Page) -> None:
     page.drag(courtyard, *WALL_FAR)
     page.sees("8 of 16 modules")
 
-    began_s = monotonic()
-    page.button("Blast").click()
-    page.until(lambda: [each for each in page.all("img[data-film]") if each.get_attribute("src")])
-    seconds = monotonic() - began_s
-    (PICTURES / "film_seconds.txt").write_text(f"{seconds:.2f} s from Blast to the film\n")
-    assert seconds < 15.0  # with two quiet cores below 1 s; here anything may run beside
     page.button("all").click()
     page.until(lambda: len(page.all("img[data-film]")) == 3)
     page.until(lambda: len(page.all(".q-table tbody tr")) == 6)
@@ -273,6 +267,25 @@ def test_place_blast_and_compare_by_particles(page: Page) -> None:
     assert frames == {"014.jpg"}  # all films at the same moment
     page.shoot("results_particles")
     assert not page.faults()
+
+
+def test_a_film_of_particles_comes_soon(page: Page) -> None:
+    """From *Blast* to the first frame that is seen; the seconds are written down."""
+    lines = []
+    for name in ("visitor_entrance", "courtyard"):
+        page.begin(name)
+        page.choose("by", "wall near the building")
+        page.button("Propose").click()
+        page.button("take it").click()
+        page.sees("last: proposal")
+        began_s = monotonic()
+        page.button("Blast").click()
+        page.until(lambda: any(page.film_widths()))
+        seconds = monotonic() - began_s
+        lines.append(f"{name}: {seconds:.2f} s from Blast to the film\n")
+        assert seconds < 15.0  # with two quiet cores about 1 s; here anything may run beside
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    (PICTURES / "film_seconds.txt").write_text("".join(lines))
 
 
 def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -> None:
