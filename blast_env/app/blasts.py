@@ -61,7 +61,8 @@ SEEDS: Final = range(8)
 """Seeds of the particle blasts whose mean a load is."""
 
 FRAMES: Final = 48
-_FIRST_FRAMES: Final = 8  # after so many a film can begin
+_FIRST_FRAMES: Final = 4  # after so many a film can begin; then it is told of every few more
+_MORE_FRAMES: Final = 16
 _FILM_PX: Final = 640
 _PLAN_HEIGHT_M: Final = 1.5
 _MOST_POINTS: Final = 600  # of a gauge's history
@@ -344,6 +345,6 @@ def _write_film(
         with write_atomically(folder / FRAME.format(number)) as temporary:
             Image.fromarray(frame).save(temporary, quality=_QUALITY)
         done = number + 1
-        if done == _FIRST_FRAMES or done == len(times_s) or done % (2 * _FIRST_FRAMES) == 0:
+        if done in (_FIRST_FRAMES, len(times_s)) or done % _MORE_FRAMES == 0:
             write_kept(keep(count=done), folder / FILM)
         tell(done / len(times_s))

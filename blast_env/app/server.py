@@ -25,6 +25,9 @@ LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
 _PAGE_FILES: Final = Path(__file__).parent / "page"
 _PRIMARY: Final = "#005a8c"  # on white and under white it can be read
 _TICK_S: Final = 0.05
+_RECONNECT_S: Final = 30.0
+"""How long a browser may be silent, as while gas keeps all cores busy, before it loads anew."""
+
 _KEPT_BY_BROWSER: Final = {"Cache-Control": "private, max-age=31536000, immutable"}
 
 
@@ -112,5 +115,5 @@ def serve(host: str, port: int, folder: Path, runs: Sequence[Path] = ()) -> None
         app.on_shutdown(held.close)  # after SIGTERM nothing else is run any more
         ui.run(
             host=host, port=port, title="blast-env", reload=False, show=False,
-            show_welcome_message=False,
+            show_welcome_message=False, reconnect_timeout=_RECONNECT_S,
         )  # fmt: skip

@@ -61,6 +61,7 @@ class Session:
         engine: The engine that blasts are run with, and whose results are shown.
         threats: Names of the threats that blasts are run with; those of the site that come first,
             unless they were chosen.
+        view: The view that was opened last; a page that is loaded again begins with it.
     """
 
     folder: DesignFolder
@@ -69,6 +70,7 @@ class Session:
     history: History
     engine: Engine = field(default_factory=Engine)
     threats: tuple[str, ...] = ()
+    view: str = "Plan"
     _listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
 
     @classmethod

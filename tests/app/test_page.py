@@ -124,6 +124,8 @@ def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
         assert [row["layout"] for row in table.rows] == ["no barrier"] * 2 + ["A"] * 2
         assert all("%" in row["reduction"] for row in table.rows[2:])
         assert {row["engine"] for row in table.rows} == {"particles (first look)"}
+        await user.open(f"/design/{session.folder.design_id}")  # a reload comes back to the results
+        assert next(iter(user.find(kind=ui.tabs).elements)).value == "Results"
         user.find(marker="propose").click()
         await user.should_see("take it")
         user.find("take it").click()

@@ -35,7 +35,7 @@ class DesignPage:
                     ui.tab("Plan", icon="map")
                     ui.tab("3-D", icon="view_in_ar")
                     ui.tab("Results", icon="leaderboard")
-                with ui.tab_panels(self._tabs, value="Plan", animated=False).classes(
+                with ui.tab_panels(self._tabs, value=session.view, animated=False).classes(
                     "w-full grow"
                 ) as panels:
                     panels.props("keep-alive").style("background: transparent")
@@ -45,6 +45,7 @@ class DesignPage:
                         self._solid = SolidView(self.editor)
                     with ui.tab_panel("Results").classes("p-0"):
                         self._results = ResultsView(session, self._url)
+            self._tabs.on_value_change(lambda event: self._keep_view(event.value))
             self._work = WorkPanel(self.editor, self.refresh, self.show_results, runs)
         ui.context.client.on_delete(session.listen(self.refresh))
         self.refresh()
@@ -53,6 +54,9 @@ class DesignPage:
     def show_results(self) -> None:
         """Turn to the results."""
         self._tabs.value = "Results"
+
+    def _keep_view(self, view: str) -> None:
+        self.session.view = view
 
     def refresh(self) -> None:
         """Show the design as it is, everywhere."""

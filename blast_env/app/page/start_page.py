@@ -44,7 +44,7 @@ class StartPage:
         for name in bundled_scenarios():
             with ui.row().classes("w-full items-center no-wrap"):
                 button = ui.button(name, icon="add", on_click=lambda _, n=name: self._bundled(n))
-                button.props("no-caps dense outline").classes("w-44")
+                button.props("no-caps dense outline").classes("w-44 shrink-0")
                 ui.label(load_scenario(name).description).classes("be-quiet")
         ui.separator()
         with ui.row().classes("items-center gap-2"):

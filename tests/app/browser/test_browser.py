@@ -159,13 +159,12 @@ class Page:
             if each.is_displayed() and label in each.text.split("\n"):
                 each.click()
                 break
-        sleep(0.4)
-        for item in self.all(".q-menu .q-item"):
-            if item.text.strip().startswith(option):
-                item.click()
-                break
-        else:
-            raise AssertionError(f"{label} does not offer {option}")
+
+        def find() -> Any:
+            offered = [each for each in self.all(".q-menu .q-item") if each.is_displayed()]
+            return next((each for each in offered if each.text.strip().startswith(option)), None)
+
+        self.until(find).click()
         sleep(0.4)
         self.press(Keys.ESCAPE)
 
@@ -253,12 +252,6 @@ def test_place_blast_and_compare_by_particles(page: Page) -> None:
     page.drag(courtyard, *WALL_FAR)
     page.sees("8 of 16 modules")
 
-    began_s = monotonic()
-    page.button("Blast").click()
-    page.until(lambda: [each for each in page.all("img[data-film]") if each.get_attribute("src")])
-    seconds = monotonic() - began_s
-    (PICTURES / "film_seconds.txt").write_text(f"{seconds:.2f} s from Blast to the film\n")
-    assert seconds < 15.0  # with two quiet cores below 1 s; here anything may run beside
     page.button("all").click()
     page.until(lambda: len(page.all("img[data-film]")) == 3)
     page.until(lambda: len(page.all(".q-table tbody tr")) == 6)
@@ -276,6 +269,34 @@ def test_place_blast_and_compare_by_particles(page: Page) -> None:
     assert not page.faults()
 
 
+FILM_CLOCK = """
+window.filmSeconds = null;
+document.addEventListener("click", () => { window.pressedMs = performance.now(); }, true);
+document.addEventListener("load", (event) => {
+  if (event.target.matches("img[data-film]"))
+    window.filmSeconds ??= (performance.now() - window.pressedMs) / 1000;
+}, true);
+"""
+
+
+def test_a_film_of_particles_comes_soon(page: Page) -> None:
+    """From *Blast* to the first frame that is seen, by the browser's clock; it is written down."""
+    lines = []
+    for name in ("visitor_entrance", "courtyard"):
+        page.begin(name)
+        page.choose("by", "wall near the building")
+        page.button("Propose").click()
+        page.button("take it").click()
+        page.sees("last: proposal")
+        page.driver.execute_script(FILM_CLOCK)
+        page.button("Blast").click()
+        seconds = page.until(lambda: page.driver.execute_script("return window.filmSeconds"))
+        lines.append(f"{name}: {seconds:.2f} s from Blast to the film\n")
+        assert seconds < 15.0  # with two quiet cores about 1 s; here anything may run beside
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    (PICTURES / "film_seconds.txt").write_text("".join(lines))
+
+
 def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -> None:
     site = high_courtyard()
     save_scenario(site, tmp_path / "courtyard_high.toml")
@@ -284,6 +305,7 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
     upload = page.all("input[type=file]")[0]
     upload.send_keys(str(tmp_path / "broken.toml"))
     page.sees("That does not work")
+    sleep(0.5)  # until it does not shine through any more
     page.shoot("broken_file")
     page.button("close").click()
     sleep(0.5)
@@ -414,7 +436,7 @@ def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
     page.until(lambda: "/design/" in page.driver.current_url)
     page.until(lambda: page.all(".be-plan svg text"))
     reached("the site of the map")
-    page.choose("by", "wall in the middle")
+    page.choose("by", "wall near the building")
     page.button("Propose").click()
     page.button("take it").click()
     page.sees("8 of 8 modules")
@@ -439,7 +461,7 @@ def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
 
 def test_a_site_too_large_for_gas_is_told_and_kept(page: Page, tmp_path: Path) -> None:
     document = high_courtyard().model_dump(mode="json", exclude_none=True)
-    document["site"] |= {"width_m": 2000.0, "height_m": 2000.0}
+    document["site"] |= {"width_m": 700.0, "height_m": 700.0, "air_height_m": 100.0}
     save_scenario(Scenario.from_document(document, "wide"), tmp_path / "wide.toml")
     page.open()
     page.all("input[type=file]")[0].send_keys(str(tmp_path / "wide.toml"))
