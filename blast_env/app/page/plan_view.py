@@ -234,9 +234,9 @@ class SolidView:
         self._scene = ui.scene(
             width=WIDTH_PX, height=HEIGHT_PX, grid=False, background_color="#eef2f6", fps=15
         ).classes("w-full")
-        ui.label(
-            "Drag to turn, wheel to come nearer, right button to shift. See-through: no height"
-            " is given, so that it goes up to the air."
+        ui.label("Drag to turn, wheel to come nearer, right button to shift.").classes("be-quiet")
+        self._see_through = ui.label(
+            "See-through: no height is given, so that it goes up to the air."
         ).classes("be-quiet")
         self._look()
 
@@ -259,6 +259,7 @@ class SolidView:
         if solids == self._drawn:
             return
         self._drawn = solids
+        self._see_through.set_visibility(any(each.opacity < 1.0 for each in solids))
         self._scene.clear()
         with self._scene:
             for each in solids:
