@@ -1,11 +1,13 @@
 """What the readers of maps and drawings give: outlines and lines with their tags."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from traceback import walk_tb
 from typing import Final
 
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, shortened
 
 with import_extra("maps", "maps and drawings"):
     import shapely
@@ -109,6 +111,32 @@ def checked_file(path: Path) -> Path:
             f"{path}: has {size:,} bytes, must have at most {MOST_BYTES:,}: cut a smaller extract"
         )
     return path
+
+
+@contextmanager
+def errors_of(package: str, path: Path, kind: str) -> Iterator[None]:
+    """Turn what a library raises in the block into the error of a file that cannot be read.
+
+    A library says what is wrong with a file in errors of many kinds, wherever it comes to it. One
+    that does not come out of it is a mistake here, and stays what it is.
+
+    Args:
+        package: Name of the library.
+        path: The file.
+        kind: What it was read as.
+
+    Raises:
+        BlastEnvError: If the library raises anything.
+    """
+    try:
+        yield
+    except Exception as error:
+        frames = (frame for frame, _ in walk_tb(error.__traceback__))
+        modules = {str(frame.f_globals.get("__name__")).partition(".")[0] for frame in frames}
+        if isinstance(error, BlastEnvError) or package not in modules:
+            raise
+        what = shortened(" ".join(str(error).split()) or type(error).__name__, 300)
+        raise BlastEnvError(f"{path}: cannot be read as {kind}: {what}") from error
 
 
 def too_many(path: Path) -> BlastEnvError:

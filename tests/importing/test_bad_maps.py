@@ -319,3 +319,15 @@ def test_extract_that_cuts_a_building_says_so(tmp_path: Path) -> None:
 def test_nothing_is_imported_by_names_that_do_not_exist() -> None:
     """Every reader is reached by its suffixes."""
     assert set(convert._READERS) == {".geojson", ".json", ".dxf", *osm.SUFFIXES}
+
+
+@pytest.mark.parametrize(("suffix", "module"), [(".dxf", dxf), (".osm", osm)])
+def test_a_mistake_of_our_own_is_not_taken_for_a_damaged_file(
+    suffix: str, module: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def mistaken(*_: Any) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(module, "_places", mistaken)
+    with pytest.raises(ZeroDivisionError):
+        import_site(BLOCK.with_suffix(suffix), HALL)
