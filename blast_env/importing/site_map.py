@@ -7,6 +7,8 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Final
 
+import numpy as np
+
 from blast_env.errors import BlastEnvError, import_extra, shortened
 
 with import_extra("maps", "maps and drawings"):
@@ -21,6 +23,9 @@ MOST_FEATURES: Final = 100_000
 
 MOST_POINTS: Final = 2_000_000
 """Points of all of them."""
+
+MOST_COORDINATE: Final = 1e12
+"""In whatever the coordinates are; with millimetres the Earth's circumference is 4e10."""
 
 Tags = Mapping[str, str | float | bool]
 
@@ -82,12 +87,21 @@ class SiteMap:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a map with more than can be worked on.
+        """Refuse a map with more, or larger, than can be worked on.
 
         Raises:
-            BlastEnvError: If it has too many points.
+            BlastEnvError: If it has too many points, or a coordinate too large.
         """
-        points = shapely.get_num_coordinates([each.geometry for each in self.features])
+        geometries = [each.geometry for each in self.features]
+        coordinates, owners = shapely.get_coordinates(geometries, return_index=True)
+        is_wrong = ~(np.abs(coordinates) <= MOST_COORDINATE)
+        if is_wrong.any():
+            owner = self.features[owners[is_wrong.any(axis=1)][0]]
+            raise BlastEnvError(
+                f"{self.path}: {owner.place}: has the coordinate {coordinates[is_wrong][0]:g}, "
+                f"must be within {MOST_COORDINATE:g}"
+            )
+        points = shapely.get_num_coordinates(geometries)
         if points.sum() > MOST_POINTS:
             raise BlastEnvError(
                 f"{self.path}: has {points.sum():,} points, must have at most {MOST_POINTS:,}: "

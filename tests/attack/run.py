@@ -1,4 +1,4 @@
-"""A long attack on everything that reads files: `make attack`."""
+"""A long attack on everything that reads and writes files: `make attack`."""
 
 import resource
 import signal
@@ -9,14 +9,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import process_time
+from time import process_time, time
 from types import FrameType
 from typing import Annotated, Any, Final
 
+import numpy as np
 import typer
 
 from blast_env.errors import BlastEnvError
 from tests.attack.formats import FORMATS, Format
+from tests.attack.kills import JOBS, outcome_after_kill, steps_and_outcome
 from tests.attack.mutants import mutants
 
 _KB: Final = 1024
@@ -168,8 +170,8 @@ app = typer.Typer(pretty_exceptions_enable=False)
 
 
 @app.command()
-def main(
-    files: Annotated[int, typer.Option(help="Files of each format.")] = 10_000,
+def files(
+    count: Annotated[int, typer.Option(help="Files of each format.")] = 10_000,
     seed: Annotated[int, typer.Option(help="Decides which.")] = 0,
     only: Annotated[str, typer.Option(help="Formats with this in their names.")] = "",
     out: Annotated[Path, typer.Option(help="Where files that failed are kept.")] = Path(
@@ -186,7 +188,7 @@ def main(
                 continue
             began_s = process_time()
             with TemporaryDirectory() as folder:
-                outcome = attack(make(Path(folder)), files, seed)
+                outcome = attack(make(Path(folder)), count, seed)
             cells = (
                 *(name, outcome.files, outcome.refused, outcome.accepted, outcome.failed),
                 *(f"{1000.0 * outcome.slowest_s:.0f}", f"{outcome.largest_bytes / 2**20:.0f}"),
@@ -200,6 +202,40 @@ def main(
                 print(f"    {problem}: {kept}")
             failed += outcome.failed
     raise typer.Exit(1 if failed else 0)
+
+
+@app.command()
+def kills(
+    most: Annotated[int, typer.Option(help="Most kills of each job, evenly spread.")] = 40,
+    only: Annotated[str, typer.Option(help="Jobs with this in their names.")] = "",
+) -> None:
+    """Kill each job at one step on the disk after the other; print whether it goes on."""
+    failed = 0
+    print("| job | steps on the disk | killed at | goes on to the same result | time, s |")
+    print("|---|---|---|---|---|")
+    for name in JOBS:
+        if only not in name:
+            continue
+        began_s = time()
+        with TemporaryDirectory() as folder:
+            steps, whole = steps_and_outcome(name, Path(folder, "whole"))
+            places = sorted({*np.linspace(0, steps - 1, min(most, steps)).round().astype(int)})
+            problems = [_after_kill(name, Path(folder, f"{at}"), int(at), whole) for at in places]
+        wrong = [each for each in problems if each]
+        cells = (name, steps, len(places), len(places) - len(wrong), f"{time() - began_s:.0f}")
+        print(f"| {' | '.join(map(str, cells))} |", flush=True)
+        print("".join(f"    {each}\n" for each in wrong), end="")
+        failed += len(wrong)
+    raise typer.Exit(1 if failed else 0)
+
+
+def _after_kill(name: str, folder: Path, kill_at: int, whole: Any) -> str:
+    """Return what is wrong with a job that was killed and begun again; empty if nothing is."""
+    try:
+        found = outcome_after_kill(name, folder, kill_at)
+    except (RuntimeError, BlastEnvError, OSError, ValueError) as error:
+        return f"step {kill_at}: {error}"
+    return "" if found == whole else f"step {kill_at}: another result"
 
 
 if __name__ == "__main__":
