@@ -30,9 +30,11 @@ quick: $(STAMP)
 test-browser: $(STAMP)
 	$(BIN)/pytest tests/app/browser
 
-# Thousands of wrong files of every format that is read; some minutes on one core.
+# Thousands of wrong files of every format that is read, kills at every step on the disk; half an
+# hour on one core.
 attack: $(STAMP)
-	$(BIN)/python -m tests.attack.run
+	$(BIN)/python -m tests.attack.run files
+	$(BIN)/python -m tests.attack.run kills
 
 # The site: out/docs/html/index.html. Warnings are errors; notebooks run when they have changed.
 docs: $(VENV)/.docs

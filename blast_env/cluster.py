@@ -6,10 +6,11 @@ the start can do.
 """
 
 import asyncio
-import json
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import joblib
 from joblib.parallel import ParallelBackendBase, SequentialBackend
 
+from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.provenance import code_digest, versions
 
@@ -78,16 +80,38 @@ def _connect(address: str) -> "Client":
     with import_extra("cluster", "work on a cluster"):
         from distributed import Client
 
-    scheduler = address
+    scheduler = address_of(address)
     try:
-        if Path(address).is_file():
-            scheduler = str(json.loads(Path(address).read_bytes())["address"])
         # A client that finds nobody leaves a thread behind: so first see whether one answers.
         with ThreadPoolExecutor(1) as pool:  # in a notebook this thread has an event loop already
             pool.submit(asyncio.run, _knock(scheduler)).result()
         return Client(scheduler, timeout=_CONNECT_S, set_as_default=False, name="blast-env")
-    except (OSError, ValueError, KeyError, TypeError) as error:  # no answer; no address
+    except (OSError, ValueError, TypeError) as error:  # no answer; no address
         raise BlastEnvError(f"cluster {address!r}: no scheduler answers: {error}") from error
+
+
+@dataclass(frozen=True)
+class _SchedulerFile:
+    """What is read of a scheduler file, which says much more."""
+
+    address: str
+
+
+def address_of(scheduler: str) -> str:
+    """Return the address of a scheduler.
+
+    Args:
+        scheduler: The address, or the path of its scheduler file.
+
+    Raises:
+        BlastEnvError: If a scheduler file cannot be read.
+    """
+    if not os.path.isfile(scheduler):
+        return scheduler
+    try:
+        return checked_as(_SchedulerFile, parse_json(read_text(Path(scheduler)))).address
+    except DocumentError as error:
+        raise BlastEnvError(f"cluster {scheduler!r}: is no scheduler file: {error}") from error
 
 
 async def _knock(address: str) -> None:

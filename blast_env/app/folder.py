@@ -153,7 +153,8 @@ class WorkFolder:
 
     def designs(self) -> list[DesignEntry]:
         """Return the designs, the one changed last first."""
-        folders = [each for each in self._designs.iterdir() if each.is_dir()]
+        # A process that is killed while it makes one leaves a folder without a design.
+        folders = [each for each in self._designs.iterdir() if (each / _DESIGN).exists()]
         entries = [DesignFolder(each).entry() for each in folders]
         return sorted(entries, key=lambda each: -each.changed_s)
 

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
 from blast_env.scenario import LayoutFile, Scenario, load_scenario
 from blast_env.sites import generate_site
 
@@ -96,8 +97,9 @@ def _from_file(
     with TemporaryDirectory() as folder:
         # The name stands in messages; nothing of it but its last part leads anywhere.
         path = Path(folder) / Path(name.replace("\\", "/")).name
-        path.write_bytes(content)
         try:
+            with write_atomically(path, durable=False) as temporary:
+                temporary.write_bytes(content)
             return readers[suffix](path)
         except BlastEnvError as error:
             raise BlastEnvError(str(error).replace(f"{folder}/", "")) from error

@@ -10,13 +10,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from blast_env.errors import BlastEnvError, import_extra, shortened, suggestion
+from blast_env.errors import BlastEnvError, import_extra, suggestion
 from blast_env.importing.site_map import (
     MOST_FEATURES,
     DrawingCoordinates,
     MapFeature,
     SiteMap,
     checked_file,
+    errors_of,
     too_many,
 )
 
@@ -63,18 +64,12 @@ def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
         BlastEnvError: If it cannot be read, or nobody says its unit.
     """
     skipped: Counter[str] = Counter()
-    try:
+    with errors_of("ezdxf", path, "DXF"):
         document = readfile(checked_file(path))
         metres = _metres_per_unit(path, document, unit)
         features = tuple(
             islice(_features(path, document, _SAG_M / metres, metres, skipped), MOST_FEATURES + 1)
         )
-    except BlastEnvError:
-        raise
-    # ezdxf says what is wrong with a file in errors of many kinds, wherever it comes to it.
-    except Exception as error:
-        what = shortened(" ".join(str(error).split()) or type(error).__name__, 300)
-        raise BlastEnvError(f"{path}: cannot be read as DXF: {what}") from error
     if len(features) > MOST_FEATURES:
         raise too_many(path)
     notes = tuple(

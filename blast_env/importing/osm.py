@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import import_extra
 from blast_env.importing.site_map import (
     MOST_FEATURES,
     MapCoordinates,
@@ -14,6 +14,7 @@ from blast_env.importing.site_map import (
     SiteMap,
     Tags,
     checked_file,
+    errors_of,
     too_many,
 )
 
@@ -40,13 +41,11 @@ def read_osm(path: Path) -> SiteMap:
         BlastEnvError: If it cannot be read.
     """
     features, skipped = [], _Skipped()
-    try:
+    with errors_of("osmium", path, "OpenStreetMap data"):
         for feature in _features(checked_file(path), skipped):
             features.append(feature)
             if len(features) > MOST_FEATURES:
                 raise too_many(path)
-    except (RuntimeError, osmium.InvalidLocationError) as error:
-        raise BlastEnvError(f"{path}: cannot be read as OpenStreetMap data: {error}") from error
     return SiteMap(path, MapCoordinates(_WGS84), tuple(features), skipped.notes)
 
 

@@ -1,11 +1,15 @@
 """What the readers of maps and drawings give: outlines and lines with their tags."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from traceback import walk_tb
 from typing import Final
 
-from blast_env.errors import BlastEnvError, import_extra
+import numpy as np
+
+from blast_env.errors import BlastEnvError, import_extra, shortened
 
 with import_extra("maps", "maps and drawings"):
     import shapely
@@ -19,6 +23,9 @@ MOST_FEATURES: Final = 100_000
 
 MOST_POINTS: Final = 2_000_000
 """Points of all of them."""
+
+MOST_COORDINATE: Final = 1e12
+"""In whatever the coordinates are; with millimetres the Earth's circumference is 4e10."""
 
 Tags = Mapping[str, str | float | bool]
 
@@ -80,12 +87,21 @@ class SiteMap:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a map with more than can be worked on.
+        """Refuse a map with more, or larger, than can be worked on.
 
         Raises:
-            BlastEnvError: If it has too many points.
+            BlastEnvError: If it has too many points, or a coordinate too large.
         """
-        points = shapely.get_num_coordinates([each.geometry for each in self.features])
+        geometries = [each.geometry for each in self.features]
+        coordinates, owners = shapely.get_coordinates(geometries, return_index=True)
+        is_wrong = ~(np.abs(coordinates) <= MOST_COORDINATE)
+        if is_wrong.any():
+            owner = self.features[owners[is_wrong.any(axis=1)][0]]
+            raise BlastEnvError(
+                f"{self.path}: {owner.place}: has the coordinate {coordinates[is_wrong][0]:g}, "
+                f"must be within {MOST_COORDINATE:g}"
+            )
+        points = shapely.get_num_coordinates(geometries)
         if points.sum() > MOST_POINTS:
             raise BlastEnvError(
                 f"{self.path}: has {points.sum():,} points, must have at most {MOST_POINTS:,}: "
@@ -109,6 +125,32 @@ def checked_file(path: Path) -> Path:
             f"{path}: has {size:,} bytes, must have at most {MOST_BYTES:,}: cut a smaller extract"
         )
     return path
+
+
+@contextmanager
+def errors_of(package: str, path: Path, kind: str) -> Iterator[None]:
+    """Turn what a library raises in the block into the error of a file that cannot be read.
+
+    A library says what is wrong with a file in errors of many kinds, wherever it comes to it. One
+    that does not come out of it is a mistake here, and stays what it is.
+
+    Args:
+        package: Name of the library.
+        path: The file.
+        kind: What it was read as.
+
+    Raises:
+        BlastEnvError: If the library raises anything.
+    """
+    try:
+        yield
+    except Exception as error:
+        frames = (frame for frame, _ in walk_tb(error.__traceback__))
+        modules = {str(frame.f_globals.get("__name__")).partition(".")[0] for frame in frames}
+        if isinstance(error, BlastEnvError) or package not in modules:
+            raise
+        what = shortened(" ".join(str(error).split()) or type(error).__name__, 300)
+        raise BlastEnvError(f"{path}: cannot be read as {kind}: {what}") from error
 
 
 def too_many(path: Path) -> BlastEnvError:

@@ -112,7 +112,8 @@ def _read(path: Path) -> tuple[pd.DataFrame, dict[bytes, bytes]]:
         # Not read_table: it takes the folder's name for a partition, "seed=3" for a column.
         with pq.ParquetFile(path) as file:
             table = file.read()
-        return table.to_pandas(), table.schema.metadata or {}
+        # What pandas says of itself in there is not needed, and not checked when it is read.
+        return table.to_pandas(ignore_metadata=True), table.schema.metadata or {}
     except (OSError, ValueError, pa.ArrowException) as error:
         reason = shortened(str(error), 300)
         raise BlastEnvError(f"{path}: damaged or not a Parquet file: {reason}") from error

@@ -102,6 +102,14 @@ def test_designs_are_listed_and_a_damaged_one_says_so(tmp_path: Path) -> None:
         bad.load()
 
 
+def test_a_design_that_was_never_finished_is_none(tmp_path: Path) -> None:
+    """As a kill leaves it between the folder and its file."""
+    work = WorkFolder(tmp_path)
+    good, unfinished = work.create(hut(), "begin"), work.create(hut(), "begin")
+    (unfinished.path / "design.json").unlink()
+    assert [each.design_id for each in work.designs()] == [good.design_id]
+
+
 @pytest.mark.parametrize("content", ["[]", "{}", '{"present": 3, "sites": []}'])
 def test_what_is_no_design_is_refused(tmp_path: Path, content: str) -> None:
     folder = WorkFolder(tmp_path).create(hut(), "begin")

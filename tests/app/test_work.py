@@ -20,7 +20,6 @@ from blast_env.app.records import BlastRecord, Engine, Load, blast_key, comparis
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status, ThreatOf, read_status, write_status
-from blast_env.app.worker import do
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.geometry import Layout
@@ -28,19 +27,12 @@ from blast_env.physics.scene import Charge
 from blast_env.reporting import StudyOptions
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.simulation.gas import GasBlast
+from tests.app.here import Here
 from tests.gas_sites import WALL, hut
 from tests.scenarios import BALLISTIC_COURTYARD
 from tests.vehicle_sites import gate_site, vehicle_document
 
 CELLS: Layout = tuple((row, 0) for row in range(22, 32))
-
-
-class Here(Workers):
-    """Does all work at once and in this process."""
-
-    def tick(self) -> None:
-        while self._waiting:
-            do(self._waiting.popleft())
 
 
 def session_on(folder: Path, scenario: Scenario, workers: Workers | None = None) -> Session:

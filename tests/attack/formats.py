@@ -1,7 +1,7 @@
 """Every kind of file that the packages read: sound ones, and what reads them."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -22,12 +22,12 @@ from blast_agents.training.run_folder import (
     read_rows,
     write_rows,
 )
-from ezdxf.filemanagement import new
 
 from blast_env.app.design import Design, History, Step
 from blast_env.app.folder import DesignFolder
 from blast_env.app.work import ReportTask, ThreatOf, read_task, write_task
 from blast_env.calibration.model import load_calibration, save_calibration
+from blast_env.cluster import address_of
 from blast_env.evaluation import Threat
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastKey, DiskCache
@@ -42,7 +42,7 @@ from blast_env.studies.calibration.candidates import HIGH, LOW, Candidate, Score
 from blast_env.studies.calibration.study import FreeFieldRun
 from scripts.pack_agent import league_result
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
-from tests.importing.maps import BLOCK, charge, outline, rectangle, written
+from tests.importing.maps import Places, charge, outline, rectangle, written
 from tests.scenario.documents import full_document
 
 
@@ -109,9 +109,9 @@ def _calibration(folder: Path) -> Format:
     return Format(tuple(samples), _from_file(folder / "a.json", load_calibration), True)
 
 
-def _run_configuration(folder: Path) -> RunConfiguration:
+def _run_configuration() -> RunConfiguration:
     return RunConfiguration(
-        settings=settings(folder / "a.toml"),
+        settings=settings(Path("a.toml")),
         hyperparameters=hyperparameters(),
         scenario_hash=small_scenario().content_hash,
     )
@@ -119,7 +119,7 @@ def _run_configuration(folder: Path) -> RunConfiguration:
 
 def _configuration(folder: Path) -> Format:
     run = RunFolder(folder / "run")
-    with run.making(_run_configuration(folder), small_scenario(), "command"):
+    with run.making(_run_configuration(), small_scenario(), "command"):
         pass
     path = run.path / "config.yaml"
     return Format((path.read_bytes(),), _from_file(path, lambda _: run.configuration()))
@@ -142,7 +142,7 @@ def _checkpoint(folder: Path) -> Format:
     path = folder / "checkpoint.pt"
     rng = np.random.default_rng(0)
     weights = {"a": torch.from_numpy(rng.random(40)), "b": torch.zeros(3)}
-    Checkpoint.of_start(_run_configuration(folder), weights).save(path)
+    Checkpoint.of_start(_run_configuration(), weights).save(path)
 
     def read(path: Path) -> Any:
         found = Checkpoint.load(path)
@@ -154,7 +154,7 @@ def _checkpoint(folder: Path) -> Format:
 
 def _packaged(folder: Path) -> Format:
     record = Record(
-        configuration=_run_configuration(folder),
+        configuration=_run_configuration(),
         scenario="small",
         command="blast-env train",
         versions={"torch": "2"},
@@ -241,7 +241,16 @@ def _result(folder: Path) -> Format:
 
 
 def _geojson(folder: Path) -> Format:
-    return _map(folder, (BLOCK.read_bytes(),), ".geojson", _HALL)
+    house = outline(_in_degrees(rectangle(0, 0, 6, 4)), name="House", height=6)
+    road = {"type": "LineString", "coordinates": _in_degrees([(-5, -8), (15, -8)])}
+    street = {"type": "Feature", "properties": {"highway": "service"}, "geometry": road}
+    sample = written(folder, house, street, crs=None).read_bytes()
+    return _map(folder, (sample,), ".geojson", _HOUSE)
+
+
+def _in_degrees(places: Places) -> Places:
+    """Return places in metres as degrees, not far from the equator."""
+    return [(round(1e-5 * x, 7), round(1e-5 * y, 7)) for x, y in places]
 
 
 def _local_geojson(folder: Path) -> Format:
@@ -250,24 +259,47 @@ def _local_geojson(folder: Path) -> Format:
 
 
 def _osm(folder: Path) -> Format:
-    return _map(folder, (BLOCK.with_suffix(".osm").read_bytes(),), ".osm", _HALL)
+    places = [*rectangle(0, 0, 6, 4), *rectangle(0, 12, 6, 4), (-5, -8), (15, -8)]
+    nodes = [
+        f'<node id="{number}" lat="{y}" lon="{x}"/>'
+        for number, (x, y) in enumerate(_in_degrees(places), start=1)
+    ]
+    ways = (
+        _way(11, (1, 2, 3, 4, 1), building="yes", name="House", height="6"),
+        _way(12, (5, 6, 7, 8, 5)),
+        _way(13, (9, 10), highway="service"),
+    )
+    outer = '<member type="way" ref="12" role="outer"/>'
+    shed = f'<relation id="1">{outer}{_tags(type="multipolygon", building="yes")}</relation>'
+    sample = "\n".join(('<osm version="0.6">', *nodes, *ways, shed, "</osm>", "")).encode()
+    return _map(folder, (sample,), ".osm", _HOUSE)
+
+
+def _way(number: int, nodes: Sequence[int], **tags: str) -> str:
+    refs = "".join(f'<nd ref="{each}"/>' for each in nodes)
+    return f'<way id="{number}">{refs}{_tags(**tags)}</way>'
+
+
+def _tags(**tags: str) -> str:
+    return "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
 
 
 def _dxf(folder: Path) -> Format:
-    document = new("R12", units=6)
-    space = document.modelspace()
-    space.add_polyline2d([(0, 0), (6, 0), (6, 4), (0, 4)], close=True, dxfattribs={"layer": "B"})
-    space.add_text("House", dxfattribs={"layer": "B"}).set_placement((3, 2))
-    space.add_circle((12, 2), 1.0, dxfattribs={"layer": "S"})
-    space.add_point((12, 2), dxfattribs={"layer": "S"})
-    document.saveas(folder / "a.dxf")
+    outline = "".join(f"0\nVERTEX\n8\nB\n10\n{x}\n20\n{y}\n" for x, y in rectangle(0, 0, 6, 4))
+    entities = (
+        f"0\nPOLYLINE\n8\nB\n66\n1\n70\n1\n39\n5.0\n{outline}0\nSEQEND\n",
+        "0\nTEXT\n8\nB\n10\n3.0\n20\n2.0\n40\n1.0\n1\nHouse\n",
+        "0\nCIRCLE\n8\nS\n10\n12.0\n20\n2.0\n40\n1.0\n",
+        "0\nPOINT\n8\nS\n10\n12.0\n20\n2.0\n",
+    )
+    sample = f"0\nSECTION\n2\nENTITIES\n{''.join(entities)}0\nENDSEC\n0\nEOF\n".encode()
     options = ImportOptions(
         units="m", buildings_from=("B",), charges_from=("S",), protect=("House",)
     )
-    return _map(folder, ((folder / "a.dxf").read_bytes(),), ".dxf", options)
+    return _map(folder, (sample,), ".dxf", options)
 
 
-_HALL: Final = ImportOptions(protect=("Town Hall",))
+_HOUSE: Final = ImportOptions(protect=("House",))
 
 
 def _map(folder: Path, samples: tuple[bytes, ...], suffix: str, options: ImportOptions) -> Format:
@@ -306,6 +338,13 @@ def _task(folder: Path) -> Format:
     return Format((path.read_bytes(),), _from_file(path, lambda _: read_task(folder)))
 
 
+def _scheduler(folder: Path) -> Format:
+    record = {"type": "Scheduler", "id": "Scheduler-1", "address": "tcp://10.0.0.1:8786"}
+    sample = json.dumps({**record, "services": {"dashboard": 8787}, "workers": {}}, indent=2)
+    path = folder / "scheduler.json"
+    return Format((sample.encode(),), _from_file(path, lambda path: address_of(str(path))))
+
+
 FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
     {
         "scenario": _scenario,
@@ -330,6 +369,7 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "collisions (Parquet)": _parquet,
         "page: design": _design,
         "page: task": _task,
+        "scheduler file": _scheduler,
     }
 )
 """By names for a table; each is made in a folder of its own."""

@@ -6,6 +6,7 @@ of each before it happens, so that a kill at step k + 1 is also one right after 
 
 import multiprocessing
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable
@@ -20,14 +21,24 @@ from blast_agents.training import resume, train
 from blast_agents.training.checkpoint import Checkpoint
 from typer.testing import CliRunner
 
+from blast_env.app.folder import WorkFolder
+from blast_env.app.jobs import jobs_of
+from blast_env.app.session import Sessions
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.files import FolderStore, is_temporary
 from blast_env.journal import Journal
-from blast_env.scenario import load_scenario
+from blast_env.scenario import load_scenario, save_scenario, write_layout
 from blast_env.studies.calibration.study import FreeFieldRun, FreeFieldStudy
 from tests.agents.league_cases import road_scenario
-from tests.agents.training_runs import hyperparameters, scenario_file, settings
+from tests.agents.training_runs import (
+    hyperparameters,
+    scenario_file,
+    settings,
+    small_scenario,
+)
+from tests.app.here import Here
+from tests.reporting.sites import LAYOUT, small_hut
 
 _STEPS: Final = ("os.rename", "os.mkdir", "os.remove", "open")
 _WRITING: Final = os.O_WRONLY | os.O_RDWR
@@ -95,7 +106,7 @@ def _files(folder: Path) -> dict[str, bytes]:
     return {
         path.name: path.read_bytes()
         for path in written
-        if path.suffix in (".csv", ".png") and not is_temporary(path.name)
+        if path.suffix in (".csv", ".png") and _is_kept(path)
     }
 
 
@@ -108,8 +119,7 @@ def _league(folder: Path) -> None:
 
 def _league_outcome(folder: Path) -> Any:
     store = FolderStore(folder / "results", ".result")
-    names = sorted(path.name for path in store.folder.iterdir() if not is_temporary(path.name))
-    return names, sorted(path.name for path in folder.iterdir() if not is_temporary(path.name))
+    return _left(store.folder), _left(folder)
 
 
 def _study(folder: Path) -> None:
@@ -122,12 +132,64 @@ def _study_outcome(folder: Path) -> Any:
     return sorted(map(str, Journal(folder / "runs.jsonl", FreeFieldRun).read()))
 
 
+def _report(folder: Path) -> None:
+    site, layout = folder / "site.toml", folder / "layout.json"
+    if not layout.exists():
+        save_scenario(small_hut(), site)
+        write_layout(layout, small_hut(), LAYOUT, {})
+    less = ("--threats", "1", "--places", "0", "--no-items", "--stills", "0", "--processes", "1")
+    where = ("--cache", folder / "cache", "--out", folder / "report.html")
+    _command(folder, "report", site, "--layout", layout, *less, *where)
+
+
+def _report_outcome(folder: Path) -> Any:
+    """Return the numbers of the page, and what the cache has."""
+    cells = re.findall(r"<td[^>]*>([^<]*)</td>", (folder / "report.html").read_text("utf-8"))
+    loads = FolderStore(folder / "cache", ".loads")
+    numbers = [cell for cell in cells if re.fullmatch(r"[-+0-9., ]+", cell)]
+    return numbers, len(loads), _left(folder)
+
+
+def _page(folder: Path) -> None:
+    """A design, a layout and its blasts, as the page does them; what is there is opened again."""
+    work = WorkFolder(folder / "work")
+    sessions = Sessions(work, Here())
+    with work.held("http://localhost"):
+        there = work.designs()
+        session = (
+            sessions.of(there[0].design_id) if there else sessions.new(small_scenario(), "begin")
+        )
+        session.put("layout", session.design.with_layout(((0, 0), (1, 0))))
+        session.blast([0])
+
+
+def _page_outcome(folder: Path) -> Any:
+    work = WorkFolder(folder / "work")
+    (entry,) = work.designs()
+    design = work.open(entry.design_id)
+    records = [design.record_of(key) for key in sorted(design.blasts_there())]
+    loads = [(record.key, str(record.loads)) for record in records if record is not None]
+    frames = sorted(path.name for path in design.blasts.rglob("*.jpg") if _is_kept(path))
+    states = {status.state for _, status in jobs_of(design.jobs)}
+    return entry.problem, design.load().design, loads, frames, "done" in states
+
+
+def _is_kept(path: Path) -> bool:
+    return not is_temporary(path.name)
+
+
+def _left(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir() if _is_kept(path))
+
+
 JOBS: Final = {
     "train": Job(_train, _training_outcome),
     "search": Job(_search, _files),
     "evaluate": Job(_evaluate, _files),
     "league": Job(_league, _league_outcome),
     "calibrate": Job(_study, _study_outcome),
+    "report": Job(_report, _report_outcome),
+    "app": Job(_page, _page_outcome),
 }
 
 
@@ -167,12 +229,14 @@ def in_process(job: Callable[[Path], None], folder: Path, kill_at: int = -1) -> 
 def outcome_after_kill(name: str, folder: Path, kill_at: int) -> Any:
     """Kill a job at a step, begin it again as a user would, and return what came of it.
 
+    It may come to its end first: how often one tells how far it is goes by the clock.
+
     Raises:
-        RuntimeError: If it was not killed, or could not go on.
+        RuntimeError: If it failed in another way, or could not go on.
     """
     job = JOBS[name]
     code, _ = in_process(job.run, folder, kill_at)
-    if code != -signal.SIGKILL:
+    if code not in (0, -signal.SIGKILL):
         raise RuntimeError(f"{name} was to be killed at step {kill_at}, ended with {code}")
     code, _ = in_process(job.run, folder)
     if code != 0:

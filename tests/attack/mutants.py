@@ -42,6 +42,8 @@ _VALUES: Final = (
 
 _ENCODINGS: Final = ("utf-16", "utf-32", "utf-16-be", "latin-1", "cp500")
 
+_MOST_ADDED: Final = 20_000  # bytes
+
 Mutation = Callable[[bytes, random.Random], bytes]
 
 
@@ -74,16 +76,20 @@ def _shortened(content: bytes, rng: random.Random) -> bytes:
 def _doubled(content: bytes, rng: random.Random) -> bytes:
     first, last = sorted(rng.randrange(len(content) + 1) for _ in range(2))
     piece = content[first : min(last, first + 2000)]
-    return content[:last] + piece * rng.choice((1, 1, 2, 50)) + content[last:]
+    return content[:last] + piece * _times(rng.choice((1, 1, 2, 50)), piece) + content[last:]
 
 
 def _repeated_line(content: bytes, rng: random.Random) -> bytes:
     """Keys and rows occur twice, or a thousand times."""
     lines = content.splitlines(keepends=True)
     number, place = rng.randrange(len(lines)), rng.randrange(len(lines) + 1)
-    return b"".join(
-        (*lines[:place], *[lines[number]] * rng.choice((1, 1, 1, 20, 1000)), *lines[place:])
-    )
+    times = _times(rng.choice((1, 1, 1, 20, 1000)), lines[number])
+    return b"".join((*lines[:place], *[lines[number]] * times, *lines[place:]))
+
+
+def _times(wanted: int, piece: bytes) -> int:
+    """Return how often a piece is repeated: as wanted, unless it is large."""
+    return max(min(wanted, _MOST_ADDED // (len(piece) or 1)), 1)
 
 
 def _swapped_lines(content: bytes, rng: random.Random) -> bytes:

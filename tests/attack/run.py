@@ -1,35 +1,51 @@
-"""A long attack on everything that reads files: `make attack`."""
+"""A long attack on everything that reads and writes files: `make attack`."""
 
 import resource
 import signal
 import traceback
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import process_time
+from time import process_time, time
 from types import FrameType
 from typing import Annotated, Any, Final
 
+import numpy as np
 import typer
 
 from blast_env.errors import BlastEnvError
 from tests.attack.formats import FORMATS, Format
+from tests.attack.kills import JOBS, outcome_after_kill, steps_and_outcome
 from tests.attack.mutants import mutants
 
-MOST_S: Final = 3.0
-"""Processor time for one file."""
-
-MOST_BYTES: Final = 2**30
-"""Memory for one file."""
-
 _KB: Final = 1024
+_RESET_PEAK: Final = "5"
 
 
 class Overtime(BaseException):
     """What no reader can turn into an error of its own."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one file may cost.
+
+    Attributes:
+        time_s: Processor time.
+        most_bytes: Memory.
+        stop_s: Processor time after which a reader is stopped.
+    """
+
+    time_s: float = 3.0
+    most_bytes: int = 2**28
+    stop_s: float = 30.0
+
+
+_LIMITS: Final = Limits()
+_MOST_BYTES: Final = 2**32  # of all together
 
 
 @dataclass
@@ -40,12 +56,15 @@ class Outcome:
         files: How many there were.
         refused: How many were refused as documented.
         slowest_s: The longest that one took, processor time.
+        largest_bytes: The most memory that one took.
         failures: What went wrong otherwise, once each, with the file.
+        failed: How many went wrong.
     """
 
     files: int = 0
     refused: int = 0
     slowest_s: float = 0.0
+    largest_bytes: int = 0
     failures: dict[str, bytes] = field(default_factory=dict)
     failed: int = 0
 
@@ -55,29 +74,32 @@ class Outcome:
         return self.files - self.refused - self.failed
 
 
-def attack(form: Format, count: int, seed: int = 0) -> Outcome:
+def attack(form: Format, count: int, seed: int = 0, limits: Limits = _LIMITS) -> Outcome:
     """Read wrong files.
 
     Args:
         form: The format.
         count: How many files.
         seed: Decides which.
+        limits: What each of them may cost.
     """
     sound = [form.read(each) for each in form.samples]
     outcome = Outcome()
     for content in mutants(form.samples, count, seed):
-        began_s, peak = process_time(), _peak_bytes()
-        problem = _problem(form, content, sound, outcome)
-        took_s, more = process_time() - began_s, _peak_bytes() - peak
-        if problem is None and took_s > MOST_S:
-            problem = f"took {took_s:.1f} s"
-        if problem is None and more > MOST_BYTES:
-            problem = f"took {more / 2**30:.1f} GiB"
+        began_s, before = process_time(), _size_bytes()
+        with _stopped_after(limits.stop_s):
+            problem = _problem(form, content, sound, outcome)
+        took_s, more = process_time() - began_s, _peak_bytes() - before
+        if problem is None and took_s > limits.time_s:
+            problem = f"took more than {limits.time_s:g} s"
+        if problem is None and more > limits.most_bytes:
+            problem = f"took more than {limits.most_bytes >> 20} MiB"
         if problem is not None:
             outcome.failed += 1
             outcome.failures.setdefault(problem, content)
         outcome.files += 1
         outcome.slowest_s = max(outcome.slowest_s, took_s)
+        outcome.largest_bytes = max(outcome.largest_bytes, more)
     return outcome
 
 
@@ -91,7 +113,8 @@ def _problem(form: Format, content: bytes, sound: list[Any], outcome: Outcome) -
         outcome.refused += 1
         return None if str(error) else "an error without a message"
     except (Exception, Overtime) as error:
-        where = traceback.extract_tb(error.__traceback__)[-1]
+        frames = traceback.extract_tb(error.__traceback__)
+        where = [each for each in frames if each.filename != __file__][-1]
         return f"{type(error).__name__} in {Path(where.filename).name}:{where.lineno}"
     if found is None:
         outcome.refused += 1
@@ -100,26 +123,46 @@ def _problem(form: Format, content: bytes, sound: list[Any], outcome: Outcome) -
     return None
 
 
+def _size_bytes() -> int:
+    """Return the memory that the process has now, and let its peak begin there.
+
+    Without the right to do so, memory counts only as far as it exceeds all before.
+    """
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text(_RESET_PEAK, encoding="ascii")
+    return _peak_bytes()
+
+
 def _peak_bytes() -> int:
     return _KB * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 @contextmanager
-def limits() -> Iterator[None]:
-    """Stop what takes twenty times as long, or more than all memory that it may have."""
+def _stopped_after(time_s: float) -> Iterator[None]:
+    """Raise `Overtime` in the block after this much processor time."""
 
     def stop(_: int, __: FrameType | None) -> None:
         raise Overtime
 
-    before = resource.getrlimit(resource.RLIMIT_DATA)
-    size = Path("/proc/self/statm").read_text(encoding="ascii").split()
-    now = resource.getpagesize() * int(size[5])
-    resource.setrlimit(resource.RLIMIT_DATA, (now + 3 * MOST_BYTES, before[1]))
-    signal.signal(signal.SIGALRM, stop)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, time_s)
     try:
         yield
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+@contextmanager
+def memory_limit(more_bytes: int) -> Iterator[None]:
+    """Let the process have this much more memory in the block, and end with it otherwise."""
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5])
+    most_bytes = resource.getpagesize() * pages + more_bytes
+    resource.setrlimit(resource.RLIMIT_DATA, (most_bytes, before[1]))
+    try:
+        yield
+    finally:
         resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
@@ -127,8 +170,8 @@ app = typer.Typer(pretty_exceptions_enable=False)
 
 
 @app.command()
-def main(
-    files: Annotated[int, typer.Option(help="Files of each format.")] = 10_000,
+def files(
+    count: Annotated[int, typer.Option(help="Files of each format.")] = 10_000,
     seed: Annotated[int, typer.Option(help="Decides which.")] = 0,
     only: Annotated[str, typer.Option(help="Formats with this in their names.")] = "",
     out: Annotated[Path, typer.Option(help="Where files that failed are kept.")] = Path(
@@ -137,18 +180,18 @@ def main(
 ) -> None:
     """Read thousands of wrong files of each format; print what became of them."""
     failed = 0
-    print("| format | files | refused | accepted | slowest, ms | failures | time, s |")
-    print("|---|---|---|---|---|---|---|")
-    with limits():
+    print("| format | files | refused | accepted | failures | slowest, ms | most, MiB | time, s |")
+    print("|---|---|---|---|---|---|---|---|")
+    with memory_limit(_MOST_BYTES):
         for name, make in FORMATS.items():
             if only not in name:
                 continue
             began_s = process_time()
             with TemporaryDirectory() as folder:
-                outcome = attack(make(Path(folder)), files, seed)
+                outcome = attack(make(Path(folder)), count, seed)
             cells = (
-                *(name, outcome.files, outcome.refused, outcome.accepted),
-                *(f"{1000.0 * outcome.slowest_s:.0f}", outcome.failed),
+                *(name, outcome.files, outcome.refused, outcome.accepted, outcome.failed),
+                *(f"{1000.0 * outcome.slowest_s:.0f}", f"{outcome.largest_bytes / 2**20:.0f}"),
                 f"{process_time() - began_s:.0f}",
             )
             print(f"| {' | '.join(map(str, cells))} |", flush=True)
@@ -159,6 +202,40 @@ def main(
                 print(f"    {problem}: {kept}")
             failed += outcome.failed
     raise typer.Exit(1 if failed else 0)
+
+
+@app.command()
+def kills(
+    most: Annotated[int, typer.Option(help="Most kills of each job, evenly spread.")] = 40,
+    only: Annotated[str, typer.Option(help="Jobs with this in their names.")] = "",
+) -> None:
+    """Kill each job at one step on the disk after the other; print whether it goes on."""
+    failed = 0
+    print("| job | steps on the disk | killed at | goes on to the same result | time, s |")
+    print("|---|---|---|---|---|")
+    for name in JOBS:
+        if only not in name:
+            continue
+        began_s = time()
+        with TemporaryDirectory() as folder:
+            steps, whole = steps_and_outcome(name, Path(folder, "whole"))
+            places = sorted({*np.linspace(0, steps - 1, min(most, steps)).round().astype(int)})
+            problems = [_after_kill(name, Path(folder, f"{at}"), int(at), whole) for at in places]
+        wrong = [each for each in problems if each]
+        cells = (name, steps, len(places), len(places) - len(wrong), f"{time() - began_s:.0f}")
+        print(f"| {' | '.join(map(str, cells))} |", flush=True)
+        print("".join(f"    {each}\n" for each in wrong), end="")
+        failed += len(wrong)
+    raise typer.Exit(1 if failed else 0)
+
+
+def _after_kill(name: str, folder: Path, kill_at: int, whole: Any) -> str:
+    """Return what is wrong with a job that was killed and begun again; empty if nothing is."""
+    try:
+        found = outcome_after_kill(name, folder, kill_at)
+    except (RuntimeError, BlastEnvError, OSError, ValueError) as error:
+        return f"step {kill_at}: {error}"
+    return "" if found == whole else f"step {kill_at}: another result"
 
 
 if __name__ == "__main__":

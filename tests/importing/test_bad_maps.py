@@ -105,6 +105,7 @@ def test_json_that_is_no_geojson(document: object, words: str, tmp_path: Path) -
         ({"type": "Polygon", "coordinates": [[["a", 0], [1, 1], [1, 0], ["a", 0]]]}, "not usable"),
         ({"type": "Point", "coordinates": [float("nan"), 1.0]}, "is no finite number"),
         ({"type": "LineString", "coordinates": [[0, 0], [float("inf"), 1.0]]}, "no finite number"),
+        ({"type": "Point", "coordinates": [1.0, -1e308]}, "coordinate -1e+308, must be within"),
         (7, "type is 7, must be one of Point"),
     ],
 )
@@ -319,3 +320,15 @@ def test_extract_that_cuts_a_building_says_so(tmp_path: Path) -> None:
 def test_nothing_is_imported_by_names_that_do_not_exist() -> None:
     """Every reader is reached by its suffixes."""
     assert set(convert._READERS) == {".geojson", ".json", ".dxf", *osm.SUFFIXES}
+
+
+@pytest.mark.parametrize(("suffix", "module"), [(".dxf", dxf), (".osm", osm)])
+def test_a_mistake_of_our_own_is_not_taken_for_a_damaged_file(
+    suffix: str, module: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def mistaken(*_: Any) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(module, "_places", mistaken)
+    with pytest.raises(ZeroDivisionError):
+        import_site(BLOCK.with_suffix(suffix), HALL)
