@@ -18,7 +18,8 @@ from blast_env.app.records import Engine
 from blast_env.app.server import add_pages
 from blast_env.app.session import Sessions
 from blast_env.scenario import Scenario, load_scenario
-from tests.app.test_work import CELLS, Here
+from tests.app.here import Here
+from tests.app.test_work import CELLS
 from tests.gas_sites import WALL, hut
 from tests.importing.maps import BLOCK
 from tests.scenarios import BALLISTIC_COURTYARD
