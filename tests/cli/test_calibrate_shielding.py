@@ -58,7 +58,15 @@ def test_a_calibration_gives_the_exponent(tmp_path: Path) -> None:
 
 def test_a_calibration_without_an_exponent_is_refused(tmp_path: Path) -> None:
     power = load_calibration("ballistic_kb_100kg", "event")
-    linear = power.model_copy(update={"law": "linear", "coefficients": {"a": 0.0, "b": 1e-6}})
+    coefficients = {"a": 0.0, "b": 1e-6}
+    intervals = {name: (value, value) for name, value in coefficients.items()}
+    linear = power.model_copy(
+        update={
+            "law": "linear",
+            "coefficients": coefficients,
+            "coefficient_intervals": intervals,
+        }
+    )
     save_calibration(linear, tmp_path / "linear.json")
     calibration = ("--calibration", tmp_path / "linear.json")
     result = calibrate("--shielding", *calibration, "--out", tmp_path / "out")

@@ -167,7 +167,7 @@ def test_unusable_arguments_are_named(evaluator: BlastEvaluator) -> None:
         evaluate_layout(COURTYARD, [(20, 0)], SEEDS)
     with pytest.raises(BlastEnvError, match="seeds: there are none"):
         evaluate_layout(COURTYARD, FEW, [])
-    with pytest.raises(BlastEnvError, match=r"seeds\[1\] is -1, must be at least 0"):
+    with pytest.raises(BlastEnvError, match=r"seeds\[1\] is -1, must be an integer from 0"):
         evaluate_layout(COURTYARD, FEW, [0, -1])
     with pytest.raises(BlastEnvError, match="processes is -2, must be a whole number"):
         evaluate_layout(COURTYARD, FEW, SEEDS, processes=-2)
