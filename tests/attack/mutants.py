@@ -127,7 +127,8 @@ def _other_number(content: bytes, rng: random.Random) -> bytes:
         return content
     first, last = rng.choice(places)
     value = float(content[first:last]) * rng.choice((-1.0, 0.0, 0.1, 10.0, 1e6, 1e-6, 1e18))
-    text = repr(value) if b"." in content[first:last] or abs(value) > 1e300 else str(round(value))
+    whole = b"." not in content[first:last] and abs(value) <= 1e300  # nan, inf: as they are
+    text = str(round(value)) if whole else repr(value)
     return content[:first] + text.encode() + content[last:]
 
 
