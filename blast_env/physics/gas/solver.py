@@ -19,7 +19,7 @@ AIR_PRESSURE_PA: Final = 101_325.0
 AIR_DENSITY_KG_M3: Final = 1.225
 
 COURANT: Final = 0.45
-"""Of half a step in x and y, of a quarter in z; the scheme is stable to 0.5."""
+"""Of half a step, in x and y by the mean of both; the scheme is stable to 0.5."""
 
 _FIRST_STEPS: Final = 10
 _FIRST_SHARE: Final = 0.2
