@@ -1,6 +1,10 @@
 """Settings for all tests."""
 
+import gc
+import multiprocessing
 import os
+
+import hypothesis  # noqa: F401  # looks for what refers to it, which is not found once frozen
 
 # Windows of render_mode="human" need no screen here. Set before pygame is imported.
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
@@ -10,3 +14,12 @@ os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # Tables are as wide as in a pipe, whatever the terminal that runs the tests.
 os.environ.pop("COLUMNS", None)
+# TorchRL, once imported, has every process of Python's started from nothing, which takes seconds;
+# it leaves alone what has been chosen, and asking chooses Python's own way.
+multiprocessing.get_start_method()
+
+
+def pytest_collection_finish() -> None:
+    """Spare the collector, and processes that are forked, the modules and tests that stay."""
+    gc.collect()
+    gc.freeze()

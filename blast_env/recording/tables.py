@@ -6,6 +6,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 import pandas as pd
 
+from blast_env.arrays import FloatArray
 from blast_env.calibration import LoadUnit
 from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
 from blast_env.physics.particles import CollisionType
@@ -149,14 +150,16 @@ def collision_table(
     module_ids = np.array([part.module_id for part in parts], dtype=object)
     structures = np.array([part.structure for part in parts], dtype=object)
     angle = incidence_angle_rad(collisions)
+    vx: FloatArray = collisions["vx"]
+    vy: FloatArray = collisions["vy"]
     values: dict[str, Any] = {
         "time_s": collisions["time_s"],
         "particle_type": [CollisionType(kind).name for kind in collisions["kind"]],
         "particle_id": collisions["ball"],
         "mass": collisions["mass"],
-        "vx": collisions["vx"],
-        "vy": collisions["vy"],
-        "speed": np.hypot(collisions["vx"], collisions["vy"]),
+        "vx": vx,
+        "vy": vy,
+        "speed": np.hypot(vx, vy),
         "impulse_sim": collisions["impulse"],
         "transferred_impulse_sim": collisions["transferred_impulse"],
         "angle_rad": angle,

@@ -271,14 +271,15 @@ def test_bad_input_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_cheaper_engine_s_best_layouts_are_judged_by_the_judge(tmp_path: Path) -> None:
-    search = Search(find_search_method("random"), BUDGET, first_engine="pymunk", finalists=2)
-    assert search.name == "random, 6 blasts of pymunk, the best 2 judged"
-    entries = (NoBarrier(), search, Search(find_search_method("random"), BUDGET))
-    _, staged, plain = Contest(TRACK, entries, store(tmp_path)).play().results
-    for case, proposal in zip(TRACK.cases, staged.proposals, strict=True):
+    search = Search(find_search_method("random"), 3, first_engine="pymunk", finalists=2)
+    assert search.name == "random, 3 blasts of pymunk, the best 2 judged"
+    entries = (NoBarrier(), search, Search(find_search_method("random"), 3))
+    track = known_track(SCENARIO, 2, 1)
+    _, staged, plain = Contest(track, entries, store(tmp_path)).play().results
+    for case, proposal in zip(track.cases, staged.proposals, strict=True):
         practice = practice_of(case)
         first = LayoutProblem(BlastEvaluator(SCENARIO, "pymunk"), practice)
-        found = find_search_method("random").search(first, BUDGET, case.seed)
+        found = find_search_method("random").search(first, 3, case.seed)
         finalists = {each.layout for each in found.history[-2:]}
         assert proposal.layout in finalists
         judge = LayoutProblem(BlastEvaluator(SCENARIO), practice)

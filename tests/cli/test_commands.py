@@ -198,21 +198,22 @@ def calibrate(*arguments: str, out: Path) -> Result:
 
 
 def test_calibrate_writes_a_calibration_its_table_and_its_figure(tmp_path: Path) -> None:
-    distances = ("--distances", "8,11,15,20")
-    result = calibrate("--reference", "reflected_impulse", *distances, out=tmp_path)
+    wanted = ("--reference", "reflected_impulse", "--distances", "8,11,15,20")
+    arguments = (*wanted, "--engine", "event")
+    result = calibrate(*arguments, out=tmp_path)
     assert result.exit_code == 0, result.output
-    stored = load_calibration(tmp_path / "mine.pymunk.json")
+    stored = load_calibration(tmp_path / "mine.event.json")
     assert stored.distances_m == (8.0, 11.0, 15.0, 20.0)
     assert stored.seeds == (1000, 1001)
     assert stored.reference.charge_kg == 100.0
-    table = pd.read_csv(tmp_path / "mine.pymunk.csv")
+    table = pd.read_csv(tmp_path / "mine.event.csv")
     assert table.i_sim.tolist() == pytest.approx(list(stored.i_sim))
-    assert (tmp_path / "mine.pymunk.png").stat().st_size > 10_000
+    assert (tmp_path / "mine.event.png").stat().st_size > 10_000
     assert "leave-one-distance-out" in result.stdout
-    finished = (tmp_path / "mine.pymunk.runs.jsonl").read_text()
-    again = calibrate("--reference", "reflected_impulse", *distances, out=tmp_path)
+    finished = (tmp_path / "mine.event.runs.jsonl").read_text()
+    again = calibrate(*arguments, out=tmp_path)
     assert again.exit_code == 0
-    assert (tmp_path / "mine.pymunk.runs.jsonl").read_text() == finished
+    assert (tmp_path / "mine.event.runs.jsonl").read_text() == finished
 
 
 @pytest.mark.parametrize(

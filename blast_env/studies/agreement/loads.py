@@ -115,11 +115,12 @@ class BlastSet:
         """Run one blast; return its collisions with the structures of the scene."""
         result = simulate(self.stepped_scenario, self.scene.layout, seed, self.engine)
         log = result.collision_array
+        time_s: FloatArray = log["time_s"]
         names = [o.name for o in result.obstacles for _ in o.parts]
         columns: dict[str, Any] = {
             "seed": np.full(len(log), seed, dtype=np.int32),
             "structure": pd.Categorical(np.array(names)[log["module"]]),
-            "time_ms": 1000.0 * log["time_s"],
+            "time_ms": 1000.0 * time_s,
             "angle_deg": np.degrees(incidence_angle_rad(log)),
             "impulse": log["impulse"],
             "transferred": log["transferred_impulse"],
