@@ -74,8 +74,8 @@ MODULE_COLUMNS: Final = (
 
 
 PARTICLES_OVERRATE: Final = (
-    "The particle model overrates barriers: on 'courtyard' it promised 5.2 times the reduction of"
-    " gas dynamics, with a rank correlation of 0.60 (docs/engineers/validity.md). Judge what"
+    "The particle model overrates barriers: on 'courtyard' it promised 5.1 times the reduction of"
+    " gas dynamics, with a rank correlation of 0.61 (docs/engineers/validity.md). Judge what"
     " matters with engine 'gas'."
 )
 """Said of every evaluation with particles; measured by `python -m scripts.gas judge`."""
