@@ -27,8 +27,10 @@ from tests.documentation.pages import (
     TEXTS,
     Code,
     Command,
+    commands_in,
     indented_blocks,
     languages,
+    shell_blocks,
     steps,
 )
 from tests.documentation.run import Page, Tally, run_and_tell
@@ -134,6 +136,12 @@ def test_what_pages_take_for_granted_they_name() -> None:
         for page in given.pages:
             following = [each for each, first in exceptions.FOLLOWS.items() if first == page]
             assert any(given.path in TEXTS[each] for each in (page, *following)), given.path
+
+
+def test_no_line_of_a_block_of_commands_is_overlooked() -> None:
+    for block in shell_blocks():
+        for line in filter(str.strip, block.splitlines()):
+            assert [*commands_in("page", line)], line
 
 
 def test_code_says_its_language_so_that_it_is_not_overlooked() -> None:

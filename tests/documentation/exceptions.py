@@ -117,7 +117,9 @@ _LEAGUE: Final = "--cases 1 --seeds 1 --budgets 4 --methods random"
 
 SMALLER: Final[dict[str, str]] = {
     # README.md
-    "blast-env evaluate --layout wall.json --scenario courtyard --engine gas --seeds 4": "--seeds 1",
+    "blast-env evaluate --layout wall.json --scenario courtyard --engine gas --seeds 4": (
+        "--seeds 1"
+    ),
     "blast-env report courtyard --layout wall.json --out report.html --pdf report.pdf": (
         "--threats 1 --places 1 --stills 1 --no-items"
     ),
@@ -164,9 +166,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m scripts.gas ending --until 0.25 --random-layouts 1": (
         "--until 0.02 --random-layouts 0"
     ),
-    "python -m scripts.gas borders --places 2/0,2/12,2/24,8/48": (
-        "--places 2/0,2/12 --until 0.02"
-    ),
+    "python -m scripts.gas borders --places 2/0,2/12,2/24,8/48": ("--places 2/0,2/12 --until 0.02"),
     "python -m scripts.gas air-height": "--heights 9,12 --until 0.02",
     "python -m scripts.gas cells": "--sizes 0.5 --random-layouts 0",
     # docs/paper

@@ -22,6 +22,7 @@ OTHERS: Final = {
     "pip": "needs an index of packages",
     "make": "sets up, tests or builds the documentation itself",
     "source": "changes the shell that it is given to",
+    "mkdir": "belongs to docker",
     "docker": "no container tool here",
     "dask": "runs until it is stopped; tests/test_cluster.py has a cluster",
     "sbatch": "needs Slurm",
@@ -129,6 +130,15 @@ def steps(page: str, text: str) -> Iterator[Step]:
             yield from commands_in(page, piece["indented"])
         elif piece["inline"]:
             yield from commands_in(page, piece["inline"].replace("\n", " "), in_sentence=True)
+
+
+def shell_blocks() -> Iterator[str]:
+    """Yield the blocks of commands of all pages, without comments and continued lines."""
+    for text in TEXTS.values():
+        for piece in _PIECE.finditer(text):
+            shell = piece["fenced"] if piece["language"] in ("sh", "bash") else piece["indented"]
+            if shell and (piece["fenced"] or _begins_as_command(shell)):
+                yield re.sub(r"(^|\s)#.*", "", shell.replace("\\\n", " "))
 
 
 def _begins_as_command(text: str) -> bool:

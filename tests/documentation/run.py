@@ -33,7 +33,7 @@ from tests.documentation.exceptions import (
     SMALLER,
     Server,
 )
-from tests.documentation.pages import OTHERS, ROOT, STEPS, Cell, Code, Command, Step
+from tests.documentation.pages import OTHERS, ROOT, STEPS, Cell, Command, Step
 
 COPIED: Final = ("docs", "scenarios", "scripts", "tests")
 MOST_S: Final = 1200.0
@@ -68,7 +68,7 @@ class Tally:
     studies: set[tuple[str, ...]] = field(default_factory=set)
 
 
-class Failed(Exception):
+class StepError(Exception):
     """A step that does not do what its page says."""
 
 
@@ -86,7 +86,7 @@ def run(words: tuple[str, ...], folder: Path, given: str | None = None) -> None:
     """Run a program to its end.
 
     Raises:
-        Failed: It did not end well.
+        StepError: It did not end well.
     """
     done = subprocess.run(
         words,
@@ -99,27 +99,27 @@ def run(words: tuple[str, ...], folder: Path, given: str | None = None) -> None:
         timeout=MOST_S,
     )
     if done.returncode:
-        raise Failed(f"exit code {done.returncode}\n{done.stdout[-2000:]}")
+        raise StepError(f"exit code {done.returncode}\n{done.stdout[-2000:]}")
 
 
 def serve(server: Server, words: tuple[str, ...], folder: Path) -> None:
     """Run a program that only ends when it is told to, until it answers.
 
     Raises:
-        Failed: It ended, or did not answer.
+        StepError: It ended, or did not answer.
     """
     process = subprocess.Popen(words, cwd=folder, env=environment(), stdout=subprocess.DEVNULL)
     until_s = monotonic() + server.within_s
     try:
         while monotonic() < until_s:
             if process.poll() is not None:
-                raise Failed(f"ended by itself, exit code {process.returncode}")
+                raise StepError(f"ended by itself, exit code {process.returncode}")
             with socket.socket() as probe:
                 if server.port and probe.connect_ex(("127.0.0.1", server.port)) == 0:
                     return
             sleep(0.2)
         if server.port:
-            raise Failed(f"no answer at port {server.port} within {server.within_s:g} s")
+            raise StepError(f"no answer at port {server.port} within {server.within_s:g} s")
     finally:
         process.send_signal(signal.SIGTERM)
         process.wait(30)
@@ -128,6 +128,8 @@ def serve(server: Server, words: tuple[str, ...], folder: Path) -> None:
 def run_command(command: Command, page: Page, tally: Tally) -> str:
     """Run a command line of a page; return what became of it."""
     words, line = command.words, command.line
+    if command.is_name:
+        return "a name"
     if line in SERVERS:
         serve(SERVERS[line], words, page.folder)
         return "served"
@@ -135,8 +137,6 @@ def run_command(command: Command, page: Page, tally: Tally) -> str:
         return f"not run: {OTHERS[words[0]]}"
     if line in NOT_RUN:
         return f"not run: {NOT_RUN[line]}"
-    if command.is_name:
-        return "a name"
     if words[0] == "python":
         if words in tally.studies:
             return "ran before"
@@ -149,7 +149,7 @@ def run_step(step: Step, page: Page, tally: Tally) -> str:
     """Run what a page shows; return what became of it.
 
     Raises:
-        Failed: It does not work.
+        StepError: It does not work.
     """
     if isinstance(step, Command):
         return run_command(step, page, tally)
@@ -227,7 +227,7 @@ def run_and_tell(step: Step, page: Page, tally: Tally) -> None:
     before_s, began_s = used_s(), monotonic()
     try:
         became = run_step(step, page, tally)
-    except (Failed, OSError, subprocess.TimeoutExpired) as failure:
+    except (StepError, OSError, subprocess.TimeoutExpired) as failure:
         became = "FAILED"
         tally.failures.append(f"{step}\n{failure}")
     tally.counts[became.partition(":")[0]] += 1

@@ -1,4 +1,4 @@
-"""The study behind docs/studies/scenario_tables.md: figures, criteria, a page that is up to date."""
+"""The study behind docs/studies/scenario_tables.md: figures, criteria, an up-to-date page."""
 
 import re
 from dataclasses import replace

@@ -55,7 +55,7 @@ class WorkPanel:
         self._results = results
         self._runs = {each.name: each for each in runs}
         self._filling = False
-        self._told: list[tuple[Path, Status]] = []
+        self._told: list[tuple[Path, Status]] | None = None
         self._build()
 
     @property

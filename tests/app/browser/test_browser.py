@@ -490,3 +490,40 @@ def test_a_closed_tab_leaves_its_work_running(page: Page) -> None:
     page.sees("after 100 of 100", 300.0)
     page.button("take it").click()
     page.sees("16 of 16 modules")
+
+
+SILENCE_S = 100.0
+"""Longer than a browser waits for a sign of the server before it connects anew."""
+
+
+def test_a_report_goes_on_while_the_page_is_loaded_anew(page: Page, server: Server) -> None:
+    """By hand, and by itself after the server was silent, as when it gets no processor time."""
+    page.begin("visitor_entrance")
+    page.choose("by", "wall near the building")
+    page.button("Propose").click()
+    page.button("take it").click()
+    page.sees("last: proposal")
+    page.button("Save as").click()
+    sleep(0.5)
+    page.button("report on this layout (.html)").click()
+    page.sees("report visitor_entrance_A.html")
+    page.button("stop")
+    page.driver.refresh()
+    page.sees("report visitor_entrance_A.html")
+    page.button("stop")
+    page.driver.execute_script("window.loadedBefore = true")
+    assert server.process is not None
+    server.process.send_signal(signal.SIGSTOP)
+    sleep(SILENCE_S)
+    page.shoot("silent")
+    server.process.send_signal(signal.SIGCONT)
+    began_s = monotonic()
+    page.until(lambda: "report visitor_entrance_A.html" in page.text() and page.all("svg text"))
+    page.until(lambda: page.driver.execute_script("return window.socket.connected"))
+    sleep(20.0)
+    print("anew:", page.driver.execute_script("return window.loadedBefore"), monotonic() - began_s)
+    for each in page.driver.get_log("browser"):
+        print(each)
+    page.shoot("silent_after")
+    page.button("stop").click()
+    page.sees("stopped")
