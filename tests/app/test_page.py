@@ -150,12 +150,16 @@ def test_a_report_is_followed_when_the_page_is_loaded_anew_and_fetched_at_the_en
         session.put("wall", session.design.with_layout(WALL))
         folder, report = session.report(tmp_path / "hut_A.html"), tmp_path / "hut_A.html"
         running = read_status(folder).model_copy(update={"state": "running", "share": 0.4})
-        write_status(running.model_copy(update={"text": "3 of 9 blasts"}), folder)
-        for _ in range(2):
+        for blasts in (3, 4):
+            write_status(running.model_copy(update={"text": f"{blasts} of 9 blasts"}), folder)
             await user.should_see("report hut_A.html")
-            await user.should_see("3 of 9 blasts")
-            await user.should_see("stop")
+            await user.should_see(f"{blasts} of 9 blasts")
             await user.open(f"/design/{session.folder.design_id}")
+        await user.should_see("stop")
+        (stop,) = user.find("stop").elements
+        write_status(running.model_copy(update={"text": "5 of 9 blasts"}), folder)
+        await user.should_see("5 of 9 blasts")
+        assert user.find("stop").elements == {stop}  # it does not go from under the mouse
         report.write_text("loads")
         write_status(running.model_copy(update={"state": "done", "file": str(report)}), folder)
         await user.should_see("download")

@@ -111,7 +111,7 @@ _CLUSTER: Final = "--cluster dask.json"
 
 _LABEL: Final = (
     "--steps 4 --envs 1 --set cases=2 --set cases_per_round=1 --set samples=1 --set neighbours=1"
-    " --set first_updates=2 --set updates=1 --set evaluation_cases=1"
+    " --set first_updates=2 --set updates=1 --set evaluation_cases=2"
 )
 _LEAGUE: Final = "--cases 1 --seeds 1 --budgets 4 --methods random"
 
@@ -147,7 +147,7 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --engine gas --layout wall.json --seeds 1000 --cluster dask.json": (
         "--seeds 1"
     ),
-    "blast-env train --engine gas --envs 64 --cluster tcp://login1:8786": (
+    "blast-env train --engine gas --envs 64 --cluster tcp://login1:8786 --run runs/gas": (
         f"{_TRAIN} --engine event {_CLUSTER}"
     ),
     "python -m tests.attack.run files --count 300": "--count 1",
@@ -161,13 +161,13 @@ SMALLER: Final[dict[str, str]] = {
     "python -m scripts.gas source": "--cell 1",
     "python -m scripts.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
     "python -m scripts.gas corners": "--sizes 0.5",
-    "python -m scripts.gas handover": "--radii 3,6 --until 0.02",
+    "python -m scripts.gas handover": "--radii 3,6 --until 0.05",
     "python -m scripts.gas settling": "--until 0.02",
     "python -m scripts.gas ending --until 0.25 --random-layouts 1": (
         "--until 0.02 --random-layouts 0"
     ),
-    "python -m scripts.gas borders --places 2/0,2/12,2/24,8/48": ("--places 2/0,2/12 --until 0.02"),
-    "python -m scripts.gas air-height": "--heights 9,12 --until 0.02",
+    "python -m scripts.gas borders --places 2/0,2/12,2/24,8/48": ("--places 2/0,2/12 --until 0.05"),
+    "python -m scripts.gas air-height": "--heights 9,12 --until 0.05",
     "python -m scripts.gas cells": "--sizes 0.5 --random-layouts 0",
     # docs/paper
     "python -m scripts.presets ballistic": (

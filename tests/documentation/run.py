@@ -39,6 +39,9 @@ COPIED: Final = ("docs", "scenarios", "scripts", "tests")
 MOST_S: Final = 1200.0
 """The longest that a step may take."""
 
+MOST_SAID: Final = 2000
+"""Characters of what a step that fails has printed at last."""
+
 
 @dataclass
 class Page:
@@ -99,7 +102,7 @@ def run(words: tuple[str, ...], folder: Path, given: str | None = None) -> None:
         timeout=MOST_S,
     )
     if done.returncode:
-        raise StepError(f"exit code {done.returncode}\n{done.stdout[-2000:]}")
+        raise StepError(f"exit code {done.returncode}\n{done.stdout[-MOST_SAID:]}")
 
 
 def serve(server: Server, words: tuple[str, ...], folder: Path) -> None:
@@ -108,12 +111,15 @@ def serve(server: Server, words: tuple[str, ...], folder: Path) -> None:
     Raises:
         StepError: It ended, or did not answer.
     """
-    process = subprocess.Popen(words, cwd=folder, env=environment(), stdout=subprocess.DEVNULL)
+    log = folder / "server.log"
+    with log.open("wb") as said:
+        process = subprocess.Popen(words, cwd=folder, env=environment(), stdout=said, stderr=said)
     until_s = monotonic() + server.within_s
     try:
         while monotonic() < until_s:
             if process.poll() is not None:
-                raise StepError(f"ended by itself, exit code {process.returncode}")
+                words_said = log.read_text(errors="replace")[-MOST_SAID:]
+                raise StepError(f"ended by itself, exit code {process.returncode}\n{words_said}")
             with socket.socket() as probe:
                 if server.port and probe.connect_ex(("127.0.0.1", server.port)) == 0:
                     return
