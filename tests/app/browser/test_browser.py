@@ -66,7 +66,7 @@ class Server:
         own = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
         command += ["--folder", str(self.folder)]
         self.process = subprocess.Popen(command, text=True, env=own)
-        until_s = monotonic() + 60.0
+        until_s = monotonic() + 180.0
         while monotonic() < until_s:
             with socket.socket() as probe:
                 if probe.connect_ex(("127.0.0.1", self.port)) == 0:
@@ -120,7 +120,7 @@ class Page:
     def text(self) -> str:
         return str(self.driver.find_element(By.TAG_NAME, "body").text)
 
-    def until(self, what: Callable[[], Any], most_s: float = 30.0) -> Any:
+    def until(self, what: Callable[[], Any], most_s: float = 60.0) -> Any:
         until_s = monotonic() + most_s
         while monotonic() < until_s:
             try:
@@ -133,7 +133,7 @@ class Page:
         self.shoot("failed")
         raise AssertionError(f"did not come within {most_s:g} s")
 
-    def sees(self, words: str, most_s: float = 30.0) -> None:
+    def sees(self, words: str, most_s: float = 60.0) -> None:
         self.until(lambda: words in self.text(), most_s)
 
     def drag(self, scenario: Scenario, *places: tuple[float, float], hold: bool = True) -> None:
