@@ -47,6 +47,10 @@ _TRAIN: Final = (
     "--steps 64 --envs 1 --set n_steps=64 --set batch_size=64 --set evaluation_cases=2"
     " --set evaluation_interval=1"
 )
+_LABEL: Final = (
+    "--steps 4 --envs 1 --set cases=2 --set cases_per_round=1 --set samples=1 --set neighbours=1"
+    " --set first_updates=2 --set updates=1 --set evaluation_cases=2"
+)
 _AGENT: Final = f"blast-env train --scenario courtyard --run agent {_TRAIN}"
 _LEAGUE_AGENTS: Final = {
     "out/runs/ppo_courtyard": "--scenario courtyard",
@@ -77,6 +81,19 @@ GIVEN: Final = (
         "runs/courtyard",
         "agent",
         _AGENT,
+    ),
+    Given(
+        ("docs/researchers/league.md",),
+        "runs/perimeter_gate",
+        "agent",
+        f"blast-env train --scenario perimeter_gate --run agent {_TRAIN}",
+    ),
+    Given(
+        ("docs/researchers/league.md",),
+        "runs/own_best",
+        "agent",
+        "blast-env train --algo self_labelling --engine gas --scenario visitor_entrance"
+        f" --run agent {_LABEL}",
     ),
     *(
         Given(
@@ -109,10 +126,6 @@ BACKGROUND: Final = {
 
 _CLUSTER: Final = "--cluster dask.json"
 
-_LABEL: Final = (
-    "--steps 4 --envs 1 --set cases=2 --set cases_per_round=1 --set samples=1 --set neighbours=1"
-    " --set first_updates=2 --set updates=1 --set evaluation_cases=2"
-)
 _LEAGUE: Final = "--cases 1 --seeds 1 --budgets 4 --methods random"
 
 SMALLER: Final[dict[str, str]] = {
