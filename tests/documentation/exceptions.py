@@ -280,7 +280,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m scripts.scale workers --gas-blasts 12 --episodes 4": (
         "--workers 1 --pauses 5 --gas-blasts 1 --episodes 1"
     ),
-    "python -m scripts.scale store": "--entries 1000",
+    "python -m scripts.scale store": "--entries 100",
     "python -m scripts.scale costs --price 0.04": "--blasts 1",
     "python -m scripts.scenario_difficulty": (
         "courtyard --layouts 2 --seeds 2 --charges 2 --realisations 1"
