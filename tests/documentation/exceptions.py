@@ -92,7 +92,7 @@ GIVEN: Final = (
         ("docs/researchers/league.md",),
         "runs/own_best",
         "agent",
-        "blast-env train --algo self_labelling --engine gas --scenario visitor_entrance"
+        "blast-env train --algo self_labelling --engine gas --scenario courtyard"
         f" --run agent {_LABEL}",
     ),
     *(
@@ -200,7 +200,7 @@ SMALLER: Final[dict[str, str]] = {
         _LEAGUE
     ),
     "blast-env league --engine gas --first-engine event --agent-search 50 --run runs/own_best"
-    " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario visitor_entrance",
+    " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario courtyard",
     "blast-env search --method genetic --budget 200 --seed 0 --charge 5 12 --out out/search": (
         "--budget 20 --held-out 2"
     ),
