@@ -1,6 +1,7 @@
 # The page to design on, at http://localhost:8080:
 #   docker build -t blast-env .
-#   docker run --rm -p 127.0.0.1:8080:8080 -v "$PWD/designs:/designs" blast-env
+#   mkdir -p designs
+#   docker run --rm --user "$(id -u)" -p 127.0.0.1:8080:8080 -v "$PWD/designs:/designs" blast-env
 FROM python:3.11-slim-bookworm
 
 # WeasyPrint, which writes reports as PDF, needs Pango.
@@ -18,7 +19,8 @@ RUN pip install --no-cache-dir -c constraints.txt ".[app]" && rm -rf /src
 RUN useradd --create-home designer && install -d -o designer /designs
 USER designer
 WORKDIR /designs
-ENV SDL_VIDEODRIVER=dummy PYGAME_HIDE_SUPPORT_PROMPT=1
+# Whoever --user says can write what Numba and matplotlib keep.
+ENV HOME=/tmp SDL_VIDEODRIVER=dummy PYGAME_HIDE_SUPPORT_PROMPT=1
 EXPOSE 8080
 # There is no password: publish the port at 127.0.0.1, as above, or behind something that has one.
 CMD ["blast-env", "app", "--host", "0.0.0.0", "--port", "8080", "--folder", "/designs"]

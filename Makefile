@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 export SDL_VIDEODRIVER ?= dummy
 export PYGAME_HIDE_SUPPORT_PROMPT := 1
 
-.PHONY: demo test suite test-browser attack quick docs lint types compiled check setup clean
+.PHONY: demo test suite test-browser attack quick docs site shown lint types compiled check setup clean
 
 demo: $(STAMP)
 	$(BIN)/python scripts/demo.py
@@ -27,7 +27,7 @@ quick: $(STAMP)
 	$(BIN)/pytest --numprocesses auto --dist worksteal -m "not slow" $(QUICK:%=tests/%)
 
 # The page in a real browser, headless; needs chromium and chromium-driver. Screenshots: out/app/.
-test-browser: $(STAMP)
+test-browser: compiled
 	$(BIN)/pytest tests/app/browser
 
 # Thousands of wrong files of every format that is read, kills at every step on the disk; half an
@@ -36,10 +36,18 @@ attack: $(STAMP)
 	$(BIN)/python -m tests.attack.run files
 	$(BIN)/python -m tests.attack.run kills
 
-# The site: out/docs/html/index.html. Warnings are errors; notebooks run when they have changed.
+# The site, and everything that it shows: code and commands, each page in a folder of its own.
 docs: $(VENV)/.docs
+	$(MAKE) --jobs 2 site shown
+
+# out/docs/html/index.html. Warnings are errors; notebooks run when they have changed.
+site: $(VENV)/.docs
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m sphinx --fail-on-warning --keep-going \
 		-b html -d out/docs/cache docs out/docs/html
+
+# What does not run just as it stands is in tests/documentation/exceptions.py.
+shown: $(STAMP)
+	$(BIN)/python -m tests.documentation.run
 
 $(VENV)/.docs: $(STAMP)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[docs]"

@@ -1,4 +1,4 @@
-"""Whether it matters where the barrier stands, for docs/studies/scenarios.md.
+"""Whether it matters where the barrier stands, for docs/studies/scenario_tables.md.
 
 For every bundled scenario with a build zone: no barrier, random layouts, layouts by hand and the
 best that was searched, on the same threats. Where single modules are placed, with an engine of
@@ -37,7 +37,7 @@ from scripts.difficulty_verdict import (
     joint_criteria,
 )
 
-PAGE: Final = Path("docs/studies/scenarios.md")
+PAGE: Final = Path("docs/studies/scenario_tables.md")
 PICTURES: Final = Path("docs/pictures")
 
 _HEADERS: Final = (

@@ -1,16 +1,15 @@
 """What the documentation shows works: code runs, commands parse, pages that code names exist.
 
-Notebooks run in `make docs`. Commands are parsed and not run: names, options and the types and
-bounds of their values. Code that is dear is compiled only.
+`make docs` runs the commands, the notebooks, and what code is dear (tests.documentation.run). Here
+commands are parsed: names, options and the types and bounds of their values.
 """
 
 import doctest
 import importlib.util
 import re
 import shlex
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+from textwrap import dedent
 
 import gymnasium as gym
 import pytest
@@ -19,24 +18,25 @@ from typer import Typer
 
 from blast_env.cli import app
 from blast_env.envs import simulator_env
+from tests.documentation import exceptions
+from tests.documentation.pages import (
+    COMMANDS,
+    OURS,
+    ROOT,
+    STEPS,
+    TEXTS,
+    Code,
+    Command,
+    commands_in,
+    indented_blocks,
+    languages,
+    shell_blocks,
+    steps,
+)
+from tests.documentation.run import Page, Tally, run_and_tell
 
-ROOT = Path(__file__).parents[1]
-PAGES = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md")))
-TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
-
-_FENCED = re.compile(r"^```(.*?)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-_INDENTED = re.compile(r"(?:^(?: {4}|\t).*\n?)+", re.MULTILINE)
-_INLINE = re.compile(r"`((?:blast-env|python\s-m)\s[^`]+)`")
-_PROGRAM = re.compile(r"(?:blast-env|python -m (?:scripts|blast_env)\b)")
-
-
-def code(page: str, language: str) -> list[str]:
-    return [block for said, block in _FENCED.findall(TEXTS[page]) if said == language]
-
-
-WITH_CODE = [page for page in TEXTS if code(page, "python")]
-DEAR = {"docs/engineers/gas.md"}
-"""Their code is compiled and not run: three blasts of gas dynamics on a large site."""
+CODE = {page: [each for each in STEPS[page] if isinstance(each, Code)] for page in STEPS}
+WITH_CODE = [page for page in CODE if CODE[page]]
 
 
 @pytest.mark.slow
@@ -47,9 +47,10 @@ def test_the_code_of_a_page_runs(
     """From top to bottom, as a reader would try it."""
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    for number, block in enumerate(code(page, "python"), start=1):
-        compiled = compile(block, f"{page}, block {number}", "exec")
-        if page not in DEAR:
+    for block in CODE[page]:
+        compiled = compile(block.source, str(block), "exec")
+        known = (page, block.number) in exceptions.CODE_NOT_RUN
+        if page not in exceptions.CODE_OF_THE_BUILD and not known:
             exec(compiled, names)
 
 
@@ -63,56 +64,6 @@ def test_examples_in_the_environment_s_docstring() -> None:
     failures, tried = doctest.testmod(simulator_env)
     assert tried > 5
     assert failures == 0
-
-
-@dataclass(frozen=True)
-class Command:
-    """A command line of a page.
-
-    Attributes:
-        page: The page.
-        words: Its words.
-        in_sentence: Whether it stands in a sentence, which may name a command and an option only.
-    """
-
-    page: str
-    words: tuple[str, ...]
-    in_sentence: bool
-
-    def __str__(self) -> str:
-        return f"{self.page}: {' '.join(self.words)}"
-
-
-def _shell_texts(text: str) -> Iterator[tuple[str, bool]]:
-    """Yield what a page shows of commands: blocks, cells of notebooks, and code in sentences."""
-    for said, block in _FENCED.findall(text):
-        if said in ("sh", "bash") or block.startswith("%%bash\n"):
-            yield block, False
-    rest = _FENCED.sub("", text)
-    for block in _INDENTED.findall(rest):
-        yield block, False
-    for inline in _INLINE.findall(_INDENTED.sub("", rest)):
-        yield inline.replace("\n", " "), True
-
-
-def _commands(page: str) -> Iterator[Command]:
-    for text, in_sentence in _shell_texts(TEXTS[page]):
-        for line in text.replace("\\\n", " ").splitlines():
-            if _PROGRAM.search(line) is None:
-                continue
-            lexer = shlex.shlex(line, posix=True, punctuation_chars=True)
-            lexer.whitespace_split = True
-            words: list[str] = []
-            for word in (*lexer, ";"):
-                if set(word) <= set(";&|()<>"):
-                    if words and words[0] in ("blast-env", "python"):
-                        yield Command(page, tuple(words), in_sentence)
-                    words = []
-                else:
-                    words.append(word)
-
-
-COMMANDS = sorted({each for page in TEXTS for each in _commands(page)}, key=str)
 
 
 def parse(application: Typer, words: tuple[str, ...], in_sentence: bool) -> None:
@@ -132,14 +83,14 @@ def parse(application: Typer, words: tuple[str, ...], in_sentence: bool) -> None
     command.make_context("command", list(words))
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=str)
-def test_a_command_parses(command: Command) -> None:
-    words = command.words
+def parse_command(words: tuple[str, ...], in_sentence: bool = False) -> None:
     if words[0] == "blast-env":
-        parse(app, words[1:], command.in_sentence)
+        parse(app, words[1:], in_sentence)
         return
-    if words[2].startswith("blast_env"):
-        assert importlib.util.find_spec(words[2]) is not None
+    package = words[2].partition(".")[0]
+    if package == "blast_env" or shlex.join(words) in exceptions.NOT_RUN:
+        elsewhere = package not in ("blast_env", "scripts", "tests")
+        assert elsewhere or importlib.util.find_spec(words[2]) is not None
         return
     module = importlib.import_module(words[2])
     application = getattr(module, "app", None)
@@ -148,11 +99,89 @@ def test_a_command_parses(command: Command) -> None:
         application.command()(module.main)
     elif len(words) == 3 or words[3].startswith("-"):
         pytest.fail("a script of several commands is named without one")
-    parse(application, words[3:], command.in_sentence)
+    parse(application, words[3:], in_sentence)
+
+
+OUR_COMMANDS = [each for each in COMMANDS if each.words[0] in OURS]
+LINES = {each.line for each in OUR_COMMANDS if not each.is_name}
+
+
+@pytest.mark.parametrize("command", OUR_COMMANDS, ids=str)
+def test_a_command_parses(command: Command) -> None:
+    parse_command(command.words, command.in_sentence)
+
+
+@pytest.mark.parametrize("line", [*exceptions.SMALLER])
+def test_what_runs_in_the_place_of_a_command_parses(line: str) -> None:
+    parse_command((*shlex.split(line), *shlex.split(exceptions.SMALLER[line])))
 
 
 def test_there_are_commands() -> None:
-    assert len(COMMANDS) > 60
+    assert len(OUR_COMMANDS) > 60
+
+
+def test_exceptions_stand_for_commands_and_code_that_the_pages_show() -> None:
+    shown = {each.line for each in COMMANDS}
+    assert {*exceptions.SMALLER, *exceptions.NOT_RUN} <= LINES
+    assert {*exceptions.SERVERS} <= shown
+    blocks = {(each.page, each.number) for page in CODE for each in CODE[page]}
+    assert {*exceptions.CODE_NOT_RUN} <= blocks
+    assert {*exceptions.CODE_OF_THE_BUILD} <= {*WITH_CODE}
+    pages = {*exceptions.BACKGROUND, *exceptions.FOLLOWS, *exceptions.FOLLOWS.values()}
+    assert pages | {page for each in exceptions.GIVEN for page in each.pages} <= {*STEPS}
+
+
+def test_what_pages_take_for_granted_they_name() -> None:
+    for given in exceptions.GIVEN:
+        for page in given.pages:
+            following = [each for each, first in exceptions.FOLLOWS.items() if first == page]
+            assert any(given.path in TEXTS[each] for each in (page, *following)), given.path
+
+
+def test_no_line_of_a_block_of_commands_is_overlooked() -> None:
+    for block in shell_blocks():
+        for line in filter(str.strip, block.splitlines()):
+            assert [*commands_in("page", line)], line
+
+
+def test_code_says_its_language_so_that_it_is_not_overlooked() -> None:
+    known = {"python", "sh", "toml", "json"}
+    assert {said for said in languages() if not said.startswith("{")} == known
+    for page, block in indented_blocks():
+        with pytest.raises(SyntaxError):
+            compile(dedent(block), page, "exec")
+
+
+PAGE = """
+    python -m json.tool {file} copy.json   # a remark
+
+```python
+copy = "copy.json"
+```
+
+Then `python -m json.tool copy.json`:
+
+```python
+from pathlib import Path
+assert Path(copy).exists()
+```
+"""
+
+
+@pytest.mark.parametrize(("file", "ran"), [("there.json", 4), ("missing.json", 1)])
+def test_a_page_is_run_in_one_folder_and_what_fails_is_told(
+    file: str, ran: int, tmp_path: Path
+) -> None:
+    (tmp_path / "there.json").write_text("{}")
+    page, tally = Page(tmp_path), Tally()
+    for step in steps("page.md", PAGE.format(file=file)):
+        run_and_tell(step, page, tally)
+    assert tally.counts["ran"] == ran
+    assert [each.partition("\n")[0] for each in tally.failures] == [
+        "page.md: python -m json.tool missing.json copy.json",
+        "page.md: python -m json.tool copy.json",
+        "page.md: Python, block 2",
+    ][: 4 - ran]
 
 
 def test_the_documentation_names_every_command_of_the_studies() -> None:

@@ -110,6 +110,17 @@ def test_all_tracks_and_the_reference_of_each(tmp_path: Path) -> None:
     ]
 
 
+def test_bundled_vehicles_are_for_engines_that_can_judge_them() -> None:
+    """Their scenarios name no calibration, so particles have no loads in Pa s to compare."""
+    particles = [track.name for track in find_tracks("all", 1, 1)]
+    gas = [track.name for track in find_tracks("all", 1, 1, noisy=False)]
+    vehicles = ["vehicle_hotel_forecourt", "vehicle_shopping_street"]
+    assert [name for name in gas if name not in particles] == vehicles
+    assert "sites" in particles
+    with pytest.raises(BlastEnvError, match="--engine gas"):
+        find_tracks("vehicle", 1, 1)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -14,9 +14,11 @@ from nicegui.testing import User
 from nicegui.testing.user_simulation import user_simulation
 
 from blast_env.app.folder import WorkFolder
+from blast_env.app.jobs import Workers
 from blast_env.app.records import Engine
 from blast_env.app.server import add_pages
 from blast_env.app.session import Sessions
+from blast_env.app.work import read_status, write_status
 from blast_env.scenario import Scenario, load_scenario
 from tests.app.here import Here
 from tests.app.test_work import CELLS
@@ -134,6 +136,35 @@ def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
         shown = next(iter(user.find(kind=ui.table).elements)).rows
         assert [row["layout"] for row in shown] == ["no barrier"] * 2  # A is another one now
         assert len(session.design.layout) == 16
+
+    play(tmp_path, story)
+
+
+def test_a_report_is_followed_when_the_page_is_loaded_anew_and_fetched_at_the_end(
+    tmp_path: Path,
+) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        sessions.workers = Workers(most=0)  # nothing is done but what is written here
+        session = await opened(user, sessions, hut())
+        await user.should_see("nothing yet: press Blast")
+        session.put("wall", session.design.with_layout(WALL))
+        folder, report = session.report(tmp_path / "hut_A.html"), tmp_path / "hut_A.html"
+        running = read_status(folder).model_copy(update={"state": "running", "share": 0.4})
+        for blasts in (3, 4):
+            write_status(running.model_copy(update={"text": f"{blasts} of 9 blasts"}), folder)
+            await user.should_see("report hut_A.html")
+            await user.should_see(f"{blasts} of 9 blasts")
+            await user.open(f"/design/{session.folder.design_id}")
+        await user.should_see("stop")
+        (stop,) = user.find("stop").elements
+        write_status(running.model_copy(update={"text": "5 of 9 blasts"}), folder)
+        await user.should_see("5 of 9 blasts")
+        assert user.find("stop").elements == {stop}  # it does not go from under the mouse
+        report.write_text("loads")
+        write_status(running.model_copy(update={"state": "done", "file": str(report)}), folder)
+        await user.should_see("download")
+        user.find("download").click()
+        assert (await user.download.next()).url.path.endswith("hut_A.html")
 
     play(tmp_path, story)
 

@@ -474,7 +474,7 @@ def test_what_the_stock_list_needs_beside_the_name_is_the_stock() -> None:
 
 
 def test_the_description_of_the_format_has_the_stock_list() -> None:
-    text = (REPOSITORY / "docs" / "reference" / "scenario_format.md").read_text(encoding="utf-8")
+    text = (REPOSITORY / "docs" / "reference" / "catalogue.md").read_text(encoding="utf-8")
     for name, each in stock_barriers().items():
         size = (each.length_modules * 0.5, each.thickness_modules * 0.5, each.height_m)
         row = " x ".join(f"{side:g}" for side in size)
@@ -484,6 +484,6 @@ def test_the_description_of_the_format_has_the_stock_list() -> None:
 
 
 def test_the_description_of_the_format_names_every_key_of_items_and_objective() -> None:
-    text = (REPOSITORY / "docs" / "reference" / "scenario_format.md").read_text(encoding="utf-8")
-    for section in (Item, ObjectiveSection):
+    for section, page in ((Item, "catalogue.md"), (ObjectiveSection, "scenario_format.md")):
+        text = (REPOSITORY / "docs" / "reference" / page).read_text(encoding="utf-8")
         assert not [key for key in section.model_fields if f"`{key}`" not in text]

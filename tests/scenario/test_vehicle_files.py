@@ -1,10 +1,12 @@
 """Vehicles in scenario files: what is wrong with one, versions, hashes."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from blast_env.scenario import Scenario, ScenarioError, parse_scenario, save_scenario
+from blast_env.scenario.sections import ChargeSource, VehicleSource
 from tests.vehicle_sites import gate_site, site_document, vehicle_document
 
 
@@ -184,3 +186,11 @@ def test_the_hash_counts_what_a_vehicle_does_but_no_words() -> None:
         {"keep_outs": pond("a pond")},
     ]
     assert len({hash_with(each) for each in changed}) == len(changed)
+
+
+def test_the_page_on_vehicles_names_every_key() -> None:
+    page = Path(__file__).parents[2] / "docs" / "reference" / "vehicles.md"
+    text = page.read_text(encoding="utf-8")
+    keys = {*VehicleSource.model_fields} - {*ChargeSource.model_fields, "kind"}
+    assert "entries" in keys
+    assert [key for key in keys if f"`{key}`" not in text] == []

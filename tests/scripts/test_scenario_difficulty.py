@@ -1,5 +1,6 @@
-"""The study behind docs/studies/scenarios.md: figures, criteria, and a page that is up to date."""
+"""The study behind docs/studies/scenario_tables.md: figures, criteria, an up-to-date page."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -188,13 +189,33 @@ def test_only_the_section_of_the_scenario_changes() -> None:
         with_section(page, "z", "new")
 
 
+def section_of(name: str) -> str:
+    section = (REPOSITORY / PAGE).read_text("utf-8").partition(f"<!-- begin {name} -->")[2]
+    return section.partition(f"<!-- end {name} -->")[0]
+
+
 @pytest.mark.parametrize("name", studied_scenarios())
 def test_the_page_was_made_with_the_scenario_as_it_is(name: str) -> None:
     """Otherwise run `python -m scripts.scenario_difficulty`."""
-    section = (REPOSITORY / PAGE).read_text("utf-8").partition(f"<!-- begin {name} -->")[2]
-    section = section.partition(f"<!-- end {name} -->")[0]
+    section = section_of(name)
     assert f"scenario hash `{load_scenario(name).content_hash[:12]}`" in section
     assert picture_path(REPOSITORY / PICTURES, name).is_file()
+
+
+@pytest.mark.parametrize("name", studied_scenarios())
+def test_the_overview_says_what_the_tables_say(name: str) -> None:
+    """Random layouts, the best rule, and the best of all, where one layout meets every place."""
+    overview = (REPOSITORY / "docs" / "studies" / "scenarios.md").read_text("utf-8")
+    (row,) = re.findall(rf"^\| \[{name}\].*$", overview, re.MULTILINE)
+    random, rule, best = re.findall(r"[\d.]+(?= %)", row)
+    hidden = section_of(name).partition("**Charge visible")[0].partition("A layout for one")[0]
+    found = dict(re.findall(r"^\| (\w[^|]+) \|.*?\| (-?[\d.]+) %", hidden, re.MULTILINE))
+    rules = {line: value for line, value in found.items() if re.match("high|long|ring|wall", line)}
+    rules |= {line: value for line, value in found.items() if "posts" in line}
+    assert random == found["random layouts (mean)"]
+    assert rule == max(rules.values(), key=float)
+    assert next(line for line in rules if rules[line] == rule) in row
+    assert best == max(found.values(), key=float)
 
 
 def run_command(*arguments: str) -> tuple[int, str]:

@@ -208,7 +208,8 @@ def find_tracks(
         scenarios: Bundled names or files for the tracks with a known site; `KNOWN_SCENARIOS`,
             `HIDDEN_SCENARIOS` and the bundled ones with a vehicle unless given. Of those that are
             given, the track `"vehicle"` has the ones with a vehicle if others are asked for too.
-        noisy: As for `known_track`.
+        noisy: As for `known_track`. Engines with noise, those of particles, leave out bundled
+            scenarios with a vehicle that name no calibration.
 
     Raises:
         UnknownNameError: If there is no such track; the message names the nearest one.
@@ -229,8 +230,13 @@ def find_tracks(
         known = [load_scenario(each) for each in scenarios or bundled_scenarios()]
         if not scenarios or name == "all":
             known = [scenario for scenario in known if scenario.vehicles]
+        if not scenarios and noisy:
+            known = [scenario for scenario in known if scenario.calibration is not None]
         if name == "vehicle" and not known:
-            raise BlastEnvError("scenario is missing: no bundled one has a vehicle")
+            raise BlastEnvError(
+                "scenario is missing: the bundled ones with a vehicle name no calibration for "
+                "particles; gas dynamics needs none (--engine gas)"
+            )
         tracks += [vehicle_track(scenario, seeds, seed) for scenario in known]
     if name in ("sites", "all"):
         count = whole_number("cases", cases, 1, MOST_CASES)

@@ -1,6 +1,7 @@
 """The panel on the right: layouts, blasts, proposals, and the work that is under way."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -33,6 +34,46 @@ _STATES: Final = {
 }
 
 
+@dataclass
+class _Card:
+    """What is shown of some work; its buttons stay in their places while it goes on.
+
+    Attributes:
+        folder: The work.
+        status: How far it has come.
+        bar: That as a bar, until it is over.
+        text: What is going on.
+    """
+
+    folder: Path
+    status: Status
+    bar: ui.linear_progress | None = None
+    text: ui.label | None = None
+
+    def can_show(self, folder: Path, status: Status) -> bool:
+        """Whether it takes no other elements to show a state of some work."""
+        return self.folder == folder and _elements_of(self.status) == _elements_of(status)
+
+    def show(self, status: Status) -> None:
+        """Show how far it has come now."""
+        self.status = status
+        if self.bar is not None:
+            self.bar.value = status.share
+            self.bar.props(f'aria-label="{status.share:.0%} of {status.title}"')
+        if self.text is not None:
+            self.text.text = status.text
+
+
+def _elements_of(status: Status) -> tuple[object, ...]:
+    """Return what decides which elements show a status."""
+    return status.title, status.state, status.file, status.layout is None, _says(status)
+
+
+def _says(status: Status) -> bool:
+    """Return whether the text of a status says more than its state."""
+    return status.text not in ("", _STATES[status.state][1])
+
+
 class WorkPanel:
     """Asks for blasts and proposals, and follows them.
 
@@ -55,7 +96,7 @@ class WorkPanel:
         self._results = results
         self._runs = {each.name: each for each in runs}
         self._filling = False
-        self._told: list[tuple[Path, Status]] = []
+        self._cards: list[_Card] | None = None
         self._build()
 
     @property
@@ -252,21 +293,25 @@ class WorkPanel:
         chosen = self._proposer.value
         self._proposer.set_options(offers, value=chosen if chosen in offers else next(iter(offers)))
 
-    def follow(self) -> bool:
-        """Show how far work has come; return whether anything is new."""
+    def follow(self) -> None:
+        """Show how far work has come."""
         jobs = self._session.jobs(_SHOWN_JOBS)
-        if jobs == self._told:
-            return False
-        self._told = jobs
+        cards = self._cards
+        if cards is not None and len(cards) == len(jobs):
+            pairs = [*zip(cards, jobs, strict=True)]
+            if all(card.can_show(*job) for card, job in pairs):
+                for card, (_, status) in pairs:
+                    if card.status != status:
+                        card.show(status)
+                return
         self._jobs.clear()
         with self._jobs:
             if not jobs:
                 ui.label("nothing yet: press Blast").classes("be-quiet")
-            for folder, status in jobs:
-                self._job(folder, status)
-        return True
+            self._cards = [self._card(folder, status) for folder, status in jobs]
 
-    def _job(self, folder: Path, status: Status) -> None:
+    def _card(self, folder: Path, status: Status) -> _Card:
+        card = _Card(folder, status)
         icon, words = _STATES[status.state]
         with ui.column().classes("be-job"):
             with ui.row().classes("w-full items-center no-wrap gap-1"):
@@ -275,20 +320,21 @@ class WorkPanel:
                 ui.space()
                 ui.label(words).classes("be-quiet")
             if not status.is_over:
-                bar = ui.linear_progress(status.share, show_value=False, size="8px")
-                bar.props(f'aria-label="{status.share:.0%} of {status.title}"')
-            if status.text and status.text != words:
+                card.bar = ui.linear_progress(status.share, show_value=False, size="8px")
+            if _says(status):
                 refused = "be-refused" if status.state == "failed" else "be-quiet"
-                ui.label(status.text).classes(refused)
+                card.text = ui.label(status.text).classes(refused)
+            card.show(status)
             with ui.row().classes("gap-1"):
                 if not status.is_over:
                     stop = ui.button("stop", icon="stop", on_click=partial(self._stop, folder))
                     stop.props("dense outline no-caps size=sm")
                 if status.layout is not None:
                     words = "take it" if status.is_over else "take best so far"
-                    take = ui.button(words, icon="input", on_click=partial(self._take, status))
+                    take = ui.button(words, icon="input", on_click=lambda: self._take(card.status))
                     take.props("dense outline no-caps size=sm")
                 if status.file and status.state == "done":
                     fetch = partial(ui.download.file, status.file)
                     button = ui.button("download", icon="download", on_click=lambda: fetch())
                     button.props("dense outline no-caps size=sm")
+        return card

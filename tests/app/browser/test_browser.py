@@ -66,7 +66,7 @@ class Server:
         own = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
         command += ["--folder", str(self.folder)]
         self.process = subprocess.Popen(command, text=True, env=own)
-        until_s = monotonic() + 60.0
+        until_s = monotonic() + 180.0
         while monotonic() < until_s:
             with socket.socket() as probe:
                 if probe.connect_ex(("127.0.0.1", self.port)) == 0:
@@ -120,7 +120,7 @@ class Page:
     def text(self) -> str:
         return str(self.driver.find_element(By.TAG_NAME, "body").text)
 
-    def until(self, what: Callable[[], Any], most_s: float = 30.0) -> Any:
+    def until(self, what: Callable[[], Any], most_s: float = 60.0) -> Any:
         until_s = monotonic() + most_s
         while monotonic() < until_s:
             try:
@@ -133,7 +133,7 @@ class Page:
         self.shoot("failed")
         raise AssertionError(f"did not come within {most_s:g} s")
 
-    def sees(self, words: str, most_s: float = 30.0) -> None:
+    def sees(self, words: str, most_s: float = 60.0) -> None:
         self.until(lambda: words in self.text(), most_s)
 
     def drag(self, scenario: Scenario, *places: tuple[float, float], hold: bool = True) -> None:
@@ -490,3 +490,33 @@ def test_a_closed_tab_leaves_its_work_running(page: Page) -> None:
     page.sees("after 100 of 100", 300.0)
     page.button("take it").click()
     page.sees("16 of 16 modules")
+
+
+FORGOTTEN_S = 35.0
+"""Longer than the server keeps a page whose browser is silent (30 s)."""
+
+
+def test_a_report_goes_on_while_its_page_is_loaded_anew(page: Page) -> None:
+    """By hand, and by the browser itself when the server has forgotten its page."""
+    page.begin("visitor_entrance")
+    page.choose("by", "wall near the building")
+    page.button("Propose").click()
+    page.button("take it").click()
+    page.sees("last: proposal")
+    page.button("Save as").click()
+    sleep(0.5)
+    page.button("report on this layout (.html)").click()
+    page.sees("report visitor_entrance_A.html")
+    page.driver.refresh()
+    page.sees("report visitor_entrance_A.html")
+    page.button("stop")
+
+    page.driver.execute_script("window.isOld = true; window.socket.disconnect()")
+    sleep(FORGOTTEN_S)
+    page.driver.execute_script("window.socket.connect()")
+    page.until(lambda: not page.driver.execute_script("return window.isOld"))
+    page.sees("report visitor_entrance_A.html")
+    page.sees("6 of 18 pieces")
+    page.shoot("loaded_anew")
+    page.button("stop").click()
+    page.sees("stopped")

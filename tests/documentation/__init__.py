@@ -1,0 +1,1 @@
+"""What the pages show: read by the tests, run by `make docs` (tests.documentation.run)."""

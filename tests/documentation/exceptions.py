@@ -1,0 +1,331 @@
+"""Which commands of the pages do not run just as they stand, and why.
+
+A test fails when one of these no longer stands for a command that a page shows.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True)
+class Given:
+    """What pages take for granted, as from a page read before.
+
+    Attributes:
+        pages: The pages.
+        path: The file or folder that they name.
+        made: The file or folder that it is a copy of.
+        command: What makes that; none: every checkout has it.
+    """
+
+    pages: tuple[str, ...]
+    path: str
+    made: str
+    command: str = ""
+
+
+@dataclass(frozen=True)
+class Server:
+    """How it is known that a program does what it should that ends only when it is told to.
+
+    Attributes:
+        port: Where it must answer; none: it must still run after the time.
+        within_s: How long it may take.
+    """
+
+    port: int | None
+    within_s: float = 60.0
+
+
+_WALL: Final = "blast-env search --scenario courtyard --method wall_near_charge --out wall"
+_SITE: Final = (
+    "blast-env import docs/data/pump_house.geojson --protect 'Pump House' --stock 8 --out site.toml"
+    " && blast-env search --scenario site.toml --method wall_near_building --threat hidden"
+    " --threats 1 --held-out 1 --out wall"
+)
+_TRAIN: Final = (
+    "--steps 64 --envs 1 --set n_steps=64 --set batch_size=64 --set evaluation_cases=2"
+    " --set evaluation_interval=1"
+)
+_LABEL: Final = (
+    "--steps 4 --envs 1 --set cases=2 --set cases_per_round=1 --set samples=1 --set neighbours=1"
+    " --set first_updates=2 --set updates=1 --set evaluation_cases=2"
+)
+_AGENT: Final = f"blast-env train --scenario courtyard --run agent {_TRAIN}"
+_LEAGUE_AGENTS: Final = {
+    "out/runs/ppo_courtyard": "--scenario courtyard",
+    "out/runs/ppo_perimeter_gate": "--scenario perimeter_gate",
+    "out/runs/ppo_courtyard_hidden": "--scenario courtyard --threat hidden",
+    "out/runs/ppo_sites": "--scenario sites --threat hidden",
+}
+
+GIVEN: Final = (
+    Given(("docs/start.md",), "depot.toml", "docs/data/depot.toml"),
+    Given(
+        ("docs/howto/pictures.md", "docs/engineers/gas.md", "docs/howto/cluster.md"),
+        "wall.json",
+        "wall/layout.json",
+        _WALL,
+    ),
+    Given(
+        ("docs/researchers/training.md", "docs/engineers/gas.md"),
+        "layout.json",
+        "wall/layout.json",
+        _WALL,
+    ),
+    Given(("docs/howto/report.md",), "site.toml", "site.toml", _SITE),
+    Given(("docs/howto/report.md",), "layout.json", "wall/layout.json", _SITE),
+    Given(("docs/engineers/gas.md",), "my_site.toml", "scenarios/courtyard.toml"),
+    Given(
+        ("docs/howto/app.md", "docs/tutorials/2_train_an_agent.md", "docs/researchers/league.md"),
+        "runs/courtyard",
+        "agent",
+        _AGENT,
+    ),
+    Given(
+        ("docs/researchers/league.md",),
+        "runs/perimeter_gate",
+        "agent",
+        f"blast-env train --scenario perimeter_gate --run agent {_TRAIN}",
+    ),
+    Given(
+        ("docs/researchers/league.md",),
+        "runs/own_best",
+        "agent",
+        "blast-env train --algo self_labelling --engine gas --scenario courtyard"
+        f" --run agent {_LABEL}",
+    ),
+    *(
+        Given(
+            ("docs/studies/league.md",),
+            path,
+            "agent",
+            f"blast-env train --algo ppo {options} --run agent {_TRAIN}",
+        )
+        for path, options in _LEAGUE_AGENTS.items()
+    ),
+)
+
+FOLLOWS: Final = {"docs/studies/league_tables.md": "docs/studies/league.md"}
+"""Pages that are read after another one, and go on in its folder."""
+
+SERVERS: Final = {
+    "blast-env app": Server(8080),
+    "blast-env app --port 8090 --folder designs --run runs/courtyard": Server(8090),
+    "blast-env play courtyard": Server(None, within_s=5.0),
+    "tensorboard --logdir runs/courtyard/tensorboard": Server(6006),
+}
+
+BACKGROUND: Final = {
+    "docs/howto/cluster.md": (
+        "dask scheduler --host 127.0.0.1 --scheduler-file dask.json --no-dashboard",
+        "dask worker --scheduler-file dask.json --nworkers 1 --nthreads 1 --no-dashboard",
+    ),
+}
+"""What runs beside all commands of a page, in the place of what a reader has elsewhere."""
+
+_CLUSTER: Final = "--cluster dask.json"
+
+_LEAGUE: Final = "--cases 1 --seeds 1 --budgets 4 --methods random"
+
+SMALLER: Final[dict[str, str]] = {
+    # README.md
+    "blast-env evaluate --layout wall.json --scenario courtyard --engine gas --seeds 4": (
+        "--seeds 1"
+    ),
+    "blast-env report courtyard --layout wall.json --out report.html --pdf report.pdf": (
+        "--threats 1 --places 1 --stills 1 --no-items"
+    ),
+    "python -m scripts.gas judge": "--random-layouts 1 --charges 1 --seeds 1",
+    "python -m scripts.gas judge --random-layouts 4 --seeds 2": "--random-layouts 1 --charges 1",
+    # docs/start.md
+    "blast-env search --engine gas --scenario depot.toml --threat hidden --method annealing"
+    " --budget 300 --start-from building/layout.json --processes 2 --cache blasts --out found": (
+        "--budget 8 --held-out 1"
+    ),
+    "blast-env report depot.toml --layout building/layout.json --limit control_room=600,170"
+    " --threats 1 --places 1 --stills 2 --no-items --out report.html --pdf report.pdf": (
+        "--stills 0"
+    ),
+    # docs/howto
+    "blast-env report site.toml --layout layout.json --out report.html --pdf report.pdf": (
+        "--threats 1 --places 1 --stills 1 --no-items"
+    ),
+    "blast-env report site.toml --layout layout.json --out report.html --limit Pump_House=300,60"
+    " --charge 5,9,100": "--places 1 --stills 1 --no-items",
+    "blast-env search --engine gas --method genetic --budget 2000 --cache blasts"
+    " --cluster tcp://login1:8786": (
+        f"--scenario visitor_entrance --budget 4 --held-out 1 {_CLUSTER}"
+    ),
+    "blast-env evaluate --engine gas --layout wall.json --seeds 1000 --cluster dask.json": (
+        "--seeds 1"
+    ),
+    "blast-env train --engine gas --envs 64 --cluster tcp://login1:8786 --run runs/gas": (
+        f"{_TRAIN} --engine event {_CLUSTER}"
+    ),
+    "python -m tests.attack.run files --count 300": "--count 1",
+    "python -m tests.attack.run kills": "--most 1",
+    # docs/engineers/gas.md, docs/howto/pictures.md
+    "blast-env simulate courtyard --engine gas --cell 0.25 --excel loads.xlsx": "--cell 0.5",
+    "blast-env search --scenario my_site.toml --engine gas --budget 50": "--budget 2 --held-out 1",
+    "blast-env evaluate --layout wall.json --scenario my_site.toml --engine gas --seeds 8": (
+        "--seeds 1"
+    ),
+    "python -m scripts.gas source": "--cell 1",
+    "python -m scripts.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
+    "python -m scripts.gas corners": "--sizes 0.5",
+    "python -m scripts.gas handover": "--radii 3,6 --until 0.05",
+    "python -m scripts.gas settling": "--until 0.02",
+    "python -m scripts.gas ending --until 0.25 --random-layouts 1": (
+        "--until 0.02 --random-layouts 0"
+    ),
+    "python -m scripts.gas borders --places 2/0,2/12,2/24,8/48": ("--places 2/0,2/12 --until 0.05"),
+    "python -m scripts.gas air-height": "--heights 9,12 --until 0.05",
+    "python -m scripts.gas cells": "--sizes 0.5 --random-layouts 0",
+    # docs/paper
+    "python -m scripts.presets ballistic": (
+        "--candidates 1 --refinements 1 --seeds 1 --finalists 1 --finalist-seeds 1"
+    ),
+    # docs/researchers
+    "python -m scripts.check_sites --blasted 16 --random-layouts 12 --threats 4": (
+        "--sites 2 --blasted 2 --random-layouts 2 --threats 1"
+    ),
+    "python -m scripts.check_sites --family item_sites --blasted 40 --random-layouts 3 --threats 1"
+    " --no-rejected --picture docs/pictures/item_sites.png": (
+        "--sites 2 --blasted 2 --random-layouts 2"
+    ),
+    "blast-env league --track known --run runs/courtyard --run runs/perimeter_gate --processes 2"
+    " --out out/league": _LEAGUE,
+    "blast-env league --track all --cases 16 --seeds 16 --budgets 50,200,1000 --out out/league": (
+        _LEAGUE
+    ),
+    "blast-env league --engine gas --first-engine event --agent-search 50 --run runs/own_best"
+    " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario courtyard",
+    "blast-env search --method genetic --budget 200 --seed 0 --charge 5 12 --out out/search": (
+        "--budget 20 --held-out 2"
+    ),
+    "blast-env search --method nsga2 --threat hidden --threats 16 --budget 1000 --processes 2"
+    " --out out/front": "--budget 40 --held-out 2",
+    "blast-env train --algo maskable_ppo --scenario courtyard --run runs/courtyard": _TRAIN,
+    "blast-env train --algo self_labelling --engine gas --scenario visitor_entrance"
+    " --run runs/own_best": _LABEL,
+    "blast-env train --algo self_labelling --engine gas --scenario scripts/demo_site.toml"
+    " --steps 700 --envs 1 --set cases=24 --set cases_per_round=12 --set samples=3"
+    " --set neighbours=5 --set first_updates=300 --set updates=100 --set evaluation_cases=8"
+    " --set evaluation_interval=1 --run out/kerb": _LABEL,
+    "blast-env evaluate --run runs/courtyard --seeds 64 --processes 2 --export out/layouts": (
+        "--seeds 4"
+    ),
+    # docs/studies
+    "python -m scripts.engines compare": "--seeds 20 --event-seeds 2",
+    "python -m scripts.engines modules": "--seeds 20 --event-seeds 2",
+    "python -m scripts.engines front": "--seeds 1",
+    "python -m scripts.engines profile": "--repeats 1",
+    "python -m scripts.engines cost --repeats 10": "--repeats 1 --most-balls 200",
+    "python -m scripts.layouts engines --charges 8": "--layouts 10 --charges 1",
+    "python -m scripts.layouts resolutions --seeds 4": "--layouts 3 --seeds 2",
+    "blast-env bench --repeats 7 --no-environment --no-gas": "--repeats 1 --no-memory",
+    "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
+    "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,
+    "blast-env train --scenario courtyard --threat hidden --steps 40960"
+    " --run out/runs/maskable_courtyard_hidden --set evaluation_cases=32": _TRAIN,
+    "blast-env train --scenario sites --threat hidden --run out/runs/maskable_sites"
+    " --set evaluation_cases=48 --set evaluation_interval=10": _TRAIN,
+    "blast-env train --scenario courtyard --steps 40960 --set ent_coef=0.005"
+    " --run out/runs/entropy": _TRAIN,
+    "blast-env league --track known --scenario courtyard --cases 24 --seeds 16 --budgets 200"
+    " --methods genetic --run out/runs/maskable_courtyard --run out/runs/ppo_courtyard"
+    " --out out/league": _LEAGUE,
+    "blast-env league --track known --scenario perimeter_gate --cases 16 --seeds 16 --budgets 200"
+    " --methods genetic --run out/runs/maskable_perimeter_gate --run out/runs/ppo_perimeter_gate"
+    " --out out/league": _LEAGUE,
+    "blast-env league --track sites --cases 24 --seeds 16 --budgets 50 --methods genetic"
+    " --run out/runs/maskable_sites --run out/runs/ppo_sites --out out/league": _LEAGUE,
+    "blast-env league --seeds 16 --out out/league --track known --scenario courtyard --cases 8"
+    " --budgets 50,200,1000 --run out/runs/maskable_courtyard --run out/runs/ppo_courtyard": (
+        _LEAGUE
+    ),
+    "blast-env league --seeds 16 --out out/league --track known --scenario perimeter_gate --cases 6"
+    " --budgets 50,200,1000 --run out/runs/maskable_perimeter_gate"
+    " --run out/runs/ppo_perimeter_gate": _LEAGUE,
+    "blast-env league --seeds 16 --out out/league --track hidden --scenario courtyard"
+    " --budgets 50,200,1000 --run out/runs/maskable_courtyard_hidden"
+    " --run out/runs/ppo_courtyard_hidden": _LEAGUE,
+    "blast-env league --seeds 16 --out out/league --track sites --cases 10 --budgets 50,200,1000"
+    " --run out/runs/maskable_sites --run out/runs/ppo_sites": _LEAGUE,
+    "blast-env calibrate --name ballistic_kb_100kg --reference reflected_impulse"
+    " --distances 8,10,12.5,16,20,25,32,40 --seeds 32": "--seeds 2 --distances 8,16,32",
+    "blast-env calibrate --name collisional_kb --preset collisional --reference reflected_impulse"
+    " --distances 8,10,12.5,16,20,25,32,40 --seeds 32 --engine event"
+    " --simulated transferred_impulse --tnt-range 20,1000": "--seeds 2 --distances 8,16,32",
+    "blast-env calibrate --name collisional_kb_20kg --preset collisional --tnt-kg 20"
+    " --reference reflected_impulse --distances 4.68,5.85,7.31,9.36,11.7,14.62,18.71,23.39"
+    " --seeds 16 --engine event --simulated transferred_impulse": (
+        "--seeds 2 --distances 4.68,9.36,18.71"
+    ),
+    "blast-env calibrate --shielding --preset collisional --seeds 16 --first-seed 1000"
+    " --calibration collisional_kb": "--seeds 2",
+    "blast-env calibrate --name mine --reference reflected_impulse --distances 8,12,20,40"
+    " --seeds 16 --out out/mine": "--seeds 2",
+    "python -m scripts.presets front": "--seeds 2",
+    "python -m scripts.presets collisional": "--population 4 --generations 1 --seeds 2",
+    "blast-env league --run runs/courtyard --out out/league": _LEAGUE,
+    "blast-env calibrate --name ballistic_ufc --reference paper_ufc --seeds 32": "--seeds 2",
+    "python -m scripts.validity scaling": "--seeds 2",
+    "python -m scripts.validity facade-width": "--seeds 2",
+    "python -m scripts.validity pressure": "--distances 10 --seeds 2",
+    "python -m scripts.validity thermal-share --seeds 8": "--resolutions 2 --seeds 2",
+    "python -m scripts.validity mach-stem --preset collisional --resolution 2 --seeds 60"
+    " --first-ms 5 --last-ms 13": "--resolution 1 --seeds 2 --times 4",
+    "python -m scripts.scale workers --gas-blasts 12 --episodes 4": (
+        "--workers 1 --pauses 5 --gas-blasts 1 --episodes 1"
+    ),
+    "python -m scripts.scale store": "--entries 100",
+    "python -m scripts.scale costs --price 0.04": "--blasts 1",
+    "python -m scripts.scenario_difficulty": (
+        "courtyard --layouts 2 --seeds 2 --charges 2 --realisations 1"
+    ),
+    "python -m scripts.scenario_difficulty visitor_entrance shopping_street hotel_forecourt"
+    " school_and_clinic control_room --processes 1": "--random 2 --budget 2 --place-budget 1",
+}
+"""Options that are appended to studies and trainings of minutes to hours."""
+
+NOT_RUN: Final[dict[str, str]] = {
+    "blast-env --install-completion": "changes the shell of whoever runs it",
+    "blast-env import FILE --out site.toml": "FILE is a placeholder; the page's next commands run",
+    "blast-env validate FILE...": "FILE is a placeholder; docs/start.md has a file to validate",
+    "python -m scripts.other_codes openfoam": "needs OpenFOAM; tests/studies/test_other_codes.py",
+    "python -m scripts.other_codes pyclaw --python PYTHON": (
+        "needs clawpack; tests/studies/test_other_codes.py"
+    ),
+    "python -m scripts.pack_agent RUN NAME --league out/league --track known_NAME": (
+        "writes into the package; tests/agents has it"
+    ),
+    "python -m scripts.blast_table FOLDER --out blasts.parquet": (
+        "FOLDER is a placeholder; tests/scripts/test_blast_table.py"
+    ),
+    "python -m rl_zoo3.train --algo ppo --env BlastBarrier-v0 --gym-packages blast_env"
+    " -conf agents/blast_agents/hyperparameters/ppo.yml --vec-env subproc"
+    """ --env-kwargs 'engine:'"'"'event'"'"'' realisations:1""": "needs RL Zoo",
+    "python -m rl_zoo3.enjoy --algo ppo --env BlastBarrier-v0 --gym-packages blast_env -f logs"
+    " --stochastic": "needs RL Zoo",
+    "python -m scripts.engines steps": "minutes, without an option that makes it smaller",
+    "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
+}
+"""Commands that are parsed only, and why."""
+
+CODE_OF_THE_BUILD: Final = {
+    "docs/engineers/gas.md": "three blasts of gas dynamics on a large site",
+    "docs/howto/cluster.md": "needs a cluster, which runs beside the page's commands",
+    "docs/researchers/training.md": "needs the agent that the page's commands train",
+}
+"""Pages whose code `make docs` runs and `make test` compiles only, and why."""
+
+CODE_NOT_RUN: Final = {
+    ("docs/howto/cluster.md", 2): "needs Slurm and submitit",
+    ("docs/researchers/libraries.md", 4): (
+        "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
+    ),
+    ("docs/researchers/libraries.md", 5): "needs Ray; tests/libraries/run_rllib.py is this code",
+}
+"""Blocks of Python, by their number on the page, that are compiled only, and why."""
