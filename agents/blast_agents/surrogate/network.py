@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from math import prod
 from pathlib import Path
 from typing import Annotated, Final, Literal, NamedTuple
@@ -34,6 +35,7 @@ class Fit(BaseModel):
         engine: The engine of the blasts.
         blasts: How many loads of structures it was fitted to.
         sites: Of how many sites.
+        seconds: Time that the fit took, without the check.
         layouts_rms: Root of the mean square error of the logarithm of an impulse, on layouts that
             were held out, of sites that were not.
         layouts_rank: Rank correlation with the engine among the layouts of a case, likewise.
@@ -49,10 +51,11 @@ class Fit(BaseModel):
     engine: str
     blasts: Annotated[int, Field(ge=1)]
     sites: Annotated[int, Field(ge=1)]
-    layouts_rms: float
-    layouts_rank: float
-    sites_rms: float
-    sites_rank: float
+    seconds: Annotated[float, Field(ge=0.0)] = 0.0
+    layouts_rms: float | None = None
+    layouts_rank: float | None = None
+    sites_rms: float | None = None
+    sites_rank: float | None = None
 
 
 class Guess(NamedTuple):
@@ -100,6 +103,13 @@ class Surrogate:
     scale: FloatArray
     members: tuple[Member, ...]
     fit: Fit
+
+    @property
+    def digest(self) -> str:
+        """Tells surrogates apart: of their numbers."""
+        arrays = (self.mean, self.scale, *(each for member in self.members for each in member))
+        numbers = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
+        return sha256(numbers).hexdigest()[:16]
 
     def guess(
         self, site: Site, layouts: Sequence[Sequence[Element]], charges: Sequence[Charge]
