@@ -17,11 +17,14 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastKey, DiskCache, StructureLoad
 from blast_env.provenance import versions
 from blast_env.recording.parquet import write_table
-from blast_env.scenario import bundled_scenarios
+from blast_env.scenario import Scenario, bundled_scenarios
+from blast_env.sites import FAMILIES, HELD_OUT_SITES, ITEM_SITES, generate_site
 from blast_env.tables import Column, table_of
 
 COLUMNS: Final = (
-    Column("scenario", "", "bundled scenario of that hash; empty: one of a file"),
+    Column(
+        "scenario", "", "bundled scenario of that hash, or generated site; empty: one of a file"
+    ),
     Column("scenario_hash", "", "content hash of the scenario"),
     Column("layout", "", "JSON: [row, column] a module, [row, column, item, turned] a piece"),
     Column("charge_x_m", "m", "where the charge went off, from the left border"),
@@ -37,14 +40,30 @@ COLUMNS: Final = (
 )
 """A row a structure of a blast."""
 
+SITE_NAME: Final = "item_sites/"
+"""What the names of generated sites in the table begin with; their seed follows."""
+
+
+def scenario_of(name: str) -> Scenario:
+    """Return the scenario of a name in the table."""
+    if name.startswith(SITE_NAME):
+        return generate_site(int(name.removeprefix(SITE_NAME)), FAMILIES[ITEM_SITES])
+    return load_scenario(name)
+
 
 def main(
     folders: Annotated[list[Path], typer.Argument(help="Folders with blasts.")],
     out: Annotated[Path, typer.Option(help="The table, .parquet.")] = Path("out/blasts.parquet"),
+    sites: Annotated[
+        int, typer.Option(min=0, help="Generated sites of the training's seeds, to name them.")
+    ] = 0,
 ) -> None:
     """Write the table, each blast once."""
     with user_errors():
         names = {load_scenario(name).content_hash: name for name in bundled_scenarios()}
+        for number in range(sites):
+            name = f"{SITE_NAME}{HELD_OUT_SITES + number}"
+            names[scenario_of(name).content_hash] = name
         rows: dict[str, list[dict[str, object]]] = {}
         for folder in folders:
             if not folder.is_dir():

@@ -8,14 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from blast_agents.league import (
+    Agent,
     Contest,
+    Entry,
     ResultStore,
     Search,
     Standings,
     Track,
+    Training,
     find_tracks,
     standard_entries,
 )
+from blast_agents.surrogate.network import load_surrogate
+from blast_agents.surrogate.search import SurrogateAgent, SurrogateSearch
 
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.options import CellSide, Processes
@@ -82,6 +87,13 @@ def league(
     agent_search: Annotated[
         str, typer.Option(help="Blasts that a search from an agent may spend on a case.")
     ] = "",
+    surrogate: Annotated[
+        Path | None,
+        typer.Option(
+            help="Surrogate of gas dynamics (scripts.surrogate fit): enters by itself, and as a "
+            "search with the blasts of --agent-search."
+        ),
+    ] = None,
     cell: CellSide = None,
     processes: Processes = 1,
     cluster: ClusterAddress = None,
@@ -109,7 +121,8 @@ def league(
             first_engine,
             tuple(_numbers(agent_search, "--agent-search")),
         )
-        contests = [_contest(each, runs, searches, store, chosen) for each in tracks]
+        guessing = () if surrogate is None else _by_guesses(surrogate, searches.agent_budgets)
+        contests = [_contest(each, runs, searches, guessing, store, chosen) for each in tracks]
         scenarios = [case.scenario for each in tracks for case in each.cases]
         print_line(engine_text(chosen, scenarios))
         _print_outlook(contests)
@@ -141,10 +154,20 @@ def _load_runs(runs: Sequence[Path], tracks: Sequence[Track]) -> "list[TrainedRu
     return loaded
 
 
+def _by_guesses(path: Path, budgets: Sequence[int]) -> tuple[Entry, ...]:
+    """Return a surrogate's entries: its own proposals, and its searches."""
+    found = load_surrogate(path)
+    search = SurrogateSearch(found, found.digest)
+    training = Training(found.fit.blasts, found.fit.seconds)
+    agent = Agent(SurrogateAgent(found), "surrogate", training)
+    return (agent, *(Search(search, budget) for budget in budgets))
+
+
 def _contest(
     track: Track,
     runs: "Sequence[TrainedRun]",
     searches: _Searches,
+    guessing: Sequence[Entry],
     store: ResultStore,
     engine: Engine,
 ) -> Contest:
@@ -157,6 +180,7 @@ def _contest(
     for run in runs:
         if run.is_for(track):
             entries += (run.entry, *map(run.search, searches.agent_budgets))
+    entries += tuple(guessing)
     return Contest(track, entries, store, engine)
 
 

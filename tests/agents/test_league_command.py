@@ -14,6 +14,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.scenario import load_scenario, save_scenario
 from blast_env.sites import SiteSource
+from tests.agents.test_surrogate import by_hand as surrogate_by_hand
 from tests.agents.training_runs import (
     hyperparameters,
     scenario_file,
@@ -67,6 +68,21 @@ def test_all_enter_and_all_is_written(run: Path, tmp_path: Path) -> None:
     for name in ("league.md", "known_small.png"):
         assert f"wrote {out / name}" in result.stdout
     assert "genetic search with 200 blasts has not entered" in result.stdout
+
+
+def test_a_surrogate_enters_by_itself_and_as_a_search(tmp_path: Path) -> None:
+    path = surrogate_by_hand().save(tmp_path / "surrogate.json")
+    few = ("--cases", 2, "--seeds", 2, "--methods", "", "--agent-search", 6)
+    site = ("--scenario", scenario_file(tmp_path), "--out", tmp_path / "out")
+    result = league(*few, *site, "--surrogate", path)
+    assert result.exit_code == 0, result.output
+    summary = pd.read_csv(tmp_path / "out" / "known_small_summary.csv")
+    blasts = dict(zip(summary["entry"].tolist(), summary["blasts"].tolist(), strict=True))
+    assert blasts["surrogate"] == surrogate_by_hand().fit.blasts
+    assert 0 < blasts["surrogate, 6 blasts"] <= 2 * 6
+    result = league(*few, *site, "--surrogate", tmp_path / "none.json")
+    assert result.exit_code == 1
+    assert "none.json: there is no such file" in result.output
 
 
 def test_called_again_it_has_nothing_left_to_simulate(

@@ -1,0 +1,245 @@
+"""Fitting the surrogate to blasts, and telling how far it is off where it was not fitted."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+import torch
+from scipy.stats import spearmanr
+from torch import Tensor, nn
+
+from blast_agents.surrogate.network import HIDDEN, Fit, Member, Surrogate
+from blast_agents.surrogate.walls import FEATURES, Approach, site_of
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element, Piece
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario
+
+MEMBERS: Final = 5
+_BATCH: Final = 128
+_RATE: Final = 5e-3
+_DECAY: Final = 1e-3
+_LEAST_SCALE: Final = 1e-3
+_LEAST_CASE: Final = 8
+"""Layouts that a case must have for its rank correlation to count."""
+
+
+_CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Loads of structures, with the features of the points on their walls.
+
+    Attributes:
+        features: Of all points (points, FEATURES).
+        log_impulse: Kingery and Bulmash's, logarithm (points,).
+        area_m2: Of each point (points,).
+        counts: Points of each sample (samples,).
+        target: Logarithm of the impulse by gas dynamics, Pa s (samples,).
+        site: Number of its site (samples,).
+        case: Number of its site, structure and charge (samples,).
+        layout: Number of its site and layout (samples,).
+    """
+
+    features: FloatArray
+    log_impulse: FloatArray
+    area_m2: FloatArray
+    counts: np.ndarray
+    target: FloatArray
+    site: np.ndarray
+    case: np.ndarray
+    layout: np.ndarray
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.target)
+
+    @classmethod
+    def of(cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario]) -> "Samples":
+        """Return the loads on protected structures of a table of `scripts.blast_table`.
+
+        Args:
+            blasts: The table.
+            scenarios: By content hash; rows of others are left out.
+
+        Raises:
+            BlastEnvError: If no row is left.
+        """
+        known = blasts["protected"] & blasts["scenario_hash"].isin(list(scenarios))
+        rows = blasts[known & (blasts["impulse_pa_s"] > 0.0)]
+        if rows.empty:
+            raise BlastEnvError("no load of a protected structure of a known scenario")
+        sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
+        approaches: list[Approach] = []
+        features = []
+        wanted = ("scenario_hash", "structure", "layout", *_CHARGE)
+        columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
+        for scenario_hash, structure, layout, *numbers in zip(*columns, strict=True):
+            site = sites[scenario_hash]
+            names = [each.name for each in site.protected]
+            x_m, y_m, height_m, tnt_kg = map(float, numbers)
+            charge = Charge((x_m, y_m), tnt_kg, height_m)
+            approach = site.approaches(charge)[names.index(structure)]
+            barrier = site.barrier(elements(layout))
+            approaches.append(approach)
+            features.append(approach.features(barrier).astype(np.float32))
+        place = rows[["scenario_hash", "structure", *_CHARGE]]
+        return cls(
+            features=np.concatenate(features),
+            log_impulse=np.concatenate([each.log_impulse for each in approaches]),
+            area_m2=np.concatenate([each.area_m2 for each in approaches]),
+            counts=np.array([len(each) for each in features]),
+            target=np.log(rows["impulse_pa_s"].to_numpy()),
+            site=rows.groupby("scenario_hash").ngroup().to_numpy(),
+            case=place.groupby(list(place.columns)).ngroup().to_numpy(),
+            layout=rows.groupby(["scenario_hash", "layout"]).ngroup().to_numpy(),
+        )
+
+
+def elements(text: str) -> tuple[Element, ...]:
+    """Return the layout of a row of the table."""
+    found = (tuple(each) for each in json.loads(text))
+    return tuple(each if len(each) == 2 else Piece(*each) for each in found)
+
+
+def fit(samples: Samples, chosen: BoolArray, epochs: int, seed: int, about: Fit) -> Surrogate:
+    """Fit the networks to some of the samples.
+
+    Args:
+        samples: All samples.
+        chosen: Which of them (samples,).
+        epochs: How often each is met.
+        seed: Of starts and orders.
+        about: What is said of it in its file.
+    """
+    at_points = np.repeat(chosen, samples.counts)
+    mean = samples.features[at_points].mean(axis=0).astype(np.float64)
+    scale = samples.features[at_points].std(axis=0).astype(np.float64) + _LEAST_SCALE
+    data = _Tensors.of(samples, mean, scale)
+    numbers = np.flatnonzero(chosen)
+    members = tuple(_member(data, numbers, epochs, seed + each) for each in range(MEMBERS))
+    return Surrogate(mean, scale, members, about)
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """How far guesses are off.
+
+    Attributes:
+        rms: Root of the mean square error of the logarithm.
+        bias: Its mean.
+        rank: Rank correlation among the layouts of a case, mean over the cases.
+        cases: How many cases have enough layouts for that.
+    """
+
+    rms: float
+    bias: float
+    rank: float
+    cases: int
+
+
+def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> Errors:
+    """Compare guesses with gas dynamics on some samples."""
+    starts = np.cumsum([0, *samples.counts[:-1]])
+    scaled = (samples.features - surrogate.mean) / surrogate.scale
+    area_m2, known = samples.area_m2, samples.log_impulse
+    logs = [
+        np.log(
+            np.add.reduceat(area_m2 * np.exp(known + member(scaled)), starts)
+            / np.add.reduceat(area_m2, starts)
+        )
+        for member in surrogate.members
+    ]
+    guess = np.mean(logs, axis=0)
+    off = (guess - samples.target)[chosen]
+    ranks = []
+    for case in np.unique(samples.case[chosen]):
+        own = chosen & (samples.case == case)
+        if own.sum() >= _LEAST_CASE and np.ptp(samples.target[own]) > 0.0:
+            ranks.append(float(spearmanr(guess[own], samples.target[own]).statistic))
+    rank = float(np.mean(ranks)) if ranks else float("nan")
+    return Errors(float(np.sqrt(np.mean(off**2))), float(off.mean()), rank, len(ranks))
+
+
+def folds(numbers: np.ndarray, count: int, seed: int) -> list[BoolArray]:
+    """Return which samples are held out in each fold; what has one number stays together.
+
+    Args:
+        numbers: Of the site or the layout of each sample (samples,).
+        count: How many folds.
+        seed: Of the order.
+    """
+    distinct = np.random.default_rng(seed).permutation(np.unique(numbers))
+    return [np.isin(numbers, distinct[first::count]) for first in range(count)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Tensors:
+    features: Tensor
+    log_impulse: Tensor
+    area_m2: Tensor
+    starts: np.ndarray
+    counts: np.ndarray
+    target: Tensor
+
+    @classmethod
+    def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray) -> "_Tensors":
+        return cls(
+            torch.from_numpy(((samples.features - mean) / scale).astype(np.float32)),
+            torch.from_numpy(samples.log_impulse.astype(np.float32)),
+            torch.from_numpy(samples.area_m2.astype(np.float32)),
+            np.cumsum([0, *samples.counts[:-1]]),
+            samples.counts,
+            torch.from_numpy(samples.target.astype(np.float32)),
+        )
+
+    def error(self, network: nn.Module, numbers: np.ndarray) -> Tensor:
+        """Return the mean square error of the logarithm on some samples."""
+        points = [
+            np.arange(start, start + count)
+            for start, count in zip(self.starts[numbers], self.counts[numbers], strict=True)
+        ]
+        rows = torch.from_numpy(np.concatenate(points))
+        owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), self.counts[numbers]))
+        area_m2 = self.area_m2[rows]
+        over = network(self.features[rows])[:, 0]
+        loads = area_m2 * torch.exp(self.log_impulse[rows] + over)
+        empty = torch.zeros(len(numbers))
+        mean = empty.index_add(0, owner, loads) / empty.index_add(0, owner, area_m2)
+        return (torch.log(mean) - self.target[torch.from_numpy(numbers)]).square().mean()
+
+
+def _member(data: _Tensors, numbers: np.ndarray, epochs: int, seed: int) -> Member:
+    """Fit one network."""
+    torch.manual_seed(seed)
+    rng = np.random.default_rng(seed)
+    network = nn.Sequential(
+        nn.Linear(FEATURES, HIDDEN),
+        nn.SiLU(),
+        nn.Linear(HIDDEN, HIDDEN),
+        nn.SiLU(),
+        nn.Linear(HIDDEN, 1),
+    )
+    optimizer = torch.optim.AdamW(network.parameters(), _RATE, weight_decay=_DECAY)
+    batches = max(1, round(len(numbers) / _BATCH))
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, _RATE, total_steps=epochs * batches)
+    for _ in range(epochs):
+        for batch in np.array_split(rng.permutation(numbers), batches):
+            loss = data.error(network, batch)
+            optimizer.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            optimizer.step()
+            schedule.step()
+    return _plain(network)
+
+
+def _plain(network: nn.Sequential) -> Member:
+    arrays: Sequence[FloatArray] = [
+        each.detach().numpy().astype(np.float64) for each in network.parameters()
+    ]
+    return Member(*(array.T if array.ndim == 2 else array for array in arrays))

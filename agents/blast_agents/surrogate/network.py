@@ -1,0 +1,217 @@
+"""The surrogate: small networks that tell what reaches each point of a wall, and how surely."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from math import prod
+from pathlib import Path
+from typing import Annotated, Final, Literal, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from blast_agents.surrogate.walls import FEATURES, Approach, Site
+from blast_env.arrays import FloatArray
+from blast_env.documents import DocumentError, checked_as, parse_json, read_text
+from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.geometry import Element
+from blast_env.physics.scene import Charge
+
+HIDDEN: Final = 48
+"""Width of the two hidden layers."""
+
+SHAPES: Final = ((FEATURES, HIDDEN), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (HIDDEN, 1), (1,))
+"""Of the arrays of a network, in the order of `Member`."""
+
+
+class Fit(BaseModel):
+    """What a surrogate was fitted to, and how far it was off where it was not.
+
+    Attributes:
+        format: Version of this form.
+        command: What fitted it.
+        versions: With what.
+        engine: The engine of the blasts.
+        blasts: How many loads of structures it was fitted to.
+        sites: Of how many sites.
+        seconds: Time that the fit took, without the check.
+        layouts_rms: Root of the mean square error of the logarithm of an impulse, on layouts that
+            were held out, of sites that were not.
+        layouts_rank: Rank correlation with the engine among the layouts of a case, likewise.
+        sites_rms: The error on sites that were held out.
+        sites_rank: The correlation on them.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    format: Literal[1] = 1
+    command: str
+    versions: dict[str, str]
+    engine: str
+    blasts: Annotated[int, Field(ge=1)]
+    sites: Annotated[int, Field(ge=1)]
+    seconds: Annotated[float, Field(ge=0.0)] = 0.0
+    layouts_rms: float | None = None
+    layouts_rank: float | None = None
+    sites_rms: float | None = None
+    sites_rank: float | None = None
+
+
+class Guess(NamedTuple):
+    """What the surrogate says of layouts.
+
+    Attributes:
+        impulse_pa_s: Mean impulse on each protected structure (layouts, structures).
+        spread: By how much its members differ about that, as a share of it: the standard deviation
+            of the logarithm (layouts, structures).
+    """
+
+    impulse_pa_s: FloatArray
+    spread: FloatArray
+
+
+class Member(NamedTuple):
+    """A network: weights and biases of its layers, in the order in which they are used."""
+
+    first: FloatArray
+    first_bias: FloatArray
+    second: FloatArray
+    second_bias: FloatArray
+    last: FloatArray
+    last_bias: FloatArray
+
+    def __call__(self, features: FloatArray) -> FloatArray:
+        """Return by how much the logarithm of the impulse differs from Kingery and Bulmash's."""
+        hidden = _silu(features @ self.first + self.first_bias)
+        hidden = _silu(hidden @ self.second + self.second_bias)
+        return (hidden @ self.last + self.last_bias)[:, 0]
+
+
+@dataclass(frozen=True, eq=False)
+class Surrogate:
+    """Some networks that were fitted to the same blasts, each from another start.
+
+    Attributes:
+        mean: Of each feature (FEATURES,).
+        scale: Its spread, likewise.
+        members: The networks.
+        fit: What they were fitted to.
+    """
+
+    mean: FloatArray
+    scale: FloatArray
+    members: tuple[Member, ...]
+    fit: Fit
+
+    @property
+    def digest(self) -> str:
+        """Tells surrogates apart: of their numbers."""
+        arrays = (self.mean, self.scale, *(each for member in self.members for each in member))
+        numbers = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
+        return sha256(numbers).hexdigest()[:16]
+
+    def guess(
+        self, site: Site, layouts: Sequence[Sequence[Element]], charges: Sequence[Charge]
+    ) -> Guess:
+        """Return what blasts behind layouts would do, without one.
+
+        Args:
+            site: The site.
+            layouts: Legal layouts.
+            charges: What goes off behind each of them, where it does (layouts,).
+
+        Raises:
+            LayoutError: If the catalogue has no such piece.
+        """
+        barriers = [site.barrier(layout) for layout in layouts]
+        approaches = [site.approaches(charge) for charge in charges]
+        columns = [
+            self._impulses([each[number] for each in approaches], barriers)
+            for number in range(len(site.protected))
+        ]
+        means, spreads = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
+        return Guess(means, spreads)
+
+    def save(self, path: Path) -> Path:
+        """Write everything as one JSON file, numbers to six digits.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        content = _File(
+            fit=self.fit,
+            mean=_numbers(self.mean),
+            scale=_numbers(self.scale),
+            members=[[_numbers(array) for array in member] for member in self.members],
+        )
+        with write_atomically(path) as temporary:
+            temporary.write_text(f"{content.model_dump_json()}\n", encoding="utf-8")
+        return path
+
+    def _impulses(
+        self, approaches: Sequence[Approach], barriers: Sequence[FloatArray]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return mean and spread of the impulse on one structure, one a layout."""
+        features = [each.features(b) for each, b in zip(approaches, barriers, strict=True)]
+        counts = [len(each) for each in features]
+        starts = np.cumsum([0, *counts[:-1]])
+        area_m2 = np.concatenate([each.area_m2 for each in approaches])
+        known = np.concatenate([each.log_impulse for each in approaches])
+        scaled = (np.concatenate(features) - self.mean) / self.scale
+        logs = [
+            np.log(
+                np.add.reduceat(area_m2 * np.exp(known + member(scaled)), starts)
+                / np.add.reduceat(area_m2, starts)
+            )
+            for member in self.members
+        ]
+        return np.exp(np.mean(logs, axis=0)), np.std(logs, axis=0)
+
+
+def load_surrogate(path: Path) -> Surrogate:
+    """Return a surrogate from its file.
+
+    Raises:
+        BlastEnvError: If there is no such file, or it is no surrogate or damaged.
+    """
+    try:
+        content = checked_as(_File, parse_json(read_text(path)))
+    except DocumentError as error:
+        raise BlastEnvError(f"{path}: is no surrogate, or damaged: {error}") from error
+    members = tuple(
+        Member(*(np.array(flat).reshape(shape) for flat, shape in zip(each, SHAPES, strict=True)))
+        for each in content.members
+    )
+    return Surrogate(np.array(content.mean), np.array(content.scale), members, content.fit)
+
+
+class _File(BaseModel):
+    """What is in a file: arrays as flat lists."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    fit: Fit
+    mean: Annotated[list[float], Field(min_length=FEATURES, max_length=FEATURES)]
+    scale: Annotated[
+        list[Annotated[float, Field(gt=0.0)]], Field(min_length=FEATURES, max_length=FEATURES)
+    ]
+    members: Annotated[list[list[list[float]]], Field(min_length=1, max_length=100)]
+
+    @field_validator("members")
+    @classmethod
+    def _check_sizes(cls, members: list[list[list[float]]]) -> list[list[list[float]]]:
+        wanted = [prod(shape) for shape in SHAPES]
+        for number, member in enumerate(members):
+            sizes = [len(flat) for flat in member]
+            if sizes != wanted:
+                raise ValueError(f"network {number} has arrays of {sizes}, must be {wanted}")
+        return members
+
+
+def _numbers(array: FloatArray) -> list[float]:
+    return [float(f"{value:.6g}") for value in array.ravel()]
+
+
+def _silu(values: FloatArray) -> FloatArray:
+    return values / (1.0 + np.exp(-values))

@@ -1,0 +1,206 @@
+"""Layouts by guesses: a search that asks the surrogate first, an agent that asks nothing else."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.search.moves import Moves
+from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
+from blast_agents.search.session import SearchSession
+from blast_agents.surrogate.network import Surrogate
+from blast_agents.surrogate.walls import Site, site_of
+from blast_env.arrays import FloatArray
+from blast_env.evaluation import Case, Threat
+from blast_env.evaluation.cases import practice_hidden, practice_visible
+from blast_env.geometry import Layout
+from blast_env.scenario import AnyCharge, Scenario
+from blast_env.values import generator
+
+_HIDDEN_CHARGES: Final = 4
+"""Charges that layouts are guessed against where the charge is not known."""
+
+_KEPT: Final = 4
+"""How many of the best layouts are changed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Guesses:
+    """What the surrogate says of the layouts of a case; each is asked once.
+
+    Attributes:
+        surrogate: The surrogate.
+        case: What layouts meet.
+        site: The scenario as the surrogate sees it.
+    """
+
+    surrogate: Surrogate
+    case: Case
+    site: Site
+    _known: dict[Layout, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, surrogate: Surrogate, case: Case) -> "Guesses":
+        """Begin with none.
+
+        Raises:
+            BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
+        """
+        return cls(surrogate, case, site_of(case.scenario))
+
+    def loads(self, layouts: Sequence[Layout]) -> FloatArray:
+        """Return the load that counts behind each layout, by the surrogate, Pa s (layouts,)."""
+        new = [each for each in dict.fromkeys(layouts) if each not in self._known]
+        if new:
+            by_threat = [self._weighted(new, threat) for threat in self.case.threats]
+            for layout, loads in zip(new, np.transpose(by_threat), strict=True):
+                self._known[layout] = self.case.combined(loads)
+        return np.array([self._known[each] for each in layouts])
+
+    @property
+    def count(self) -> int:
+        """How many layouts it was asked about."""
+        return len(self._known)
+
+    def ranked(self) -> list[Layout]:
+        """Return all layouts that it was asked about, the least load first."""
+        return sorted(self._known, key=lambda layout: self._known[layout])
+
+    def _weighted(self, layouts: Sequence[Layout], threat: Threat) -> FloatArray:
+        charges = [threat.charge_against(self.case.scenario, each) for each in layouts]
+        guess = self.surrogate.guess(self.site, layouts, charges)
+        weights = np.array([each.weight for each in self.site.protected])
+        loads: FloatArray = (guess.impulse_pa_s * weights).sum(axis=1)
+        return loads
+
+
+def improved(
+    guesses: Guesses, begin_with: Iterable[Layout], most: int, rng: np.random.Generator
+) -> list[Layout]:
+    """Return the layouts that a search by guesses alone has met, the best first.
+
+    Begins with given layouts, then changes the best ones so far by one or two moves.
+
+    Args:
+        guesses: Is asked, and remembers.
+        begin_with: Legal layouts.
+        most: Most layouts to ask about, beside those.
+        rng: Draws the changes.
+    """
+    guesses.loads([tuple(sorted(each)) for each in begin_with])
+    moves, end = Moves(guesses.case.scenario), guesses.count + most
+    tries = 0
+    while guesses.count < end and tries < 4 * most:
+        best = guesses.ranked()[:_KEPT]
+        changed = [_changed(best, moves, rng) for _ in range(min(_BATCH, end - guesses.count))]
+        guesses.loads(changed)
+        tries += len(changed)
+    return guesses.ranked()
+
+
+_BATCH: Final = 8
+
+
+def _changed(best: Sequence[Layout], moves: Moves, rng: np.random.Generator) -> Layout:
+    """Return one of the best layouts, the better ones more often, one or two moves on."""
+    layout = best[min(int(rng.exponential(1.0)), len(best) - 1)]
+    for _ in range(1 + int(rng.random() < 0.4)):
+        layout = moves.neighbour(layout, rng)
+    return tuple(sorted(layout))
+
+
+@dataclass(frozen=True)
+class SurrogateAgent:
+    """Proposes what the surrogate likes best of the rules' layouts and changes of them: no blast.
+
+    Attributes:
+        surrogate: The surrogate.
+        changes: How many changed layouts it looks at, beside the rules'.
+    """
+
+    surrogate: Surrogate = field(repr=False)
+    changes: int = 24
+
+    def propose(self, scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
+        """Return a layout that keeps every condition of the build zone; always the same one.
+
+        Args:
+            scenario: The scenario; it has a build zone.
+            charge: Where the charge is, if that is known; otherwise the layout is for some of the
+                places where the scenario may have one.
+
+        Raises:
+            BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
+        """
+        if charge is None:
+            case = practice_hidden(scenario, _HIDDEN_CHARGES, 1, 0)
+        else:
+            case = practice_visible(scenario, charge, 1, 0)
+        guesses = Guesses.of(self.surrogate, case)
+        ruled = layouts_by_rule(scenario, charge).values()
+        return improved(guesses, [(), *ruled], self.changes, generator(0))[0]
+
+
+@dataclass(frozen=True)
+class SurrogateSearch:
+    """Spends each blast on what the surrogate likes best of what is left.
+
+    First the rules' layouts and the best that a search by guesses alone has found, in turn; then
+    changes of the best by blasts, of which the surrogate picks one out of many.
+
+    Attributes:
+        surrogate: The surrogate; the digest says which.
+        digest: Of its file, so that results of different ones are told apart.
+        guesses: Layouts that it is asked about before the first blast.
+        drawn: Changes that it picks one out of, afterwards.
+        guessed_share: Share of the blasts for what was found by guesses alone.
+        name: In tables.
+    """
+
+    surrogate: Surrogate = field(repr=False)
+    digest: str
+    guesses: int = 600
+    drawn: int = 16
+    guessed_share: float = 0.4
+    name: str = "surrogate"
+
+    def search(
+        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
+    ) -> SearchResult:
+        """Return the best layout that was met.
+
+        Raises:
+            BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
+        """
+        rng = generator(seed)
+        plan = Plan.of(problem, budget)
+        session = SearchSession(problem, budget, plan, report)
+        met = tuple(problem.threats[: plan.threats])
+        guesses = Guesses.of(self.surrogate, Case(problem.scenario, met, risk=problem.case.risk))
+
+        def explore() -> None:
+            ruled = list(layouts_by_rule(problem.scenario, problem.told).values())
+            found = improved(guesses, [(), *ruled], self.guesses, rng)
+            share = max(1, round(self.guessed_share * plan.exploring_layouts))
+            for first, second in zip(found[:share], [*ruled, *found[share:]], strict=False):
+                session.assess([first])
+                session.assess([second])
+            self._go_on(session, guesses, plan, rng)
+
+        return session.result(self.name, seed, session.run(explore))
+
+    def _go_on(
+        self, session: SearchSession, guesses: Guesses, plan: Plan, rng: np.random.Generator
+    ) -> None:
+        """Change the best by blasts, one of many changes at a time, until the blasts are spent."""
+        moves = Moves(guesses.case.scenario)
+        tried: set[Layout] = set(session.ranked(plan.threats))
+        while True:
+            best = session.ranked(plan.threats)[:_KEPT]
+            changed = [_changed(best, moves, rng) for _ in range(self.drawn)]
+            new = [each for each in dict.fromkeys(changed) if each not in tried] or changed
+            chosen = new[int(guesses.loads(new).argmin())]
+            tried.add(chosen)
+            session.assess([chosen])

@@ -1,0 +1,177 @@
+"""What the surrogate sees of a site: points on the walls that count, and what may stop a blast."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from blast_agents.surrogate.ways import SHARES, Ways
+from blast_env.arrays import FloatArray
+from blast_env.calibration import kingery_bulmash
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element
+from blast_env.physics.scene import Charge
+from blast_env.scenario import AnyStructure, Scenario
+
+_ALONG_M: Final = 1.0
+_UP_M: Final = 1.5
+_BEFORE_M: Final = 0.05
+"""Points are this far before their wall, so that it does not stop what comes to them."""
+
+_LEAST_HEIGHT_M: Final = 0.3
+"""A charge on the ground begins so high: its middle."""
+
+_LEAST_Z: Final = 0.2
+"""A point that is nearer to the charge, m/kg^(1/3), has the reflected impulse from there."""
+
+_OUTWARD: Final = {"west": (-1, 0), "east": (1, 0), "south": (0, -1), "north": (0, 1)}
+
+FEATURES: Final = 7 + 2 * SHARES
+"""Numbers that the network is given about a point."""
+
+
+@dataclass(frozen=True, eq=False)
+class WallPoints:
+    """Points that stand for the walls of a structure that count.
+
+    Attributes:
+        points_m: (points, 3).
+        outward: Where their wall looks (points, 2).
+        area_m2: What each stands for (points,).
+        to_edge_m: To the nearest upright edge of its wall (points,).
+        to_roof_m: To the roof (points,).
+    """
+
+    points_m: FloatArray
+    outward: FloatArray
+    area_m2: FloatArray
+    to_edge_m: FloatArray
+    to_roof_m: FloatArray
+
+    @classmethod
+    def on(cls, structure: AnyStructure, height_m: float) -> "WallPoints":
+        """Put points on a structure, one a metre along a wall and 1.5 m of its height, or so."""
+        left, bottom, right, top = structure.rectangle_m
+        levels = max(1, round(height_m / _UP_M))
+        z_m = (np.arange(levels) + 0.5) * height_m / levels
+        rows = []
+        for face in structure.faces:
+            x_out, y_out = _OUTWARD[face]
+            length_m = top - bottom if x_out else right - left
+            number = max(1, round(length_m / _ALONG_M))
+            area_m2 = length_m * height_m / (number * levels)
+            for along_m in (np.arange(number) + 0.5) * length_m / number:
+                if x_out:
+                    x_m, y_m = (left if x_out < 0 else right) + _BEFORE_M * x_out, bottom + along_m
+                else:
+                    x_m, y_m = left + along_m, (bottom if y_out < 0 else top) + _BEFORE_M * y_out
+                edge_m = min(along_m, length_m - along_m)
+                rows += [(x_m, y_m, z, x_out, y_out, area_m2, edge_m, height_m - z) for z in z_m]
+        table = np.array(rows)
+        return cls(table[:, :3], table[:, 3:5], table[:, 5], table[:, 6], table[:, 7])
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """A charge and the walls of a structure: what of it no layout changes.
+
+    Attributes:
+        ways: From the charge to the points.
+        fixed: The first features of each point (points, FEATURES - SHARES).
+        log_impulse: Logarithm of Kingery and Bulmash's reflected impulse there, Pa s (points,).
+        area_m2: What each point stands for (points,).
+    """
+
+    ways: Ways
+    fixed: FloatArray
+    log_impulse: FloatArray
+    area_m2: FloatArray
+
+    def features(self, barrier: FloatArray) -> FloatArray:
+        """Return the features of the points behind a barrier (points, FEATURES)."""
+        return np.hstack((self.fixed, self.ways.shares(barrier)))
+
+
+class Site:
+    """A scenario as the surrogate sees it.
+
+    Args:
+        scenario: The scenario.
+
+    Attributes:
+        scenario: The scenario.
+        protected: Its protected structures.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.protected = tuple(each for each in scenario.structures if each.protected)
+        air_m = scenario.air_height_m
+        self._solids = np.array(
+            [[*each.rectangle_m, each.height_m or air_m] for each in scenario.structures]
+        ).reshape(-1, 5)
+        self._points = [WallPoints.on(each, each.height_m or air_m) for each in self.protected]
+        self._approaches: dict[Charge, tuple[Approach, ...]] = {}
+
+    def approaches(self, charge: Charge) -> tuple[Approach, ...]:
+        """Return what comes from a charge to each protected structure on the empty site."""
+        if charge not in self._approaches:
+            found = tuple(self._approach(charge, points) for points in self._points)
+            self._approaches[charge] = found
+        return self._approaches[charge]
+
+    def barrier(self, layout: Sequence[Element]) -> FloatArray:
+        """Return left, bottom, right, top and height of what a layout sets down, m (pieces, 5).
+
+        Raises:
+            LayoutError: If the catalogue has no such piece.
+        """
+        zone, air_m = self.scenario.zone, self.scenario.air_height_m
+        rows = [
+            [*zone.element_rectangle_m(each), zone.catalogue.variant(each).height_m or air_m]
+            for each in layout
+        ]
+        return np.array(rows, dtype=np.float64).reshape(-1, 5)
+
+    def _approach(self, charge: Charge, points: WallPoints) -> Approach:
+        start_m = np.array((*charge.position_m, max(charge.height_m, _LEAST_HEIGHT_M)))
+        away_m = start_m - points.points_m
+        distance_m = np.linalg.norm(away_m, axis=1)
+        scale = float(np.cbrt(charge.tnt_kg))
+        facing = (away_m[:, :2] * points.outward).sum(axis=1) / distance_m
+        ways = Ways.between(start_m, points.points_m, charge.tnt_kg, self._solids)
+        geometry = np.stack(
+            (
+                np.log(distance_m / scale),
+                facing,
+                np.abs(facing),
+                points.points_m[:, 2] / scale,
+                points.to_roof_m / scale,
+                points.to_edge_m / scale,
+                np.full(len(distance_m), np.log(scale)),
+            ),
+            axis=1,
+        )
+        met_m = np.maximum(distance_m, _LEAST_Z * scale)
+        impulse = kingery_bulmash("reflected_impulse", met_m, charge.tnt_kg)
+        fixed = np.hstack((geometry, ways.shares()))
+        return Approach(ways, fixed, np.log(impulse), points.area_m2)
+
+
+def site_of(scenario: Scenario) -> Site:
+    """Return a scenario as the surrogate sees it.
+
+    Raises:
+        BlastEnvError: If nothing on it is protected, or its objective counts peaks, of which the
+            surrogate knows nothing.
+    """
+    if scenario.objective.needs_peaks:
+        raise BlastEnvError(
+            f"{scenario.name}: objective.quantity is {scenario.objective.quantity!r}, but the"
+            " surrogate knows impulses only"
+        )
+    site = Site(scenario)
+    if not site.protected:
+        raise BlastEnvError(f"{scenario.name}: no structure is protected")
+    return site

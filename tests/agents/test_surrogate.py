@@ -1,0 +1,282 @@
+"""The surrogate: what ways are open, what it learns, how it is kept, and what is found with it."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from blast_agents.rules import random_layout
+from blast_agents.search import LayoutProblem
+from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.surrogate.fitting import MEMBERS, Samples, elements, errors, fit, folds
+from blast_agents.surrogate.network import SHAPES, Fit, Member, Surrogate, load_surrogate
+from blast_agents.surrogate.search import Guesses, SurrogateAgent, SurrogateSearch, improved
+from blast_agents.surrogate.walls import FEATURES, WallPoints, site_of
+from blast_agents.surrogate.ways import FALLS_M, SHARES, Ways
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Case, draw_threats
+from blast_env.geometry import Piece
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Placement, Scenario, load_scenario
+from scripts.blast_table import COLUMNS, SITE_NAME, scenario_of
+from scripts.surrogate import varied_layouts, verdict
+from tests.agents.test_self_labelling import wide_yard
+
+CHARGE_M = np.array([0.0, 0.0, 0.3])
+POINT_M = np.array([[20.0, 0.0, 1.5]])
+NOTHING = np.empty((0, 5))
+FAST = GasEngine(border_m=0.0, time_limit_s=0.02)
+YARD = wide_yard()
+ABOUT = Fit(
+    command="by hand",
+    versions={},
+    engine="made up",
+    blasts=1,
+    sites=1,
+    layouts_rms=0.1,
+    layouts_rank=0.9,
+    sites_rms=0.1,
+    sites_rank=0.9,
+)
+
+
+def wall(x_m: float, low_m: float, high_m: float, height_m: float) -> list[float]:
+    return [x_m, low_m, x_m + 0.5, high_m, height_m]
+
+
+def shares(*solids: list[float], point_m: np.ndarray = POINT_M) -> np.ndarray:
+    ways = Ways.between(CHARGE_M, point_m, 100.0, NOTHING)
+    return ways.shares(np.array(solids).reshape(-1, 5))[0]
+
+
+def by_hand(seed: int = 0, members: int = 2) -> Surrogate:
+    """Return networks that nobody has fitted; what hides a wall lowers their guesses."""
+    rng = np.random.default_rng(seed)
+    networks = []
+    for _ in range(members):
+        arrays = [0.05 * rng.standard_normal(shape) for shape in SHAPES]
+        arrays[0][-SHARES:] += 0.2
+        arrays[2] += 0.02
+        arrays[4] += 0.02
+        networks.append(Member(*arrays))
+    return Surrogate(np.zeros(FEATURES), np.ones(FEATURES), tuple(networks), ABOUT)
+
+
+def test_all_is_open_where_nothing_stands_and_nothing_behind_an_endless_wall() -> None:
+    assert shares() == pytest.approx(1.0)
+    assert shares(wall(5.0, -100.0, 100.0, 100.0)) == pytest.approx(0.0)
+    assert shares(wall(25.0, -100.0, 100.0, 100.0)) == pytest.approx(1.0)  # behind the point
+    assert shares(wall(5.0, 30.0, 40.0, 100.0)) == pytest.approx(1.0)  # far aside
+
+
+def test_ways_go_over_the_top_and_round_the_ends() -> None:
+    low, high = shares(wall(5.0, -50.0, 50.0, 2.0)), shares(wall(5.0, -50.0, 50.0, 4.0))
+    assert low[-1] == high[-1] == 0.0
+    assert (low[:-1] >= high[:-1]).all()
+    assert low.sum() > 1.2 * high.sum() > 0.0
+    narrow, wide = shares(wall(5.0, -1.0, 1.0, 50.0)), shares(wall(5.0, -4.0, 4.0, 50.0))
+    assert narrow.sum() > 1.2 * wide.sum() > 0.0
+    gap = shares(wall(5.0, -50.0, -0.5, 50.0), wall(5.0, 0.5, 50.0, 50.0))
+    assert gap[-1] == 1.0
+    assert 0.0 < gap[-2] < 1.0
+
+
+def test_long_detours_count_for_more_where_the_weight_falls_slowly() -> None:
+    """Behind a wide wall only long detours are open."""
+    behind = shares(wall(10.0, -5.0, 5.0, 50.0))[:-1].reshape(-1, len(FALLS_M))
+    assert (np.diff(behind, axis=1) >= 0.0).all()
+    assert behind[1, -1] > behind[1, 0]
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(
+    boxes=st.lists(
+        st.tuples(st.floats(2.0, 16.0), st.floats(-6.0, 6.0), st.floats(0.5, 6.0)),
+        min_size=1,
+        max_size=5,
+    ),
+    more=st.tuples(st.floats(2.0, 16.0), st.floats(-6.0, 6.0), st.floats(0.5, 6.0)),
+)
+def test_more_barrier_never_opens_a_way_and_mirrors_change_nothing(
+    boxes: list[tuple[float, float, float]], more: tuple[float, float, float]
+) -> None:
+    solids = [wall(x, y - 1.0, y + 1.0, height) for x, y, height in boxes]
+    x, y, height = more
+    found = shares(*solids)
+    assert (shares(*solids, wall(x, y - 1.0, y + 1.0, height)) <= found + 1e-12).all()
+    mirrored = [[left, -top, right, -bottom, h] for left, bottom, right, top, h in solids]
+    assert shares(*mirrored) == pytest.approx(found, abs=1e-9)
+
+
+def test_points_stand_for_the_walls_that_count() -> None:
+    structure = load_scenario("visitor_entrance").structures[0]
+    points = WallPoints.on(structure, 3.5)
+    left, bottom, right, top = structure.rectangle_m
+    lengths = {"west": top - bottom, "east": top - bottom}
+    lengths |= {"south": right - left, "north": right - left}
+    assert points.area_m2.sum() == pytest.approx(3.5 * sum(lengths[f] for f in structure.faces))
+    assert (points.points_m[:, 2] < 3.5).all()
+    assert points.to_roof_m + points.points_m[:, 2] == pytest.approx(3.5)
+    assert len(points.points_m) == len(points.outward) == len(points.to_edge_m)
+
+
+def test_a_guess_is_the_same_alone_and_among_others() -> None:
+    site, surrogate = site_of(YARD), by_hand()
+    rng = np.random.default_rng(0)
+    layouts = [random_layout(YARD, rng) for _ in range(3)]
+    charges = [Charge((1.5, 4.0), 5.0), Charge((2.0, 8.0), 5.0), Charge((1.5, 4.0), 5.0)]
+    together = surrogate.guess(site, layouts, charges)
+    assert together.impulse_pa_s.shape == together.spread.shape == (3, len(site.protected))
+    assert (together.spread > 0.0).all()
+    for number, (layout, charge) in enumerate(zip(layouts, charges, strict=True)):
+        alone = surrogate.guess(site_of(YARD), [layout], [charge])
+        assert alone.impulse_pa_s[0] == pytest.approx(together.impulse_pa_s[number], rel=1e-12)
+
+
+def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
+    surrogate = by_hand()
+    path = surrogate.save(tmp_path / "surrogate.json")
+    again = load_surrogate(path)
+    assert again.fit == ABOUT
+    site, charge = site_of(YARD), Charge((1.5, 4.0), 5.0)
+    guesses = [each.guess(site, [()], [charge]).impulse_pa_s for each in (surrogate, again)]
+    assert guesses[0] == pytest.approx(guesses[1], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda content: content["mean"].pop(), "mean"),
+        (lambda content: content["scale"].__setitem__(3, 0.0), r"scale\[3\]"),
+        (lambda content: content["members"][1][2].pop(), "network 1 has arrays of .*2303"),
+        (lambda content: content.update(members=[]), "members"),
+        (lambda content: content["fit"].update(blasts=0), "fit.blasts"),
+        (lambda content: content.update(more=1), "more"),
+    ],
+)
+def test_what_is_no_surrogate_is_refused(change: object, words: str, tmp_path: Path) -> None:
+    path = by_hand().save(tmp_path / "surrogate.json")
+    content = json.loads(path.read_text())
+    assert callable(change)
+    change(content)
+    path.write_text(json.dumps(content))
+    with pytest.raises(BlastEnvError, match=f"surrogate.json: is no surrogate, .*{words}"):
+        load_surrogate(path)
+
+
+def test_peaks_are_not_its_business() -> None:
+    document = YARD.model_dump() | {"objective": {"quantity": "peak"}}
+    with pytest.raises(BlastEnvError, match="'peak', but the surrogate knows impulses only"):
+        site_of(Scenario.from_document(document, "peaks"))
+
+
+def table_of_guesses(truth: Surrogate, layouts: int) -> pd.DataFrame:
+    """Return a table of blasts that never were: what one surrogate says, for another to learn."""
+    site, rng = site_of(YARD), np.random.default_rng(1)
+    tried = [(), *(random_layout(YARD, rng) for _ in range(layouts - 1))]
+    charges = [Charge((1.0 + 1.5 * rng.random(), 3.0 + 6.0 * rng.random()), 5.0) for _ in tried]
+    said = truth.guess(site, tried, charges).impulse_pa_s
+    rows = [
+        ("", YARD.content_hash, json.dumps(layout), *charge.position_m, 0.0, 5.0, 0, "gas")
+        + (structure.name, True, float(said[number, column]), 1.0)
+        for number, (layout, charge) in enumerate(zip(tried, charges, strict=True))
+        for column, structure in enumerate(site.protected)
+    ]
+    return pd.DataFrame(rows, columns=[column.name for column in COLUMNS])
+
+
+def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
+    table = table_of_guesses(by_hand(7, members=1), 80)
+    samples = Samples.of(table, {YARD.content_hash: YARD})
+    held = folds(samples.layout, 4, 0)
+    assert sum(each.sum() for each in held) == len(samples)
+    learnt = fit(samples, ~held[0], 20, 0, ABOUT)
+    assert len(learnt.members) == MEMBERS
+    found = errors(learnt, samples, held[0])
+    spread = float(np.std(samples.target[held[0]]))
+    assert found.rms < 0.35 * spread
+    twice = fit(samples, ~held[0], 20, 0, ABOUT)
+    assert all((a == b).all() for a, b in zip(learnt.members[0], twice.members[0], strict=True))
+
+
+def test_rows_of_unknown_scenarios_are_left_out() -> None:
+    table = table_of_guesses(by_hand(), 3)
+    with pytest.raises(BlastEnvError, match="no load of a protected structure"):
+        Samples.of(table, {})
+
+
+def test_layouts_of_the_table_are_read_back() -> None:
+    assert elements("[[1, 2], [3, 4]]") == ((1, 2), (3, 4))
+    assert elements('[[1, 2, "t_wall", true]]') == (Piece(1, 2, "t_wall", True),)
+
+
+def case(charges: int = 1) -> Case:
+    return Case(YARD, draw_threats(YARD, range(charges)))
+
+
+def test_a_search_by_guesses_is_never_worse_than_what_it_begins_with() -> None:
+    guesses = Guesses.of(by_hand(), case())
+    begin = [(), *layouts_by_rule(YARD).values()]
+    ranked = improved(guesses, begin, 20, np.random.default_rng(0))
+    loads = guesses.loads(ranked)
+    assert (np.diff(loads) >= 0.0).all()
+    assert loads[0] <= guesses.loads([tuple(sorted(each)) for each in begin]).min()
+    assert len(ranked) > len(begin)
+    for layout in ranked:
+        assert Placement.of(YARD, layout).layout == layout
+
+
+def test_the_agent_proposes_the_same_legal_layout_again() -> None:
+    agent = SurrogateAgent(by_hand(), changes=8)
+    for charge in (None, Charge((1.5, 5.0), 5.0)):
+        layout = agent.propose(YARD, charge)
+        assert layout == agent.propose(YARD, charge)
+        assert Placement.of(YARD, layout).layout == layout
+        assert layout
+
+
+def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
+    """With blasts for all rules it is at least as good as the best of them."""
+    problem = LayoutProblem(BlastEvaluator(YARD, FAST), case())
+    ruled = {tuple(sorted(each)) for each in layouts_by_rule(YARD, problem.told).values()}
+    budget = 3 * len(ruled)
+    method = SurrogateSearch(by_hand(), "digest", guesses=12, drawn=4)
+    result = method.search(problem, budget, 0)
+    assert result.blasts <= budget
+    assert result.load is not None
+    assert result.load <= min(map(problem.load, ruled))
+    assert result == method.search(problem, budget, 0)
+    assert replace(method, guesses=13) != method
+
+
+def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
+    layouts = varied_layouts(YARD, 8, 1)
+    assert layouts[0] == ()
+    assert len(set(layouts)) == len(layouts) > 8
+    assert {tuple(sorted(each)) for each in layouts_by_rule(YARD).values()} <= set(layouts)
+    for layout in layouts:
+        assert Placement.of(YARD, layout).layout == layout
+    assert layouts == varied_layouts(YARD, 8, 1)
+
+
+def test_scenarios_of_the_table_are_found_by_their_names() -> None:
+    assert scenario_of("visitor_entrance") == load_scenario("visitor_entrance")
+    assert scenario_of(f"{SITE_NAME}10000").name == "site_10000"
+
+
+def test_a_verdict_holds_promise_and_rules_against_blasts() -> None:
+    evaluator = BlastEvaluator(YARD, FAST)
+    agent, threat = SurrogateAgent(by_hand(), changes=2), draw_threats(YARD, [3])[0]
+    found = verdict(agent, evaluator, threat)
+    bare = evaluator.loads((), threat).protected_impulse_pa_s
+    proposed = evaluator.loads(agent.propose(YARD, threat.charge), threat)
+    assert found.reduction == pytest.approx(1.0 - proposed.protected_impulse_pa_s / bare)
+    assert set(found.rules) == set(layouts_by_rule(YARD, threat.charge))
+    assert found.promised < 1.0
+    assert found.ms > 0.0
