@@ -137,7 +137,6 @@ SMALLER: Final[dict[str, str]] = {
         "--threats 1 --places 1 --stills 1 --no-items"
     ),
     "python -m scripts.gas judge": "--random-layouts 1 --charges 1 --seeds 1",
-    "python -m scripts.gas judge --random-layouts 4 --seeds 2": "--random-layouts 1 --charges 1",
     # docs/start.md
     "blast-env search --engine gas --scenario depot.toml --threat hidden --method annealing"
     " --budget 300 --start-from building/layout.json --processes 2 --cache blasts --out found": (
@@ -181,7 +180,22 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "python -m scripts.gas borders --places 2/0,2/12,2/24,8/48": ("--places 2/0,2/12 --until 0.05"),
     "python -m scripts.gas air-height": "--heights 9,12 --until 0.05",
-    "python -m scripts.gas cells": "--sizes 0.5 --random-layouts 0",
+    "python -m scripts.gas cells --random-layouts 18 --finest 0.125": (
+        "--sizes 0.5 --random-layouts 0 --finest 0.5"
+    ),
+    "python -m scripts.gas cells --scenario visitor_entrance --random-layouts 18 --finest 0.125": (
+        "--sizes 0.5 --random-layouts 0 --finest 0.5"
+    ),
+    # docs/researchers/surrogate.md
+    "python -m scripts.surrogate fit --epochs 10 --out surrogate.json": "--epochs 1",
+    "blast-env league --engine gas --surrogate surrogate.json --scenario visitor_entrance"
+    " --agent-search 50 --out out/league": f"{_LEAGUE} --agent-search 3",
+    "python -m scripts.surrogate fit --no-check --without visitor_entrance --epochs 30"
+    " --out surrogate.json": "--epochs 1",
+    "python -m scripts.surrogate judge visitor_entrance --charges 6 --surrogate surrogate.json": (
+        "--charges 1 --changes 1"
+    ),
+    "python -m scripts.surrogate blasts": "--sites 1 --layouts 1 --cache blasts",
     # docs/paper
     "python -m scripts.presets ballistic": (
         "--candidates 1 --refinements 1 --seeds 1 --finalists 1 --finalist-seeds 1"
@@ -300,6 +314,9 @@ NOT_RUN: Final[dict[str, str]] = {
     ),
     "python -m scripts.pack_agent RUN NAME --league out/league --track known_NAME": (
         "writes into the package; tests/agents has it"
+    ),
+    "python -m scripts.blast_table FOLDER --sites 100 --out blasts.parquet": (
+        "FOLDER is a placeholder; tests/scripts/test_blast_table.py"
     ),
     "python -m scripts.blast_table FOLDER --out blasts.parquet": (
         "FOLDER is a placeholder; tests/scripts/test_blast_table.py"
