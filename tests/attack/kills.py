@@ -137,7 +137,7 @@ def _report(folder: Path) -> None:
     if not layout.exists():
         save_scenario(small_hut(), site)
         write_layout(layout, small_hut(), LAYOUT, {})
-    less = ("--threats", "1", "--places", "0", "--no-items", "--stills", "0", "--processes", "1")
+    less = ("--threats", "1", "--places", "1", "--no-items", "--stills", "0", "--processes", "1")
     where = ("--cache", folder / "cache", "--out", folder / "report.html")
     _command(folder, "report", site, "--layout", layout, *less, *where)
 

@@ -60,15 +60,15 @@ def _checkpoint(path: Path) -> None:
     replace(start, policy={"weight": torch.zeros(2000)}).save(path)
 
 
-def _report(html: Path, pdf: Path | None = None) -> None:
+def _report(html: Path, pdf: Path | None = None, words: int = 600) -> None:
     """Write a page that says little: what it says costs blasts."""
-    with patch("blast_env.reporting.page.report_html", lambda *_: "<p>" + "words " * 600):
+    with patch("blast_env.reporting.page.report_html", lambda *_: "<p>" + "words " * words):
         write_report(Mock(), html, pdf, [])
 
 
 def _pdf(path: Path) -> None:
     with scratch_folder() as folder:
-        _report(folder / "report.html", path)
+        _report(folder / "report.html", path, words=10)  # so that the page has room
 
 
 WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
