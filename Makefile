@@ -30,11 +30,12 @@ quick: $(STAMP)
 test-browser: $(STAMP)
 	$(BIN)/pytest tests/app/browser
 
-# Thousands of wrong files of every format that is read, kills at every step on the disk; half an
-# hour on one core.
+# Thousands of wrong files of every format that is read, kills at steps on the disk, full devices;
+# an hour on one core.
 attack: $(STAMP)
 	$(BIN)/python -m tests.attack.run files
 	$(BIN)/python -m tests.attack.run kills
+	$(BIN)/python -m tests.attack.run disks
 
 # The site: out/docs/html/index.html. Warnings are errors; notebooks run when they have changed.
 docs: $(VENV)/.docs
