@@ -201,7 +201,7 @@ def main(
                 continue
             for part in parts:
                 if not _passes(tree, part.tests):
-                    raise typer.Exit(f"{part.module}: its tests fail as it is")
+                    raise SystemExit(f"{part.module}: its tests fail as it is")
             places, mutants = drawn(parts, count, Random(f"{seed} {area}"))
             survivors, tried = [], 0
             for mutant in mutants:

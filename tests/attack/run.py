@@ -270,7 +270,7 @@ def _killed(most: int, name: str, folder: Path) -> JobOutcome:
     steps, whole = steps_and_outcome(name, folder / "whole")
     places = spread(steps - 1, min(most, steps))
     problems = (
-        problem_with(lambda at=at: outcome_after_kill(name, folder / f"{at}", at), whole)
+        problem_with(partial(outcome_after_kill, name, folder / f"{at}", at), whole)
         for at in places
     )
     return JobOutcome(steps, len(places), _told("step", places, problems))
@@ -281,9 +281,7 @@ def _without_room(most: int, name: str, folder: Path) -> JobOutcome:
     size = size_of(folder / "whole")
     rooms = spread(size, most)
     problems = (
-        problem_with(
-            lambda left=left: outcome_after_full_device(name, folder / "disk", size, left), whole
-        )
+        problem_with(partial(outcome_after_full_device, name, folder / "disk", size, left), whole)
         for left in rooms
     )
     return JobOutcome(size // _KB, len(rooms), _told("bytes left", rooms, problems))
