@@ -75,7 +75,7 @@ _LAWS: Final = tuple(
 _COMPARISON: Final = ("tests/evaluation/test_statistics.py", "tests/evaluation/test_objective.py")
 _PLACES: Final = tuple(
     f"tests/scenario/test_{name}.py"
-    for name in ("placement", "layout", "conditions", "zone_checks", "access_way")
+    for name in ("placement", "layout", "conditions", "zone_checks", "access_way", "checks")
 )
 
 AREAS: Final[Mapping[str, list[Part]]] = MappingProxyType(
