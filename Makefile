@@ -7,7 +7,8 @@ STAMP := $(VENV)/.installed
 export SDL_VIDEODRIVER ?= dummy
 export PYGAME_HIDE_SUPPORT_PROMPT := 1
 
-.PHONY: demo test suite test-browser attack quick docs site shown lint types compiled check setup clean
+.PHONY: demo test suite test-browser attack mutants matrix quick docs site shown lint types compiled \
+	check setup clean
 
 demo: $(STAMP)
 	$(BIN)/python scripts/demo.py
@@ -30,11 +31,44 @@ quick: $(STAMP)
 test-browser: compiled
 	$(BIN)/pytest tests/app/browser
 
-# Thousands of wrong files of every format that is read, kills at every step on the disk; half an
-# hour on one core.
+# Thousands of wrong files of every format that is read, kills at steps on the disk, full devices;
+# an hour on one core.
 attack: $(STAMP)
 	$(BIN)/python -m tests.attack.run files
 	$(BIN)/python -m tests.attack.run kills
+	$(BIN)/python -m tests.attack.run disks
+
+# Small errors put into the rules of the core: do their tests notice? Half an hour on one core.
+mutants: $(VENV)/.mutants
+	$(BIN)/python -m tests.mutation
+
+$(VENV)/.mutants: $(STAMP)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt cosmic-ray
+	touch $@
+
+# The tests of `make quick` with other Pythons, which uv gets, and with the oldest libraries that
+# pyproject.toml allows; torch stays as it is, because each of its versions is gigabytes. Without
+# agents: MATRIX_EXTRAS=app,cluster,report MATRIX_TESTS="tests/physics tests/recording".
+MATRIX := 3.11 3.12 3.13 lowest
+MATRIX_EXTRAS ?= all
+MATRIX_TESTS ?= $(QUICK:%=tests/%)
+MATRIX_TOOLS := pytest hypothesis pytest-benchmark pytest-xdist imageio openpyxl pypdfium2
+MATRIX_PYTHON = out/matrix/$*/bin/python
+matrix: $(MATRIX:%=matrix-%)
+
+matrix-%: $(VENV)/.uv
+	mkdir -p out/matrix
+	grep '^torch==' constraints.txt > out/matrix/torch.txt
+	$(BIN)/uv venv --quiet --clear --python $(if $(filter lowest,$*),3.11,$*) out/matrix/$*
+	$(BIN)/uv pip install --quiet --python $(MATRIX_PYTHON) -e ".[$(MATRIX_EXTRAS)]" \
+		$(if $(filter lowest,$*),--resolution lowest-direct --override out/matrix/torch.txt,-c constraints.txt)
+	$(BIN)/uv pip install --quiet --python $(MATRIX_PYTHON) $(MATRIX_TOOLS)
+	$(MATRIX_PYTHON) -m pytest --numprocesses auto --dist worksteal -m "not slow" \
+		$(if $(filter lowest,$*),-W ignore::DeprecationWarning) $(MATRIX_TESTS)
+
+$(VENV)/.uv: $(STAMP)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt uv
+	touch $@
 
 # The site, and everything that it shows: code and commands, each page in a folder of its own.
 docs: $(VENV)/.docs

@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from stat import S_ISREG
+from tempfile import TemporaryDirectory
 from typing import Final, NamedTuple, TypeVar
 
 from blast_env.errors import BlastEnvError
@@ -75,6 +76,21 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
     finally:
         with suppress(OSError):  # of a device that fails altogether
             temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Give a folder for files that nobody keeps; it goes when the block ends.
+
+    Raises:
+        BlastEnvError: If it cannot be made, or if the block raises `OSError`: the device is full,
+            for example.
+    """
+    try:
+        with TemporaryDirectory() as folder:
+            yield Path(folder)
+    except OSError as error:
+        raise _cannot_write("a scratch folder", error) from error
 
 
 def is_temporary(name: str) -> bool:

@@ -15,6 +15,7 @@ from blast_env import load_scenario
 from blast_env.cli.output import print_line, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastKey, DiskCache, StructureLoad
+from blast_env.files import make_folder
 from blast_env.provenance import versions
 from blast_env.recording.parquet import write_table
 from blast_env.scenario import Scenario, bundled_scenarios
@@ -73,7 +74,7 @@ def main(
         if not rows:
             raise BlastEnvError(f"no blasts in {', '.join(map(str, folders))}")
         table = table_of([row for own in rows.values() for row in own], COLUMNS)
-        out.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(out.parent)
         write_table(table, COLUMNS, {"blasts": len(rows), **versions()}, out)
     print_line(f"{len(rows):,} blasts; wrote {out}")
 

@@ -21,7 +21,7 @@ from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import evaluate_against
-from blast_env.files import write_atomically
+from blast_env.files import make_folder, write_atomically
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import Scenario, bundled_scenarios
 from blast_env.tables import markdown_table
@@ -90,7 +90,7 @@ def main(
         scenarios = [load_scenario(name) for name in names or studied_scenarios()]
         for scenario in scenarios:  # before the blasts, so that no result is lost
             with_section(read_page(page), scenario.name, "")
-        pictures.mkdir(parents=True, exist_ok=True)
+        make_folder(pictures)
         results = []
         for scenario in scenarios:
             if scenario.zone.items:

@@ -80,11 +80,8 @@ class DesignFolder:
             BlastEnvError: If it cannot be written.
         """
         content = json.dumps(history.record(), allow_nan=False)
-        try:
-            with write_atomically(self.path / _DESIGN) as temporary:
-                temporary.write_text(content, encoding="utf-8")
-        except OSError as error:  # a full disk
-            raise BlastEnvError(f"{self.path}: cannot be written: {error.strerror}") from error
+        with write_atomically(self.path / _DESIGN) as temporary:
+            temporary.write_text(content, encoding="utf-8")
 
     def load(self) -> History:
         """Return the design with its steps.

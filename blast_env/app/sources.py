@@ -3,12 +3,11 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from blast_env.errors import BlastEnvError
-from blast_env.files import write_atomically
+from blast_env.files import scratch_folder, write_atomically
 from blast_env.scenario import LayoutFile, Scenario, load_scenario
 from blast_env.sites import generate_site
 
@@ -94,9 +93,9 @@ def _from_file(
     if suffix not in readers:
         known = ", ".join(readers)
         raise BlastEnvError(f"{name}: has the suffix {suffix!r}, {what} must have {known}")
-    with TemporaryDirectory() as folder:
+    with scratch_folder() as folder:
         # The name stands in messages; nothing of it but its last part leads anywhere.
-        path = Path(folder) / Path(name.replace("\\", "/")).name
+        path = folder / Path(name.replace("\\", "/")).name
         try:
             with write_atomically(path, durable=False) as temporary:
                 temporary.write_bytes(content)

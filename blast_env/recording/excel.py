@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
@@ -16,7 +15,7 @@ from xlsxwriter.exceptions import XlsxFileError
 
 from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
-from blast_env.files import write_atomically
+from blast_env.files import scratch_folder, write_atomically
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.recording.tables import (
     COLLISION_COLUMNS,
@@ -460,9 +459,9 @@ def _workbook(path: str | Path) -> Iterator[Any]:
         try:
             with (
                 # XlsxWriter's own scratch files would stay if it failed.
-                TemporaryDirectory() as scratch,
+                scratch_folder() as scratch,
                 xlsxwriter.Workbook(
-                    str(temporary), {"constant_memory": True, "tmpdir": scratch}
+                    str(temporary), {"constant_memory": True, "tmpdir": str(scratch)}
                 ) as workbook,
             ):
                 workbook.use_zip64()

@@ -6,7 +6,6 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from math import isfinite, isnan
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Final
 from warnings import catch_warnings, filterwarnings
 
@@ -14,7 +13,7 @@ import numpy as np
 import tomli_w
 
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.files import write_atomically
+from blast_env.files import scratch_folder, write_atomically
 from blast_env.geometry import layout_counts, layout_text
 from blast_env.physics.gas.engine import CHECKED_SCALED_DISTANCE
 from blast_env.provenance import code_version, command, versions
@@ -254,8 +253,8 @@ def _points(share: float) -> str:
 
 def _layout_file(study: Study) -> str:
     """Return the layout as a file that commands take."""
-    with TemporaryDirectory() as folder:
-        path = write_layout(Path(folder) / "layout.json", study.scenario, study.layout)
+    with scratch_folder() as folder:
+        path = write_layout(folder / "layout.json", study.scenario, study.layout)
         return path.read_text(encoding="utf-8")
 
 

@@ -5,7 +5,9 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+from tests.attack.kills import JOBS, REFUSED, in_process, outcome_of_going_on
 
 
 @contextmanager
@@ -54,3 +56,36 @@ def fill(folder: Path, left: int) -> None:
             pass
         page = 4096
         file.truncate(max(file.tell() - page * (-(-left // page)), 0))
+
+
+def size_of(folder: Path) -> int:
+    """Return how many bytes the files in a folder take."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def outcome_after_full_device(name: str, device: Path, size: int, left: int) -> Any:
+    """Do a job on a device without room for all of it, make room, and begin it again.
+
+    Args:
+        name: The job.
+        device: Where the device of memory is mounted.
+        size: What the job takes, in bytes.
+        left: The room that the job has at first.
+
+    Returns:
+        What came of it.
+
+    Raises:
+        RuntimeError: If it failed with anything but the documented error, or could not go on.
+        PermissionError: If no device can be mounted.
+    """
+    folder = device / "job"
+    with small_device(device, 4 * size + 2**24):
+        fill(device, left)
+        ending = in_process(JOBS[name].run, folder)
+        if ending.code not in (0, REFUSED):
+            raise RuntimeError(f"ended with exit code {ending.code}")
+        if ending.code == REFUSED and "cannot be" not in ending.said:
+            raise RuntimeError(f"says of a full device: {ending.said}")
+        (device / _RESERVE).unlink()
+        return outcome_of_going_on(name, folder)

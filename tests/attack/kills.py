@@ -43,6 +43,9 @@ from tests.reporting.sites import LAYOUT, small_hut
 _STEPS: Final = ("os.rename", "os.mkdir", "os.remove", "open")
 _WRITING: Final = os.O_WRONLY | os.O_RDWR
 
+REFUSED: Final = 3
+"""Exit code of a job that ends with the documented error."""
+
 
 @dataclass(frozen=True)
 class Job:
@@ -80,16 +83,17 @@ def _training_outcome(folder: Path) -> Any:
     return weights, best, steps, reductions, rows, evaluations, left
 
 
-def _command(folder: Path, *arguments: str | Path) -> None:
-    result = CliRunner().invoke(app, [str(each) for each in arguments])
-    if result.exit_code != 0:
-        raise BlastEnvError(f"{folder}: {result.output}")
+def _command(*arguments: str | Path) -> None:
+    result = CliRunner().invoke(app, [str(each) for each in arguments], catch_exceptions=False)
+    if result.exit_code == 2:  # what a command says to the user
+        raise BlastEnvError(result.output)
+    assert result.exit_code == 0, result.output
 
 
 def _search(folder: Path) -> None:
     options = ("--method", "random", "--budget", "6", "--held-out", "2", "--seed", "1")
     where = ("--cache", folder / "cache", "--out", folder / "out")
-    _command(folder, "search", *options, *where)
+    _command("search", *options, *where)
 
 
 def _evaluate(folder: Path) -> None:
@@ -97,7 +101,7 @@ def _evaluate(folder: Path) -> None:
     if not layout.exists():
         layout.write_text("[[9, 0], [10, 0]]")
     where = ("--cache", folder / "cache", "--out", folder / "out")
-    _command(folder, "evaluate", "--layout", layout, "--seeds", "2", *where)
+    _command("evaluate", "--layout", layout, "--seeds", "2", *where)
 
 
 def _files(folder: Path) -> dict[str, bytes]:
@@ -119,7 +123,10 @@ def _league(folder: Path) -> None:
 
 def _league_outcome(folder: Path) -> Any:
     store = FolderStore(folder / "results", ".result")
-    return _left(store.folder), _left(folder)
+    kept = [
+        (key, re.sub(rb'"(seconds|cpu_s)":[^,}]*', b"", content)) for key, content in store.items()
+    ]
+    return kept, _left(store.folder), _left(folder)
 
 
 def _study(folder: Path) -> None:
@@ -137,9 +144,9 @@ def _report(folder: Path) -> None:
     if not layout.exists():
         save_scenario(small_hut(), site)
         write_layout(layout, small_hut(), LAYOUT, {})
-    less = ("--threats", "1", "--places", "0", "--no-items", "--stills", "0", "--processes", "1")
+    less = ("--threats", "1", "--places", "1", "--no-items", "--stills", "0", "--processes", "1")
     where = ("--cache", folder / "cache", "--out", folder / "report.html")
-    _command(folder, "report", site, "--layout", layout, *less, *where)
+    _command("report", site, "--layout", layout, *less, *where)
 
 
 def _report_outcome(folder: Path) -> Any:
@@ -193,7 +200,24 @@ JOBS: Final = {
 }
 
 
-def _run_until(job: Callable[[Path], None], folder: Path, kill_at: int, steps: Any) -> None:
+@dataclass(frozen=True)
+class Ending:
+    """How a process has ended.
+
+    Attributes:
+        code: Its exit code; `REFUSED` for the documented error.
+        steps: How many steps it came to.
+        said: What the documented error said.
+    """
+
+    code: int
+    steps: int
+    said: str
+
+
+def _run_until(
+    job: Callable[[Path], None], folder: Path, kill_at: int, steps: Any, said: Any
+) -> None:
     """Do the job in this process, and kill it at a step in the folder."""
     place = str(folder)
 
@@ -207,23 +231,26 @@ def _run_until(job: Callable[[Path], None], folder: Path, kill_at: int, steps: A
         steps.value += 1
 
     sys.addaudithook(watch)
-    job(folder)
+    try:
+        job(folder)
+    except BlastEnvError as error:
+        said.put(str(error))
+        sys.exit(REFUSED)
 
 
-def in_process(job: Callable[[Path], None], folder: Path, kill_at: int = -1) -> tuple[int, int]:
-    """Do a job in a process of its own.
-
-    Returns:
-        The exit code of the process, and how many steps it came to.
-    """
+def in_process(job: Callable[[Path], None], folder: Path, kill_at: int = -1) -> Ending:
+    """Do a job in a process of its own; it is killed at a step, unless that is negative."""
     folder.mkdir(parents=True, exist_ok=True)
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([__name__])
-    steps = context.Value("i", 0, lock=False)
-    process = context.Process(target=_run_until, args=(job, folder, kill_at, steps))
+    # What the main module imports is imported in each process again, unless it is there.
+    context.set_forkserver_preload([__name__, "tests.attack.formats"])
+    steps, said = context.Value("i", 0, lock=False), context.SimpleQueue()
+    process = context.Process(target=_run_until, args=(job, folder, kill_at, steps, said))
     process.start()
     process.join()
-    return process.exitcode or 0, steps.value
+    return Ending(
+        process.exitcode or 0, steps.value, "" if said.empty() else " ".join(said.get().split())
+    )
 
 
 def outcome_after_kill(name: str, folder: Path, kill_at: int) -> Any:
@@ -234,20 +261,28 @@ def outcome_after_kill(name: str, folder: Path, kill_at: int) -> Any:
     Raises:
         RuntimeError: If it failed in another way, or could not go on.
     """
-    job = JOBS[name]
-    code, _ = in_process(job.run, folder, kill_at)
-    if code not in (0, -signal.SIGKILL):
-        raise RuntimeError(f"{name} was to be killed at step {kill_at}, ended with {code}")
-    code, _ = in_process(job.run, folder)
-    if code != 0:
-        raise RuntimeError(f"{name}, killed at step {kill_at}, cannot go on: exit code {code}")
-    return job.outcome(folder)
+    ending = in_process(JOBS[name].run, folder, kill_at)
+    if ending.code not in (0, -signal.SIGKILL):
+        raise RuntimeError(f"ended with {ending.code} before it was killed: {ending.said}")
+    return outcome_of_going_on(name, folder)
+
+
+def outcome_of_going_on(name: str, folder: Path) -> Any:
+    """Do a job, in what is there, and return what came of it.
+
+    Raises:
+        RuntimeError: If it failed.
+    """
+    ending = in_process(JOBS[name].run, folder)
+    if ending.code != 0:
+        raise RuntimeError(f"cannot go on: {ending.said or f'exit code {ending.code}'}")
+    return JOBS[name].outcome(folder)
 
 
 def steps_and_outcome(name: str, folder: Path) -> tuple[int, Any]:
     """Do a job that is not killed; return how many steps it takes and what comes of it."""
     job = JOBS[name]
-    code, steps = in_process(job.run, folder)
-    if code != 0:
-        raise RuntimeError(f"{name} ended with exit code {code}")
-    return steps, job.outcome(folder)
+    ending = in_process(job.run, folder)
+    if ending.code != 0:
+        raise RuntimeError(f"{name}: {ending.said or f'exit code {ending.code}'}")
+    return ending.steps, job.outcome(folder)

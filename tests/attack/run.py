@@ -4,9 +4,10 @@ import resource
 import signal
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time, time
@@ -17,6 +18,7 @@ import numpy as np
 import typer
 
 from blast_env.errors import BlastEnvError
+from tests.attack.disks import outcome_after_full_device, size_of, small_device
 from tests.attack.formats import FORMATS, Format
 from tests.attack.kills import JOBS, outcome_after_kill, steps_and_outcome
 from tests.attack.mutants import mutants
@@ -210,32 +212,102 @@ def kills(
     only: Annotated[str, typer.Option(help="Jobs with this in their names.")] = "",
 ) -> None:
     """Kill each job at one step on the disk after the other; print whether it goes on."""
+    _attack_jobs("steps on the disk | killed at", only, partial(_killed, most))
+
+
+@app.command()
+def disks(
+    most: Annotated[int, typer.Option(help="Devices for each job, evenly spread.")] = 12,
+    only: Annotated[str, typer.Option(help="Jobs with this in their names.")] = "",
+) -> None:
+    """Do each job on devices without room for all of it, and again with room.
+
+    The devices are of memory, which the superuser may mount.
+    """
+    try:
+        with TemporaryDirectory() as folder, small_device(Path(folder, "disk"), _KB):
+            pass
+    except PermissionError as error:
+        print(f"not tried: {error}")
+        return
+    _attack_jobs("KiB on the disk | devices", only, partial(_without_room, most))
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """What became of a job that was attacked.
+
+    Attributes:
+        size: How long or large it is.
+        attacks: How often it was attacked.
+        wrong: What went wrong.
+    """
+
+    size: int
+    attacks: int
+    wrong: list[str]
+
+
+def _attack_jobs(columns: str, only: str, attacked: Callable[[str, Path], JobOutcome]) -> None:
     failed = 0
-    print("| job | steps on the disk | killed at | goes on to the same result | time, s |")
+    print(f"| job | {columns} | goes on to the same result | time, s |")
     print("|---|---|---|---|---|")
     for name in JOBS:
         if only not in name:
             continue
         began_s = time()
         with TemporaryDirectory() as folder:
-            steps, whole = steps_and_outcome(name, Path(folder, "whole"))
-            places = sorted({*np.linspace(0, steps - 1, min(most, steps)).round().astype(int)})
-            problems = [_after_kill(name, Path(folder, f"{at}"), int(at), whole) for at in places]
-        wrong = [each for each in problems if each]
-        cells = (name, steps, len(places), len(places) - len(wrong), f"{time() - began_s:.0f}")
+            found = attacked(name, Path(folder))
+        right = found.attacks - len(found.wrong)
+        cells = (name, found.size, found.attacks, right, f"{time() - began_s:.0f}")
         print(f"| {' | '.join(map(str, cells))} |", flush=True)
-        print("".join(f"    {each}\n" for each in wrong), end="")
-        failed += len(wrong)
+        print("".join(f"    {each}\n" for each in found.wrong), end="", flush=True)
+        failed += len(found.wrong)
     raise typer.Exit(1 if failed else 0)
 
 
-def _after_kill(name: str, folder: Path, kill_at: int, whole: Any) -> str:
-    """Return what is wrong with a job that was killed and begun again; empty if nothing is."""
+def _killed(most: int, name: str, folder: Path) -> JobOutcome:
+    steps, whole = steps_and_outcome(name, folder / "whole")
+    places = spread(steps - 1, min(most, steps))
+    problems = (
+        problem_with(partial(outcome_after_kill, name, folder / f"{at}", at), whole)
+        for at in places
+    )
+    return JobOutcome(steps, len(places), _told("step", places, problems))
+
+
+def _without_room(most: int, name: str, folder: Path) -> JobOutcome:
+    _, whole = steps_and_outcome(name, folder / "whole")
+    size = size_of(folder / "whole")
+    rooms = spread(size, most)
+    problems = (
+        problem_with(partial(outcome_after_full_device, name, folder / "disk", size, left), whole)
+        for left in rooms
+    )
+    return JobOutcome(size // _KB, len(rooms), _told("bytes left", rooms, problems))
+
+
+def spread(last: int, count: int) -> list[int]:
+    """Return whole numbers from 0 to the last, evenly spread, each once."""
+    return sorted({int(each) for each in np.linspace(0, last, count).round()})
+
+
+def _told(what: str, places: Sequence[int], problems: Iterable[str]) -> list[str]:
+    return [f"{what} {at}: {each}" for at, each in zip(places, problems, strict=True) if each]
+
+
+def problem_with(attacked: Callable[[], Any], whole: Any) -> str:
+    """Return what is wrong with a job that was attacked and begun again; empty if nothing is.
+
+    Args:
+        attacked: Attacks it, begins it again and returns what came of it.
+        whole: What comes of it otherwise.
+    """
     try:
-        found = outcome_after_kill(name, folder, kill_at)
+        found = attacked()
     except (RuntimeError, BlastEnvError, OSError, ValueError) as error:
-        return f"step {kill_at}: {error}"
-    return "" if found == whole else f"step {kill_at}: another result"
+        return f"{type(error).__name__}: {error}"
+    return "" if found == whole else "another result"
 
 
 if __name__ == "__main__":

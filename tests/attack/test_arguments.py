@@ -16,13 +16,15 @@ from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import evaluate_layout
 from blast_env.files import write_atomically
+from blast_env.physics.gas.engine import GasEngine
 from blast_env.scenario import Scenario, ScenarioError, save_scenario
 from tests.scenarios import BALLISTIC_COURTYARD
 
 ENORMOUS = 10**400
 LONG = "x" * 100_000
 FIVE: Any = 5
-"""An argument of a type that the checker of types would refuse."""
+SOON: Any = "soon"
+"""Arguments of types that the checker of types would refuse."""
 
 
 def blast(**changes: Any) -> Callable[[], Any]:
@@ -68,6 +70,9 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "scenario long": (blast(scenario=f"{LONG}.toml"), r"path is .* of 100005 characters"),
     "cells text": (blast(engine="gas", cell_m="a"), "^cell_m is 'a', must be a number"),
     "cells tiny": (blast(engine="gas", cell_m=1e-9), "^cell_m is 1e-09, .* at least 0.001 m"),
+    "settled text": (lambda: GasEngine(settled_s=SOON), "^settled_s is 'soon', must be a number"),
+    "settled nan": (lambda: GasEngine(settled_s=float("nan")), "^settled_s is nan, must be a fini"),
+    "settled 0": (lambda: GasEngine(settled_s=0.0), "^settled_s is 0, must be above 0"),
     "cells enormous": (blast(engine="gas", cell_m=ENORMOUS), "^cell_m is an integer of about 400"),
     "cells of balls": (blast(cell_m="a"), "'event' has no cells"),
     "seeds 5": (evaluation(seeds=5), "^seeds is 5, must be integers"),

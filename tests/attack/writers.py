@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
+from unittest.mock import Mock, patch
 
 import torch
 from blast_agents.training.checkpoint import Checkpoint
@@ -14,8 +15,10 @@ from blast_agents.training.run_folder import RunConfiguration
 from blast_env.calibration.model import load_calibration, save_calibration
 from blast_env.evaluation import evaluate_layout
 from blast_env.export import LayoutPlan, export_layout
+from blast_env.files import scratch_folder
 from blast_env.rendering.figures import initial_velocities, save_figure
 from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
+from blast_env.reporting.page import write_report
 from blast_env.scenario import save_scenario, write_layout
 from blast_env.simulation import Blast, BlastResult
 from blast_env.tables import write_csv
@@ -57,6 +60,17 @@ def _checkpoint(path: Path) -> None:
     replace(start, policy={"weight": torch.zeros(2000)}).save(path)
 
 
+def _report(html: Path, pdf: Path | None = None, words: int = 600) -> None:
+    """Write a page that says little: what it says costs blasts."""
+    with patch("blast_env.reporting.page.report_html", lambda *_: "<p>" + "words " * words):
+        write_report(Mock(), html, pdf, [])
+
+
+def _pdf(path: Path) -> None:
+    with scratch_folder() as folder:
+        _report(folder / "report.html", path, words=10)  # so that the page has room
+
+
 WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
     {
         "scenario.toml": lambda path: save_scenario(_blast().scenario, path),
@@ -82,6 +96,8 @@ WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
         "evaluation.json": lambda path: evaluate_layout("courtyard", (), (0, 1)).to_json(path),
         "calibration.json": lambda path: save_calibration(load_calibration("ballistic_ufc"), path),
         "checkpoint.pt": _checkpoint,
+        "report.html": _report,
+        "report.pdf": _pdf,
     }
 )
 """By the name of a file that each of them writes."""

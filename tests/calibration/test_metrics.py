@@ -43,6 +43,16 @@ def test_the_measures_of_a_case_worked_out_by_hand() -> None:
     assert lower.integral_error_percent == pytest.approx(100.0 * 10.0 / 105.0)
 
 
+def test_distances_may_lie_within_a_metre() -> None:
+    """Of a small charge; the measures that are shares do not change with the scale."""
+    far, near = (
+        fit_metrics(scale * np.array(DISTANCE_M), [2.0, 1.0, 4.0, 4.0], [1.0, 2.0, 4.0, 2.0])
+        for scale in (1.0, 0.01)
+    )
+    assert near.mape_percent == far.mape_percent
+    assert near.integral_error_percent == pytest.approx(far.integral_error_percent)
+
+
 def test_the_integral_error_has_no_sign() -> None:
     low, high = (
         fit_metrics(DISTANCE_M, np.full(4, value), np.full(4, 2.0)) for value in (1.5, 2.5)

@@ -98,3 +98,11 @@ def test_numpy_layouts_become_plain_integers(layout: list[Cell]) -> None:
 def test_bad_layout_is_refused_by_its_cell(layout: list[Cell], words: str) -> None:
     with pytest.raises(LayoutError, match=words):
         check_layout(scenario(), layout)
+
+
+def test_centres_of_cells_are_those_of_their_squares() -> None:
+    zone = load_scenario("courtyard").zone
+    x_m, y_m = zone.centres_m
+    assert x_m.shape == zone.shape
+    for cell in zone.cells():
+        assert (x_m[cell], y_m[cell]) == zone.cell_centre_m(cell)

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import tomli_w
 from nicegui import events, ui
@@ -21,6 +19,7 @@ from blast_env.app.sources import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.export import SUFFIXES, LayoutPlan, export_layout
+from blast_env.files import scratch_folder
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario
 
@@ -136,8 +135,8 @@ class FilesMenu:
         provenance = {"made by": "blast-env app", "versions": versions()}
         try:
             plan = LayoutPlan(session.scenario, session.design.layout, provenance=provenance)
-            with TemporaryDirectory() as folder:
-                content = export_layout(plan, Path(folder) / name).read_bytes()
+            with scratch_folder() as folder:
+                content = export_layout(plan, folder / name).read_bytes()
         except BlastEnvError as error:
             complain(error)
             return

@@ -9,7 +9,7 @@ loads on the structures are complete.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
-from math import cbrt, ceil, hypot, isclose
+from math import cbrt, ceil, hypot, inf, isclose
 from typing import Final
 
 import numpy as np
@@ -103,7 +103,7 @@ class GasEngine:
         for name, length_m in (("margin_m", self.margin_m), ("border_m", self.border_m)):
             if not 0.0 <= finite_number(name, length_m) <= _FARTHEST_M:
                 raise BlastEnvError(f"{name} is {length_m:g}, must be 0 to {_FARTHEST_M:g}")
-        if not self.settled_s > 0.0:
+        if self.settled_s != inf and not finite_number("settled_s", self.settled_s) > 0.0:
             raise BlastEnvError(f"settled_s is {self.settled_s:g}, must be above 0")
         limit_s = self.time_limit_s
         if limit_s is not None and not finite_number("time_limit_s", limit_s) > 0.0:

@@ -5,10 +5,10 @@ from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from shutil import which
-from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Final
 
+from blast_env.files import scratch_folder
 from blast_env.physics.gas.benchmark import CELL_M, GasBenchmark, measure
 from blast_env.studies.gas import openfoam, pyclaw
 from blast_env.studies.gas.histories import Histories
@@ -98,10 +98,10 @@ def beside_foam() -> OtherCode | None:
     if which("rhoCentralFoam") is None:
         return None
     scene = openfoam.scene(_FOAM_CELL_M)
-    with TemporaryDirectory() as folder:
+    with scratch_folder() as folder:
         runs = (
             openfoam.ours(scene, _UNTIL_S),
-            openfoam.rho_central_foam(scene, _UNTIL_S, Path(folder) / "case"),
+            openfoam.rho_central_foam(scene, _UNTIL_S, folder / "case"),
         )
     rates = (each.cell_updates / each.cpu_s for each in runs)
     return OtherCode("rhoCentralFoam", f"3-D, cells of {_FOAM_CELL_M:g} m", *rates)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
+from blast_env.files import make_folder, write_atomically
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import Gauges
 from blast_env.physics.gas.solver import AIR_PRESSURE_PA, GasSolver
@@ -167,7 +168,7 @@ def _run(command: tuple[str, ...], folder: Path) -> str:
     done = subprocess.run(
         command, cwd=folder, env=settings, capture_output=True, text=True, check=False
     )
-    (folder / f"log.{command[0]}").write_text(done.stdout + done.stderr)
+    _write(folder / f"log.{command[0]}", done.stdout + done.stderr)
     if done.returncode != 0:
         last = (done.stderr or done.stdout).strip().splitlines()[-1:] or [""]
         raise BlastEnvError(
@@ -179,7 +180,7 @@ def _run(command: tuple[str, ...], folder: Path) -> str:
 def _write_case(scene: Scene, solver: GasSolver, until_s: float, folder: Path) -> None:
     """Write everything but the fields, which need the mesh without the solids."""
     for name in ("system", "constant", "0"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
+        make_folder(folder / name)
     centres_m = scene.grid.cell_m * (scene.gauges + 0.5)
     texts = {
         "system/blockMeshDict": _block_mesh(scene.grid),
@@ -198,7 +199,7 @@ def _write_case(scene: Scene, solver: GasSolver, until_s: float, folder: Path) -
         "constant/turbulenceProperties": "simulationType laminar;\n",
     }
     for name, text in texts.items():
-        (folder / name).write_text(_HEADER.format(kind="dictionary", name=Path(name).name) + text)
+        _write(folder / name, _HEADER.format(kind="dictionary", name=Path(name).name) + text)
 
 
 def _block_mesh(grid: GasGrid) -> str:
@@ -236,13 +237,19 @@ def _write_fields(scene: Scene, solver: GasSolver, folder: Path) -> None:
             lines = "\n".join(f"({a:.9g} {b:.9g} {c:.9g})" for a, b, c in values)
         else:
             lines = "\n".join(f"{value:.9g}" for value in values)
-        (folder / name).write_text(
+        _write(
+            folder / name,
             _HEADER.format(kind=kind, name=name)
             + f"dimensions {dimensions};\n"
             + f"internalField nonuniform List<{of}>\n{len(values)}\n(\n{lines}\n);\n"
             + "boundaryField {\n"
-            + f'"(ground|solids)" {{ type {wall}; }}\nopen {{ type zeroGradient; }}\n}}\n'
+            + f'"(ground|solids)" {{ type {wall}; }}\nopen {{ type zeroGradient; }}\n}}\n',
         )
+
+
+def _write(path: Path, text: str) -> None:
+    with write_atomically(path, durable=False) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 _HEADER: Final = "FoamFile {{ version 2.0; format ascii; class {kind}; object {name}; }}\n"

@@ -7,7 +7,6 @@ needs does not mix with what this project needs.
 """
 
 import subprocess
-import tempfile
 from pathlib import Path
 from time import process_time
 from types import MappingProxyType
@@ -17,6 +16,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
+from blast_env.files import scratch_folder
 from blast_env.physics.gas.grid import FaceKind, GasGrid
 from blast_env.physics.gas.probes import Gauges
 from blast_env.physics.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA, GasSolver
@@ -105,8 +105,8 @@ def by_pyclaw(cell_m: float, until_s: float, python: Path) -> Histories:
         )
     )
     nothing = np.zeros_like(density)
-    with tempfile.TemporaryDirectory() as folder:
-        given, found = Path(folder) / "scene.npz", Path(folder) / "found.npz"
+    with scratch_folder() as folder:
+        given, found = folder / "scene.npz", folder / "found.npz"
         np.savez(
             given,
             state=np.stack([density, nothing, nothing, pressure / (GAMMA - 1.0)]),
