@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, value_text
 from blast_env.importing.site_map import (
+    MOST_COORDINATE,
     MOST_FEATURES,
     DrawingCoordinates,
     MapCoordinates,
@@ -109,16 +109,31 @@ def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:
         raise BlastEnvError(
             f"{path}: {place}.geometry: type is {kind!r}, must be one of {', '.join(_KINDS)}"
         )
+    _check_numbers(path, place, document)
     try:
         geometry = shapely.force_2d(shape(document))
-        finite = np.isfinite(shapely.get_coordinates(geometry)).all()
     except (ShapelyError, TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
         raise BlastEnvError(f"{path}: {place}.geometry: is not usable: {error}") from error
     except RecursionError as error:
         raise BlastEnvError(f"{path}: {place}.geometry: is nested too deeply") from error
-    if not finite:
-        raise BlastEnvError(f"{path}: {place}.geometry: has a coordinate that is no finite number")
     return geometry
+
+
+def _check_numbers(path: Path, place: str, geometry: dict[str, Any]) -> None:
+    """Refuse a coordinate that is no finite number, or so large that no outline can be made."""
+    left: list[Any] = [geometry]
+    while left:
+        value = left.pop()
+        if isinstance(value, dict):
+            left += [value.get("coordinates"), value.get("geometries")]
+        elif isinstance(value, list):
+            left += value
+        elif isinstance(value, int | float) and not abs(value) <= MOST_COORDINATE:
+            where = f"{path}: {place}.geometry: has"
+            if isinstance(value, float) and not isfinite(value):
+                raise BlastEnvError(f"{where} a coordinate that is no finite number")
+            bound = f"must be within {MOST_COORDINATE:g}"
+            raise BlastEnvError(f"{where} the coordinate {value_text(value)}, {bound}")
 
 
 def _tags(item: Mapping[str, Any]) -> Tags:
