@@ -162,8 +162,9 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env train --engine gas --envs 64 --cluster tcp://login1:8786 --run runs/gas": (
         f"{_TRAIN} --engine event {_CLUSTER}"
     ),
-    "python -m tests.attack.run files --count 300": "--count 1",
+    "python -m tests.attack.run files": "--count 1",
     "python -m tests.attack.run kills": "--most 1",
+    "python -m tests.attack.run disks": "--most 1",
     # docs/engineers/gas.md, docs/howto/pictures.md
     "blast-env simulate courtyard --engine gas --cell 0.25 --excel loads.xlsx": "--cell 0.5",
     "blast-env search --scenario my_site.toml --engine gas --budget 50": "--budget 2 --held-out 1",
