@@ -187,6 +187,11 @@ SMALLER: Final[dict[str, str]] = {
     "python -m scripts.gas cells --scenario visitor_entrance --random-layouts 18 --finest 0.125": (
         "--sizes 0.5 --random-layouts 0 --finest 0.5"
     ),
+    # docs/studies/scenarios.md
+    "blast-env evaluate --scenario visitor_entrance --layout"
+    " docs/data/best_found/visitor_entrance.json --engine gas --cell 0.25 --seeds 3": (
+        "--cell 0.5 --seeds 1"
+    ),
     # docs/researchers/surrogate.md
     "python -m scripts.surrogate fit --epochs 10 --out surrogate.json": "--epochs 1",
     "blast-env league --engine gas --surrogate surrogate.json --scenario visitor_entrance"
