@@ -72,7 +72,10 @@ _RULES: Final = (
 _LAWS: Final = tuple(
     f"tests/calibration/test_{name}.py" for name in ("laws", "metrics", "references", "friedlander")
 )
-_COMPARISON: Final = ("tests/evaluation/test_statistics.py", "tests/evaluation/test_objective.py")
+_COMPARISON: Final = (
+    *("tests/evaluation/test_statistics.py", "tests/evaluation/test_objective.py"),
+    *("tests/evaluation/test_evaluate.py", "tests/agents/test_evaluation.py"),
+)
 _PLACES: Final = tuple(
     f"tests/scenario/test_{name}.py"
     for name in ("placement", "layout", "conditions", "zone_checks", "access_way", "checks")

@@ -86,6 +86,7 @@ def test_the_impulse_comes_over_time(duration_s: float, decay: float, x: float) 
     parts = [quad(wave.pressure, *ends)[0] for ends in ((0.1, knee_s), (knee_s, end_s))]
     assert wave.impulse_until(until_s) == pytest.approx(sum(parts), rel=1e-7, abs=1e-6)
     assert wave.impulse_until([0.0, 0.1]).tolist() == [0.0, 0.0]
+    assert type(wave.impulse_until(until_s)) is float
     assert wave.impulse_until(0.1 + 2.0 * duration_s) == pytest.approx(wave.impulse(), rel=1e-12)
 
 
