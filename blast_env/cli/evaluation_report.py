@@ -17,7 +17,7 @@ from blast_env.cli.output import (
     save_pictures,
     without,
 )
-from blast_env.cli.pictures import save_layout_picture
+from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
 from blast_env.cli.targets import FileTarget
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -224,7 +224,7 @@ def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
 
     return [
         save_figure(evaluation_figure(evaluation), out / "evaluation.png"),
-        save_layout_picture(evaluation.scenario, evaluation.layout, out),
+        save_layout_picture(evaluation.scenario, evaluation.layout, out / LAYOUT_PICTURE),
     ]
 
 

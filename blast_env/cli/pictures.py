@@ -11,8 +11,8 @@ LAYOUT_PICTURE: Final = "layout.png"
 """File of the picture in the folder of `--out`."""
 
 
-def save_layout_picture(scenario: Scenario, layout: Sequence[Element], folder: Path) -> Path:
-    """Draw a layout on its site, from above and obliquely, into a folder; return the file.
+def save_layout_picture(scenario: Scenario, layout: Sequence[Element], path: Path) -> Path:
+    """Draw a layout on its site, from above and obliquely; return the file.
 
     Raises:
         MissingExtraError: If the extra `render` is not installed.
@@ -22,4 +22,4 @@ def save_layout_picture(scenario: Scenario, layout: Sequence[Element], folder: P
     from blast_env.rendering.figures import save_figure
     from blast_env.rendering.site_picture import site_picture
 
-    return save_figure(site_picture(scenario, layout), folder / LAYOUT_PICTURE)
+    return save_figure(site_picture(scenario, layout), path)

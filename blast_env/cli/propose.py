@@ -16,8 +16,10 @@ from blast_env.cli.output import (
     print_line,
     progress_bar,
     result_console,
+    save_pictures,
     user_errors,
 )
+from blast_env.cli.pictures import save_layout_picture
 from blast_env.cli.targets import FileTarget, checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
@@ -54,7 +56,9 @@ def propose(
         bool,
         typer.Option("--verify", help="Judge it by gas dynamics, beside no barrier and all rules."),
     ] = False,
-    out: Annotated[Path | None, typer.Option(help="JSON file for the layout.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="JSON file for the layout; its picture is drawn beside it.")
+    ] = None,
     processes: Processes = 1,
 ) -> None:
     """Propose a layout with trained weights that come with the package; no blast is run for it.
@@ -93,7 +97,11 @@ def propose(
             print_line(engine_text(evaluator.engine))
         if out is not None:
             provenance |= {"command": command(), "versions": versions()}
-            print_line(f"wrote {LayoutFile.of(chosen, layout, provenance).save(out)}")
+            written = [LayoutFile.of(chosen, layout, provenance).save(out)]
+            picture = out.with_suffix(".png")
+            written += save_pictures(lambda: [save_layout_picture(chosen, layout, picture)])
+            for path in written:
+                print_line(f"wrote {path}")
 
 
 def _charge(

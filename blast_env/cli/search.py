@@ -38,7 +38,7 @@ from blast_env.cli.output import (
     show_interruption,
     user_errors,
 )
-from blast_env.cli.pictures import save_layout_picture
+from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
 from blast_env.cli.targets import checked_targets
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.envs.strategies import HiddenThreat
@@ -148,7 +148,9 @@ def write_search(
     scenario = run.problem.scenario
     provenance = _provenance(run, options, checked)
     written = [write_layout(out / LAYOUT_NAME, scenario, result.layout, provenance)]
-    written += save_pictures(lambda: [save_layout_picture(scenario, result.layout, out)])
+    written += save_pictures(
+        lambda: [save_layout_picture(scenario, result.layout, out / LAYOUT_PICTURE)]
+    )
     if result.history:
         written.append(write_csv(result.history_table(), out / "history.csv"))
         written += save_pictures(lambda: _save_figure(run, out))

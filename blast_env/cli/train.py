@@ -10,7 +10,7 @@ import typer
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.options import CellSide
 from blast_env.cli.output import engine_text, print_line, progress_bar, user_errors
-from blast_env.cli.pictures import save_layout_picture
+from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
 from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.physics.scene import Charge
@@ -199,4 +199,4 @@ def _draw_proposal(folder: "RunFolder", scenario: Scenario, threat: str) -> Path
     agent = load_agent(folder.path, newest_weights(folder.path))
     charge = None if threat == "hidden" else scenario.sample_charge(np.random.default_rng(0))
     shown = scenario.with_charge(charge) if isinstance(charge, Charge) else scenario
-    return save_layout_picture(shown, agent.propose(scenario, charge), folder.path)
+    return save_layout_picture(shown, agent.propose(scenario, charge), folder.path / LAYOUT_PICTURE)

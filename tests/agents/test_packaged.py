@@ -102,6 +102,8 @@ def test_a_proposal_is_verified_and_written(
     assert "by the weights of walled_yard" in done.output
     for row in ("no barrier", "wall near the charge", "most sight lines cut", "this proposal"):
         assert row in done.output
+    assert f"wrote {out.with_suffix('.png')}" in done.output
+    assert out.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
     layout = LayoutFile.load(out)
     agent = packaged_agent(wide_yard(), "visible", folder)
     assert agent is not None
