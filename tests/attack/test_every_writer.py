@@ -35,7 +35,7 @@ _IN_MEMORY: Final = frozenset({"BytesIO", "StringIO"})
 
 _OWN: Final = frozenset(
     {
-        *("folder.save", "self.folder.save", "checkpoint.save", "start.save"),
+        *("folder.save", "self.folder.save", "checkpoint.save", "start.save", "surrogate.save"),
         *("LayoutFile.of(chosen, layout, provenance).save",),
         *("LayoutFile.of(scenario, layout, provenance).save", "save"),
         *("result.to_excel", "result.to_parquet", "protected.to_excel", "evaluation.to_json"),

@@ -176,7 +176,11 @@ def load_surrogate(path: Path) -> Surrogate:
         BlastEnvError: If there is no such file, or it is no surrogate or damaged.
     """
     try:
-        content = checked_as(_File, parse_json(read_text(path)))
+        text = read_text(path)
+    except DocumentError as error:
+        raise BlastEnvError(f"{path}: {error}") from error
+    try:
+        content = checked_as(_File, parse_json(text))
     except DocumentError as error:
         raise BlastEnvError(f"{path}: is no surrogate, or damaged: {error}") from error
     members = tuple(
