@@ -64,9 +64,6 @@ class PolicySearch:
             moves = Moves(scenario)
             while True:
                 best = session.ranked(plan.threats)[: self.kept]
-                layout = best[min(int(rng.exponential(1.0)), len(best) - 1)]
-                for _ in range(1 + int(rng.random() < 0.4)):
-                    layout = moves.neighbour(layout, rng)
-                session.assess([layout])
+                session.assess([moves.near_best(best, rng)])
 
         return session.result(self.name, seed, session.run(explore))

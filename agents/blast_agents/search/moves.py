@@ -117,6 +117,13 @@ class Moves:
     count_share: float = 0.1
     item_share: float = 0.2
 
+    def near_best(self, best: Sequence[Layout], rng: np.random.Generator) -> Layout:
+        """Return one of some layouts, the first ones more often, one or two moves on; sorted."""
+        layout = best[min(int(rng.exponential(1.0)), len(best) - 1)]
+        for _ in range(1 + int(rng.random() < 0.4)):
+            layout = self.neighbour(layout, rng)
+        return tuple(sorted(layout))
+
     def neighbour(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Return a layout that differs a little; all conditions of the build zone hold."""
         if not layout:

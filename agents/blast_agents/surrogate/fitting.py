@@ -147,15 +147,8 @@ def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> Errors:
     """Compare guesses with gas dynamics on some samples."""
     starts = np.cumsum([0, *samples.counts[:-1]])
     scaled = (samples.features - surrogate.mean) / surrogate.scale
-    area_m2, known = samples.area_m2, samples.log_impulse
-    logs = [
-        np.log(
-            np.add.reduceat(area_m2 * np.exp(known + member(scaled)), starts)
-            / np.add.reduceat(area_m2, starts)
-        )
-        for member in surrogate.members
-    ]
-    guess = np.mean(logs, axis=0)
+    logs = surrogate.log_means(scaled, samples.log_impulse, samples.area_m2, starts)
+    guess = logs.mean(axis=0)
     off = (guess - samples.target)[chosen]
     ranks = []
     for case in np.unique(samples.case[chosen]):

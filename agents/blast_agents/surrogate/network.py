@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from blast_agents.surrogate.walls import FEATURES, Approach, Site
@@ -17,6 +18,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
+
+IntArray = NDArray[np.int64]
 
 HIDDEN: Final = 48
 """Width of the two hidden layers."""
@@ -133,6 +136,25 @@ class Surrogate:
         means, spreads = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
         return Guess(means, spreads)
 
+    def log_means(
+        self, scaled: FloatArray, known: FloatArray, area_m2: FloatArray, starts: IntArray
+    ) -> FloatArray:
+        """Return the logarithm of the mean impulse on each wall, by each network (members, walls).
+
+        Args:
+            scaled: Features of all points, less `mean`, over `scale` (points, FEATURES).
+            known: Logarithm of Kingery and Bulmash's impulse there (points,).
+            area_m2: What each point stands for (points,).
+            starts: The first point of each wall (walls,).
+        """
+        area_of_wall_m2 = np.add.reduceat(area_m2, starts)
+        loads = [
+            np.add.reduceat(area_m2 * np.exp(known + member(scaled)), starts)
+            for member in self.members
+        ]
+        logs: FloatArray = np.log(np.array(loads) / area_of_wall_m2)
+        return logs
+
     def save(self, path: Path) -> Path:
         """Write everything as one JSON file, numbers to six digits.
 
@@ -155,18 +177,12 @@ class Surrogate:
         """Return mean and spread of the impulse on one structure, one a layout."""
         features = [each.features(b) for each, b in zip(approaches, barriers, strict=True)]
         counts = [len(each) for each in features]
-        starts = np.cumsum([0, *counts[:-1]])
+        starts: IntArray = np.cumsum([0, *counts[:-1]])
         area_m2 = np.concatenate([each.area_m2 for each in approaches])
         known = np.concatenate([each.log_impulse for each in approaches])
         scaled = (np.concatenate(features) - self.mean) / self.scale
-        logs = [
-            np.log(
-                np.add.reduceat(area_m2 * np.exp(known + member(scaled)), starts)
-                / np.add.reduceat(area_m2, starts)
-            )
-            for member in self.members
-        ]
-        return np.exp(np.mean(logs, axis=0)), np.std(logs, axis=0)
+        logs = self.log_means(scaled, known, area_m2, starts)
+        return np.exp(logs.mean(axis=0)), logs.std(axis=0)
 
 
 def load_surrogate(path: Path) -> Surrogate:

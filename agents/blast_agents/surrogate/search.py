@@ -94,21 +94,13 @@ def improved(
     tries = 0
     while guesses.count < end and tries < 4 * most:
         best = guesses.ranked()[:_KEPT]
-        changed = [_changed(best, moves, rng) for _ in range(min(_BATCH, end - guesses.count))]
+        changed = [moves.near_best(best, rng) for _ in range(min(_BATCH, end - guesses.count))]
         guesses.loads(changed)
         tries += len(changed)
     return guesses.ranked()
 
 
 _BATCH: Final = 8
-
-
-def _changed(best: Sequence[Layout], moves: Moves, rng: np.random.Generator) -> Layout:
-    """Return one of the best layouts, the better ones more often, one or two moves on."""
-    layout = best[min(int(rng.exponential(1.0)), len(best) - 1)]
-    for _ in range(1 + int(rng.random() < 0.4)):
-        layout = moves.neighbour(layout, rng)
-    return tuple(sorted(layout))
 
 
 @dataclass(frozen=True)
@@ -199,7 +191,7 @@ class SurrogateSearch:
         tried: set[Layout] = set(session.ranked(plan.threats))
         while True:
             best = session.ranked(plan.threats)[:_KEPT]
-            changed = [_changed(best, moves, rng) for _ in range(self.drawn)]
+            changed = [moves.near_best(best, rng) for _ in range(self.drawn)]
             new = [each for each in dict.fromkeys(changed) if each not in tried] or changed
             chosen = new[int(guesses.loads(new).argmin())]
             tried.add(chosen)
