@@ -19,7 +19,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange
 from blast_env.physics.scene import Charge
 from blast_env.scenario import VehicleCharge, save_scenario
-from blast_env.sites import HELD_OUT_SITES, SiteSource
+from blast_env.sites import FAMILIES, HELD_OUT_SITES, SiteSource
 from tests.agents.league_cases import ROAD, road_scenario
 from tests.vehicle_sites import gate_site
 
@@ -77,7 +77,7 @@ def test_sites_are_those_that_training_never_sees() -> None:
     assert [case.scenario.content_hash for case in track.cases] == held_out
     assert HELD_OUT_SITES > 3
     assert all(case.charge is None for case in track.cases)
-    assert track.scenario_hash is None
+    assert track.site == "sites"
 
 
 def test_more_cases_and_seeds_keep_the_first_ones() -> None:
@@ -114,11 +114,18 @@ def test_bundled_vehicles_are_for_engines_that_can_judge_them() -> None:
     """Their scenarios name no calibration, so particles have no loads in Pa s to compare."""
     particles = [track.name for track in find_tracks("all", 1, 1)]
     gas = [track.name for track in find_tracks("all", 1, 1, noisy=False)]
-    vehicles = ["vehicle_hotel_forecourt", "vehicle_shopping_street"]
-    assert [name for name in gas if name not in particles] == vehicles
+    of_gas = ["vehicle_hotel_forecourt", "vehicle_shopping_street", "item_sites"]
+    assert [name for name in gas if name not in particles] == of_gas
     assert "sites" in particles
     with pytest.raises(BlastEnvError, match="--engine gas"):
         find_tracks("vehicle", 1, 1)
+
+
+def test_each_family_of_sites_is_a_track_of_its_own() -> None:
+    (plain,), (items,) = (find_tracks(family, 2, 1) for family in FAMILIES)
+    assert (plain.site, items.site) == (plain.name, items.name) == ("sites", "item_sites")
+    assert all(not case.scenario.zone.items for case in plain.cases)
+    assert all(case.scenario.zone.items for case in items.cases)
 
 
 @pytest.mark.parametrize(
@@ -130,6 +137,7 @@ def test_bundled_vehicles_are_for_engines_that_can_judge_them() -> None:
         (("hidden", 1, 0), "seeds is 0, must be an integer from 1 to 1000"),
         (("hidden", 1, 1, 1001), "seed is 1001"),
         (("sites", 1, 1, 0, ["courtyard"]), "generates its own"),
+        (("item_sites", 1, 1, 0, ["courtyard"]), "'item_sites' generates its own"),
         (("known", 1, 1, 0, ["courtyard", "courtyard"]), "'known_courtyard' is there twice"),
         (("known", 1, 1, 0, ["free_field"]), "no build zone"),
     ],

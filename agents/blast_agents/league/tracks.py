@@ -1,7 +1,8 @@
 """What the entries of a league are asked: cases, and the blasts that their layouts meet."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Final, Literal
 
 from blast_env.envs.arguments import check_names
@@ -17,14 +18,21 @@ from blast_env.scenario import (
     load_scenario,
 )
 from blast_env.scenario.build_scene import draw_threat
-from blast_env.sites import SiteSource
+from blast_env.sites import FAMILIES, ITEM_SITES, SITES, SiteSource
 from blast_env.values import whole_number
 
-TRACKS: Final = ("known", "hidden", "vehicle", "sites")
-"""The tracks by name."""
+TRACKS: Final = ("known", "hidden", "vehicle", *FAMILIES)
+"""The tracks by name; those of generated sites have the names of the families."""
 
 KNOWN_SCENARIOS: Final = ("courtyard", "perimeter_gate")
 HIDDEN_SCENARIOS: Final = ("courtyard",)
+
+_SITES_TITLES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        SITES: "Hidden threat on unseen generated sites",
+        ITEM_SITES: "Hidden threat on unseen generated sites with heights and a catalogue",
+    }
+)
 
 MOST_CASES: Final = 1000
 MOST_SEEDS: Final = 1000
@@ -44,7 +52,7 @@ class Track:
         name: Of the track's files.
         title: What is asked, for people.
         threat: `"visible"` or `"hidden"`, as in training.
-        scenario_hash: Content hash of the scenario; `None` for generated sites.
+        site: Content hash of the scenario, or the family of generated sites.
         cases: At least one.
         reference_budget: An agent is held against genetic search with so many blasts a case.
     """
@@ -52,7 +60,7 @@ class Track:
     name: str
     title: str
     threat: Literal["visible", "hidden"]
-    scenario_hash: str | None
+    site: str
     cases: tuple[Case, ...]
     reference_budget: int
 
@@ -95,7 +103,7 @@ def known_track(
         name=f"known_{scenario.name}",
         title=f"Known threat at an unseen position: {scenario.name}",
         threat="visible",
-        scenario_hash=scenario.content_hash,
+        site=scenario.content_hash,
         cases=tuple(drawn),
         reference_budget=200,
     )
@@ -121,7 +129,7 @@ def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
         name=f"hidden_{scenario.name}",
         title=f"Hidden threat on a known site: {scenario.name}",
         threat="hidden",
-        scenario_hash=scenario.content_hash,
+        site=scenario.content_hash,
         cases=(
             _hidden_case(scenario.name, scenario, first, HIDDEN_SEEDS * seeds, seed * MOST_CASES),
         ),
@@ -153,23 +161,24 @@ def vehicle_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
     )
 
 
-def sites_track(sites: Sequence[Scenario], seeds: int, seed: int = 0) -> Track:
+def sites_track(sites: Sequence[Scenario], seeds: int, seed: int = 0, family: str = SITES) -> Track:
     """Return the track of a hidden threat on generated sites, each of them a case.
 
     Args:
         sites: Sites that no training has seen, at most 1,000.
         seeds: Held-out threats of each, at most 1,000.
         seed: As for `known_track`.
+        family: What the sites are of, one of `FAMILIES`.
 
     Raises:
         BlastEnvError: As for `known_track`.
     """
     firsts = _first_seeds(len(sites), seeds, seed)
     return Track(
-        name="sites",
-        title="Hidden threat on unseen generated sites",
+        name=family,
+        title=_SITES_TITLES[family],
         threat="hidden",
-        scenario_hash=None,
+        site=family,
         cases=tuple(
             _hidden_case(site.name, site, first, seeds, seed * MOST_CASES + index)
             for index, (site, first) in enumerate(zip(sites, firsts, strict=True))
@@ -209,7 +218,7 @@ def find_tracks(
             `HIDDEN_SCENARIOS` and the bundled ones with a vehicle unless given. Of those that are
             given, the track `"vehicle"` has the ones with a vehicle if others are asked for too.
         noisy: As for `known_track`. Engines with noise, those of particles, leave out bundled
-            scenarios with a vehicle that name no calibration.
+            scenarios with a vehicle that name no calibration; of `"all"` also sites with heights.
 
     Raises:
         UnknownNameError: If there is no such track; the message names the nearest one.
@@ -217,8 +226,8 @@ def find_tracks(
             no use, or one for the generated sites.
     """
     check_names("track", [name], [*TRACKS, "all"])
-    if name == "sites" and scenarios:
-        raise BlastEnvError(f"scenario is {scenarios[0]!r}: the track 'sites' generates its own")
+    if name in FAMILIES and scenarios:
+        raise BlastEnvError(f"scenario is {scenarios[0]!r}: the track {name!r} generates its own")
     tracks: list[Track] = []
     if name in ("known", "all"):
         known = [load_scenario(each) for each in scenarios or KNOWN_SCENARIOS]
@@ -238,9 +247,13 @@ def find_tracks(
                 "particles; gas dynamics needs none (--engine gas)"
             )
         tracks += [vehicle_track(scenario, seeds, seed) for scenario in known]
-    if name in ("sites", "all"):
+    families = [each for each in FAMILIES if name in (each, "all")]
+    if name == "all" and noisy:
+        families.remove(ITEM_SITES)
+    for family in families:
         count = whole_number("cases", cases, 1, MOST_CASES)
-        tracks.append(sites_track(tuple(SiteSource.held_out(count)), seeds, seed))
+        sites = tuple(SiteSource.held_out(count, FAMILIES[family]))
+        tracks.append(sites_track(sites, seeds, seed, family))
     names = [track.name for track in tracks]
     for each in names:
         if names.count(each) > 1:

@@ -25,14 +25,14 @@ class TrainedRun:
         entry: The agent.
         threat: `"visible"` or `"hidden"`.
         scenario: Name of the scenario, for people.
-        scenario_hash: Content hash of the scenario; `None` if it was trained on generated sites.
+        site: Content hash of the scenario, or the family of generated sites.
     """
 
     run: Path
     entry: Agent
     threat: Literal["visible", "hidden"]
     scenario: str
-    scenario_hash: str | None
+    site: str
 
     @classmethod
     def load(cls, run: Path) -> "TrainedRun":
@@ -50,7 +50,9 @@ class TrainedRun:
             entry=Agent(load_agent(run), name, _training(folder, settings.evaluation_cases)),
             threat=settings.threat,
             scenario=settings.scenario,
-            scenario_hash=None if settings.scenario in FAMILIES else configuration.scenario_hash,
+            site=settings.scenario
+            if settings.scenario in FAMILIES
+            else configuration.scenario_hash,
         )
 
     def search(self, budget: int) -> Search:
@@ -63,7 +65,7 @@ class TrainedRun:
 
     def is_for(self, track: Track) -> bool:
         """Return whether a track asks what the agent was trained for."""
-        return self.threat == track.threat and self.scenario_hash == track.scenario_hash
+        return self.threat == track.threat and self.site == track.site
 
 
 def check_runs(runs: Sequence[TrainedRun], tracks: Sequence[Track]) -> None:
@@ -76,8 +78,8 @@ def check_runs(runs: Sequence[TrainedRun], tracks: Sequence[Track]) -> None:
         if not any(run.is_for(track) for track in tracks):
             names = ", ".join(track.name for track in tracks)
             raise BlastEnvError(
-                f"{run.run}: was trained for a {run.threat} threat on {run.scenario!r} (scenario "
-                f"hash {(run.scenario_hash or 'of many')[:12]}), which is none of the tracks "
+                f"{run.run}: was trained for a {run.threat} threat on {run.scenario!r} "
+                f"({run.site[:12]}), which is none of the tracks "
                 f"({names}) as they are now"
             )
 
