@@ -25,12 +25,12 @@ from blast_env.files import make_folder, write_atomically
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import Scenario, bundled_scenarios
 from blast_env.tables import markdown_table
-from scripts.difficulty_figure import difficulty_figure
-from scripts.difficulty_items import ItemEffort, ItemResult, ItemStudy, cost_of, pieces_text
-from scripts.difficulty_items_figure import items_figure
-from scripts.difficulty_outcomes import Outcome, TaskResult
-from scripts.difficulty_study import Effort, Study
-from scripts.difficulty_verdict import (
+from scripts.difficulty.figure import difficulty_figure
+from scripts.difficulty.items import ItemEffort, ItemResult, ItemStudy, cost_of, pieces_text
+from scripts.difficulty.items_figure import items_figure
+from scripts.difficulty.outcomes import Outcome, TaskResult
+from scripts.difficulty.study import Effort, Study
+from scripts.difficulty.verdict import (
     Criterion,
     difficulty_criteria,
     item_criteria,

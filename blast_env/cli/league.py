@@ -46,7 +46,9 @@ def league(
     out: Annotated[
         Path, typer.Option(help="Folder for tables, figures and results; goes on with what it has.")
     ],
-    track: Annotated[str, typer.Option(help="known, hidden, vehicle, sites, item_sites or all.")] = "known",
+    track: Annotated[
+        str, typer.Option(help="known, hidden, vehicle, sites, item_sites or all.")
+    ] = "known",
     cases: Annotated[
         int, typer.Option(help="Cases of a track; a hidden threat on a known site is one.")
     ] = 16,

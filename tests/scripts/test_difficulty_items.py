@@ -10,7 +10,7 @@ from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.engine import GasEngine
 from blast_env.scenario import Placement, Scenario, VehicleCharge
-from scripts.difficulty_items import (
+from scripts.difficulty.items import (
     POST_RULES,
     RULES,
     ItemEffort,
@@ -21,9 +21,9 @@ from scripts.difficulty_items import (
     pieces_text,
     rules_of,
 )
-from scripts.difficulty_items_figure import items_figure
-from scripts.difficulty_outcomes import Outcome, TaskResult
-from scripts.difficulty_verdict import item_criteria, joint_criteria
+from scripts.difficulty.items_figure import items_figure
+from scripts.difficulty.outcomes import Outcome, TaskResult
+from scripts.difficulty.verdict import item_criteria, joint_criteria
 from scripts.scenario_difficulty import elsewhere_text, item_rows, joint_rows, with_items
 from tests.catalogue_sites import yard_document
 from tests.vehicle_sites import gate_site

@@ -15,10 +15,10 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange, evaluate_against
 from scripts import scenario_difficulty
-from scripts.difficulty_figure import difficulty_figure
-from scripts.difficulty_outcomes import Outcome, TaskResult
-from scripts.difficulty_study import STAND_OFFS, Effort, Study
-from scripts.difficulty_verdict import difficulty_criteria
+from scripts.difficulty.figure import difficulty_figure
+from scripts.difficulty.outcomes import Outcome, TaskResult
+from scripts.difficulty.study import STAND_OFFS, Effort, Study
+from scripts.difficulty.verdict import difficulty_criteria
 from scripts.scenario_difficulty import (
     PAGE,
     PICTURES,

@@ -42,8 +42,8 @@ from blast_env.scenario import (
     VehicleCharge,
     VehicleSource,
 )
-from scripts.difficulty_outcomes import Outcome, TaskResult
-from scripts.difficulty_study import STAND_OFFS
+from scripts.difficulty.outcomes import Outcome, TaskResult
+from scripts.difficulty.study import STAND_OFFS
 
 METHOD: Final = "annealing"
 """The search; it begins with the best of rules, random layouts and random walls."""

@@ -19,7 +19,7 @@ from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_t
 from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Scenario
-from scripts.difficulty_outcomes import Outcome, TaskResult
+from scripts.difficulty.outcomes import Outcome, TaskResult
 
 STAND_OFFS: Final = {0.0: "near the charge", 0.5: "in the middle", 1.0: "near the building"}
 """Shares of the way through the build zone at which the hand-made walls stand."""

@@ -17,7 +17,7 @@ from blast_env.rendering.site_plan import (
 from blast_env.rendering.style import INK, PROTECTED, QUIET_INK, render_extra, unit_interval
 from blast_env.rendering.vehicle_plan import draw_vehicles, stand_off_text, vehicle_legend
 from blast_env.scenario.build_scene import build_site
-from scripts.difficulty_items import ItemResult, Purchase, cost_of, pieces_text
+from scripts.difficulty.items import ItemResult, Purchase, cost_of, pieces_text
 
 with render_extra():
     from matplotlib.axes import Axes

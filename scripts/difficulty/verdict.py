@@ -6,8 +6,8 @@ from typing import Final
 
 from blast_env.statistics import Estimate
 from blast_env.studies.agreement.layouts import Noise
-from scripts.difficulty_items import ItemResult
-from scripts.difficulty_outcomes import Outcome, TaskResult
+from scripts.difficulty.items import ItemResult
+from scripts.difficulty.outcomes import Outcome, TaskResult
 
 LEAST_REDUCTION, MOST_REDUCTION = 0.15, 0.85
 """Between these the best layout does something and leaves something to do."""

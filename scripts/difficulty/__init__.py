@@ -1,0 +1,1 @@
+"""What the study of the scenarios, `scripts.scenario_difficulty`, is made of."""
