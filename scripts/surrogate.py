@@ -142,10 +142,18 @@ def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
                 progress(done / len(held))
         rms = float(np.sqrt(np.mean([each.rms**2 for each in found])))
         ranks = [each.rank for each in found]
-        mean = float(np.nanmean(ranks))
-        about = about.model_copy(update={f"{name}_rms": rms, f"{name}_rank": mean})
-        rows.append((f"held-out {name}", f"{rms:.3f}", f"{mean:.2f}", f"{np.nanmin(ranks):.2f}"))
-    headers = ("", "error of ln(impulse), rms", "rank correlation in a case", "worst fold")
+        mean, lost = float(np.nanmean(ranks)), float(np.nanmean([each.lost for each in found]))
+        update = {f"{name}_rms": rms, f"{name}_rank": mean, f"{name}_lost": lost}
+        about = about.model_copy(update=update)
+        worst, points = f"{np.nanmin(ranks):.2f}", f"{100.0 * lost:.1f} points"
+        rows.append((f"held-out {name}", f"{rms:.3f}", f"{mean:.2f}", worst, points))
+    headers = (
+        "",
+        "error of ln(impulse), rms",
+        "rank correlation in a case",
+        "worst fold",
+        "lost by choosing",
+    )
     print_line(markdown_table(headers, rows))
     return about
 

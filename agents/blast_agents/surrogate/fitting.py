@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 from typing import Any, Final
 
 import numpy as np
@@ -20,7 +21,15 @@ from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
 
 MEMBERS: Final = 5
-_BATCH: Final = 128
+_BATCH: Final = 6
+"""Groups of samples that an update is made from."""
+
+_GROUP: Final = 24
+"""Most samples of a group, which are all of one case."""
+
+_COMMON: Final = 0.1
+"""How much an error counts that all layouts of a case have in common: it ranks none of them."""
+
 _RATE: Final = 5e-3
 _DECAY: Final = 1e-3
 _LEAST_SCALE: Final = 1e-3
@@ -121,8 +130,9 @@ def fit(samples: Samples, chosen: BoolArray, epochs: int, seed: int, about: Fit)
     mean = samples.features[at_points].mean(axis=0).astype(np.float64)
     scale = samples.features[at_points].std(axis=0).astype(np.float64) + _LEAST_SCALE
     data = _Tensors.of(samples, mean, scale)
-    numbers = np.flatnonzero(chosen)
-    members = tuple(_member(data, numbers, epochs, seed + each) for each in range(MEMBERS))
+    cases = [np.flatnonzero(chosen & (samples.case == case)) for case in np.unique(samples.case)]
+    own = [each for each in cases if len(each)]
+    members = tuple(_member(data, own, epochs, seed + each) for each in range(MEMBERS))
     return Surrogate(mean, scale, members, about)
 
 
@@ -134,12 +144,15 @@ class Errors:
         rms: Root of the mean square error of the logarithm.
         bias: Its mean.
         rank: Rank correlation among the layouts of a case, mean over the cases.
+        lost: By how much the load behind the layout that is guessed to be the best is above that
+            behind the best one, as a share of the largest load of the case; mean over the cases.
         cases: How many cases have enough layouts for that.
     """
 
     rms: float
     bias: float
     rank: float
+    lost: float
     cases: int
 
 
@@ -150,13 +163,21 @@ def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> Errors:
     logs = surrogate.log_means(scaled, samples.log_impulse, samples.area_m2, starts)
     guess = logs.mean(axis=0)
     off = (guess - samples.target)[chosen]
-    ranks = []
+    ranks, lost = [], []
     for case in np.unique(samples.case[chosen]):
         own = chosen & (samples.case == case)
-        if own.sum() >= _LEAST_CASE and np.ptp(samples.target[own]) > 0.0:
-            ranks.append(float(spearmanr(guess[own], samples.target[own]).statistic))
-    rank = float(np.mean(ranks)) if ranks else float("nan")
-    return Errors(float(np.sqrt(np.mean(off**2))), float(off.mean()), rank, len(ranks))
+        true = samples.target[own]
+        if own.sum() >= _LEAST_CASE and np.ptp(true) > 0.0:
+            ranks.append(float(spearmanr(guess[own], true).statistic))
+            shares = np.exp(true - true.max())
+            lost.append(float(shares[guess[own].argmin()] - shares.min()))
+    return Errors(
+        rms=float(np.sqrt(np.mean(off**2))),
+        bias=float(off.mean()),
+        rank=float(np.mean(ranks)) if ranks else float("nan"),
+        lost=float(np.mean(lost)) if lost else float("nan"),
+        cases=len(ranks),
+    )
 
 
 def folds(numbers: np.ndarray, count: int, seed: int) -> list[BoolArray]:
@@ -191,8 +212,19 @@ class _Tensors:
             torch.from_numpy(samples.target.astype(np.float32)),
         )
 
-    def error(self, network: nn.Module, numbers: np.ndarray) -> Tensor:
-        """Return the mean square error of the logarithm on some samples."""
+    def loss(self, network: nn.Module, groups: Sequence[np.ndarray]) -> Tensor:
+        """Return the mean square error of the logarithm on groups of samples, each of one case.
+
+        What a group's errors have in common counts less than by what they differ.
+        """
+        errors = self._errors(network, np.concatenate(groups))
+        common = torch.cat(
+            [each.mean().expand(len(each)) for each in errors.split([*map(len, groups)])]
+        )
+        return (errors - common).square().mean() + _COMMON * common.square().mean()
+
+    def _errors(self, network: nn.Module, numbers: np.ndarray) -> Tensor:
+        """Return by how much the logarithm is off on some samples."""
         points = [
             np.arange(start, start + count)
             for start, count in zip(self.starts[numbers], self.counts[numbers], strict=True)
@@ -204,11 +236,11 @@ class _Tensors:
         loads = area_m2 * torch.exp(self.log_impulse[rows] + over)
         empty = torch.zeros(len(numbers))
         mean = empty.index_add(0, owner, loads) / empty.index_add(0, owner, area_m2)
-        return (torch.log(mean) - self.target[torch.from_numpy(numbers)]).square().mean()
+        return torch.log(mean) - self.target[torch.from_numpy(numbers)]
 
 
-def _member(data: _Tensors, numbers: np.ndarray, epochs: int, seed: int) -> Member:
-    """Fit one network."""
+def _member(data: _Tensors, cases: Sequence[np.ndarray], epochs: int, seed: int) -> Member:
+    """Fit one network to the samples of some cases."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     network = nn.Sequential(
@@ -219,11 +251,16 @@ def _member(data: _Tensors, numbers: np.ndarray, epochs: int, seed: int) -> Memb
         nn.Linear(HIDDEN, 1),
     )
     optimizer = torch.optim.AdamW(network.parameters(), _RATE, weight_decay=_DECAY)
-    batches = max(1, round(len(numbers) / _BATCH))
+    groups = [
+        group
+        for case in cases
+        for group in np.array_split(rng.permutation(case), ceil(len(case) / _GROUP))
+    ]
+    batches = max(1, round(len(groups) / _BATCH))
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, _RATE, total_steps=epochs * batches)
     for _ in range(epochs):
-        for batch in np.array_split(rng.permutation(numbers), batches):
-            loss = data.error(network, batch)
+        for batch in np.array_split(rng.permutation(len(groups)), batches):
+            loss = data.loss(network, [groups[number] for number in batch])
             optimizer.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             optimizer.step()

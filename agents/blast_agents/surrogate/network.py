@@ -42,8 +42,11 @@ class Fit(BaseModel):
         layouts_rms: Root of the mean square error of the logarithm of an impulse, on layouts that
             were held out, of sites that were not.
         layouts_rank: Rank correlation with the engine among the layouts of a case, likewise.
+        layouts_lost: What choosing by it costs, likewise: by how much the load behind the layout
+            that it likes best is above the least one of the case, as a share of the largest.
         sites_rms: The error on sites that were held out.
         sites_rank: The correlation on them.
+        sites_lost: What choosing by it costs on them.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -57,8 +60,10 @@ class Fit(BaseModel):
     seconds: Annotated[float, Field(ge=0.0)] = 0.0
     layouts_rms: float | None = None
     layouts_rank: float | None = None
+    layouts_lost: float | None = None
     sites_rms: float | None = None
     sites_rank: float | None = None
+    sites_lost: float | None = None
 
 
 class Guess(NamedTuple):
