@@ -146,10 +146,12 @@ def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
         update = {f"{name}_rms": rms, f"{name}_rank": mean, f"{name}_lost": lost}
         about = about.model_copy(update=update)
         worst, points = f"{np.nanmin(ranks):.2f}", f"{100.0 * lost:.1f} points"
-        rows.append((f"held-out {name}", f"{rms:.3f}", f"{mean:.2f}", worst, points))
+        cases = str(sum(each.cases for each in found))
+        rows.append((f"held-out {name}", f"{rms:.3f}", cases, f"{mean:.2f}", worst, points))
     headers = (
         "",
         "error of ln(impulse), rms",
+        "cases of 8 layouts",
         "rank correlation in a case",
         "worst fold",
         "lost by choosing",
@@ -219,7 +221,7 @@ def judge(
     scenarios: Annotated[list[str], typer.Argument(help="Bundled names or paths.")],
     surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
     charges: Annotated[int, typer.Option(min=1, help="Held-out charges of each.")] = 6,
-    changes: Annotated[int, typer.Option(min=0, help="Layouts that it looks at.")] = 24,
+    changes: Annotated[int, typer.Option(min=0, help="Layouts that it looks at.")] = 300,
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
     processes: Processes = 2,
     cluster: ClusterAddress = None,

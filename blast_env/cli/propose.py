@@ -1,13 +1,16 @@
-"""`blast-env propose`: a layout from the weights that come with the package."""
+"""`blast-env propose`: a layout from what comes with the package, weights or a surrogate."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import typer
+from blast_agents.proposal import LayoutAgent
 from blast_agents.rules import expected_charge
 from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.surrogate import SurrogateAgent, packaged_surrogate
 
 from blast_env.cli.options import ChargePlace, Processes, TntMass
 from blast_env.cli.output import (
@@ -38,9 +41,6 @@ from blast_env.scenario.zone import source_bounds_m
 from blast_env.statistics import reductions
 from blast_env.units import MS_PER_S
 
-if TYPE_CHECKING:
-    from blast_agents.training.packaged import Record
-
 _HIDDEN_THREATS: Final = 8
 """Threats that layouts meet where the charge is not known."""
 
@@ -61,11 +61,12 @@ def propose(
     ] = None,
     processes: Processes = 1,
 ) -> None:
-    """Propose a layout with trained weights that come with the package; no blast is run for it.
+    """Propose a layout for any site in a second or a few; no blast is run for it.
 
-    Where there are no weights for the scenario, it is the best rule's layout, which takes a blast
-    of gas dynamics for each rule and threat. Without --charge it is for all places where the charge
-    may be.
+    It comes from weights that were trained for the scenario, if some come with the package; if not,
+    from the surrogate of gas dynamics, which was fitted to other sites. Where peaks count, of which
+    the surrogate knows nothing, it is the best rule's layout, which takes a blast of gas dynamics
+    for each rule and threat. Without --charge it is for all places where the charge may be.
     """
     with user_errors(), checked_targets({"--out": FileTarget(out, (".json",))}):
         chosen = load_scenario(scenario)
@@ -73,30 +74,23 @@ def propose(
         told = _charge(chosen, charge, tnt_kg)
         case = _case(chosen, told)
         evaluator = BlastEvaluator(chosen, GAS)
-        rules = layouts_by_rule(chosen, told)
-        began_s = perf_counter()
-        found = _by_agent(chosen, told)
-        if found is None:
-            loads = _loads(evaluator, case, {_NOTHING: (), **rules}, processes)
-            name = min(rules, key=lambda rule: loads[rule])
-            layout, how = rules[name], f"the best rule by gas dynamics: {name}"
-            provenance: dict[str, object] = {"rule": name}
-            print_line(f"note: {_why_not(chosen, told)}; the best rule is proposed instead")
-        else:
-            layout, record = found
-            seconds = perf_counter() - began_s
-            how = f"the weights of {record.scenario}, in {MS_PER_S * seconds:,.0f} ms"
-            provenance = {"weights": record.configuration.scenario_hash[:12]}
+        proposal = (
+            _by_weights(chosen, told)
+            or _by_surrogate(chosen, told)
+            or _by_best_rule(evaluator, case, processes)
+        )
+        layout = proposal.layout
         placement = Placement.of(chosen, layout)
         cost = "" if chosen.zone.budget is None else f", cost {placement.cost:g}"
-        print_line(f"{chosen.name}: {layout_counts(layout)}{cost}, by {how}")
+        print_line(f"{chosen.name}: {layout_counts(layout)}{cost}, by {proposal.how}")
         if verify:
+            rules = layouts_by_rule(chosen, told)
             loads = _loads(evaluator, case, {_NOTHING: (), **rules, _PROPOSAL: layout}, processes)
             _print_verdict(loads, case)
-        if verify or found is None:
+        if verify or evaluator.blasts:
             print_line(engine_text(evaluator.engine))
         if out is not None:
-            provenance |= {"command": command(), "versions": versions()}
+            provenance = {**proposal.provenance, "command": command(), "versions": versions()}
             written = [LayoutFile.of(chosen, layout, provenance).save(out)]
             picture = out.with_suffix(".png")
             written += save_pictures(lambda: [save_layout_picture(chosen, layout, picture)])
@@ -124,8 +118,8 @@ def _charge(
         for each in bounds
     ):
         print_line(
-            f"note: {scenario.name} never has a charge at ({place_m[0]:g}, {place_m[1]:g}) m: the "
-            "weights were not trained for that, so --verify the proposal"
+            f"note: {scenario.name} never has a charge at ({place_m[0]:g}, {place_m[1]:g}) m: "
+            "--verify the proposal"
         )
     return charge
 
@@ -140,7 +134,16 @@ def _case(scenario: Scenario, charge: Charge | None) -> Case:
     return Case(scenario, tuple(distinct.values()))
 
 
-def _by_agent(scenario: Scenario, charge: Charge | None) -> "tuple[Layout, Record] | None":
+@dataclass(frozen=True)
+class _Proposal:
+    """A layout, and where it comes from: for people, and for the layout's file."""
+
+    layout: Layout
+    how: str
+    provenance: Mapping[str, object]
+
+
+def _by_weights(scenario: Scenario, charge: Charge | None) -> _Proposal | None:
     """Return what the weights that come with the package propose, if there are some."""
     # Here, because torch takes seconds to start, and is an extra.
     with import_extra("agents", "proposals by trained weights"):
@@ -150,23 +153,50 @@ def _by_agent(scenario: Scenario, charge: Charge | None) -> "tuple[Layout, Recor
     if found is None:
         return None
     agent, record = found
-    return tuple(sorted(agent.propose(scenario, charge))), record
+    return _timed(
+        agent,
+        scenario,
+        charge,
+        f"the weights of {record.scenario}",
+        {"weights": record.configuration.scenario_hash[:12]},
+    )
 
 
-def _why_not(scenario: Scenario, charge: Charge | None) -> str:
-    from blast_agents.training.packaged import records
-
-    known = [record for _, record in records() if record.scenario == scenario.name]
-    told = "a charge that is not known" if charge is None else "a known charge"
-    if any(each.configuration.scenario_hash == scenario.content_hash for each in known):
-        other = "give --charge for a known one" if charge is None else "leave --charge out"
-        return f"the weights for {scenario.name} are not for {told} ({other})"
-    if known:
-        return (
-            f"the weights for {scenario.name} are for another state of it (scenario hash "
-            f"{known[0].configuration.scenario_hash[:12]}, here {scenario.content_hash[:12]})"
+def _by_surrogate(scenario: Scenario, charge: Charge | None) -> _Proposal | None:
+    """Return what the surrogate proposes that comes with the package, if it can."""
+    if scenario.objective.needs_peaks:
+        print_line(
+            "note: peaks count, of which the surrogate knows nothing; the best rule is proposed"
         )
-    return f"no weights come with the package for {scenario.name}"
+        return None
+    surrogate = packaged_surrogate()
+    return _timed(
+        SurrogateAgent(surrogate),
+        scenario,
+        charge,
+        "guesses of gas dynamics (--verify says what it is worth)",
+        {"surrogate": surrogate.digest},
+    )
+
+
+def _timed(
+    agent: LayoutAgent,
+    scenario: Scenario,
+    charge: Charge | None,
+    how: str,
+    provenance: Mapping[str, object],
+) -> _Proposal:
+    began_s = perf_counter()
+    layout = tuple(sorted(agent.propose(scenario, charge)))
+    ms = MS_PER_S * (perf_counter() - began_s)
+    return _Proposal(layout, f"{how}, in {ms:,.0f} ms", provenance)
+
+
+def _by_best_rule(evaluator: BlastEvaluator, case: Case, processes: int) -> _Proposal:
+    rules = layouts_by_rule(case.scenario, case.charge)
+    loads = _loads(evaluator, case, {_NOTHING: (), **rules}, processes)
+    name = min(rules, key=lambda rule: loads[rule])
+    return _Proposal(rules[name], f"the best rule by gas dynamics: {name}", {"rule": name})
 
 
 def _loads(

@@ -21,6 +21,8 @@ from blast_env.physics.scene import Charge
 
 IntArray = NDArray[np.int64]
 
+_PACKAGED: Final = Path(__file__).with_name("gas.json")
+
 HIDDEN: Final = 48
 """Width of the two hidden layers."""
 
@@ -209,6 +211,15 @@ def load_surrogate(path: Path) -> Surrogate:
         for each in content.members
     )
     return Surrogate(np.array(content.mean), np.array(content.scale), members, content.fit)
+
+
+def packaged_surrogate() -> Surrogate:
+    """Return the surrogate that comes with the package.
+
+    Its `fit` says what it was fitted to: generated sites only, so that it may be judged on all
+    bundled ones.
+    """
+    return load_surrogate(_PACKAGED)
 
 
 class _File(BaseModel):

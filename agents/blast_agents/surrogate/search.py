@@ -113,7 +113,7 @@ class SurrogateAgent:
     """
 
     surrogate: Surrogate = field(repr=False)
-    changes: int = 24
+    changes: int = 300
 
     def propose(self, scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
         """Return a layout that keeps every condition of the build zone; always the same one.
