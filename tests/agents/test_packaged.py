@@ -3,16 +3,21 @@
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 import torch
+from blast_agents.surrogate import SurrogateAgent, packaged_surrogate, site_of
+from blast_agents.surrogate.fitting import elements
 from blast_agents.training import load_agent, packaged, train
 from blast_agents.training.packaged import LeagueResult, pack, packaged_agent, records
+from scipy.stats import spearmanr
 from typer.testing import CliRunner, Result
 
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator
 from blast_env.physics.scene import Charge
-from blast_env.scenario import LayoutFile, load_scenario, save_scenario
+from blast_env.scenario import LayoutFile, Scenario, load_scenario, save_scenario
 from tests.agents.test_self_labelling import own, run_settings, wide_yard
 from tests.catalogue_sites import yard as yard_with_a_point
 
@@ -28,6 +33,7 @@ LEAGUE = LeagueResult(
     best_rule_reduction=0.35,
 )
 CHARGE = Charge((1.7, 5.2), 5.0)
+BLASTS = Path(__file__).parents[2] / "docs/data/gas_blasts.parquet"
 
 
 @pytest.fixture(scope="module")
@@ -112,15 +118,51 @@ def test_a_proposal_is_verified_and_written(
     assert layout.provenance["weights"] == wide_yard().content_hash[:12]
 
 
-def test_without_weights_the_best_rule_is_proposed_and_that_is_said(
-    yard: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_without_weights_the_surrogate_proposes_and_no_blast_is_run(
+    yard: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    charge = ("--charge", *CHARGE.position_m)
-    done = proposed(tmp_path, monkeypatch, yard, *charge)
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("a blast is simulated")
+
+    monkeypatch.setattr(BlastEvaluator, "loads_of_many", refuse)
+    out = tmp_path / "layout.json"
+    done = proposed(tmp_path, monkeypatch, yard, "--charge", *CHARGE.position_m, "--out", out)
     assert done.exit_code == 0, done.output
-    assert "note: no weights come with the package for walled_yard; the best rule" in done.output
+    assert "by guesses of gas dynamics (--verify says what it is worth)" in done.output
+    surrogate = packaged_surrogate()
+    wanted = SurrogateAgent(surrogate).propose(load_scenario(yard), CHARGE)
+    layout = LayoutFile.load(out)
+    assert layout.layout_for(wide_yard()) == tuple(sorted(wanted))
+    assert layout.provenance["surrogate"] == surrogate.digest
+
+
+def test_where_peaks_count_the_best_rule_is_proposed_and_that_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    document = wide_yard().model_dump() | {"objective": {"quantity": "peak"}}
+    path = tmp_path / "peaks.toml"
+    save_scenario(Scenario.from_document(document, "peaks"), path)
+    done = proposed(tmp_path, monkeypatch, path, "--charge", *CHARGE.position_m)
+    assert done.exit_code == 0, done.output
+    assert "note: peaks count, of which the surrogate knows nothing" in done.output
     assert "by the best rule by gas dynamics:" in done.output
     assert "engine gas" in done.output
+
+
+def test_the_surrogate_of_the_package_ranks_layouts_of_a_site_that_it_was_not_fitted_to() -> None:
+    table = pd.read_parquet(BLASTS)
+    one = table[(table["scenario"] == "visitor_entrance") & table["protected"]].groupby(
+        ["charge_x_m", "charge_y_m", "structure"]
+    )
+    _, rows = next(iter(one))
+    rows = rows.iloc[:: len(rows) // 40]
+    site = site_of(load_scenario("visitor_entrance"))
+    columns = rows[["charge_x_m", "charge_y_m", "tnt_kg", "charge_height_m"]]
+    charges = [Charge((x, y), tnt, up) for x, y, tnt, up in columns.itertuples(index=False)]
+    layouts = [elements(text) for text in rows["layout"]]
+    guess = packaged_surrogate().guess(site, layouts, charges).impulse_pa_s[:, 0]
+    assert spearmanr(guess, rows["impulse_pa_s"]).statistic > 0.6
+    assert packaged_surrogate().fit.sites == 79
 
 
 @pytest.mark.parametrize(
