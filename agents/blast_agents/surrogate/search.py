@@ -1,7 +1,7 @@
 """Layouts by guesses: a search that asks the surrogate first, an agent that asks nothing else."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -19,8 +19,10 @@ from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Scenario
 from blast_env.values import generator
 
+_DRAWN_CHARGES: Final = 16
 _HIDDEN_CHARGES: Final = 4
-"""Charges that layouts are guessed against where the charge is not known."""
+"""Where the charge is not known, layouts are guessed against so many different ones of those drawn:
+the middle one, and those that are farthest from each other."""
 
 _KEPT: Final = 4
 """How many of the best layouts are changed."""
@@ -127,7 +129,10 @@ class SurrogateAgent:
             BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
         """
         if charge is None:
-            case = practice_hidden(scenario, _HIDDEN_CHARGES, 1, 0)
+            drawn = practice_hidden(scenario, _DRAWN_CHARGES, 1, 0)
+            distinct = {threat.charge: threat for threat in reversed(drawn.threats)}
+            first = [each for each in drawn.threats if distinct[each.charge] is each]
+            case = replace(drawn, threats=tuple(first[:_HIDDEN_CHARGES]), realisations=1)
         else:
             case = practice_visible(scenario, charge, 1, 0)
         guesses = Guesses.of(self.surrogate, case)
