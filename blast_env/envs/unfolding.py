@@ -13,7 +13,6 @@ from blast_env.physics.engines import is_gas
 from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import BARRIER_NAME, ModularPart, module_name
-from blast_env.recording.tables import collision_table
 from blast_env.scenario import Scenario
 from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
@@ -122,6 +121,8 @@ class UnfoldingParticles:
 
     def advance(self, until_s: float) -> dict[str, Any]:
         """Go on to a time, or the end; return the collisions on the way."""
+        from blast_env.recording.tables import collision_table  # pandas takes long to import
+
         recorded = len(self.run.log)
         self.run.advance(until_s)
         collisions = collision_table(self.run.log.to_array(recorded), self.run.obstacles)
