@@ -121,15 +121,19 @@ class UnfoldingParticles:
 
     def advance(self, until_s: float) -> dict[str, Any]:
         """Go on to a time, or the end; return the collisions on the way."""
-        from blast_env.recording.tables import collision_table  # pandas takes long to import
-
         recorded = len(self.run.log)
         self.run.advance(until_s)
-        collisions = collision_table(self.run.log.to_array(recorded), self.run.obstacles)
         return {
-            "collisions": tuple(collisions.to_dict("records")),
+            "collisions": self._collisions(recorded) if len(self.run.log) > recorded else (),
             "impulse_sim": self.impulse,
         }
+
+    def _collisions(self, start: int) -> tuple[dict[Any, Any], ...]:
+        """Return the collisions from a number on, each as a row of `BlastResult.collisions`."""
+        from blast_env.recording.tables import collision_table  # pandas takes long to import
+
+        table = collision_table(self.run.log.to_array(start), self.run.obstacles)
+        return tuple(table.to_dict("records"))
 
     def observe(self) -> Observation:
         """Return impulses, counts of balls and the time."""
