@@ -128,7 +128,7 @@ class SiteSource:
 
 @cache
 def training_sites(family: str) -> SiteSource:
-    """Return the sites of a family to train on: one source for all, which finds its first site once.
+    """Return the sites of a family to train on: one source, which finds its first site once.
 
     Args:
         family: Name of one of `FAMILIES`.
