@@ -38,6 +38,13 @@ def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) ->
     return pd.DataFrame([[row[name] for name in names] for row in rows], columns=names)
 
 
+def texts(values: Any) -> Any:
+    """Return values as a column of text. With other types, the stubs of pandas take mypy long."""
+    import pandas as pd
+
+    return pd.array(values, dtype="str")
+
+
 def as_types(table: "pd.DataFrame", types: Mapping[str, str]) -> "pd.DataFrame":
     """Return a table with some columns of other types, by their names."""
     wanted: Any = types  # the stubs of pandas take mypy seconds for each dict that is written out
