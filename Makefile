@@ -6,6 +6,8 @@ STAMP := $(VENV)/.installed
 # Without a display, SDL must not look for one.
 export SDL_VIDEODRIVER ?= dummy
 export PYGAME_HIDE_SUPPORT_PROMPT := 1
+# Python keeps what it has compiled, whatever the shell says: the tests start many processes.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test suite test-browser attack mutants matrix quick docs site shown lint types compiled \
 	check setup clean

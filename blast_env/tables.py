@@ -2,12 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from blast_env.files import write_atomically
 from blast_env.values import path_of
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
 
 
 class Column(NamedTuple):
@@ -25,17 +26,26 @@ class Column(NamedTuple):
     meaning: str
 
 
-def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) -> pd.DataFrame:
+def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) -> "pd.DataFrame":
     """Return rows, each by the names of the columns, as a data frame in the columns' order.
 
     Raises:
         KeyError: If a row lacks a column.
     """
+    import pandas as pd
+
     names = [column.name for column in columns]
     return pd.DataFrame([[row[name] for name in names] for row in rows], columns=names)
 
 
-def as_types(table: pd.DataFrame, types: Mapping[str, str]) -> pd.DataFrame:
+def texts(values: Any) -> Any:
+    """Return values as a column of text. With other types, the stubs of pandas take mypy long."""
+    import pandas as pd
+
+    return pd.array(values, dtype="str")
+
+
+def as_types(table: "pd.DataFrame", types: Mapping[str, str]) -> "pd.DataFrame":
     """Return a table with some columns of other types, by their names."""
     wanted: Any = types  # the stubs of pandas take mypy seconds for each dict that is written out
     converted: pd.DataFrame = table.astype(wanted)
@@ -50,7 +60,7 @@ def markdown_table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> 
     return "\n".join([text[0], "|---" * len(headers) + "|", *text[1:]])
 
 
-def write_csv(table: pd.DataFrame, path: str | Path, float_format: str | None = None) -> Path:
+def write_csv(table: "pd.DataFrame", path: str | Path, float_format: str | None = None) -> Path:
     """Write a table without its index as CSV, complete or not at all.
 
     Args:

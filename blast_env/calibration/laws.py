@@ -8,16 +8,18 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final, overload
+from typing import TYPE_CHECKING, Any, Final, Union, overload
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 
-Numbers = Sequence[float] | NDArray[Any] | pd.Series
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
+
+Numbers = Union[Sequence[float], NDArray[Any], "pd.Series"]
 """Several numbers; a lone one is a float."""
 
 

@@ -8,15 +8,17 @@ from importlib.resources import files
 from io import StringIO
 from math import factorial, isfinite
 from types import MappingProxyType
-from typing import Final, Literal, get_args, overload
+from typing import TYPE_CHECKING, Final, Literal, get_args, overload
 
 import numpy as np
-import pandas as pd
 
 from blast_env.arrays import FloatArray
 from blast_env.calibration.laws import Numbers, checked_array
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.tables import Column
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
 
 Quantity = Literal[
     "incident_overpressure",
@@ -110,21 +112,25 @@ class _Curve:
         return self.factor_to_si * value
 
 
-def paper_table() -> pd.DataFrame:
+def paper_table() -> "pd.DataFrame":
     """Return Tables 1 to 3 of the paper, one row a distance; see `PAPER_COLUMNS`.
 
     A new frame in every call.
     """
+    import pandas as pd
+
     return pd.read_csv(StringIO(_read("paper_tables.csv")), dtype=np.float64)
 
 
-def paper_ufc_column() -> pd.Series:
+def paper_ufc_column() -> "pd.Series":
     """Return the paper's UFC column, psi*s, by the distance in metres.
 
     It is what the paper prints as UFC 3-340-02, not the standard itself: at 30 to 120 m it is
     within 8 % of Kingery and Bulmash's incident impulse of about 10 t TNT on the ground, at 15 m
     1.9 times as large. For the standard's curves take `kingery_bulmash`.
     """
+    import pandas as pd
+
     table = paper_table()
     index = pd.Index(table["r_m"], name="distance_m")
     return pd.Series(table["i_ufc_psi_s"].to_numpy(), index=index, name=PAPER_UFC_LABEL)

@@ -13,7 +13,7 @@ from blast_env.evaluation.comparison import Objective
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, AnyScenario, AnySource, Scenario, ScenarioField
 from blast_env.scenario.vehicles import source_of
-from blast_env.sites import FAMILIES, SiteSource
+from blast_env.sites import FAMILIES, training_sites
 
 
 class ThreatModel(Protocol):
@@ -116,7 +116,7 @@ def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
     """
     source: ScenarioSource
     if isinstance(scenario, str) and scenario in FAMILIES:
-        source = SiteSource.training(ranges=FAMILIES[scenario])
+        source = training_sites(scenario)
     elif isinstance(scenario, str | Path | Mapping | Scenario):
         source = SingleScenario(scenario)
     else:

@@ -13,7 +13,6 @@ from blast_env.physics.engines import is_gas
 from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import BARRIER_NAME, ModularPart, module_name
-from blast_env.recording.tables import collision_table
 from blast_env.scenario import Scenario
 from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
@@ -124,11 +123,17 @@ class UnfoldingParticles:
         """Go on to a time, or the end; return the collisions on the way."""
         recorded = len(self.run.log)
         self.run.advance(until_s)
-        collisions = collision_table(self.run.log.to_array(recorded), self.run.obstacles)
         return {
-            "collisions": tuple(collisions.to_dict("records")),
+            "collisions": self._collisions(recorded) if len(self.run.log) > recorded else (),
             "impulse_sim": self.impulse,
         }
+
+    def _collisions(self, start: int) -> tuple[dict[Any, Any], ...]:
+        """Return the collisions from a number on, each as a row of `BlastResult.collisions`."""
+        from blast_env.recording.tables import collision_table  # pandas takes long to import
+
+        table = collision_table(self.run.log.to_array(start), self.run.obstacles)
+        return tuple(table.to_dict("records"))
 
     def observe(self) -> Observation:
         """Return impulses, counts of balls and the time."""

@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import pandas as pd
 
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.cases import Case, Threat, draw_threats
@@ -23,7 +22,6 @@ from blast_env.physics.engine import Engine
 from blast_env.physics.engines import GAS, find_engine
 from blast_env.physics.scene import Charge
 from blast_env.provenance import versions
-from blast_env.recording.tables import module_table
 from blast_env.scenario import AnyScenario, Scenario, check_layout
 from blast_env.scenario.build_scene import build_site
 from blast_env.scenario.vehicles import stand_off_m
@@ -38,6 +36,9 @@ from blast_env.statistics import (
 )
 from blast_env.tables import Column, table_of
 from blast_env.units import PA_PER_PSI
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
 
 STRUCTURE_COLUMNS: Final = (
     Column("structure", "", "name of the structure"),
@@ -116,14 +117,16 @@ CASE_COLUMNS: Final = (
 )
 
 
-def structure_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
+def structure_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
     """Return one row a structure; see `STRUCTURE_COLUMNS`."""
     pairs = zip(_by_structure(evaluation.loads), _by_structure(evaluation.unprotected), strict=True)
     return table_of([_structure_row(loads, bare) for loads, bare in pairs], STRUCTURE_COLUMNS)
 
 
-def module_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
+def module_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
     """Return one row a module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
+    from blast_env.recording.tables import module_table
+
     threat = evaluation.threats[0]
     scene = build_site(evaluation.scenario, (), threat.seed, threat.charge)
     impulse, bare = (
@@ -136,7 +139,7 @@ def module_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
     return table[[column.name for column in MODULE_COLUMNS]]
 
 
-def threat_reductions(evaluation: "LayoutEvaluation") -> pd.DataFrame:
+def threat_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
     """Return one row a threat; see `THREAT_COLUMNS`."""
     return table_of([_threat_row(outcome) for outcome in evaluation.outcomes], THREAT_COLUMNS)
 
@@ -214,7 +217,7 @@ def evaluation_record(evaluation: "LayoutEvaluation") -> dict[str, Any]:
     }
 
 
-def case_table(comparison: Comparison) -> pd.DataFrame:
+def case_table(comparison: Comparison) -> "pd.DataFrame":
     """Return one row a case; see `CASE_COLUMNS`."""
     rows = []
     for index, (case, layout) in enumerate(zip(comparison.cases, comparison.layouts, strict=True)):
@@ -313,7 +316,7 @@ def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
     }
 
 
-def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
+def _rows(table: "pd.DataFrame") -> list[dict[str, Any]]:
     return [
         {str(name): _or_none(value) for name, value in row.items()}
         for row in table.to_dict("records")
@@ -495,17 +498,17 @@ class LayoutEvaluation:
         return conditional_value_at_risk(_impulses_pa_s(self.unprotected), self.cvar_level)
 
     @cached_property
-    def table(self) -> pd.DataFrame:
+    def table(self) -> "pd.DataFrame":
         """One row a structure; the columns are `tables.STRUCTURE_COLUMNS`."""
         return structure_reductions(self)
 
     @cached_property
-    def module_table(self) -> pd.DataFrame:
+    def module_table(self) -> "pd.DataFrame":
         """One row a module of the structures; the columns are `tables.MODULE_COLUMNS`."""
         return module_reductions(self)
 
     @cached_property
-    def threat_table(self) -> pd.DataFrame:
+    def threat_table(self) -> "pd.DataFrame":
         """One row a threat; the columns are `tables.THREAT_COLUMNS`."""
         return threat_reductions(self)
 

@@ -73,16 +73,19 @@ class CollisionLog:
             self._rows = []
 
 
+def _floats(collisions: CollisionArray, column: str) -> NDArray[np.float64]:
+    values: NDArray[np.float64] = collisions[column]
+    return values
+
+
 def incidence_angle_rad(collisions: CollisionArray) -> NDArray[np.float64]:
     """Return the angle of incidence (n,): 0 is head-on, pi/2 grazing.
 
     The angle between the reversed velocity before the collision and the module's normal.
     """
-    towards = -(
-        collisions["vx"] * collisions["normal_x"] + collisions["vy"] * collisions["normal_y"]
-    )
-    across = np.abs(
-        collisions["vx"] * collisions["normal_y"] - collisions["vy"] * collisions["normal_x"]
-    )
+    columns = ("vx", "vy", "normal_x", "normal_y")
+    vx, vy, normal_x, normal_y = (_floats(collisions, name) for name in columns)
+    towards = -(vx * normal_x + vy * normal_y)
+    across = np.abs(vx * normal_y - vy * normal_x)
     angle: NDArray[np.float64] = np.arctan2(across, towards)
     return angle

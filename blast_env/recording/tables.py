@@ -11,7 +11,7 @@ from blast_env.calibration import LoadUnit
 from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import ModularObstacle
-from blast_env.tables import Column, as_types
+from blast_env.tables import Column, as_types, texts
 from blast_env.units import UNITS_PER_M
 
 Columns = tuple[Column, ...]
@@ -113,9 +113,8 @@ def structures_in_pa_s(structures: pd.DataFrame, unit: LoadUnit) -> tuple[pd.Dat
     loads = [unit.of_structures.get(name) for name in structures["structure"]]
     added = structures.assign(
         impulse_pa_s=[np.nan if load is None else load.scaled.pa_s for load in loads],
-        calibration_in_range=pd.array(
-            ["" if load is None else "; ".join(load.scaled.notes) or "yes" for load in loads],
-            dtype="str",
+        calibration_in_range=texts(
+            ["" if load is None else "; ".join(load.scaled.notes) or "yes" for load in loads]
         ),
     )
     return added, (*STRUCTURE_COLUMNS, *STRUCTURE_PA_S_COLUMNS)
@@ -152,6 +151,7 @@ def collision_table(
     angle = incidence_angle_rad(collisions)
     vx: FloatArray = collisions["vx"]
     vy: FloatArray = collisions["vy"]
+    module: Any = collisions["module"]  # as what it is, it takes mypy seconds to index with
     values: dict[str, Any] = {
         "time_s": collisions["time_s"],
         "particle_type": [CollisionType(kind).name for kind in collisions["kind"]],
@@ -166,8 +166,8 @@ def collision_table(
         "angle_deg": np.degrees(angle),
         "normal_x": collisions["normal_x"],
         "normal_y": collisions["normal_y"],
-        "module_id": pd.array(module_ids[collisions["module"]], dtype="str"),
-        "structure": pd.array(structures[collisions["module"]], dtype="str"),
+        "module_id": texts(module_ids[module]),
+        "structure": texts(structures[module]),
         "earlier_collisions": collisions["earlier_collisions"],
         "first_contact": collisions["first_contact"],
     }

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, StrictFloat
-from scipy.ndimage import label
 
 from blast_env.arrays import BoolArray
 from blast_env.scenario.catalogue import Variant
@@ -103,6 +102,8 @@ class _Chains:
 
     @classmethod
     def of(cls, way: AccessWay, passable: BoolArray) -> "_Chains":
+        from scipy.ndimage import label  # takes a third of a second to import
+
         width = way.width_cells
         closed = any_in_windows(counts_before(~_along_columns(way, passable)), width, width)
         bordered = np.ones((closed.shape[0] + 2, closed.shape[1]), dtype=bool)

@@ -20,7 +20,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Element, Rectangle
@@ -270,6 +269,8 @@ def _squares(
 @lru_cache(maxsize=8)
 def _reach(ground: VehicleGround, obstacles: Obstacles) -> Reach:
     """Work out where a vehicle gets to."""
+    from scipy.ndimage import label  # takes a third of a second to import
+
     half = _steps(ground.source.width_m) // 2
     plane = _Plane.of(ground, obstacles, half)
     closed = plane.covering((*ground.closed_m, *obstacles.stops))

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
-import pandas as pd
 
 from blast_env.calibration.load_unit import LoadUnit
 from blast_env.calibration.model import (
@@ -30,21 +29,16 @@ from blast_env.physics.engines import (
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.provenance import versions
-from blast_env.recording.excel import write_workbook
-from blast_env.recording.parquet import write_parquet
-from blast_env.recording.tables import (
-    RunRecord,
-    collision_table,
-    module_table,
-    structure_table,
-)
 from blast_env.runner import check_workers, in_order
 from blast_env.scenario import AnyCharge, AnyScenario, ScenarioField
 from blast_env.scenario.build_scene import build_scene, draw_threat
 from blast_env.values import number_pair, path_of
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
+    import pandas as pd
+
     from blast_env.physics.gas.engine import GasEngine
+    from blast_env.recording.tables import RunRecord
     from blast_env.simulation.gas import GasResult
 
 _PROGRESS_CALLS = 200
@@ -165,18 +159,24 @@ class BlastResult:
         return STEP_NAMES.get(self.engine_name, "steps")
 
     @cached_property
-    def collisions(self) -> pd.DataFrame:
+    def collisions(self) -> "pd.DataFrame":
         """One row a collision; the columns are `recording.tables.COLLISION_COLUMNS`."""
+        from blast_env.recording.tables import collision_table
+
         return collision_table(self.collision_array, self.obstacles)
 
     @cached_property
-    def modules(self) -> pd.DataFrame:
+    def modules(self) -> "pd.DataFrame":
         """One row a module; the columns are `recording.tables.MODULE_COLUMNS`."""
+        from blast_env.recording.tables import module_table
+
         return module_table(self.obstacles)
 
     @cached_property
-    def structures(self) -> pd.DataFrame:
+    def structures(self) -> "pd.DataFrame":
         """One row a structure; the columns are `recording.tables.STRUCTURE_COLUMNS`."""
+        from blast_env.recording.tables import structure_table
+
         return structure_table(self.obstacles)
 
     @cached_property
@@ -273,7 +273,7 @@ class BlastResult:
         return state.hexdigest()
 
     @cached_property
-    def run_record(self) -> RunRecord:
+    def run_record(self) -> "RunRecord":
         """Everything needed to repeat the run: what was run, with which versions."""
         blast, charge = self.blast, self.blast.scene.charge
         known = versions(self.engine_version)
@@ -312,6 +312,8 @@ class BlastResult:
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
+        from blast_env.recording.excel import write_workbook
+
         return write_workbook(self, path_of(path))
 
     def to_parquet(self, path: str | Path) -> Path:
@@ -323,6 +325,8 @@ class BlastResult:
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
+        from blast_env.recording.parquet import write_parquet
+
         return write_parquet(self, path_of(path))
 
 

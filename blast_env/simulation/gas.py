@@ -38,7 +38,7 @@ from blast_env.recording.parquet import write_table
 from blast_env.recording.tables import RunRecord
 from blast_env.scenario import AnyCharge, ScenarioField
 from blast_env.scenario.build_scene import build_site, draw_threat
-from blast_env.tables import Column, as_types, table_of
+from blast_env.tables import Column, as_types, table_of, texts
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
 _PROGRESS_CALLS: Final = 100
@@ -240,7 +240,7 @@ class GasResult:
         }
         modules = zip(table["structure"], table["row"], table["column"], strict=True)
         pieces = [of_pieces.get(module, "") for module in modules]
-        table["piece"] = pd.array(pieces, dtype="str")
+        table["piece"] = texts(pieces)
         return table[[column.name for column in MODULE_COLUMNS]]
 
     @cached_property

@@ -10,7 +10,14 @@ from blast_env.sites.criterion import (
 from blast_env.sites.generate import draw_site, generate_site
 from blast_env.sites.item_sites import ItemSiteRanges
 from blast_env.sites.ranges import SiteRanges
-from blast_env.sites.source import FAMILIES, HELD_OUT_SITES, ITEM_SITES, SITES, SiteSource
+from blast_env.sites.source import (
+    FAMILIES,
+    HELD_OUT_SITES,
+    ITEM_SITES,
+    SITES,
+    SiteSource,
+    training_sites,
+)
 from blast_env.sites.turning import turned
 from blast_env.sites.visibility import Visibility
 
@@ -29,6 +36,7 @@ __all__ = [
     "VisibilityCriterion",
     "draw_site",
     "generate_site",
+    "training_sites",
     "turned",
     "visibility_layout",
 ]

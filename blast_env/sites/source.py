@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from types import MappingProxyType
 from typing import Final
 
@@ -98,7 +98,9 @@ class SiteSource:
         wanted = isinstance(self.ranges, ItemSiteRanges) and self.ranges.vehicle_probability > 0.0
         if wanted:
             sites = (self.site(index) for index in range(min(self.count, _MOST_LOOKED_AT)))
-            return next((site for site in sites if site.vehicles), self.site(0))
+            with_vehicle = next((site for site in sites if site.vehicles), None)
+            if with_vehicle is not None:
+                return with_vehicle
         return self.site(0)
 
     def sample(self, rng: np.random.Generator) -> Scenario:
@@ -122,3 +124,13 @@ class SiteSource:
     def __iter__(self) -> Iterator[Scenario]:
         """Yield all sites in their order."""
         return (self.site(index) for index in range(self.count))
+
+
+@cache
+def training_sites(family: str) -> SiteSource:
+    """Return the sites of a family to train on: one source, which finds its first site once.
+
+    Args:
+        family: Name of one of `FAMILIES`.
+    """
+    return SiteSource.training(ranges=FAMILIES[family])

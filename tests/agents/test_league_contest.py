@@ -274,7 +274,7 @@ def test_a_cheaper_engine_s_best_layouts_are_judged_by_the_judge(tmp_path: Path)
     search = Search(find_search_method("random"), 3, first_engine="pymunk", finalists=2)
     assert search.name == "random, 3 blasts of pymunk, the best 2 judged"
     entries = (NoBarrier(), search, Search(find_search_method("random"), 3))
-    track = known_track(SCENARIO, 2, 1)
+    track = known_track(SCENARIO, 1, 1)
     _, staged, plain = Contest(track, entries, store(tmp_path)).play().results
     for case, proposal in zip(track.cases, staged.proposals, strict=True):
         practice = practice_of(case)

@@ -123,7 +123,7 @@ def test_a_policy_learns_to_place_what_it_was_shown(observation: str, count: int
     agent = agent_for(scenario, observation)
     layouts = [by_rule(each) for each in cases]
     shown = [Demonstration(*each, 0.4, observation) for each in zip(cases, layouts, strict=True)]
-    loss = imitate(agent.policy, shown, 240, 8, 0.02, 0.5, 0.5, np.random.default_rng(0))
+    loss = imitate(agent.policy, shown, 160, 8, 0.02, 0.5, 0.5, np.random.default_rng(0))
     assert loss < 1.5
     for case, layout in zip(cases, layouts, strict=True):
         assert sorted(agent.propose(scenario, case.charge)) == sorted(layout)

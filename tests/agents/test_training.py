@@ -242,10 +242,10 @@ def test_other_algorithms_and_hidden_threats_train_too(
 
 
 def test_training_learns(tmp_path: Path) -> None:
-    """On a site where only cells in the line of sight help, within some 300 blasts."""
+    """On a site where only cells in the line of sight help, within some 200 blasts."""
     changes = {"n_steps": 128, "batch_size": 64, "n_epochs": 4, "learning_rate": 0.01}
     chosen = hyperparameters({**changes, "policy_kwargs.width": 16})
-    run = settings(scenario_file(tmp_path), steps=128 * 6, evaluation_interval=6)
+    run = settings(scenario_file(tmp_path), steps=128 * 4, evaluation_interval=4)
     rows = train(run, chosen, tmp_path / "run").progress.rollouts
     first, last = (np.mean([row.reduction for row in part]) for part in (rows[:2], rows[-2:]))
     assert last > first + 0.1

@@ -10,8 +10,7 @@ import pytest
 from blast_agents.posts import VEHICLE_RULES
 
 from blast_env import reporting
-from blast_env.app import offers
-from blast_env.app.blasts import FRAMES
+from blast_env.app import blasts, offers
 from blast_env.app.design import SLOTS
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers, settle
@@ -78,7 +77,7 @@ def test_a_particle_blast_has_a_film_and_the_loads_of_the_library(particles: Ses
         folder = particles.folder.blast_of(key)
         film = read_film(folder)
         assert film is not None
-        assert film.count == FRAMES == len(list(folder.glob("*.jpg")))
+        assert film.count == blasts.FRAMES == len(list(folder.glob("*.jpg")))
 
 
 def test_the_table_holds_layouts_against_no_barrier(particles: Session) -> None:
@@ -154,7 +153,7 @@ def test_particles_show_a_film_and_say_that_peaks_need_gas(tmp_path: Path) -> No
     assert "no loads: peak overpressure counts here; blast it with gas" in record.notes
     film = read_film(session.folder.blast_of(record.key))
     assert film is not None
-    assert film.count == FRAMES
+    assert film.count == blasts.FRAMES
 
 
 def test_an_edit_takes_results_away_and_undo_brings_them_back(particles: Session) -> None:

@@ -23,12 +23,12 @@ SCENARIOS = {
         if (scenario := load_scenario(name)).build_zone is not None and not scenario.zone.items
     },
 }
-EPISODES = 60
+EPISODES = 20
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_an_action_is_legal_exactly_if_the_layout_with_it_is_accepted(name: str) -> None:
-    """Thousands of states; in each, some cells are tried that are legal and some that are not.
+    """Hundreds of states; in each, some cells are tried that are legal and some that are not.
 
     Whether a layout is accepted is for `check_layout` to say, which looks at it as a whole.
     """

@@ -11,30 +11,22 @@ import pytest
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from tests.envs.small import ThinEngine, make, play, same, small_scenario
+from tests.envs.small import make, play, same
+from tests.envs.spawned import barrier_arguments, play_in_process
 
 pytestmark = pytest.mark.slow
 
 FINISH = 40
 
 
-def arguments() -> dict[str, Any]:
-    return {"scenario": small_scenario(), "engine": ThinEngine(), "observation": "features"}
-
-
-def _play_in_process(queue: "multiprocessing.Queue[list]") -> None:
-    env = gym.make("blast_env:BlastBarrier-v0", **arguments())
-    queue.put(play(env, 3))
-
-
 def test_works_by_module_name_in_a_spawned_process_with_the_same_rollout() -> None:
     context = multiprocessing.get_context("spawn")
     queue: multiprocessing.Queue[list] = context.Queue()
-    process = context.Process(target=_play_in_process, args=(queue,))
+    process = context.Process(target=play_in_process, args=(queue,))
     process.start()
     steps = queue.get(timeout=120)
     process.join()
-    assert same(steps, play(gym.make("BlastBarrier-v0", **arguments()), 3))
+    assert same(steps, play(gym.make("BlastBarrier-v0", **barrier_arguments()), 3))
 
 
 @pytest.mark.parametrize(
@@ -46,7 +38,7 @@ def test_vectors_of_environments_stack_the_information(mode: str, vector_kwargs:
         num_envs=2,
         vectorization_mode=mode,
         vector_kwargs=vector_kwargs,
-        **arguments(),
+        **barrier_arguments(),
     )
     _, info = envs.reset(seed=3)
     assert info["action_mask"].shape == (2, FINISH + 1)

@@ -18,6 +18,7 @@ from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.scenario import Scenario, ScenarioError
 from blast_env.simulation import BlastResult
+from tests.envs.spawned import digest_in_process, watch
 from tests.scenarios import BALLISTIC_COURTYARD
 
 pytestmark = pytest.mark.slow
@@ -31,18 +32,6 @@ def make(**arguments: Any) -> BlastSimulatorEnv:
     env = gym.make("BlastSimulator-v0", **arguments).unwrapped
     assert isinstance(env, BlastSimulatorEnv)
     return env
-
-
-def play(env: gym.Env, seed: int, **options: object) -> tuple[list, list[float], dict]:
-    """Return the observations, the rewards and the last information of an episode."""
-    observation, info = env.reset(seed=seed, options=options)
-    observations, rewards, ended = [observation], [], False
-    while not ended:
-        observation, reward, ended, truncated, info = env.step(0)
-        assert not truncated
-        observations.append(observation)
-        rewards.append(float(reward))
-    return observations, rewards, info
 
 
 @pytest.mark.parametrize(
@@ -99,7 +88,7 @@ def test_an_episode_adds_up_to_the_blast_exactly(
 
 
 def test_time_passes_in_steps_of_the_given_length() -> None:
-    observations, *_ = play(make(step_s=0.01), seed=1)
+    observations, *_ = watch(make(step_s=0.01), seed=1)
     times = np.array([observation["time_s"][0] for observation in observations])
     expected = 0.01 * np.arange(len(times))
     assert ((times >= expected) | (times == times[-1])).all()
@@ -108,7 +97,7 @@ def test_time_passes_in_steps_of_the_given_length() -> None:
 
 
 def test_balls_are_counted() -> None:
-    observations, *_ = play(make(step_s=0.02), seed=1)
+    observations, *_ = watch(make(step_s=0.02), seed=1)
     counts = np.array([observation["particle_counts"] for observation in observations])
     assert counts[0, 0] == 720
     assert counts[0, 1] > 100
@@ -118,13 +107,13 @@ def test_balls_are_counted() -> None:
 
 def test_one_seed_repeats_exactly_in_two_environments_and_after_a_reset() -> None:
     one, other = make(step_s=0.02), make(step_s=0.02)
-    first, second, again = play(one, 3), play(other, 3), play(one, 3)
+    first, second, again = watch(one, 3), watch(other, 3), watch(one, 3)
     for episode in (second, again):
         assert episode[1] == first[1]
         assert episode[2]["digest"] == first[2]["digest"]
         for a, b in zip(first[0], episode[0], strict=True):
             assert all((a[key] == b[key]).all() for key in a)
-    assert play(one, 4)[2]["digest"] != first[2]["digest"]
+    assert watch(one, 4)[2]["digest"] != first[2]["digest"]
 
 
 def test_without_a_seed_blasts_follow_from_the_first_seed() -> None:
@@ -137,19 +126,14 @@ def test_without_a_seed_blasts_follow_from_the_first_seed() -> None:
     assert len(set(seeds[0])) == 3
 
 
-def _digest_in_process(queue: "multiprocessing.Queue[str]") -> None:
-    env = gym.make("blast_env:BlastSimulator-v0", scenario=BALLISTIC_COURTYARD, step_s=0.1)
-    queue.put(play(env, 3)[2]["digest"])
-
-
 def test_works_by_module_name_in_a_spawned_process_with_the_same_digest() -> None:
     context = multiprocessing.get_context("spawn")
     queue: multiprocessing.Queue[str] = context.Queue()
-    process = context.Process(target=_digest_in_process, args=(queue,))
+    process = context.Process(target=digest_in_process, args=(queue,))
     process.start()
     digest = queue.get(timeout=120)
     process.join()
-    assert digest == play(make(step_s=0.1), 3)[2]["digest"]
+    assert digest == watch(make(step_s=0.1), 3)[2]["digest"]
 
 
 def test_vector_environments_run_it() -> None:
@@ -159,7 +143,6 @@ def test_vector_environments_run_it() -> None:
         vectorization_mode="async",
         scenario=BALLISTIC_COURTYARD,
         step_s=0.05,
-        vector_kwargs={"context": "spawn"},
     )
     observation, _ = envs.reset(seed=3)
     assert observation["time_s"].shape == (2, 1)
@@ -209,19 +192,19 @@ def test_stepping_before_reset_and_after_the_end_is_refused() -> None:
         BlastSimulatorEnv().step(0)
     with pytest.raises(gym.error.InvalidAction, match="action is 1"):
         BlastSimulatorEnv().step(1)
-    play(env, 0)
+    watch(env, 0)
     with pytest.raises(gym.error.ResetNeeded):
         env.step(0)
 
 
 def test_an_environment_that_is_not_running_pickles() -> None:
     copy = pickle.loads(pickle.dumps(make(step_s=0.1)))
-    assert play(copy, 3)[2]["digest"] == play(make(step_s=0.1), 3)[2]["digest"]
+    assert watch(copy, 3)[2]["digest"] == watch(make(step_s=0.1), 3)[2]["digest"]
 
 
 def test_weights_count_in_the_reward() -> None:
     env = make(scenario="street_junction", engine="event", step_s=10.0)
-    _, rewards, _ = play(env, 2)
+    _, rewards, _ = watch(env, 2)
     result = env.result()
     assert isinstance(result, BlastResult)
     assert fsum(rewards) == -2.0 * result.impulse_sim("block_north_east")

@@ -21,7 +21,7 @@ MASKS = arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9)))
 
 
 @given(MASKS)
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 def test_rectangles_are_the_cells_and_none_lies_over_another(cells: np.ndarray) -> None:
     count = np.zeros(cells.shape, dtype=int)
     for each in rectangles_of(cells):
@@ -30,7 +30,7 @@ def test_rectangles_are_the_cells_and_none_lies_over_another(cells: np.ndarray) 
 
 
 @given(MASKS)
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 def test_every_rectangle_has_a_wall_that_no_other_one_hides(cells: np.ndarray) -> None:
     """So that no part of a building alone is without a load."""
     framed = np.pad(cells, 1)

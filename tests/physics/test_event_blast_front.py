@@ -19,14 +19,13 @@ from blast_env.studies.blast_front import (
 )
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_an_elastic_blast_is_sedov_s(seed: int) -> None:
+def test_an_elastic_blast_is_sedov_s() -> None:
     """60,000 balls; the air swept up is 20 to 115 times as heavy as the charge.
 
     One seed's densest place scatters by 2 %, which is 0.02 in an exponent over this range.
     """
     case = FrontCase(restitution=1.0, side_spacings=245)
-    trace = elastic_front(case, np.geomspace(45.0, 105.0, 8).tolist(), seed)
+    trace = elastic_front(case, np.geomspace(45.0, 105.0, 8).tolist(), 0)
     assert trace.ratio == pytest.approx(1.0, abs=0.05)
     assert np.abs(trace.radius / trace.law - 1.0).max() < 0.07
     assert trace.exponent == pytest.approx(1.0 / 2.0, abs=0.04)

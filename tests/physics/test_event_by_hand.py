@@ -44,7 +44,7 @@ def rules(restitution: float, at_module: float = 1.0) -> SimulationParameters:
     speed=st.floats(50.0, 1e5),
     drift=st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)),
 )
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=75, deadline=None, derandomize=True)
 def test_two_balls_of_any_mass_and_size_from_any_side(
     masses: tuple[float, float],
     radii: tuple[float, float],

@@ -68,7 +68,7 @@ STEPS = st.one_of(
 
 
 @given(st.lists(STEPS, max_size=120))
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 def test_the_heap_gives_what_sorting_gives(steps: list[tuple]) -> None:
     """Balls are put in, moved to earlier and later times, and taken out of the middle; many times
     are equal, and then walls come first and pairs follow their numbers.

@@ -131,7 +131,7 @@ CELLS = st.lists(
 
 
 @given(CELLS, st.integers(0, 2**32 - 1))
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=75, deadline=None, derandomize=True)
 def test_first_hits_on_any_set_of_modules(cells: list[tuple[int, int]], seed: int) -> None:
     check_first_hits(rays([wall((92.0, 92.0), 8, 8, cells=tuple(cells))], seed))
 
@@ -142,7 +142,7 @@ def test_first_hits_on_any_set_of_modules(cells: list[tuple[int, int]], seed: in
     st.sampled_from([(0.0, 0.5), (1.0, 0.0), (0.3, 0.7), (2.0, 2.0), (1e-10, 0.0)]),
     st.integers(0, 2**32 - 1),
 )
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=75, deadline=None, derandomize=True)
 def test_first_hits_on_two_structures_side_by_side(
     cells: list[tuple[int, int]],
     others: list[tuple[int, int]],

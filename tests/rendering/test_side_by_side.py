@@ -15,7 +15,7 @@ from blast_env.rendering.film import FilmPanel, plan_film, write_side_by_side
 from blast_env.rendering.frames import FramePainter
 from blast_env.simulation import Blast
 
-WIDTH_PX = 1280
+WIDTH_PX = 640
 
 
 def frames_of(path: Path) -> np.ndarray:

@@ -112,7 +112,7 @@ def wrong_values(value: Any) -> st.SearchStrategy[Any]:
 
 
 @given(st.data())
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=200, deadline=None, derandomize=True)
 def test_misspelt_key_is_named_with_the_nearest_one(data: st.DataObject) -> None:
     document, path = data.draw(st.sampled_from(KEYS))
     key = str(path[-1])
@@ -135,7 +135,7 @@ def test_deleted_key_is_named(case: int) -> None:
 
 
 @given(st.data())
-@settings(max_examples=250, deadline=None, derandomize=True)
+@settings(max_examples=125, deadline=None, derandomize=True)
 def test_value_of_the_wrong_type_is_named(data: st.DataObject) -> None:
     document, path = data.draw(st.sampled_from(CASES))
     wrong = data.draw(wrong_values(value_at(document, path)))
@@ -153,7 +153,7 @@ def test_value_of_the_wrong_type_is_named(data: st.DataObject) -> None:
     | st.integers(1, 4000).map(lambda exponent: -(10**exponent))
     | st.integers(13, 4000).map(lambda exponent: 10**exponent),
 )
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=200, deadline=None, derandomize=True)
 def test_number_out_of_bounds_is_named(case: tuple[Document, KeyPath], wrong: float) -> None:
     document, path = case
     message = error_of_document(changed(document, path, wrong))
@@ -163,7 +163,7 @@ def test_number_out_of_bounds_is_named(case: tuple[Document, KeyPath], wrong: fl
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=75, deadline=None, derandomize=True)
 def test_overlapping_structures_are_both_named(data: st.DataObject) -> None:
     document = deepcopy(data.draw(st.sampled_from(all_documents())))
     index = data.draw(st.integers(0, len(document["structures"]) - 1))
@@ -179,7 +179,7 @@ def test_overlapping_structures_are_both_named(data: st.DataObject) -> None:
 
 
 @given(st.data())
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 def test_structure_outside_the_site_is_named(data: st.DataObject) -> None:
     document = deepcopy(data.draw(st.sampled_from(all_documents())))
     index = data.draw(st.integers(0, len(document["structures"]) - 1))
@@ -193,7 +193,7 @@ def test_structure_outside_the_site_is_named(data: st.DataObject) -> None:
 
 
 @given(st.sampled_from(TEXTS), st.floats(0.0, 1.0))
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=75, deadline=None, derandomize=True)
 def test_truncated_file_is_an_error(text: str, share: float) -> None:
     # Without any structure, whatever else is there is no scenario.
     end = text.index("[[structures]]") if "[[structures]]" in text else text.index("structures = ")
@@ -201,7 +201,7 @@ def test_truncated_file_is_an_error(text: str, share: float) -> None:
 
 
 @given(st.sampled_from(TEXTS), st.integers(0, 10**6), st.text(min_size=1, max_size=10))
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=150, deadline=None, derandomize=True)
 def test_edited_file_is_a_scenario_or_an_error(text: str, place: int, inserted: str) -> None:
     place %= len(text)
     edited = text[:place] + inserted + text[place + len(inserted) :]
@@ -214,7 +214,7 @@ def test_edited_file_is_a_scenario_or_an_error(text: str, place: int, inserted: 
 
 
 @given(st.binary(max_size=200))
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=75, deadline=None, derandomize=True)
 def test_random_bytes_are_an_error(
     tmp_path_factory: pytest.TempPathFactory, content: bytes
 ) -> None:
@@ -234,7 +234,7 @@ TOP_KEYS = sorted(set(Scenario.model_fields))
 
 
 @given(st.dictionaries(st.sampled_from(TOP_KEYS) | st.text(max_size=10), TOML_VALUES, max_size=8))
-@settings(max_examples=120, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 def test_any_other_toml_is_an_error(document: Document) -> None:
     error_of_document(document)
 

@@ -339,7 +339,7 @@ HEIGHT = st.none() | st.floats(0.5, 60.0)
 
 
 @given(HEIGHT, HEIGHT, HEIGHT)
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 def test_air_is_6_m_higher_than_anything_and_at_least_12_m(
     house: float | None, bunker: float | None, modules: float | None
 ) -> None:
@@ -357,7 +357,7 @@ def test_air_is_6_m_higher_than_anything_and_at_least_12_m(
 
 
 @given(st.tuples(st.floats(0.0, 30.0), st.floats(0.0, 20.0), st.floats(0.0, 14.0)))
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 def test_gauge_is_refused_just_where_there_is_no_air_within_half_a_metre(
     position_m: tuple[float, float, float],
 ) -> None:

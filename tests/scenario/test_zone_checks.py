@@ -107,7 +107,7 @@ def test_two_problems_of_a_zone_are_both_named() -> None:
 
 
 @given(zone_documents())
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 def test_conditions_survive_saving(
     tmp_path_factory: pytest.TempPathFactory, document: Document
 ) -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -118,7 +118,8 @@ class EventRun:
         collisions = np.empty(len(rows), dtype=COLLISION_DTYPE)
         for name, column in zip(RECORD_COLUMNS, rows.T, strict=True):
             collisions[name] = column
-        collisions["kind"] = self.scene.balls.kind[collisions["ball"]]
+        ball: Any = collisions["ball"]  # as what it is, it takes mypy seconds to index with
+        collisions["kind"] = self.scene.balls.kind[ball]
         self.log.extend(collisions)
 
     def _load_parts(self) -> None:

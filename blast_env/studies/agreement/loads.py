@@ -117,9 +117,10 @@ class BlastSet:
         log = result.collision_array
         time_s: FloatArray = log["time_s"]
         names = [o.name for o in result.obstacles for _ in o.parts]
+        module: Any = log["module"]  # as what it is, it takes mypy seconds to index with
         columns: dict[str, Any] = {
             "seed": np.full(len(log), seed, dtype=np.int32),
-            "structure": pd.Categorical(np.array(names)[log["module"]]),
+            "structure": pd.Categorical(np.array(names)[module]),
             "time_ms": 1000.0 * time_s,
             "angle_deg": np.degrees(incidence_angle_rad(log)),
             "impulse": log["impulse"],
