@@ -64,9 +64,10 @@ def propose(
     """Propose a layout for any site in a second or a few; no blast is run for it.
 
     It comes from weights that were trained for the scenario, if some come with the package; if not,
-    from the surrogate of gas dynamics, which was fitted to other sites. Where peaks count, of which
-    the surrogate knows nothing, it is the best rule's layout, which takes a blast of gas dynamics
-    for each rule and threat. Without --charge it is for all places where the charge may be.
+    from the surrogate of gas dynamics, which was fitted to other sites. Where peaks count or there
+    is no catalogue, of which the surrogate knows nothing, it is the best rule's layout, which takes
+    a blast of gas dynamics for each rule and threat. Without --charge it is for all places where
+    the charge may be.
     """
     with user_errors(), checked_targets({"--out": FileTarget(out, (".json",))}):
         chosen = load_scenario(scenario)
@@ -164,10 +165,10 @@ def _by_weights(scenario: Scenario, charge: Charge | None) -> _Proposal | None:
 
 def _by_surrogate(scenario: Scenario, charge: Charge | None) -> _Proposal | None:
     """Return what the surrogate proposes that comes with the package, if it can."""
-    if scenario.objective.needs_peaks:
-        print_line(
-            "note: peaks count, of which the surrogate knows nothing; the best rule is proposed"
-        )
+    peaks, items = scenario.objective.needs_peaks, scenario.zone.items
+    if peaks or not items:
+        why = "peaks count" if peaks else "single modules are placed"
+        print_line(f"note: {why}, of which the surrogate knows nothing; the best rule is proposed")
         return None
     surrogate = packaged_surrogate()
     return _timed(
@@ -223,3 +224,5 @@ def _print_verdict(loads: Mapping[str, float], case: Case) -> None:
         share = reductions(loads[name], loads[_NOTHING]).item()
         table.add_row(name, f"{loads[name]:,.1f}", f"{share:.1%}")
     result_console().print(table)
+    if rules and loads[rules[-1]] < loads[_PROPOSAL]:
+        print_line(f"note: {rules[-1]} does better here than the proposal")

@@ -33,6 +33,7 @@ LEAGUE = LeagueResult(
     best_rule_reduction=0.35,
 )
 CHARGE = Charge((1.7, 5.2), 5.0)
+MODULES = {"corner_m": [4.0, 3.0], "rows": 12, "columns": 2, "stock": 6, "height_m": 2.0}
 BLASTS = Path(__file__).parents[2] / "docs/data/gas_blasts.parquet"
 
 
@@ -136,15 +137,22 @@ def test_without_weights_the_surrogate_proposes_and_no_blast_is_run(
     assert layout.provenance["surrogate"] == surrogate.digest
 
 
-def test_where_peaks_count_the_best_rule_is_proposed_and_that_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"objective": {"quantity": "peak"}}, "peaks count"),
+        ({"build_zone": MODULES}, "single modules are placed"),
+    ],
+)
+def test_what_the_surrogate_knows_nothing_of_is_left_to_the_best_rule(
+    changed: dict[str, Any], why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    document = wide_yard().model_dump() | {"objective": {"quantity": "peak"}}
-    path = tmp_path / "peaks.toml"
-    save_scenario(Scenario.from_document(document, "peaks"), path)
+    document = wide_yard().model_dump() | changed
+    path = tmp_path / "other.toml"
+    save_scenario(Scenario.from_document(document, "other"), path)
     done = proposed(tmp_path, monkeypatch, path, "--charge", *CHARGE.position_m)
     assert done.exit_code == 0, done.output
-    assert "note: peaks count, of which the surrogate knows nothing" in done.output
+    assert f"note: {why}, of which the surrogate knows nothing" in done.output
     assert "by the best rule by gas dynamics:" in done.output
     assert "engine gas" in done.output
 
