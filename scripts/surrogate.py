@@ -34,7 +34,7 @@ from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from scripts.blast_table import COLUMNS, scenario_of
 
-DATA: Final = Path("docs/data/gas_blasts.parquet")
+DATA: Final = Path("docs/data/site_blasts.parquet")
 _FOLDS: Final = 5
 
 Processes = Annotated[int, typer.Option(min=1)]
@@ -100,7 +100,7 @@ def fit_it(
     check: Annotated[
         bool, typer.Option(help="First tell the errors, with a fifth held out in turn.")
     ] = True,
-    epochs: Annotated[int, typer.Option(min=1)] = 40,
+    epochs: Annotated[int, typer.Option(min=1)] = 20,
     seed: int = 0,
     out: Annotated[Path, typer.Option(help="The surrogate, .json.")] = Path("out/surrogate.json"),
 ) -> None:

@@ -193,15 +193,18 @@ SMALLER: Final[dict[str, str]] = {
         "--cell 0.5 --seeds 1"
     ),
     # docs/researchers/surrogate.md
-    "python -m scripts.surrogate fit --epochs 10 --out surrogate.json": "--epochs 1",
-    "blast-env league --engine gas --surrogate surrogate.json --scenario visitor_entrance"
-    " --agent-search 50 --out out/league": f"{_LEAGUE} --agent-search 3",
-    "python -m scripts.surrogate fit --no-check --without visitor_entrance --epochs 30"
-    " --out surrogate.json": "--epochs 1",
-    "python -m scripts.surrogate judge visitor_entrance --charges 6 --surrogate surrogate.json": (
+    "python -m scripts.surrogate blasts --sites 79 --layouts 4": (
+        "--sites 1 --layouts 1 --cache blasts"
+    ),
+    "python -m scripts.surrogate fit --out surrogate.json": "--epochs 1 --no-check",
+    "blast-env league --engine gas --track item_sites --cases 24 --seeds 2 --methods best_rule"
+    " --budgets 16 --surrogate surrogate.json --out out/league": (
+        "--cases 1 --seeds 1 --budgets 2"
+    ),
+    "python -m scripts.surrogate judge control_room school_and_clinic visitor_entrance"
+    " hotel_forecourt shopping_street --charges 3 --surrogate surrogate.json": (
         "--charges 1 --changes 1"
     ),
-    "python -m scripts.surrogate blasts": "--sites 1 --layouts 1 --cache blasts",
     # docs/paper
     "python -m scripts.presets ballistic": (
         "--candidates 1 --refinements 1 --seeds 1 --finalists 1 --finalist-seeds 1"
@@ -321,7 +324,7 @@ NOT_RUN: Final[dict[str, str]] = {
     "python -m scripts.pack_agent RUN NAME --league out/league --track known_NAME": (
         "writes into the package; tests/agents has it"
     ),
-    "python -m scripts.blast_table FOLDER --sites 100 --out blasts.parquet": (
+    "python -m scripts.blast_table FOLDER --sites 79 --out blasts.parquet": (
         "FOLDER is a placeholder; tests/scripts/test_blast_table.py"
     ),
     "python -m scripts.blast_table FOLDER --out blasts.parquet": (

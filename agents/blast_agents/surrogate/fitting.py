@@ -218,9 +218,8 @@ class _Tensors:
         What a group's errors have in common counts less than by what they differ.
         """
         errors = self._errors(network, np.concatenate(groups))
-        common = torch.cat(
-            [each.mean().expand(len(each)) for each in errors.split([*map(len, groups)])]
-        )
+        parts = errors.split([*map(len, groups)])  # type: ignore[no-untyped-call]
+        common = torch.cat([each.mean().expand(len(each)) for each in parts])
         return (errors - common).square().mean() + _COMMON * common.square().mean()
 
     def _errors(self, network: nn.Module, numbers: np.ndarray) -> Tensor:
