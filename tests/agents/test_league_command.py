@@ -67,7 +67,8 @@ def test_all_enter_and_all_is_written(run: Path, tmp_path: Path) -> None:
     assert len(pd.read_csv(out / "known_small_cases.csv")) == 20
     for name in ("league.md", "known_small.png"):
         assert f"wrote {out / name}" in result.stdout
-    assert "genetic search with 200 blasts has not entered" in result.stdout
+    for other in ("wall near the", "random, 4 blasts"):
+        assert f"(agent) minus {other}" in " ".join(result.stdout.split())
 
 
 def test_a_surrogate_enters_by_itself_and_as_a_search(tmp_path: Path) -> None:

@@ -117,6 +117,18 @@ def test_a_verdict_is_the_agent_minus_genetic_search() -> None:
     )
 
 
+def test_agents_are_held_against_the_best_rule_genetic_search_and_the_best_search() -> None:
+    agent = result("agent", AGENT, training=TRAINING)
+    rules = [
+        result("wall near the charge", BARE, is_rule=True),
+        result("wall near the building", SEARCH, is_rule=True),
+    ]
+    searches = [result(REFERENCE, SEARCH, blasts=200), result("annealing, 50 blasts", AGENT, 50)]
+    it = standings(BARE, agent, *rules, *searches)
+    names = [verdict.reference for verdict in verdicts(it)]
+    assert names == ["wall near the building", REFERENCE, "annealing, 50 blasts"]
+
+
 @pytest.mark.parametrize(
     ("low", "high", "words"),
     [
@@ -137,7 +149,7 @@ def test_there_is_no_verdict_without_agent_or_reference() -> None:
     agent = result("agent", AGENT, training=TRAINING)
     assert verdicts(standings(BARE, agent)) == ()
     (line,) = verdict_lines(standings(BARE, agent))
-    assert "genetic search with 200 blasts has not entered" in line
+    assert "neither a rule nor a search has entered" in line
     (line,) = verdict_lines(standings(BARE, result(REFERENCE, SEARCH, blasts=200)))
     assert "no trained agent" in line
 

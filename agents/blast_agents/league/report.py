@@ -10,7 +10,7 @@ import pandas as pd
 
 from blast_agents.league.entries import Training
 from blast_agents.league.figure import league_figure
-from blast_agents.league.standings import REFERENCE_METHOD, Result, Standings, verdicts
+from blast_agents.league.standings import Result, Standings, verdicts
 from blast_agents.proposal import Proposal
 from blast_env.arrays import FloatArray
 from blast_env.evaluation import Case
@@ -136,9 +136,8 @@ def verdict_lines(standings: Standings) -> list[str]:
     """Return what may be said of the agents, or why nothing can be."""
     if not any(result.training is not None for result in standings.results):
         return ["No verdict: no trained agent has entered this track."]
-    if standings.reference is None:
-        budget = standings.track.reference_budget
-        return [f"No verdict: {REFERENCE_METHOD} search with {budget} blasts has not entered."]
+    if not standings.references:
+        return ["No verdict: neither a rule nor a search has entered."]
     return [verdict.text for verdict in verdicts(standings)]
 
 

@@ -15,7 +15,7 @@ from blast_env.evaluation.comparison import Comparison, check_something_arrives
 from blast_env.statistics import CVAR_LEVEL, Estimate, conditional_value_at_risk, reductions
 
 REFERENCE_METHOD: Final = "genetic"
-"""Agents are held against this search."""
+"""Agents are held against this search, with the track's budget, and what was best of its kind."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +109,23 @@ class Standings:
         name = search_name(REFERENCE_METHOD, self.track.reference_budget)
         return next((result for result in self.results if result.name == name), None)
 
+    @property
+    def references(self) -> tuple[Result, ...]:
+        """What agents are held against, as far as it entered.
+
+        The best rule, the reference, and the best search, by their mean reductions.
+        """
+        searches = [result for result in self.results if result.budget]
+        found = (
+            *sorted(self.rules, key=self._mean)[-1:],
+            self.reference,
+            *sorted(searches, key=self._mean)[-1:],
+        )
+        return tuple(dict.fromkeys(each for each in found if each is not None))
+
+    def _mean(self, result: Result) -> float:
+        return self.reduction(result).value
+
     def comparison(self, result: Result) -> Comparison:
         """Return an entry's layouts against no barrier."""
         return Comparison(
@@ -150,12 +167,12 @@ class Standings:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A trained agent against the reference, case by case.
+    """A trained agent against a rule or a search, case by case.
 
     Attributes:
         agent: Name of the agent.
-        reference: Name of the search.
-        difference: Mean reduction of the agent minus that of the search.
+        reference: Name of the rule or the search.
+        difference: Mean reduction of the agent minus that of the other.
         sample: What the interval is over, e.g. `"16 cases"`.
         proposal_ms: Time from a case to the agent's layout, median, ms.
     """
@@ -190,10 +207,7 @@ class Verdict:
 
 
 def verdicts(standings: Standings) -> tuple[Verdict, ...]:
-    """Return a verdict for each agent; none if the search to compare with did not enter."""
-    reference = standings.reference
-    if reference is None:
-        return ()
+    """Return a verdict for each agent and each of the references."""
     count = len(standings.track.cases)
     sample = f"{count} cases"
     if standings.has_one_case:
@@ -208,4 +222,5 @@ def verdicts(standings: Standings) -> tuple[Verdict, ...]:
         )
         for result in standings.results
         if result.training is not None
+        for reference in standings.references
     )
