@@ -47,6 +47,11 @@ def compare(
             return loads.collisions_of(blasts, processes, out, progress)
 
     with user_errors(), running_on(cluster):
+        if event_seeds < seeds:
+            raise BlastEnvError(
+                f"--event-seeds is {event_seeds}, must be at least --seeds, {seeds}: the engines "
+                "share charge and air of each seed"
+            )
         make_folder(out)
         make_folder(figure.parent)
         scenes = [each for each in loads.engine_scenes() if scene in (None, each.name)]

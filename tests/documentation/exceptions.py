@@ -240,11 +240,11 @@ SMALLER: Final[dict[str, str]] = {
         "--seeds 4"
     ),
     # docs/studies
-    "python -m scripts.engines compare": "--seeds 20 --event-seeds 2",
+    "python -m scripts.engines compare": "--seeds 20 --event-seeds 20",
     "python -m scripts.engines modules": "--seeds 20 --event-seeds 2",
     "python -m scripts.engines front": "--seeds 1",
     "python -m scripts.engines profile": "--repeats 1",
-    "python -m scripts.engines cost --repeats 10": "--repeats 1 --most-balls 200",
+    "python -m scripts.engines cost --repeats 10": "--repeats 1 --most-balls 5000",
     "python -m scripts.layouts engines --charges 8": "--layouts 10 --charges 1",
     "python -m scripts.layouts resolutions --seeds 4": "--layouts 3 --seeds 2",
     "blast-env bench --repeats 7 --no-environment --no-gas": "--repeats 1 --no-memory",
