@@ -95,3 +95,9 @@ def test_costs_of_two_sizes_are_fitted(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert re.search(r"ns an event = -?\d+ [+] -?[\d.]+ log2\(balls\)", result.output)
     assert run(engines.app, "cost", "--most-balls=2000", f"--out={out}").exit_code == 2
+
+
+def test_the_event_engine_needs_all_seeds_that_pymunk_has() -> None:
+    refused = run(engines.app, "compare", "--seeds=20", "--event-seeds=19")
+    assert refused.exit_code == 2
+    assert "--event-seeds is 19, must be at least --seeds, 20" in refused.output

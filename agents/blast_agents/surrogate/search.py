@@ -130,9 +130,9 @@ class SurrogateAgent:
         """
         if charge is None:
             drawn = practice_hidden(scenario, _DRAWN_CHARGES, 1, 0)
-            distinct = {threat.charge: threat for threat in reversed(drawn.threats)}
-            first = [each for each in drawn.threats if distinct[each.charge] is each]
-            case = replace(drawn, threats=tuple(first[:_HIDDEN_CHARGES]), realisations=1)
+            distinct = {threat.charge: threat for threat in drawn.threats}
+            first = tuple(distinct.values())[:_HIDDEN_CHARGES]
+            case = replace(drawn, threats=first)
         else:
             case = practice_visible(scenario, charge, 1, 0)
         guesses = Guesses.of(self.surrogate, case)
