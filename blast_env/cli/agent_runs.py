@@ -95,13 +95,14 @@ def evaluate_run(run: Path, options: EvaluateOptions) -> None:
         if note and not options.any_json:
             print_line(f"note: {note}")
     if isinstance(source, SingleScenario) and settings.threat == "hidden":
-        _report_hidden(agent, source, provenance, options)
+        _report_hidden(agent, settings, source, provenance, options)
     else:
         _report_cases(agent, settings, source, provenance, options)
 
 
 def _report_hidden(
     agent: TrainedAgent,
+    settings: TrainingSettings,
     source: SingleScenario,
     provenance: dict[str, Any],
     options: EvaluateOptions,
@@ -109,7 +110,7 @@ def _report_hidden(
     """One layout for all the places where the charge may be."""
     evaluator = BlastEvaluator(
         source.scenario,
-        _engine(agent, options),
+        _engine(settings, options),
         cache=options.cache,
     )
     proposal = propose(agent, source.scenario, None)
@@ -128,7 +129,7 @@ def _report_cases(
     seeds = options.seed_range
     options.prepare_files(len(seeds))
     cases = [_fixed(case, options) for case in unseen_cases(settings, source, seeds)]
-    evaluators = Evaluators(_engine(agent, options), options.cache)
+    evaluators = Evaluators(_engine(settings, options), options.cache)
     proposals = [propose(agent, each.scenario, each.charge) for each in cases]
     with progress_bar(f"{2 * len(cases)} blasts in {_place(settings, cases)}") as progress:
         comparison = compare(
@@ -157,9 +158,9 @@ def _report_cases(
     print_line(cache_text(evaluators))
 
 
-def _engine(agent: TrainedAgent, options: EvaluateOptions) -> Engine:
+def _engine(settings: TrainingSettings, options: EvaluateOptions) -> Engine:
     """Return the engine that judges: the one asked for, or that of the run."""
-    return find_engine(options.engine or agent.engine, options.cell_m)
+    return find_engine(options.engine or settings.judge, options.cell_m)
 
 
 def _fixed(case: Case, options: EvaluateOptions) -> Case:

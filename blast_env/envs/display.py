@@ -11,7 +11,7 @@ from blast_env.envs.episode import Episode
 from blast_env.envs.vehicle_observations import VehicleView
 from blast_env.evaluation.cases import Threat
 from blast_env.geometry import Cell, Layout, Rectangle
-from blast_env.physics.engines import is_gas
+from blast_env.physics.engines import has_particles, is_gas
 from blast_env.scenario import AnySource, Placement, PointSource, Scenario
 from blast_env.scenario.catalogue import element_text
 from blast_env.scenario.zone import distances_m
@@ -193,7 +193,7 @@ class Display:
 
     def _final_frame(self, episode: Episode) -> Frame:
         painter = self._placing_painter(episode)
-        if is_gas(episode.objective.evaluator.engine):  # no balls that could be drawn
+        if not has_particles(episode.objective.evaluator.engine):  # no balls to be drawn
             return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
         if self._last_frame is None:
             self._last_frame = painter.padded(_screening(episode).last_frame())

@@ -34,7 +34,7 @@ from blast_env.evaluation.comparison import Assessment, Objective
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.geometry import Layout
 from blast_env.physics.engine import Engine
-from blast_env.physics.engines import is_gas
+from blast_env.physics.engines import has_particles
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
@@ -297,12 +297,14 @@ def find_realisations(realisations: int | None, threat: str | ThreatModel, engin
     """Return the number of blasts for each charge for the arguments `realisations` and `threat`.
 
     Raises:
-        BlastEnvError: If the number is out of bounds: gas dynamics has no fan and no air to draw,
-            so that a charge has one realisation.
+        BlastEnvError: If the number is out of bounds: engines without particles have no fan and no
+            air to draw, so that a charge has one realisation.
     """
-    if is_gas(engine):
+    if not has_particles(engine):
         if realisations not in (None, 1):
-            raise BlastEnvError(f"realisations is {realisations}, must be 1: gas has no noise")
+            raise BlastEnvError(
+                f"realisations is {realisations}, must be 1: {engine.name} has no noise"
+            )
         return 1
     if realisations is None:
         return VISIBLE_REALISATIONS if threat == "visible" else 1

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from blast_env.calibration.model import Calibration, scenario_calibration
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Threat
-from blast_env.evaluation.loads import BlastLoads, blast_loads, gas_loads
+from blast_env.evaluation.loads import BlastLoads, LoadModel, blast_loads, gas_loads
 from blast_env.evaluation.store import (
     BlastCache,
     BlastKey,
@@ -20,7 +20,7 @@ from blast_env.evaluation.store import (
 )
 from blast_env.geometry import Element, Layout
 from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine, is_gas
+from blast_env.physics.engines import find_engine, has_particles, is_gas
 from blast_env.physics.scene import Charge
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
@@ -49,7 +49,7 @@ class BlastEvaluator:
         scenario: The scenario.
         engine: The engine.
         calibration: The scenario's calibration, checked against its parameters and the engine;
-            `None` for gas dynamics, which needs none.
+            `None` for engines without particles, which need none.
         blasts: Number of blasts that were really simulated.
         cache_hits: Number of loads that were asked for and needed no blast.
 
@@ -77,7 +77,7 @@ class BlastEvaluator:
                 f" {self.scenario.objective.quantity!r}, but engine {self.engine.name!r} knows no"
                 " overpressure: must be 'impulse', or the engine 'gas'"
             )
-        if not is_gas(self.engine):
+        if has_particles(self.engine):
             self.scenario.check_for_particles()
             self.calibration = scenario_calibration(self.scenario, self.engine.name)
         self.blasts = 0
@@ -96,7 +96,7 @@ class BlastEvaluator:
 
     @property
     def calibration_name(self) -> str:
-        """Name of the calibration; `"none"` for gas dynamics, which needs none."""
+        """Name of the calibration; `"none"` for engines without particles, which need none."""
         return "none" if self.calibration is None else self.calibration.name
 
     @property
@@ -157,8 +157,8 @@ class BlastEvaluator:
 
     def _key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
         cells = tuple(sorted(check_layout(self.scenario, layout)))
-        # Gas dynamics has no fan and no air to draw: a charge has one realisation.
-        seed = 0 if is_gas(self.engine) else threat.seed
+        # Without particles there is no fan and no air to draw: a charge has one realisation.
+        seed = threat.seed if has_particles(self.engine) else 0
         charge = threat.charge_against(self.scenario, cells)
         return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
 
@@ -208,6 +208,8 @@ def _run_one(work: _Work) -> BlastLoads:
         from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
 
         return gas_loads(GasBlast(scenario, key.layout, key.seed, engine, work.charge).run())
+    if isinstance(engine, LoadModel):
+        return engine.loads(scenario, key.layout, work.charge)
     if work.calibration is None:
         raise AssertionError("an evaluator of particles has a calibration")
     result = Blast(scenario, key.layout, key.seed, engine, work.charge).run()

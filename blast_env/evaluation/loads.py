@@ -1,14 +1,17 @@
 """The loads that one blast puts on the structures."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.calibration.model import Calibration
+from blast_env.geometry import Element
+from blast_env.physics.engine import Engine
 from blast_env.physics.structure import ModularObstacle
-from blast_env.scenario import AnyScenario, ObjectiveSection, find_scenario
+from blast_env.scenario import AnyCharge, AnyScenario, ObjectiveSection, Scenario, find_scenario
 from blast_env.simulation import BlastResult
 from blast_env.units import PA_PER_PSI
 
@@ -122,6 +125,20 @@ class BlastLoads:
     def in_range(self) -> bool:
         """Whether the calibration was made for this distance to every protected structure."""
         return all(load.in_range for load in self.protected)
+
+
+@runtime_checkable
+class LoadModel(Engine, Protocol):
+    """An engine that tells loads without running a blast; it has no noise and no calibration."""
+
+    def loads(self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> BlastLoads:
+        """Return the loads behind a layout, impulses only.
+
+        Args:
+            scenario: The scenario.
+            layout: A legal layout.
+            charge: What goes off: where it does, or the vehicle that brings it.
+        """
 
 
 def blast_loads(result: BlastResult, calibration: Calibration) -> BlastLoads:

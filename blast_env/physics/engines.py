@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Final
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.physics.engine import Engine, ParticleEngine
@@ -76,9 +76,16 @@ def find_particle_engine(engine: str | Engine) -> ParticleEngine:
         BlastEnvError: If it is no engine of particles.
     """
     found = find_engine(engine)
-    if is_gas(found):
-        raise BlastEnvError(f"engine {GAS!r} has no particles: this is for the particle engines")
-    return cast(ParticleEngine, found)
+    if not has_particles(found):
+        raise BlastEnvError(
+            f"engine {found.name!r} has no particles: this is for the particle engines"
+        )
+    return found
+
+
+def has_particles(engine: Engine) -> "TypeIs[ParticleEngine]":
+    """Return whether an engine runs scenes of balls: with noise, and a calibration for loads."""
+    return hasattr(engine, "start")
 
 
 def is_gas(engine: Engine) -> "TypeIs[GasEngine]":

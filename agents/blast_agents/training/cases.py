@@ -44,7 +44,7 @@ class Selection:
             processes: Worker processes for the blasts; they change nothing but the time.
 
         Raises:
-            CalibrationError: If the scenario has no calibration for the engine.
+            CalibrationError: If the scenario has no calibration for the judge.
             UnknownNameError: If there is no such engine.
             BlastEnvError: If there are to be more cases than seeds or sites for them.
         """
@@ -55,7 +55,7 @@ class Selection:
         else:
             sites = SiteSource(HELD_OUT_SITES - count, count, _ranges_of(source))
             scenarios = tuple(sites)
-        evaluators = Evaluators(settings.blast_engine, most=count)
+        evaluators = Evaluators(settings.judge, most=count)
         evaluators.of(scenarios[0])  # refuses an unknown engine before anything is written
         return cls(_cases(settings, scenarios, seeds), evaluators, processes)
 

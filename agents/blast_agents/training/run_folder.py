@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from blast_agents.surrogate.engine import SURROGATE, engine_to_train_on
 from blast_agents.training.hyperparameters import (
     ALGORITHMS,
     SELF_LABELLING,
@@ -34,7 +35,7 @@ from blast_env.envs.observations import OBSERVATIONS
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import is_temporary, make_folder, sync, write_atomically
 from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine
+from blast_env.physics.engines import GAS, find_engine
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
 
@@ -48,6 +49,7 @@ SETTING_KEYS: Final = (
     "hidden_threats",
     "evaluation_interval",
     "evaluation_cases",
+    "evaluation_engine",
     "evaluation_first_seed",
     "torch_threads",
 )
@@ -63,13 +65,15 @@ class TrainingSettings(BaseModel):
         steps: Steps to train for; a rollout, or a round, is always finished.
         seed: Decides everything: weights, episodes, actions, minibatches.
         threat: `"visible"`: the agent sees the charge; `"hidden"`: it sees where it may be.
-        engine: Engine that runs the blasts.
+        engine: Engine that runs the blasts; or `"surrogate"`, guesses instead of blasts.
         cell_m: Side of the cells of gas dynamics; that of the engine unless given.
         observation: Name of what the agent sees of the site; see `BlastBarrier-v0`.
         hidden_threats: Charges in an episode where they are hidden. The mean over episodes is the
             same for any number; with few, more layouts are tried for the same number of blasts.
         evaluation_interval: Rollouts from one evaluation to the next.
         evaluation_cases: Held-out threats that the layouts are evaluated on.
+        evaluation_engine: Engine by which the best weights are chosen; that of the training unless
+            given, and gas dynamics where the surrogate trains.
         evaluation_first_seed: The seeds of these threats count from here, within those that
             belong to the choice of weights (`SeedRange.SELECTION`).
         torch_threads: Threads for the network.
@@ -89,6 +93,7 @@ class TrainingSettings(BaseModel):
     hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
     evaluation_interval: Annotated[int, Field(ge=1, le=10**6)] = 5
     evaluation_cases: Annotated[int, Field(ge=2, le=100)] = 16
+    evaluation_engine: str | None = None
     evaluation_first_seed: Annotated[int, Field(ge=0, lt=2**30)] = 0
     torch_threads: Annotated[int, Field(ge=1, le=256)] = 1
     start_from: str | None = None
@@ -101,7 +106,18 @@ class TrainingSettings(BaseModel):
             UnknownNameError: If there is no engine of that name.
             BlastEnvError: If it has no such cells.
         """
-        return find_engine(self.engine, self.cell_m)
+        return engine_to_train_on(self.engine, self.cell_m)
+
+    @property
+    def judge(self) -> Engine:
+        """The engine by which the best weights are chosen, and the agent is evaluated.
+
+        Raises:
+            UnknownNameError: If there is no engine of that name.
+        """
+        if self.evaluation_engine is not None:
+            return find_engine(self.evaluation_engine)
+        return find_engine(GAS) if self.engine == SURROGATE else self.blast_engine
 
 
 class RunConfiguration(BaseModel):

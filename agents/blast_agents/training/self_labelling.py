@@ -35,6 +35,7 @@ from blast_env.evaluation import Case, Evaluators
 from blast_env.evaluation.evaluator import BlastAsked
 from blast_env.evaluation.store import BlastCache, DiskCache
 from blast_env.geometry import Layout
+from blast_env.physics.engine import Engine
 from blast_env.physics.scene import Charge
 from blast_env.statistics import reductions
 
@@ -58,7 +59,7 @@ class Judge:
 
     @classmethod
     def of(
-        cls, engine: str, cases: Sequence[Case], cache: BlastCache | None, processes: int
+        cls, engine: str | Engine, cases: Sequence[Case], cache: BlastCache | None, processes: int
     ) -> "Judge":
         """Return the judge of cases, with an evaluator for each of their scenarios."""
         scenarios = {case.scenario.content_hash for case in cases}
@@ -261,12 +262,12 @@ class SelfLabelling:
         policy.set_training_mode(False)
         cases = training_cases(settings, source, hyperparameters.cases)
         cache = DiskCache(folder.blasts, _MOST_BYTES)
-        judge = Judge.of(settings.engine, cases, cache, hyperparameters.n_envs)
+        judge = Judge.of(settings.blast_engine, cases, cache, hyperparameters.n_envs)
         judge.asked = progress.counters.steps
         return cls(
             folder=folder,
             configuration=configuration,
-            agent=TrainedAgent(policy, scenario, settings.observation, settings.engine),
+            agent=TrainedAgent(policy, scenario, settings.observation, settings.blast_engine),
             lessons=Lessons(cases, [*checkpoint.labels]),
             judge=judge,
             selection=selection,

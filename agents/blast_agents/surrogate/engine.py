@@ -1,0 +1,120 @@
+"""The surrogate in the place of an engine: for training, where blasts are too dear."""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from blast_agents.surrogate.network import Surrogate, packaged_surrogate
+from blast_agents.surrogate.walls import Site, site_of
+from blast_env.evaluation.loads import BlastLoads, StructureLoad
+from blast_env.geometry import Element
+from blast_env.physics.engine import Engine
+from blast_env.physics.engines import find_engine
+from blast_env.scenario import AnyCharge, Scenario
+from blast_env.scenario.build_scene import charge_against
+from blast_env.units import PA_PER_PSI
+
+SURROGATE: Final = "surrogate"
+"""Name of the engine that is none."""
+
+_KEPT_SITES: Final = 64
+"""What no layout changes is remembered for so many sites: some megabytes each."""
+
+
+@dataclass(frozen=True)
+class SurrogateEngine:
+    """Tells the impulse on each protected structure by guesses: an engine without a blast.
+
+    `gymnasium.make("BlastBarrier-v0", scenario=..., engine=SurrogateEngine())` has episodes of
+    milliseconds. What is trained on it has to be judged by gas dynamics. It knows no overpressure,
+    and no structure that is not protected: nothing arrives there.
+
+    Attributes:
+        surrogate: The surrogate; that of the package unless given.
+        digest: Its digest.
+    """
+
+    surrogate: Surrogate = field(default_factory=packaged_surrogate, repr=False)
+    digest: str = field(init=False)
+    _sites: OrderedDict[str, Site] = field(
+        default_factory=OrderedDict, init=False, repr=False, compare=False
+    )
+
+    def __post_init__(self) -> None:
+        """Work out the digest, which tells results of different surrogates apart."""
+        object.__setattr__(self, "digest", self.surrogate.digest)
+
+    @property
+    def name(self) -> str:
+        """Name in records."""
+        return SURROGATE
+
+    @property
+    def version(self) -> str:
+        """Which surrogate."""
+        return f"{SURROGATE} {self.digest}"
+
+    def loads(self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> BlastLoads:
+        """Return what the surrogate guesses, a charge and a layout at a time.
+
+        Args:
+            scenario: The scenario.
+            layout: A legal layout.
+            charge: What goes off: where it does, or the vehicle that brings it.
+
+        Returns:
+            The loads. Those of a structure's modules are all the same, since only their mean is
+            known.
+
+        Raises:
+            BlastEnvError: If nothing is protected, or the scenario's objective counts peaks.
+        """
+        site = self._site(scenario)
+        guess = self.surrogate.guess(site, [layout], [charge_against(scenario, layout, charge)])
+        of_protected = dict(
+            zip((each.name for each in site.protected), guess.impulse_pa_s[0].tolist(), strict=True)
+        )
+        impulse_pa_s = [of_protected.get(each.name, 0.0) for each in scenario.structures]
+        structures = tuple(
+            StructureLoad(
+                name=each.name,
+                protected=each.protected,
+                weight=each.weight,
+                impulse_sim=np.nan,
+                transferred_impulse_sim=np.nan,
+                impulse_psi_s=load_pa_s / PA_PER_PSI,
+                peak_pa=None,
+                peak_weight=each.counted_peak_weight,
+                in_range=False,
+                notes=("a guess of the surrogate, not a blast",),
+            )
+            for each, load_pa_s in zip(scenario.structures, impulse_pa_s, strict=True)
+        )
+        modules = [each.rows * each.columns for each in scenario.structures]
+        return BlastLoads(structures, np.repeat(impulse_pa_s, modules))
+
+    def _site(self, scenario: Scenario) -> Site:
+        key = scenario.content_hash
+        if key not in self._sites:
+            self._sites[key] = site_of(scenario)
+            if len(self._sites) > _KEPT_SITES:
+                self._sites.popitem(last=False)
+        self._sites.move_to_end(key)
+        return self._sites[key]
+
+
+def engine_to_train_on(name: str, cell_m: float | None = None) -> Engine:
+    """Return an engine by its name; beside the usual ones there is `"surrogate"`.
+
+    Args:
+        name: The name.
+        cell_m: Side of the cells of gas dynamics; that of the engine unless given.
+
+    Raises:
+        UnknownNameError: If there is no engine of that name.
+        BlastEnvError: If it has no such cells.
+    """
+    return find_engine(SurrogateEngine() if name == SURROGATE else name, cell_m)
