@@ -15,7 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from blast_env.cli.tables import ResultTable
 from blast_env.errors import BlastEnvError, MissingExtraError
 from blast_env.physics.engine import Engine
-from blast_env.physics.engines import is_gas
+from blast_env.physics.engines import has_particles, is_gas
 from blast_env.scenario import Scenario
 from blast_env.values import STEERING
 
@@ -87,12 +87,14 @@ def engine_text(engine: Engine, scenarios: Iterable[Scenario] = ()) -> str:
 
     Args:
         engine: The engine.
-        scenarios: Those that it runs; gas dynamics has no parameters.
+        scenarios: Those that it runs; only particles have parameters.
     """
     known = engine.version.split()[0] == engine.name
     text = f"engine {engine.version}" if known else f"engine {engine.name}, {engine.version}"
     if is_gas(engine):
         return f"{text}, cells of {engine.cell_m:g} m"
+    if not has_particles(engine):
+        return text
     presets = dict.fromkeys(_preset_text(each) for each in scenarios)
     return f"{text}, preset {', '.join(presets)}" if presets else text
 

@@ -63,7 +63,10 @@ def train(
         ),
     ] = None,
     engine: Annotated[
-        str | None, typer.Option(help="Engine that runs the blasts.", show_default="event")
+        str | None,
+        typer.Option(
+            help="Engine that runs the blasts; surrogate: guesses instead.", show_default="event"
+        ),
     ] = None,
     cell: CellSide = None,
     observation: Annotated[
@@ -181,6 +184,8 @@ def _print_result(result: "TrainingResult") -> None:
     settings = result.configuration.settings
     scenario = folder.scenario(result.configuration)
     print_line(engine_text(settings.blast_engine, [scenario]))
+    if settings.judge.name != settings.engine:
+        print_line(f"weights chosen by {engine_text(settings.judge, [scenario])}")
     for row in result.progress.evaluations:
         if row.steps == counters.best_steps:
             print_line(

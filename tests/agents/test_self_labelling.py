@@ -10,7 +10,7 @@ import torch
 from blast_agents.search.by_rule import layouts_by_rule
 from blast_agents.training import load_agent, load_hyperparameters, resume, train
 from blast_agents.training.agent import TrainedAgent, fitted, policy_for
-from blast_agents.training.cases import training_cases
+from blast_agents.training.cases import Selection, training_cases
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import AnyHyperparameters
 from blast_agents.training.imitation import Demonstration, imitate, imitation_loss
@@ -129,6 +129,18 @@ def test_a_policy_learns_to_place_what_it_was_shown(observation: str, count: int
         assert sorted(agent.propose(scenario, case.charge)) == sorted(layout)
 
 
+def test_sites_with_and_without_vehicles_are_learnt_side_by_side() -> None:
+    with_vehicle, without = gate_site(), wide_yard()
+    assert bool(with_vehicle.vehicles) > bool(without.vehicles)
+    (case,) = first_cases(without, 1)
+    lesson = Demonstration(case, by_rule(case), 0.4, "grid", among_vehicles=True)
+    agent = TrainedAgent(agent_for(without).policy, with_vehicle)
+    seen = agent._episode(without, case.charge).observe(Placement.empty(without))
+    assert lesson.draw(np.random.default_rng(0)).observation.shape == seen.shape
+    alone = replace(lesson, among_vehicles=False).draw(np.random.default_rng(0))
+    assert len(alone.observation) < len(seen)
+
+
 def test_a_race_ends_with_the_best_of_those_that_met_all_threats() -> None:
     scenario = small_scenario()
     (case,) = first_cases(scenario, 4, threat="hidden", hidden_threats=3)  # one layout for all
@@ -241,15 +253,21 @@ def test_another_training_begins_with_the_weights_of_a_run(finished: Path, tmp_p
     assert not (tmp_path / "none").exists()
 
 
-def test_it_learns_by_gas_from_pieces(tmp_path: Path) -> None:
+def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -> None:
     scenario = tmp_path / "yard.toml"
     save_scenario(wide_yard(), scenario)
     small = own(cases=2, samples=1, neighbours=1, borrowed=0)
-    result = train(run_settings(scenario, engine="gas", steps=17), small, tmp_path / "run")
+    chosen = run_settings(scenario, engine="surrogate", steps=17, evaluation_interval=100)
+    result = train(chosen, small, tmp_path / "run")
     first, *_, last = result.progress.rollouts
     assert first.reward > 0.2  # the best rule of each case
     assert last.reward >= first.reward
     assert last.episodes <= 6
+    (evaluation,) = result.progress.evaluations
+    selection = Selection.of(chosen, SingleScenario(wide_yard()))
+    assert selection.evaluators.engine.name == "gas"
+    best = selection.reduction(load_agent(tmp_path / "run"))
+    assert (best.value, best.low) == (evaluation.reduction, evaluation.low)
 
 
 @pytest.mark.parametrize(
@@ -257,6 +275,9 @@ def test_it_learns_by_gas_from_pieces(tmp_path: Path) -> None:
     [
         ({"observation": "grid_with_load"}, "must be 'grid' or 'features' for self_labelling"),
         ({"engine": "gass"}, "did you mean 'gas'"),
+        ({"engine": "surrogat"}, "did you mean 'surrogate'"),
+        ({"engine": "surrogate", "cell_m": 0.5}, "engine 'surrogate' has no cells"),
+        ({"evaluation_engine": "surrogate"}, "known: event, gas, pymunk"),
     ],
 )
 def test_what_it_cannot_do_is_refused_before_anything_is_written(

@@ -10,6 +10,7 @@ import pytest
 from blast_agents.rules import random_layout
 from blast_agents.search import LayoutProblem
 from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.surrogate.engine import SurrogateEngine
 from blast_agents.surrogate.fitting import MEMBERS, Samples, elements, errors, fit, folds
 from blast_agents.surrogate.network import SHAPES, Fit, Member, Surrogate, load_surrogate
 from blast_agents.surrogate.search import Guesses, SurrogateAgent, SurrogateSearch, improved
@@ -18,6 +19,7 @@ from blast_agents.surrogate.ways import FALLS_M, SHARES, Ways
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.geometry import Piece
@@ -174,6 +176,41 @@ def test_peaks_are_not_its_business() -> None:
     document = YARD.model_dump() | {"objective": {"quantity": "peak"}}
     with pytest.raises(BlastEnvError, match="'peak', but the surrogate knows impulses only"):
         site_of(Scenario.from_document(document, "peaks"))
+
+
+def test_in_the_place_of_an_engine_it_says_what_it_guesses() -> None:
+    surrogate = by_hand()
+    evaluator = BlastEvaluator(YARD, SurrogateEngine(surrogate))
+    layout = random_layout(YARD, np.random.default_rng(0))
+    first, second = draw_threats(YARD, range(2))
+    loads = [evaluator.loads(layout, each) for each in (first, replace(first, seed=9), second)]
+    charges = [each.charge_against(YARD, layout) for each in (first, second)]
+    site = site_of(YARD)
+    said = surrogate.guess(site, [layout, layout], charges).impulse_pa_s
+    protected = [[each.impulse_pa_s for each in of_blast.protected] for of_blast in loads]
+    assert protected == [pytest.approx(said[0]), protected[0], pytest.approx(said[1])]
+    others = [each for each in loads[0].structures if not each.protected]
+    assert all(each.impulse_pa_s == 0.0 for each in others)
+    assert loads[0].are_for(YARD)
+    assert evaluator.blasts == 2  # a seed changes nothing
+    assert evaluator.calibration_name == "none"
+    assert SurrogateEngine(by_hand(1)) != SurrogateEngine(surrogate)
+
+
+def test_an_environment_pays_by_guesses() -> None:
+    surrogate = by_hand()
+    env = BlastBarrierEnv(scenario=YARD, engine=SurrogateEngine(surrogate), reward="terminal")
+    _, info = env.reset(seed=0)
+    actions = np.flatnonzero(info["action_mask"])
+    _, _, _, _, _ = env.step(actions[0])
+    _, _, ended, _, info = env.step(YARD.zone.catalogue.finish)
+    assert ended
+    ((x_m, y_m), tnt_kg, height_m) = info["charges"][0]
+    charges = [Charge((x_m, y_m), tnt_kg, height_m)] * 2
+    said = surrogate.guess(site_of(YARD), [info["layout"], ()], charges).impulse_pa_s.sum(axis=1)
+    assert info["reduction"] == pytest.approx(1.0 - said[0] / said[1])
+    with pytest.raises(BlastEnvError, match="realisations is 2, must be 1: surrogate has no noise"):
+        BlastBarrierEnv(scenario=YARD, engine=SurrogateEngine(surrogate), realisations=2)
 
 
 def table_of_guesses(truth: Surrogate, layouts: int) -> pd.DataFrame:

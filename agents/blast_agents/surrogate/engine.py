@@ -9,10 +9,11 @@ import numpy as np
 
 from blast_agents.surrogate.network import Surrogate, packaged_surrogate
 from blast_agents.surrogate.walls import Site, site_of
+from blast_env.envs.arguments import check_names
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.geometry import Element
 from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine
+from blast_env.physics.engines import ENGINE_NAMES, find_engine
 from blast_env.scenario import AnyCharge, Scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.units import PA_PER_PSI
@@ -117,4 +118,5 @@ def engine_to_train_on(name: str, cell_m: float | None = None) -> Engine:
         UnknownNameError: If there is no engine of that name.
         BlastEnvError: If it has no such cells.
     """
+    check_names("engine", [name], [*ENGINE_NAMES, SURROGATE])
     return find_engine(SurrogateEngine() if name == SURROGATE else name, cell_m)

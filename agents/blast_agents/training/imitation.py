@@ -47,12 +47,15 @@ class Demonstration:
         layout: The layout; it keeps every condition of the build zone.
         reduction: By which share it lowers the impulse.
         observation: Name of what the agent sees.
+        among_vehicles: Whether other scenarios of the training have vehicles, so that this one
+            shows that it has none.
     """
 
     case: Case
     layout: Layout
     reduction: float
     observation: str = "grid"
+    among_vehicles: bool = False
 
     def draw(self, rng: np.random.Generator) -> Step:
         """Return a random moment in its placing, from nothing to all of it.
@@ -80,7 +83,8 @@ class Demonstration:
     def _episode(self) -> EpisodeObservation:
         scenario, charge = self.case.scenario, self.case.charge
         sources = scenario.charge if charge is None else (source_of(charge),)
-        return OBSERVATIONS[self.observation].episode(Observable(scenario, sources))
+        observable = Observable(scenario, sources, among_vehicles=self.among_vehicles)
+        return OBSERVATIONS[self.observation].episode(observable)
 
 
 def check_observation(observation: str) -> None:

@@ -339,6 +339,7 @@ class SelfLabelling:
                 self.lessons.labels[index].layout,
                 self.lessons.reduction(index),
                 settings.observation,
+                bool(self.agent.representative.vehicles),
             )
             for index in self.lessons.demonstrations
         ]

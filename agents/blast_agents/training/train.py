@@ -27,6 +27,7 @@ from blast_agents.training.run_folder import (
 from blast_agents.training.self_labelling import SelfLabelling
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator
 from blast_env.scenario import Scenario
 from blast_env.sites import FAMILIES
 
@@ -70,7 +71,9 @@ def train(
         hyperparameters=fitted(hyperparameters, settings, scenario),
         scenario_hash=scenario.content_hash,
     )
-    selection = _selection(configuration, source)  # refuses an unknown engine before any writing
+    # Refuse an engine that does not fit before any writing: to train on, and to choose weights by.
+    BlastEvaluator(scenario, settings.blast_engine)
+    selection = _selection(configuration, source)
     folder = RunFolder(Path(run))
     start = _start(configuration, scenario)
     with folder.making(configuration, scenario, shlex.join(sys.argv)):
