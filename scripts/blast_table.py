@@ -58,10 +58,14 @@ def main(
     sites: Annotated[
         int, typer.Option(min=0, help="Generated sites of the training's seeds, to name them.")
     ] = 0,
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="Scenario files to name, beside the bundled ones.")
+    ] = None,
 ) -> None:
     """Write the table, each blast once."""
     with user_errors():
-        names = {load_scenario(name).content_hash: name for name in bundled_scenarios()}
+        known = (*bundled_scenarios(), *(scenario or ()))
+        names = {load_scenario(name).content_hash: name for name in known}
         for number in range(sites):
             name = f"{SITE_NAME}{HELD_OUT_SITES + number}"
             names[scenario_of(name).content_hash] = name

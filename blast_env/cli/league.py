@@ -19,7 +19,7 @@ from blast_agents.league import (
     find_tracks,
     standard_entries,
 )
-from blast_agents.surrogate.network import load_surrogate
+from blast_agents.surrogate.network import Surrogate, load_surrogate
 from blast_agents.surrogate.search import SurrogateAgent, SurrogateSearch
 
 from blast_env.cli.cluster import ClusterAddress, running_on
@@ -93,7 +93,7 @@ def league(
         Path | None,
         typer.Option(
             help="Surrogate of gas dynamics (scripts.surrogate fit): enters by itself, and as a "
-            "search with the blasts of --agent-search."
+            "search with the blasts of --agent-search; what agents draw enters ranked by it, too."
         ),
     ] = None,
     cell: CellSide = None,
@@ -123,8 +123,8 @@ def league(
             first_engine,
             tuple(_numbers(agent_search, "--agent-search")),
         )
-        guessing = () if surrogate is None else _by_guesses(surrogate, searches.agent_budgets)
-        contests = [_contest(each, runs, searches, guessing, store, chosen) for each in tracks]
+        found = None if surrogate is None else load_surrogate(surrogate)
+        contests = [_contest(each, runs, searches, found, store, chosen) for each in tracks]
         scenarios = [case.scenario for each in tracks for case in each.cases]
         print_line(engine_text(chosen, scenarios))
         _print_outlook(contests)
@@ -156,9 +156,8 @@ def _load_runs(runs: Sequence[Path], tracks: Sequence[Track]) -> "list[TrainedRu
     return loaded
 
 
-def _by_guesses(path: Path, budgets: Sequence[int]) -> tuple[Entry, ...]:
+def _by_guesses(found: Surrogate, budgets: Sequence[int]) -> tuple[Entry, ...]:
     """Return a surrogate's entries: its own proposals, and its searches."""
-    found = load_surrogate(path)
     search = SurrogateSearch(found, found.digest)
     training = Training(found.fit.blasts, found.fit.seconds)
     agent = Agent(SurrogateAgent(found), "surrogate", training)
@@ -169,7 +168,7 @@ def _contest(
     track: Track,
     runs: "Sequence[TrainedRun]",
     searches: _Searches,
-    guessing: Sequence[Entry],
+    surrogate: Surrogate | None,
     store: ResultStore,
     engine: Engine,
 ) -> Contest:
@@ -182,7 +181,10 @@ def _contest(
     for run in runs:
         if run.is_for(track):
             entries += (run.entry, *map(run.search, searches.agent_budgets))
-    entries += tuple(guessing)
+            if surrogate is not None:
+                entries += (run.ranked(surrogate),)
+    if surrogate is not None:
+        entries += _by_guesses(surrogate, searches.agent_budgets)
     return Contest(track, entries, store, engine)
 
 

@@ -184,7 +184,7 @@ def _print_result(result: "TrainingResult") -> None:
     settings = result.configuration.settings
     scenario = folder.scenario(result.configuration)
     print_line(engine_text(settings.blast_engine, [scenario]))
-    if settings.judge.name != settings.engine:
+    if settings.judge.name != settings.blast_engine.name:
         print_line(f"weights chosen by {engine_text(settings.judge, [scenario])}")
     for row in result.progress.evaluations:
         if row.steps == counters.best_steps:

@@ -277,6 +277,7 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
         ({"engine": "gass"}, "did you mean 'gas'"),
         ({"engine": "surrogat"}, "did you mean 'surrogate'"),
         ({"engine": "surrogate", "cell_m": 0.5}, "engine 'surrogate' has no cells"),
+        ({"engine": "none.json"}, "none.json: there is no such file"),
         ({"evaluation_engine": "surrogate"}, "known: event, gas, pymunk"),
     ],
 )

@@ -13,7 +13,13 @@ from blast_agents.search.by_rule import layouts_by_rule
 from blast_agents.surrogate.engine import SurrogateEngine
 from blast_agents.surrogate.fitting import MEMBERS, Samples, elements, errors, fit, folds
 from blast_agents.surrogate.network import SHAPES, Fit, Member, Surrogate, load_surrogate
-from blast_agents.surrogate.search import Guesses, SurrogateAgent, SurrogateSearch, improved
+from blast_agents.surrogate.search import (
+    Guesses,
+    RankedAgent,
+    SurrogateAgent,
+    SurrogateSearch,
+    improved,
+)
 from blast_agents.surrogate.walls import FEATURES, WallPoints, site_of
 from blast_agents.surrogate.ways import FALLS_M, SHARES, Ways
 from hypothesis import given, settings
@@ -21,11 +27,11 @@ from hypothesis import strategies as st
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, draw_threats
-from blast_env.geometry import Piece
+from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats
+from blast_env.geometry import Layout, Piece
 from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, Scenario, load_scenario
+from blast_env.scenario import AnyCharge, Placement, Scenario, load_scenario
 from scripts.blast_table import COLUMNS, SITE_NAME, scenario_of
 from scripts.surrogate import varied_layouts, verdict
 from tests.agents.test_self_labelling import wide_yard
@@ -286,6 +292,33 @@ def test_the_agent_proposes_the_same_legal_layout_again() -> None:
         assert layout == agent.propose(YARD, charge)
         assert Placement.of(YARD, layout).layout == layout
         assert layout
+
+
+class Drawing:
+    """An agent that proposes nothing and draws rules' layouts, twice each."""
+
+    def propose(self, _scenario: Scenario, _charge: AnyCharge | None = None, /) -> Layout:
+        return ()
+
+    def sample(
+        self, scenario: Scenario, charge: AnyCharge | None = None, count: int = 8, _seed: int = 0, /
+    ) -> list[Layout]:
+        return (2 * list(layouts_by_rule(scenario, charge).values()))[:count]
+
+
+@pytest.mark.parametrize("charge", [None, Charge((1.5, 5.0), 5.0)], ids=["hidden", "told"])
+def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
+    charge: Charge | None,
+) -> None:
+    surrogate, drawing = by_hand(), Drawing()
+    proposed = RankedAgent(drawing, surrogate, drawn=3).propose(YARD, charge)
+    drawn = [tuple(sorted(each)) for each in drawing.sample(YARD, charge, 3)]
+    met = case() if charge is None else Case(YARD, (Threat(charge, 0),))
+    likes = Guesses.of(surrogate, met).loads([(), *drawn])
+    if charge is not None:
+        assert proposed == [(), *drawn][int(likes.argmin())]
+    assert proposed in drawn  # a wall is better than none
+    assert RankedAgent(drawing, surrogate, drawn=1).propose(YARD, charge) == drawn[0]
 
 
 def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:

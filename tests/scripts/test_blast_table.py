@@ -10,7 +10,9 @@ from typer.testing import CliRunner
 
 from blast_env.evaluation import BlastEvaluator, DiskCache, draw_threats
 from blast_env.geometry import Piece
+from blast_env.scenario import save_scenario
 from scripts import blast_table
+from tests.agents.training_runs import small_scenario
 from tests.evaluation.cases import COURTYARD
 from tests.evaluation.test_disk_cache import key, loads, same
 
@@ -37,6 +39,17 @@ def test_each_blast_is_there_once_with_what_was_asked(tmp_path: Path) -> None:
     assert set(table["scenario_hash"]) == {scenario.content_hash}
     assert table["seed"].tolist() == [each.seed for each in threats]
     assert [json.loads(each) for each in table["layout"]] == [[], []]
+
+
+def test_own_scenarios_are_named_if_they_are_given(tmp_path: Path) -> None:
+    own, out = tmp_path / "own.toml", tmp_path / "blasts.parquet"
+    save_scenario(small_scenario(), own)
+    evaluator = BlastEvaluator(small_scenario(), "event", cache=tmp_path / "blasts")
+    evaluator.loads((), draw_threats(small_scenario(), [0])[0])
+    for options, names in (((), {""}), (("--scenario", own), {str(own)})):
+        assert run(tmp_path / "blasts", *options, "--out", out)[0] == 0
+        assert set(pd.read_parquet(out)["scenario"]) == names
+    assert blast_table.scenario_of(str(own)) == small_scenario()
 
 
 def test_a_folder_without_blasts_is_an_error(tmp_path: Path) -> None:

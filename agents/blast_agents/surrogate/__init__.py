@@ -1,11 +1,12 @@
 """A surrogate of gas dynamics: what a blast would do, told in a millisecond."""
 
 from blast_agents.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
-from blast_agents.surrogate.search import SurrogateAgent, SurrogateSearch
+from blast_agents.surrogate.search import RankedAgent, SurrogateAgent, SurrogateSearch
 from blast_agents.surrogate.walls import Site, site_of
 
 __all__ = [
     "Guess",
+    "RankedAgent",
     "Site",
     "Surrogate",
     "SurrogateAgent",

@@ -3,11 +3,12 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from blast_agents.surrogate.network import Surrogate, packaged_surrogate
+from blast_agents.surrogate.network import Surrogate, load_surrogate, packaged_surrogate
 from blast_agents.surrogate.walls import Site, site_of
 from blast_env.envs.arguments import check_names
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
@@ -111,12 +112,14 @@ def engine_to_train_on(name: str, cell_m: float | None = None) -> Engine:
     """Return an engine by its name; beside the usual ones there is `"surrogate"`.
 
     Args:
-        name: The name.
+        name: The name, or a surrogate's file (.json).
         cell_m: Side of the cells of gas dynamics; that of the engine unless given.
 
     Raises:
         UnknownNameError: If there is no engine of that name.
-        BlastEnvError: If it has no such cells.
+        BlastEnvError: If it has no such cells, or the file is no surrogate.
     """
+    if Path(name).suffix == ".json":
+        return find_engine(SurrogateEngine(load_surrogate(Path(name))), cell_m)
     check_names("engine", [name], [*ENGINE_NAMES, SURROGATE])
     return find_engine(SurrogateEngine() if name == SURROGATE else name, cell_m)

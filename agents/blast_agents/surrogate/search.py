@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.search.from_policy import SamplingAgent
 from blast_agents.search.moves import Moves
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
 from blast_agents.search.session import SearchSession
@@ -128,16 +129,49 @@ class SurrogateAgent:
         Raises:
             BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
         """
-        if charge is None:
-            drawn = practice_hidden(scenario, _DRAWN_CHARGES, 1, 0)
-            distinct = {threat.charge: threat for threat in drawn.threats}
-            first = tuple(distinct.values())[:_HIDDEN_CHARGES]
-            case = replace(drawn, threats=first)
-        else:
-            case = practice_visible(scenario, charge, 1, 0)
-        guesses = Guesses.of(self.surrogate, case)
+        guesses = Guesses.of(self.surrogate, _case_for(scenario, charge))
         ruled = layouts_by_rule(scenario, charge).values()
         return improved(guesses, [(), *ruled], self.changes, generator(0))[0]
+
+
+@dataclass(frozen=True)
+class RankedAgent:
+    """Proposes what the surrogate likes best of what another agent proposes and draws: no blast.
+
+    Attributes:
+        agent: The other agent.
+        surrogate: The surrogate.
+        drawn: How many layouts are drawn.
+    """
+
+    agent: SamplingAgent = field(repr=False)
+    surrogate: Surrogate = field(repr=False)
+    drawn: int = 16
+
+    def propose(self, scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
+        """Return a layout that keeps every condition of the build zone; always the same one.
+
+        Args:
+            scenario: As for `SurrogateAgent`.
+            charge: Likewise.
+
+        Raises:
+            BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
+        """
+        guesses = Guesses.of(self.surrogate, _case_for(scenario, charge))
+        proposed = self.agent.propose(scenario, charge)
+        drawn = self.agent.sample(scenario, charge, self.drawn, 0)
+        guesses.loads([tuple(sorted(each)) for each in (proposed, *drawn)])
+        return guesses.ranked()[0]
+
+
+def _case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
+    """Return what a proposal is guessed against: the charge, or some of those that may be."""
+    if charge is not None:
+        return practice_visible(scenario, charge, 1, 0)
+    drawn = practice_hidden(scenario, _DRAWN_CHARGES, 1, 0)
+    distinct = {threat.charge: threat for threat in drawn.threats}
+    return replace(drawn, threats=tuple(distinct.values())[:_HIDDEN_CHARGES])
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,8 @@ class TrainingSettings(BaseModel):
         steps: Steps to train for; a rollout, or a round, is always finished.
         seed: Decides everything: weights, episodes, actions, minibatches.
         threat: `"visible"`: the agent sees the charge; `"hidden"`: it sees where it may be.
-        engine: Engine that runs the blasts; or `"surrogate"`, guesses instead of blasts.
+        engine: Engine that runs the blasts; or `"surrogate"`, guesses instead of blasts (that
+            of the package; or a surrogate's file).
         cell_m: Side of the cells of gas dynamics; that of the engine unless given.
         observation: Name of what the agent sees of the site; see `BlastBarrier-v0`.
         hidden_threats: Charges in an episode where they are hidden. The mean over episodes is the
@@ -117,7 +118,8 @@ class TrainingSettings(BaseModel):
         """
         if self.evaluation_engine is not None:
             return find_engine(self.evaluation_engine)
-        return find_engine(GAS) if self.engine == SURROGATE else self.blast_engine
+        engine = self.blast_engine
+        return find_engine(GAS) if engine.name == SURROGATE else engine
 
 
 class RunConfiguration(BaseModel):
