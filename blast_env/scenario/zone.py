@@ -67,6 +67,24 @@ class CostArea(Area):
         return {key: value for key, value in handler(self).items() if value is not None}
 
 
+@dataclass(frozen=True, eq=False)
+class _SameItems:
+    """The very items of a zone: to compare them takes longer than to make a catalogue of them."""
+
+    items: tuple[Item, ...]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _SameItems) and other.items is self.items
+
+    def __hash__(self) -> int:
+        return id(self.items)
+
+
+@lru_cache(maxsize=64)
+def _catalogue_of(same: _SameItems, shape: tuple[int, int]) -> Catalogue:
+    return Catalogue.of_items(same.items, shape)
+
+
 class BuildZone(Section):
     """Where barriers may stand: a grid of cells of one module each.
 
@@ -121,7 +139,7 @@ class BuildZone(Section):
     def catalogue(self) -> Catalogue:
         """What can be placed."""
         if self.items:
-            return Catalogue.of_items(self.items, self.shape)
+            return _catalogue_of(_SameItems(self.items), self.shape)
         return Catalogue.of_modules(self.stock, self.height_m, self.module_cost, self.shape)
 
     @property

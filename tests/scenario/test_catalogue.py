@@ -487,3 +487,13 @@ def test_the_description_of_the_format_names_every_key_of_items_and_objective() 
     for section, page in ((Item, "catalogue.md"), (ObjectiveSection, "scenario_format.md")):
         text = (REPOSITORY / "docs" / "reference" / page).read_text(encoding="utf-8")
         assert not [key for key in section.model_fields if f"`{key}`" not in text]
+
+
+def test_the_catalogue_of_a_changed_zone_is_its_own() -> None:
+    zone = yard().zone
+    first = zone.catalogue
+    fewer = zone.model_copy(update={"items": zone.items[:1]})
+    taller = zone.model_copy(update={"rows": zone.rows + 1})
+    assert fewer.catalogue.names == first.names[:1]
+    assert taller.catalogue.shape == (zone.rows + 1, zone.columns)
+    assert zone.catalogue == first
