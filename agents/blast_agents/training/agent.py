@@ -1,6 +1,6 @@
 """Agents: the model, its files, and what it proposes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -306,12 +306,15 @@ class TrainedAgent:
         placements = [Placement.empty(scenario)] * count
         open_ones = [index for index in range(count) if not placements[index].is_full]
         while open_ones:
-            observations = np.stack([episode.observe(placements[index]) for index in open_ones])
-            legal = np.stack([placements[index].legal.ravel() for index in open_ones])
+            # Most layouts begin alike: what is the same is looked at once.
+            different = {placements[index].layout: placements[index] for index in open_ones}
+            number_of = {layout: number for number, layout in enumerate(different)}
+            observations = np.stack([episode.observe(each) for each in different.values()])
+            legal = np.stack([each.legal.ravel() for each in different.values()])
+            numbers = [number_of[placements[index].layout] for index in open_ones]
+            actions = self._actions(observations, legal, numbers, draw)
             going_on = []
-            for index, action in zip(
-                open_ones, self._actions(observations, legal, draw), strict=True
-            ):
+            for index, action in zip(open_ones, actions, strict=True):
                 if action == catalogue.finish:
                     continue
                 placements[index] = placements[index].place(catalogue.element(action))
@@ -329,13 +332,17 @@ class TrainedAgent:
         return OBSERVATIONS[self.observation].episode(observable)
 
     def _actions(
-        self, observations: Array, placeable: NDArray[np.bool_], draw: torch.Generator | None
+        self,
+        observations: Array,
+        placeable: NDArray[np.bool_],
+        numbers: Sequence[int],
+        draw: torch.Generator | None,
     ) -> list[int]:
-        """Return the action for each observation; the last one, to finish, is always legal."""
+        """Return an action for each of the numbered observations; to finish is always legal."""
         legal = torch.as_tensor(np.pad(placeable, ((0, 0), (0, 1)), constant_values=True))
         with torch.no_grad():
             logits = logits_of(self.policy, torch.as_tensor(observations))
-            logits = logits.masked_fill(~legal, -torch.inf)
+            logits = logits.masked_fill(~legal, -torch.inf)[numbers]
             if draw is None:
                 chosen = logits.argmax(dim=1)
             else:
