@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from blast_agents.league.trained import TrainedRun
 from blast_agents.search.by_rule import layouts_by_rule
 from blast_agents.training import load_agent, load_hyperparameters, resume, train
 from blast_agents.training.agent import TrainedAgent, fitted, policy_for
@@ -14,7 +15,13 @@ from blast_agents.training.cases import Selection, training_cases
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import AnyHyperparameters
 from blast_agents.training.imitation import Demonstration, imitate, imitation_loss
-from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunConfiguration, read_rows
+from blast_agents.training.run_folder import (
+    EvaluationRow,
+    RolloutRow,
+    RunConfiguration,
+    read_rows,
+    settings_from,
+)
 from blast_agents.training.self_labelling import Judge, race
 
 from blast_env.envs.strategies import SingleScenario
@@ -264,6 +271,8 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
     assert last.reward >= first.reward
     assert last.episodes <= 6
     (evaluation,) = result.progress.evaluations
+    cost = TrainedRun.load(tmp_path / "run").entry.training
+    assert cost.blasts == 2 * chosen.evaluation_cases  # to choose the weights; guesses are none
     selection = Selection.of(chosen, SingleScenario(wide_yard()))
     assert selection.evaluators.engine.name == "gas"
     best = selection.reduction(load_agent(tmp_path / "run"))
@@ -287,3 +296,12 @@ def test_what_it_cannot_do_is_refused_before_anything_is_written(
     with pytest.raises(BlastEnvError, match=words):
         train(run_settings(scenario_file(tmp_path), **changes), own(), tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def test_a_surrogate_cannot_show_the_loads_of_modules() -> None:
+    given = {"algorithm": "ppo", "scenario": "courtyard", "steps": 1, "engine": "own.json"}
+    with pytest.raises(BlastEnvError, match="'grid_with_load', must be .* with a surrogate"):
+        settings_from({**given, "observation": "grid_with_load"})
+    chosen = settings_from(given)
+    assert (chosen.judge.name, chosen.real_engine.name) == ("gas", "gas")  # without the file
+    assert settings_from({**given, "evaluation_engine": "event"}).judge.name == "event"

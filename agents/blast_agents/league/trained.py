@@ -12,7 +12,7 @@ from blast_agents.surrogate import RankedAgent, Surrogate
 from blast_agents.training import TrainedAgent, load_agent
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
-from blast_agents.training.run_folder import RunFolder
+from blast_agents.training.run_folder import RunFolder, TrainingSettings
 from blast_env.errors import BlastEnvError
 from blast_env.sites import FAMILIES
 
@@ -48,7 +48,7 @@ class TrainedRun:
         name = f"{ALGORITHM_NAMES[settings.algorithm]} ({run.resolve().name})"
         return cls(
             run=run,
-            entry=Agent(load_agent(run), name, _training(folder, settings.evaluation_cases)),
+            entry=Agent(load_agent(run), name, _training(folder, settings)),
             threat=settings.threat,
             scenario=settings.scenario,
             site=settings.scenario
@@ -97,12 +97,13 @@ def check_runs(runs: Sequence[TrainedRun], tracks: Sequence[Track]) -> None:
             )
 
 
-def _training(folder: RunFolder, evaluation_cases: int) -> Training:
-    """Return what a run cost.
+def _training(folder: RunFolder, settings: TrainingSettings) -> Training:
+    """Return what a run cost, without the one that it started from; guesses are no blasts.
 
     Each evaluation counts with a blast a case, and the cases without a barrier once: the most that
     it can have been, because a layout that comes again needs no blast.
     """
     checkpoint = Checkpoint.load(folder.checkpoint)
-    selection = (len(checkpoint.evaluations) + 1) * evaluation_cases
-    return Training(checkpoint.counters.blasts + selection, checkpoint.counters.seconds)
+    selection = (len(checkpoint.evaluations) + 1) * settings.evaluation_cases
+    blasts = 0 if settings.guesses else checkpoint.counters.blasts
+    return Training(blasts + selection, checkpoint.counters.seconds)

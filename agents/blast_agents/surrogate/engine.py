@@ -108,6 +108,11 @@ class SurrogateEngine:
         return self._sites[key]
 
 
+def is_surrogate(name: str) -> bool:
+    """Return whether the name of an engine to train on is that of a surrogate, or of its file."""
+    return name == SURROGATE or Path(name).suffix == ".json"
+
+
 def engine_to_train_on(name: str, cell_m: float | None = None) -> Engine:
     """Return an engine by its name; beside the usual ones there is `"surrogate"`.
 
@@ -119,7 +124,9 @@ def engine_to_train_on(name: str, cell_m: float | None = None) -> Engine:
         UnknownNameError: If there is no engine of that name.
         BlastEnvError: If it has no such cells, or the file is no surrogate.
     """
-    if Path(name).suffix == ".json":
+    if name == SURROGATE:
+        return find_engine(SurrogateEngine(), cell_m)
+    if is_surrogate(name):
         return find_engine(SurrogateEngine(load_surrogate(Path(name))), cell_m)
     check_names("engine", [name], [*ENGINE_NAMES, SURROGATE])
-    return find_engine(SurrogateEngine() if name == SURROGATE else name, cell_m)
+    return find_engine(name, cell_m)

@@ -390,7 +390,7 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     policy = policy_for(configuration, scenario)
     checkpoint.load_policy(policy, folder.path, weights)
     policy.set_training_mode(False)
-    return TrainedAgent(policy, scenario, settings.observation, settings.blast_engine)
+    return TrainedAgent(policy, scenario, settings.observation, settings.real_engine)
 
 
 def load_archive(

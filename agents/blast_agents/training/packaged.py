@@ -165,4 +165,4 @@ def _agent(path: Path, configuration: RunConfiguration, scenario: Scenario) -> T
     load_weights(policy, load_archive(path, "no weights"), path)
     policy.set_training_mode(False)
     settings = configuration.settings
-    return TrainedAgent(policy, scenario, settings.observation, settings.blast_engine)
+    return TrainedAgent(policy, scenario, settings.observation, settings.real_engine)

@@ -207,7 +207,7 @@ class Recorder(BaseCallback):
             self.algorithm.policy,
             self.scenario,
             self.settings.observation,
-            self.settings.blast_engine,
+            self.settings.real_engine,
         )
         row = self.progress.evaluate(agent, self.selection)
         self.logger.record("evaluation/reduction", row.reduction)

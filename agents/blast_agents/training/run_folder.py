@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from blast_agents.surrogate.engine import SURROGATE, engine_to_train_on
+from blast_agents.surrogate.engine import engine_to_train_on, is_surrogate
 from blast_agents.training.hyperparameters import (
     ALGORITHMS,
     SELF_LABELLING,
@@ -99,6 +99,15 @@ class TrainingSettings(BaseModel):
     torch_threads: Annotated[int, Field(ge=1, le=256)] = 1
     start_from: str | None = None
 
+    @model_validator(mode="after")
+    def _check_loads(self) -> "TrainingSettings":
+        """Refuse to show loads of modules, of which a surrogate knows only the mean."""
+        if self.guesses and self.observation == "grid_with_load":
+            raise ValueError(
+                "observation is 'grid_with_load', must be 'grid' or 'features' with a surrogate"
+            )
+        return self
+
     @property
     def blast_engine(self) -> Engine:
         """The engine itself.
@@ -110,6 +119,23 @@ class TrainingSettings(BaseModel):
         return engine_to_train_on(self.engine, self.cell_m)
 
     @property
+    def guesses(self) -> bool:
+        """Whether a surrogate says what blasts would do."""
+        return is_surrogate(self.engine)
+
+    @property
+    def real_engine(self) -> Engine:
+        """The engine that runs the blasts; gas dynamics where a surrogate guesses it.
+
+        A surrogate's file need not be there (any more).
+
+        Raises:
+            UnknownNameError: If there is no engine of that name.
+            BlastEnvError: If it has no such cells.
+        """
+        return find_engine(GAS) if self.guesses else self.blast_engine
+
+    @property
     def judge(self) -> Engine:
         """The engine by which the best weights are chosen, and the agent is evaluated.
 
@@ -118,8 +144,7 @@ class TrainingSettings(BaseModel):
         """
         if self.evaluation_engine is not None:
             return find_engine(self.evaluation_engine)
-        engine = self.blast_engine
-        return find_engine(GAS) if engine.name == SURROGATE else engine
+        return self.real_engine
 
 
 class RunConfiguration(BaseModel):

@@ -267,7 +267,7 @@ class SelfLabelling:
         return cls(
             folder=folder,
             configuration=configuration,
-            agent=TrainedAgent(policy, scenario, settings.observation, settings.blast_engine),
+            agent=TrainedAgent(policy, scenario, settings.observation, settings.real_engine),
             lessons=Lessons(cases, [*checkpoint.labels]),
             judge=judge,
             selection=selection,
