@@ -300,7 +300,7 @@ def test_what_it_cannot_do_is_refused_before_anything_is_written(
 
 def test_a_surrogate_cannot_show_the_loads_of_modules() -> None:
     given = {"algorithm": "ppo", "scenario": "courtyard", "steps": 1, "engine": "own.json"}
-    with pytest.raises(BlastEnvError, match="'grid_with_load', must be .* with a surrogate"):
+    with pytest.raises(BlastEnvError, match=r"'grid_with_load', must be .* with a surrogate"):
         settings_from({**given, "observation": "grid_with_load"})
     chosen = settings_from(given)
     assert (chosen.judge.name, chosen.real_engine.name) == ("gas", "gas")  # without the file

@@ -106,7 +106,10 @@ GIVEN: Final = (
     ),
 )
 
-FOLLOWS: Final = {"docs/studies/league_tables.md": "docs/studies/league.md"}
+FOLLOWS: Final = {
+    "docs/studies/league_tables.md": "docs/studies/league.md",
+    "docs/researchers/league.md": "docs/researchers/how_agents_learn.md",
+}
 """Pages that are read after another one, and go on in its folder."""
 
 SERVERS: Final = {
@@ -224,6 +227,9 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "blast-env league --engine gas --first-engine event --agent-search 50 --run runs/own_best"
     " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario courtyard",
+    "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 16"
+    " --seeds 1 --methods best_rule --budgets 16 --run out/street --run out/street_ppo"
+    " --surrogate street.json --out out/street_league": "--cases 1 --budgets 1",
     "blast-env search --method genetic --budget 200 --seed 0 --charge 5 12 --out out/search": (
         "--budget 20 --held-out 2"
     ),
@@ -236,6 +242,16 @@ SMALLER: Final[dict[str, str]] = {
     " --steps 700 --envs 1 --set cases=24 --set cases_per_round=12 --set samples=3"
     " --set neighbours=5 --set first_updates=300 --set updates=100 --set evaluation_cases=8"
     " --set evaluation_interval=1 --run out/kerb": _LABEL,
+    "blast-env train --algo self_labelling --engine gas --scenario scripts/school_street.toml"
+    " --envs 1 --steps 1800 --set cases=96 --set cases_per_round=32 --set samples=2"
+    " --set neighbours=4 --set borrowed=2 --set first_updates=600 --set updates=200"
+    " --set evaluation_interval=2 --set evaluation_cases=8 --run out/street": _LABEL,
+    "python -m scripts.surrogate fit --data docs/data/site_blasts.parquet"
+    " --data docs/data/street_blasts.parquet --no-check --out street.json": "--epochs 1",
+    "blast-env train --algo maskable_ppo --engine street.json --scenario"
+    " scripts/school_street.toml --start-from out/street --envs 1 --steps 12288"
+    " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
+    " --set evaluation_cases=8 --run out/street_ppo": _TRAIN,
     "blast-env evaluate --run runs/courtyard --seeds 64 --processes 2 --export out/layouts": (
         "--seeds 4"
     ),
@@ -327,6 +343,8 @@ NOT_RUN: Final[dict[str, str]] = {
     "python -m scripts.blast_table FOLDER --sites 79 --out blasts.parquet": (
         "FOLDER is a placeholder; tests/scripts/test_blast_table.py"
     ),
+    "python -m scripts.blast_table out/street/blasts --scenario scripts/school_street.toml"
+    " --out FILE": "FILE is a placeholder; tests/scripts/test_blast_table.py",
     "python -m scripts.blast_table FOLDER --out blasts.parquet": (
         "FOLDER is a placeholder; tests/scripts/test_blast_table.py"
     ),
