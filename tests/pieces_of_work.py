@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,10 +40,11 @@ def refuse_three(item: int) -> int:
 
 @dataclass(frozen=True)
 class Touch:
-    """Leaves a file with the number of each item in a folder."""
+    """Leaves a file with the number of each item in a folder, and takes a moment for it."""
 
     folder: Path
 
     def __call__(self, item: int) -> None:
         """Leave the file."""
         (self.folder / str(item)).touch()
+        time.sleep(0.02)

@@ -8,7 +8,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.physics.pymunk.engine import PymunkEngine
 from blast_env.physics.pymunk.space import build_space
 from blast_env.scenario.build_scene import build_scene
-from blast_env.studies.benchmark import engines
+from blast_env.studies.benchmark import engines, parallel
 from blast_env.studies.benchmark.engines import (
     BenchmarkScene,
     dense_courtyard,
@@ -102,7 +102,10 @@ def test_twice_as_fast_is_a_scaling_of_two() -> None:
     assert ThreadFigures(40, 2, one_thread_s=3.0, all_threads_s=1.5).scaling == 2.0
 
 
-def test_both_are_timed_on_the_same_whole_number_of_blasts_a_thread() -> None:
+def test_both_are_timed_on_the_same_whole_number_of_blasts_a_thread(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(parallel, "_LOT_S", 0.2)
     figures = measure_threads(SHORT, threads=3, repeats=1)
     assert figures.threads == 3
     assert figures.blasts % 3 == 0

@@ -21,6 +21,7 @@ from blast_env.studies.gas.reference import free_field, wide_wall
 from blast_env.studies.gas.sites import with_heights, yard
 from blast_env.studies.gas.sources import CHOSEN, source_ratios, trade_off_figure
 from blast_env.studies.shielding.scenes import BlockGeometry
+from tests.gas_sites import hut
 
 WALL = tuple((row, 4) for row in range(4, 12))
 
@@ -111,7 +112,11 @@ def test_loads_of_layouts_by_processes_are_the_same(site: Scenario) -> None:
     assert one.impulse_pa_s.tolist() == two.impulse_pa_s.tolist()
     assert 0.0 < one.reduction[0] < 0.4
     assert one.cpu_s > 0.0
-    at_end = cell_loads(site, [], charge, 0.5)
+
+
+def test_without_a_time_loads_are_those_of_the_end() -> None:
+    site = hut()
+    at_end = cell_loads(site, [], draw_charge(site, 0), 0.5)
     assert at_end.unprotected_pa_s == protected_impulse_pa_s(GasBlast(site).run())
 
 
