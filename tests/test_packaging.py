@@ -24,6 +24,18 @@ CALIBRATIONS = (
     "collisional_kb_20kg",
 )
 
+OTHERS = """
+import json, sys
+from typer.testing import CliRunner
+from blast_env.cli import app
+for arguments in json.loads(sys.argv[1]):
+    result = CliRunner().invoke(app, arguments)
+    print(json.dumps([result.exit_code, " ".join(result.stderr.split())]))
+import blast_env.physics.event.engine, blast_env.physics.gas.engine, agents
+print(agents.Agent)
+"""
+"""Runs commands without their extras, and sees what the engines leave of another's package."""
+
 
 def started(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Run a command that finds nothing of the checkout through the environment."""
@@ -88,14 +100,17 @@ def test_a_search_runs_beside_a_package_named_agents_and_without_extras(
     assert done.returncode == 0, done.stderr
     assert json.loads((tmp_path / "found" / "layout.json").read_text())["cells"]
     assert "pip install blast-env[render]" in done.stderr  # no picture, and no blast lost for it
-    genetic = started(*command, "--method", "genetic", cwd=tmp_path)
-    assert genetic.returncode == 2
-    assert "'pymoo': pip install blast-env[search]" in genetic.stderr
-    training = started(python, "-m", "blast_env", "train", "--run", "run", cwd=tmp_path)
-    assert training.returncode == 2
-    assert "'torch': pip install blast-env[agents,render]" in training.stderr
-    engines = "import blast_env.physics.event.engine, blast_env.physics.gas.engine"
-    assert call(python, "-c", f"{engines}, agents; print(agents.Agent)", cwd=tmp_path)
+    # One process for the others: its imports take longer than they do.
+    others = [
+        [*map(str, command[3:]), "--method", "genetic"],
+        ["train", "--run", "run"],
+    ]
+    told = call(python, "-c", OTHERS, json.dumps(others), cwd=tmp_path).splitlines()
+    genetic, training = map(json.loads, told[:2])
+    assert genetic[0] == training[0] == 2
+    assert "'pymoo': pip install blast-env[search]" in genetic[1]
+    assert "'torch': pip install blast-env[agents,render]" in training[1]
+    assert told[2] == "<class 'agents.Agent'>"
 
 
 def test_the_description_on_a_package_page_links_to_no_file(clean: Path) -> None:

@@ -283,11 +283,20 @@ def write_names(axes: Axes, obstacles: Sequence[Obstacle], below: bool = False) 
     texts = [_name(axes, obstacle) for obstacle in named]
     if figure is None or not texts:
         return
-    figure.draw_without_rendering()
+    _lay_out(figure)
     taken = [_pixels(axes, obstacle) for obstacle in obstacles] + _stars_and_texts(axes, texts)
     site = axes.patches[0].get_window_extent()
     for text, obstacle in zip(texts, named, strict=True):
         taken.append(_settle(text, _pixels(axes, obstacle), taken, site, below))
+
+
+def _lay_out(figure: Figure) -> None:
+    """Put the axes where they are going to be drawn, which drawing would do too, and much more."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+    for axes in figure.axes:
+        axes.apply_aspect()
 
 
 def _stars_and_texts(axes: Axes, names: Sequence[Annotation]) -> list[Bbox]:

@@ -11,12 +11,13 @@ from unittest.mock import Mock, patch
 import torch
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.run_folder import RunConfiguration
+from matplotlib.figure import Figure
 
 from blast_env.calibration.model import load_calibration, save_calibration
 from blast_env.evaluation import evaluate_layout
 from blast_env.export import LayoutPlan, export_layout
 from blast_env.files import scratch_folder
-from blast_env.rendering.figures import initial_velocities, save_figure
+from blast_env.rendering.figures import save_figure
 from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
 from blast_env.reporting.page import write_report
 from blast_env.scenario import save_scenario, write_layout
@@ -41,6 +42,14 @@ def _result() -> BlastResult:
 @cache
 def _plan() -> LayoutPlan:
     return LayoutPlan(_blast().scenario, LAYOUT, provenance={"text": "x" * 3000})
+
+
+@cache
+def _figure() -> Figure:
+    """Return a small one, of one text."""
+    figure = Figure(figsize=(2.0, 1.0))
+    figure.text(0.1, 0.5, "a figure")
+    return figure
 
 
 def _mp4(path: Path) -> None:
@@ -81,15 +90,9 @@ WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
         "table.csv": lambda path: write_csv(_result().collisions, path),
         "table.xlsx": lambda path: _result().to_excel(path),
         "table.parquet": lambda path: _result().to_parquet(path),
-        "figure.png": lambda path: save_figure(
-            initial_velocities(_blast().scenario.parameters), path
-        ),
-        "figure.svg": lambda path: save_figure(
-            initial_velocities(_blast().scenario.parameters), path
-        ),
-        "figure.pdf": lambda path: save_figure(
-            initial_velocities(_blast().scenario.parameters), path
-        ),
+        "figure.png": lambda path: save_figure(_figure(), path),
+        "figure.svg": lambda path: save_figure(_figure(), path),
+        "figure.pdf": lambda path: save_figure(_figure(), path),
         "film.mp4": _mp4,
         "pair.mp4": _pair,
         "film.gif": _mp4,

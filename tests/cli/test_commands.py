@@ -18,6 +18,7 @@ from blast_env.calibration.model import load_calibration
 from blast_env.cli import app
 from blast_env.physics.pymunk.engine import PymunkRun
 from blast_env.rendering import film
+from blast_env.studies.benchmark import parallel
 from tests.scenarios import BALLISTIC_COURTYARD
 
 COMMANDS = (
@@ -185,6 +186,7 @@ def test_bench_prints_the_hardware_and_the_ratios(
     sparse: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(sparse.parent)
+    monkeypatch.setattr(parallel, "_LOT_S", 0.2)
     options = ("--scenario", sparse.name, "--no-memory", "--no-environment", "--no-gas")
     result = run("bench", "--repeats", "1", *options)
     assert result.exit_code == 0, result.output
