@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import cache
 from hashlib import sha256
 from importlib.resources import files
 from math import hypot
@@ -289,13 +290,18 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
                 f"calibration {name!r} was not made for engine {engine!r}, only for "
                 f"{', '.join(engines)}"
             )
-        entry = files("blast_env.calibration") / "stored" / calibration_file(name, engine)
-        return _parse(entry.read_text(encoding="utf-8"), f"{name} for {engine}")
+        return _of_the_package(name, engine).model_copy(deep=True)
     try:
         text = read_text(path)
     except DocumentError as error:
         raise CalibrationError(f"{path}: {error}") from error
     return _parse(text, str(path))
+
+
+@cache
+def _of_the_package(name: str, engine: str) -> Calibration:
+    entry = files("blast_env.calibration") / "stored" / calibration_file(name, engine)
+    return _parse(entry.read_text(encoding="utf-8"), f"{name} for {engine}")
 
 
 def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:
@@ -332,6 +338,7 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
         temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
+@cache
 def _stored_files() -> tuple[tuple[str, str], ...]:
     """Return name and engine of the calibrations that come with the package."""
     folder = files("blast_env.calibration") / "stored"

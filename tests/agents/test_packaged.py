@@ -48,7 +48,7 @@ def yard(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(yard: Path) -> Path:
     """A run on the yard that has hardly learnt anything."""
     small = own(cases=1, first_updates=2)
-    train(run_settings(yard, engine="gas", steps=1), small, yard.parent / "run")
+    train(run_settings(yard, engine="surrogate", steps=1), small, yard.parent / "run")
     return yard.parent / "run"
 
 

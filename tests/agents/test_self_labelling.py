@@ -55,9 +55,9 @@ STEPS = 30
 """The rules of four cases, then three rounds."""
 
 
-def wide_yard() -> Scenario:
+def wide_yard(tnt_kg: float = 5.0) -> Scenario:
     """Return the yard with a charge that may be anywhere in an area."""
-    area = {"kind": "rectangle", "corner_m": [1.0, 3.0], "size_m": [1.5, 6.0], "tnt_kg": 5.0}
+    area = {"kind": "rectangle", "corner_m": [1.0, 3.0], "size_m": [1.5, 6.0], "tnt_kg": tnt_kg}
     return Scenario.from_document(yard_document() | {"charge": [area]}, "wide yard")
 
 

@@ -290,10 +290,10 @@ def test_calibrating_gives_a_calibration_that_converts_its_own_runs() -> None:
     scenario = load_scenario("free_field").with_simulation(
         overrides={"explosive": {"ball_count": 180}, "stepping": {"time_limit_s": 0.12}}
     )
-    study = FreeFieldStudy(scenario, (8.0, 11.0, 15.0, 20.0), (1, 2, 3))
+    study = FreeFieldStudy(scenario, (8.0, 11.0, 15.0, 20.0), (1, 2, 3), "event")
     report = calibrate(study, study.run(), kingery_bulmash_reference(study.distances_m, 100.0))
     stored: Calibration = report.calibration("small")
-    stored.check(scenario.parameters, "pymunk")
+    stored.check(scenario.parameters, "event")
     row = report.table().iloc[1]
     converted = stored.convert(row.i_sim, stored.facade_width_m, 11.0, 100.0)
     assert converted.psi_s == pytest.approx(row.power_psi_s)

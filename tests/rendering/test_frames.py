@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -59,7 +60,7 @@ def test_balls_are_where_they_should_be_in_the_papers_colours(blast: Blast) -> N
 
 def test_small_balls_stay_visible(blast: Blast) -> None:
     balls = balls_at_start(blast.scene)
-    balls.radius[:] = 0.01
+    balls = replace(balls, radius=np.full(len(balls), 0.01))
     painter = FramePainter.for_blast(blast, width_px=320)
     frame = painter.paint(balls, blast.scene.obstacles(), 0.0)
     x, y = balls.position[0].tolist()

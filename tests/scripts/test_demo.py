@@ -20,8 +20,12 @@ from tests.agents.league_cases import TRAINING, result, standings
 from tests.agents.test_self_labelling import SMALL, wide_yard
 
 
+SITE = wide_yard(tnt_kg=1.0)
+"""A small charge, whose blasts are soon over."""
+
+
 def tiny(folder: Path) -> DemoSettings:
-    save_scenario(wide_yard(), folder / "yard.toml")
+    save_scenario(SITE, folder / "yard.toml")
     return DemoSettings(
         out=folder / "out",
         scenario=str(folder / "yard.toml"),
@@ -62,7 +66,7 @@ def test_it_trains_compares_and_films(first: tuple[DemoSettings, Comparison, str
     assert len(seeds) == 2
     assert all(seed in SeedRange.JUDGEMENT.value for seed in seeds)
     for proposal in comparison.agent.proposals:
-        assert Placement.of(wide_yard(), proposal.layout).layout == proposal.layout
+        assert Placement.of(SITE, proposal.layout).layout == proposal.layout
 
 
 def test_it_clears_its_own_run_and_nothing_of_others(

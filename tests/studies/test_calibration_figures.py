@@ -22,7 +22,7 @@ SMALL = load_scenario("free_field").with_simulation(
 
 @pytest.fixture(scope="module")
 def report() -> CalibrationReport:
-    study = FreeFieldStudy(SMALL, (8.0, 11.0, 15.0, 20.0), (1, 2, 3))
+    study = FreeFieldStudy(SMALL, (8.0, 11.0, 15.0, 20.0), (1, 2, 3), "event")
     return calibrate(study, study.run(), kingery_bulmash_reference(study.distances_m, 100.0))
 
 
@@ -44,7 +44,7 @@ def test_a_calibration_figure_draws_means_laws_and_residuals(report: Calibration
 
 
 def test_a_pressure_figure_has_a_panel_a_distance_and_one_legend() -> None:
-    results = [simulate(SMALL.at_stand_off(8.0), seed=seed) for seed in (1, 2)]
+    results = [simulate(SMALL.at_stand_off(8.0), seed=seed, engine="event") for seed in (1, 2)]
     history = facade_history(results, "building", "left", 5e-4)
     wave = Friedlander.from_impulse(1e5, 0.01, 300.0, 0.01)
     case = PressureCase(8.0, history, wave, wave)
