@@ -1,8 +1,10 @@
 """Entries on a track: the same blasts for all, and nothing is done twice."""
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from blast_agents.league import (
     ResultStore,
     Rule,
     Search,
+    Standings,
     VisibilityLayout,
     hidden_track,
     known_track,
@@ -194,15 +197,43 @@ def test_a_key_is_the_same_in_every_process() -> None:
     assert " at 0x" not in key.method
 
 
+@dataclass(frozen=True)
+class Played:
+    """A league of a search that has come to its end.
+
+    Attributes:
+        folder: Where its results are; not to be changed.
+        standings: What came of it.
+    """
+
+    folder: Path
+    standings: Standings
+
+    def damaged(self, folder: Path, damage: Callable[[Path], object]) -> Contest:
+        """Return the same league on a copy of the results, each of which is damaged."""
+        copytree(self.folder, folder, dirs_exist_ok=True)
+        for path in store(folder).folder.iterdir():
+            damage(path)
+        return Contest(TRACK, FINISHED, store(folder))
+
+
+FINISHED = (NoBarrier(), Search(RandomSearch(), BUDGET))
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
+    folder = tmp_path_factory.mktemp("played")
+    contest = Contest(TRACK, FINISHED, store(folder))
+    standings = contest.play()
+    assert contest.outlook().kept_searches == len(TRACK.cases)
+    return Played(folder, standings)
+
+
 @pytest.mark.parametrize("damage", [b"", b"{", b'{"key": "another", "value": null}'])
-def test_a_damaged_result_is_found_again(tmp_path: Path, damage: bytes) -> None:
-    entries = (NoBarrier(), Search(CountedSearch(), BUDGET))
-    first = Contest(TRACK, entries, store(tmp_path)).play()
-    for path in (tmp_path / "results").iterdir():
-        path.write_bytes(damage)
-    again = Contest(TRACK, entries, store(tmp_path))
+def test_a_damaged_result_is_found_again(tmp_path: Path, played: Played, damage: bytes) -> None:
+    again = played.damaged(tmp_path, lambda path: path.write_bytes(damage))
     assert again.outlook().kept_searches == 0
-    for one, other in zip(first.results, again.play().results, strict=True):
+    for one, other in zip(played.standings.results, again.play().results, strict=True):
         assert np.array_equal(one.loads, other.loads)
 
 
@@ -220,16 +251,15 @@ def test_a_damaged_result_is_found_again(tmp_path: Path, damage: bytes) -> None:
     ],
 )
 def test_a_result_with_a_right_checksum_that_does_not_fit_is_done_again(
-    content: bytes, tmp_path: Path
+    content: bytes, tmp_path: Path, played: Played
 ) -> None:
-    entries = (NoBarrier(), Search(RandomSearch(), BUDGET))
-    first = Contest(TRACK, entries, store(tmp_path)).play()
-    for path in store(tmp_path).folder.iterdir():
+    def damage(path: Path) -> None:
         key = json.loads(path.read_bytes()[32:].partition(b"\n")[0])
         FolderStore(path.parent, ".result").put(key, content)
-    again = Contest(TRACK, entries, store(tmp_path))
+
+    again = played.damaged(tmp_path, damage)
     assert again.outlook().kept_searches == 0
-    for one, other in zip(first.results, again.play().results, strict=True):
+    for one, other in zip(played.standings.results, again.play().results, strict=True):
         assert np.array_equal(one.loads, other.loads)
 
 

@@ -19,7 +19,6 @@ from scripts.demo_comparison import Comparison
 from tests.agents.league_cases import TRAINING, result, standings
 from tests.agents.test_self_labelling import SMALL, wide_yard
 
-
 SITE = wide_yard(tnt_kg=1.0)
 """A small charge, whose blasts are soon over."""
 
