@@ -16,6 +16,13 @@ UNCLOSED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionW
 """XlsxWriter leaves its scratch files to the collector when it fails."""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def spared() -> None:
+    """Spare the collector, called after each failure, all that was there before."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[UNCLOSED] * n.endswith(".xlsx")) for n in WRITERS]
 )

@@ -14,7 +14,7 @@ from blast_agents.training.run_folder import RunConfiguration
 from matplotlib.figure import Figure
 
 from blast_env.calibration.model import load_calibration, save_calibration
-from blast_env.evaluation import evaluate_layout
+from blast_env.evaluation import LayoutEvaluation, evaluate_layout
 from blast_env.export import LayoutPlan, export_layout
 from blast_env.files import scratch_folder
 from blast_env.rendering.figures import save_figure
@@ -50,6 +50,11 @@ def _figure() -> Figure:
     figure = Figure(figsize=(2.0, 1.0))
     figure.text(0.1, 0.5, "a figure")
     return figure
+
+
+@cache
+def _evaluation() -> LayoutEvaluation:
+    return evaluate_layout("courtyard", (), (0, 1))
 
 
 def _mp4(path: Path) -> None:
@@ -96,7 +101,7 @@ WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
         "film.mp4": _mp4,
         "pair.mp4": _pair,
         "film.gif": _mp4,
-        "evaluation.json": lambda path: evaluate_layout("courtyard", (), (0, 1)).to_json(path),
+        "evaluation.json": lambda path: _evaluation().to_json(path),
         "calibration.json": lambda path: save_calibration(load_calibration("ballistic_ufc"), path),
         "checkpoint.pt": _checkpoint,
         "report.html": _report,
