@@ -1,15 +1,10 @@
-"""TorchRL makes every environment by its id, and draws only legal actions where it is told to."""
+"""TorchRL makes every environment by its id, and draws only legal actions where it is told to.
+
+It is imported by the tests themselves: it takes seconds, in each process that looks for tests.
+"""
 
 import pytest
 import torch
-from torchrl.data import Binary
-from torchrl.envs import (
-    ActionMask,
-    GymEnv,
-    TransformedEnv,
-    check_env_specs,
-    default_info_dict_reader,
-)
 
 from tests.libraries.ids import IDS, arguments
 
@@ -18,12 +13,17 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("name", IDS)
 def test_every_id_is_made_and_keeps_its_specs(name: str) -> None:
+    from torchrl.envs import GymEnv, check_env_specs
+
     env = GymEnv(name, **arguments(name))
     check_env_specs(env)
     assert env.rollout(2).batch_size[0] >= 1
 
 
 def test_masked_actions_fill_the_stock() -> None:
+    from torchrl.data import Binary
+    from torchrl.envs import ActionMask, GymEnv, TransformedEnv, default_info_dict_reader
+
     env = GymEnv("BlastBarrier-v0", realisations=1)
     actions = env.action_spec.space.n
     mask = Binary(actions, shape=(actions,), dtype=torch.bool)
