@@ -1,5 +1,6 @@
 """A surrogate of gas dynamics: what a blast would do, told in a millisecond."""
 
+from blast_agents.surrogate.engine import SurrogateEngine
 from blast_agents.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
 from blast_agents.surrogate.search import RankedAgent, SurrogateAgent, SurrogateSearch
 from blast_agents.surrogate.walls import Site, site_of
@@ -10,6 +11,7 @@ __all__ = [
     "Site",
     "Surrogate",
     "SurrogateAgent",
+    "SurrogateEngine",
     "SurrogateSearch",
     "load_surrogate",
     "packaged_surrogate",
