@@ -78,7 +78,10 @@ _COMPARISON: Final = (
 )
 _PLACES: Final = tuple(
     f"tests/scenario/test_{name}.py"
-    for name in ("placement", "layout", "conditions", "zone_checks", "access_way", "checks")
+    for name in (
+        *("placement", "layout", "conditions", "zone_checks", "access_way", "checks"),
+        *("catalogue", "vehicles", "item_scenarios"),
+    )
 )
 
 AREAS: Final[Mapping[str, list[Part]]] = MappingProxyType(

@@ -95,6 +95,13 @@ GIVEN: Final = (
         "blast-env train --algo self_labelling --engine gas --scenario courtyard"
         f" --run agent {_LABEL}",
     ),
+    Given(
+        ("docs/researchers/league.md",),
+        "out/street_hidden",
+        "agent",
+        "blast-env train --engine surrogate --scenario scripts/school_street.toml"
+        f" --threat hidden --run agent {_TRAIN}",
+    ),
     *(
         Given(
             ("docs/studies/league.md",),
@@ -230,6 +237,9 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 16"
     " --seeds 1 --methods best_rule --budgets 16 --run out/street --run out/street_ppo"
     " --surrogate street.json --out out/street_league": "--cases 1 --budgets 1",
+    "blast-env league --engine gas --track hidden --scenario scripts/school_street.toml --seeds 12"
+    " --methods best_rule --budgets 200 --run out/street_hidden --surrogate street.json"
+    " --out out/street_league": "--seeds 1 --budgets 16",
     "blast-env search --method genetic --budget 200 --seed 0 --charge 5 12 --out out/search": (
         "--budget 20 --held-out 2"
     ),
