@@ -273,6 +273,7 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
     (evaluation,) = result.progress.evaluations
     cost = TrainedRun.load(tmp_path / "run").entry.training
     assert cost.blasts == 2 * chosen.evaluation_cases  # to choose the weights; guesses are none
+    assert not (tmp_path / "run" / "blasts").exists()
     selection = Selection.of(chosen, SingleScenario(wide_yard()))
     assert selection.evaluators.engine.name == "gas"
     best = selection.reduction(load_agent(tmp_path / "run"))

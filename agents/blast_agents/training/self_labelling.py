@@ -6,7 +6,7 @@ further round some of the cases get new layouts: what the policy proposes and dr
 a little changed, the labels of the nearest charges. They race by blasts on the case's threats; the
 winner is the new label, from which the policy learns on.
 
-Blasts are kept in the run folder. A round has seeds of its own and ends with a checkpoint, so that
+Blasts are kept in the run folder, guesses of a surrogate are not. A round has seeds of its own and ends with a checkpoint, so that
 a run that was interrupted ends as if it had not been, and repeats none of its blasts.
 """
 
@@ -33,7 +33,7 @@ from blast_agents.training.run_folder import RolloutRow, RunConfiguration, RunFo
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Case, Evaluators
 from blast_env.evaluation.evaluator import BlastAsked
-from blast_env.evaluation.store import BlastCache, DiskCache
+from blast_env.evaluation.store import BlastCache, DiskCache, LoadsCache
 from blast_env.geometry import Layout
 from blast_env.physics.engine import Engine
 from blast_env.physics.scene import Charge
@@ -41,6 +41,9 @@ from blast_env.statistics import reductions
 
 _MOST_BYTES: Final = 2_000_000_000
 """Most that the blasts of a run take on the disk; one takes some kilobytes."""
+
+_GUESSES: Final = 50_000
+"""Guesses that are remembered, so that none of a round is made twice."""
 
 
 @dataclass(eq=False)
@@ -261,7 +264,8 @@ class SelfLabelling:
             checkpoint.load_optimizer(policy.optimizer, folder.checkpoint)
         policy.set_training_mode(False)
         cases = training_cases(settings, source, hyperparameters.cases)
-        cache = DiskCache(folder.blasts, _MOST_BYTES)
+        # Guesses cost less than to read them from a file.
+        cache = LoadsCache(_GUESSES) if settings.guesses else DiskCache(folder.blasts, _MOST_BYTES)
         judge = Judge.of(settings.blast_engine, cases, cache, hyperparameters.n_envs)
         judge.asked = progress.counters.steps
         return cls(
