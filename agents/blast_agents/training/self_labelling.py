@@ -6,8 +6,9 @@ further round some of the cases get new layouts: what the policy proposes and dr
 a little changed, the labels of the nearest charges. They race by blasts on the case's threats; the
 winner is the new label, from which the policy learns on.
 
-Blasts are kept in the run folder, guesses of a surrogate are not. A round has seeds of its own and ends with a checkpoint, so that
-a run that was interrupted ends as if it had not been, and repeats none of its blasts.
+Blasts are kept in the run folder, guesses of a surrogate are not. A round has seeds of its own and
+ends with a checkpoint, so that a run that was interrupted ends as if it had not been, and repeats
+none of its blasts.
 """
 
 from collections.abc import Mapping, Sequence
