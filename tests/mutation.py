@@ -28,7 +28,7 @@ from cosmic_ray.plugins import get_operator, operator_names
 
 ROOT: Final = Path(__file__).parents[1]
 
-_PARTS: Final = ("blast_env", "agents", "scenarios", "tests", "pyproject.toml")
+_PARTS: Final = ("blast_env", "agents", "docs", "scenarios", "tests", "pyproject.toml")
 _IMPORTS: Final = ("numba", "pandas", "pydantic", "gymnasium", "scipy.stats")
 _MOST_CPU_S: Final = 120
 """Processor time after which a change counts as noticed: something has no end."""
