@@ -52,6 +52,9 @@ _LABEL: Final = (
     " --set first_updates=2 --set updates=1 --set evaluation_cases=2"
 )
 _AGENT: Final = f"blast-env train --scenario courtyard --run agent {_TRAIN}"
+_STREET: Final = (
+    "blast-env train --engine surrogate --scenario scripts/school_street.toml --run agent"
+)
 _LEAGUE_AGENTS: Final = {
     "out/runs/ppo_courtyard": "--scenario courtyard",
     "out/runs/ppo_perimeter_gate": "--scenario perimeter_gate",
@@ -95,12 +98,19 @@ GIVEN: Final = (
         "blast-env train --algo self_labelling --engine gas --scenario courtyard"
         f" --run agent {_LABEL}",
     ),
+    *(
+        Given(("docs/researchers/league.md",), path, "agent", f"{_STREET} {options}")
+        for path, options in {
+            "out/street": f"--algo self_labelling {_LABEL}",
+            "out/street_ppo": _TRAIN,
+            "out/street_hidden": f"--threat hidden {_TRAIN}",
+        }.items()
+    ),
     Given(
         ("docs/researchers/league.md",),
-        "out/street_hidden",
-        "agent",
-        "blast-env train --engine surrogate --scenario scripts/school_street.toml"
-        f" --threat hidden --run agent {_TRAIN}",
+        "street.json",
+        "street.json",
+        "python -m scripts.surrogate fit --epochs 1 --no-check --out street.json",
     ),
     *(
         Given(
@@ -113,10 +123,7 @@ GIVEN: Final = (
     ),
 )
 
-FOLLOWS: Final = {
-    "docs/studies/league_tables.md": "docs/studies/league.md",
-    "docs/researchers/league.md": "docs/researchers/how_agents_learn.md",
-}
+FOLLOWS: Final = {"docs/studies/league_tables.md": "docs/studies/league.md"}
 """Pages that are read after another one, and go on in its folder."""
 
 SERVERS: Final = {
