@@ -1,6 +1,7 @@
 """A full device costs the new file and nothing else, and nobody is told that it was written."""
 
 import gc
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,10 +18,12 @@ UNCLOSED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionW
 
 
 @pytest.fixture(scope="module", autouse=True)
-def spared() -> None:
+def spared() -> Iterator[None]:
     """Spare the collector, called after each failure, all that was there before."""
     gc.collect()
     gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 @pytest.mark.parametrize(
