@@ -246,6 +246,18 @@ def test_the_figure_shows_searches_over_blasts_and_agents_as_lines() -> None:
     assert all(label.get_text().endswith(" %") for label in axes.get_yticklabels())
 
 
+def test_many_agents_are_told_apart_and_no_name_is_cut_off() -> None:
+    names = [f"MaskablePPO (a long name of a run {i}), ranked by the surrogate" for i in range(11)]
+    figure = drawn(standings(BARE, *(result(each, AGENT, training=TRAINING) for each in names)))
+    (axes,), (legend,) = figure.axes, figure.legends
+    kept = [each for each in axes.lines if str(each.get_label()).startswith("MaskablePPO")]
+    assert len({(each.get_color(), each.get_linestyle()) for each in kept}) == len(names)
+    box, page = legend.get_window_extent(), figure.bbox
+    assert page.x0 <= box.x0 < box.x1 <= page.x1
+    assert page.y0 <= box.y0 < box.y1 <= page.y1
+    assert axes.bbox.width > 0.4 * page.width
+
+
 def test_methods_at_one_budget_stand_side_by_side() -> None:
     methods = ("random", "greedy", "annealing", "genetic")
     it = standings(BARE, *(result(f"{name}, 50 blasts", SEARCH, blasts=50) for name in methods))

@@ -17,9 +17,13 @@ with render_extra():
 _SEARCHES: Final = ("#0072B2", "#E69F00", "#009E73", "#56B4E9", "#F0E442")
 _AGENTS: Final = ("#D55E00", "#CC79A7", "#000000")
 _SEARCH_MARKERS: Final = "osD^v"
-_NOTHING_MARKERS: Final = "xP*X"
+_AGENT_LINES: Final = ("-", "--", "-.", ":")
+_NOTHING_MARKERS: Final = "xP*Xdph8<>+1"
 _APART: Final = 1.05
 """What stands at the same number of blasts is this factor apart, so that all of it is seen."""
+
+_AROUND_ZERO: Final = 1.4
+"""What spends none stands within this factor of the tick of 0."""
 
 
 def league_figure(standings: Standings) -> Figure:
@@ -27,15 +31,16 @@ def league_figure(standings: Standings) -> Figure:
 
     Agents are lines: they spend none, whatever the others do.
     """
-    figure = Figure(figsize=(9.6, 6.4), layout="constrained")
+    figure = Figure(figsize=(13.6, 6.4), layout="constrained")
     axes = figure.add_subplot()
     searches, agents, others = _kinds(standings)
     spent = sorted({result.budget for each in searches.values() for result in each}) or [1]
     zero = spent[0] / 4.0
+    places = np.geomspace(zero / _AROUND_ZERO, zero * _AROUND_ZERO, len(others) + len(agents))
     for index, result in enumerate(agents):
-        _draw_agent(axes, standings, result, _AGENTS[index % len(_AGENTS)])
+        _draw_agent(axes, standings, result, index, places[len(others) + index])
     for index, result in enumerate(others):
-        _draw_other(axes, standings, result, index, zero * _aside(index, len(others)))
+        _draw_other(axes, standings, result, index, places[index])
     for index, (method, results) in enumerate(searches.items()):
         _draw_search(axes, standings, method, results, index, _aside(index, len(searches)))
     axes.set_xscale("log")
@@ -50,7 +55,7 @@ def league_figure(standings: Standings) -> Figure:
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)
     axes.set_axisbelow(True)
-    figure.legend(loc="outside lower center", ncols=3, fontsize=9, frameon=False)
+    figure.legend(loc="outside right center", fontsize=8, frameon=False)
     write_heading(figure, standings.track.title, _subtitle(standings))
     return figure
 
@@ -73,15 +78,18 @@ def _aside(index: int, count: int) -> float:
     return float(_APART ** (2.0 * index - (count - 1)))
 
 
-def _draw_agent(axes: Axes, standings: Standings, result: Result, colour: str) -> None:
-    value, low, high = standings.reduction(result)
+def _draw_agent(
+    axes: Axes, standings: Standings, result: Result, index: int, blasts: float
+) -> None:
+    """Draw a line, with its interval where what spends nothing stands."""
+    value = standings.reduction(result).value
+    colour = _AGENTS[index % len(_AGENTS)]
+    style = _AGENT_LINES[index // len(_AGENTS) % len(_AGENT_LINES)]
     trained = 0 if result.training is None else result.training.blasts
     label = f"{result.name}: no blast a case, {trained:,} in training"
-    axes.axhline(value, color=colour, linewidth=2.2, label=label, zorder=2)
-    if not np.isnan(low):
-        axes.axhspan(low, high, color=colour, alpha=0.13, linewidth=0.0, zorder=1)
-        for end in (low, high):  # where bands lie over each other, their ends are still seen
-            axes.axhline(end, color=colour, linewidth=0.7, linestyle="--", alpha=0.7, zorder=1)
+    axes.axhline(value, color=colour, linewidth=1.8, linestyle=style, label=label, zorder=2)
+    bars = _error_bars(standings, [result])
+    axes.errorbar([blasts], [value], yerr=bars, color=colour, capsize=3, linewidth=1.2, zorder=3)
 
 
 def _draw_other(
