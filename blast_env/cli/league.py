@@ -93,7 +93,8 @@ def league(
         Path | None,
         typer.Option(
             help="Surrogate of gas dynamics (scripts.surrogate fit): enters by itself, and as a "
-            "search with the blasts of --agent-search; what agents draw enters ranked by it, too."
+            "search with the blasts of --agent-search; what agents draw enters ranked by it, and "
+            "their searches guided by it, too."
         ),
     ] = None,
     cell: CellSide = None,
@@ -182,7 +183,8 @@ def _contest(
         if run.is_for(track):
             entries += (run.entry, *map(run.search, searches.agent_budgets))
             if surrogate is not None:
-                entries += (run.ranked(surrogate),)
+                guided = (run.guided(surrogate, each) for each in searches.agent_budgets)
+                entries += (run.ranked(surrogate), *guided)
     if surrogate is not None:
         entries += _by_guesses(surrogate, searches.agent_budgets)
     return Contest(track, entries, store, engine)

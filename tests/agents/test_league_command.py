@@ -83,6 +83,7 @@ def test_a_surrogate_enters_by_itself_as_a_search_and_behind_an_agent(
     blasts = dict(zip(summary["entry"].tolist(), summary["blasts"].tolist(), strict=True))
     assert blasts["surrogate"] == surrogate_by_hand().fit.blasts
     assert 0 < blasts["surrogate, 6 blasts"] <= 2 * 6
+    assert 0 < blasts["MaskablePPO (agent) with search by the surrogate, 6 blasts"] <= 2 * 6
     ranked = blasts["MaskablePPO (agent), ranked by the surrogate"]
     assert ranked == blasts["MaskablePPO (agent)"] + surrogate_by_hand().fit.blasts
     result = league(*few, *site, "--surrogate", tmp_path / "none.json")

@@ -333,6 +333,13 @@ def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
     assert result.load <= min(map(problem.load, ruled))
     assert result == method.search(problem, budget, 0)
     assert replace(method, guesses=13) != method
+    # From an agent it begins with what that proposes, whatever the surrogate thinks of it.
+    assert result.layout != Drawing().propose(YARD)
+    first = replace(method, agent=Drawing()).search(problem, 1, 0)
+    assert (first.layout, first.blasts) == (Drawing().propose(YARD), 1)
+    guided = replace(method, agent=Drawing()).search(problem, budget, 0)
+    assert guided.load is not None
+    assert guided.load <= min(map(problem.load, Drawing().sample(YARD, problem.told, 3)))
 
 
 def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:

@@ -8,7 +8,7 @@ from typing import Literal
 from blast_agents.league.entries import Agent, Search, Training
 from blast_agents.league.tracks import Track
 from blast_agents.search.from_policy import PolicySearch
-from blast_agents.surrogate import RankedAgent, Surrogate
+from blast_agents.surrogate import RankedAgent, Surrogate, SurrogateSearch
 from blast_agents.training import TrainedAgent, load_agent
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
@@ -58,23 +58,32 @@ class TrainedRun:
 
     def search(self, budget: int) -> Search:
         """Return the agent with a search at test time: what it draws, and changes of the best."""
-        agent = self.entry.agent
-        if not isinstance(agent, TrainedAgent):
-            raise TypeError(f"{agent!r} draws no layouts")
+        agent = self._drawing
         method = PolicySearch(agent, agent.digest, name=f"{self.entry.name} with search")
         return Search(method, budget)
 
+    def guided(self, surrogate: Surrogate, budget: int) -> Search:
+        """Return the agent with a search in which a surrogate picks what gets a blast."""
+        agent = self._drawing
+        name = f"{self.entry.name} with search by the surrogate"
+        digest = f"{surrogate.digest} {agent.digest}"
+        return Search(SurrogateSearch(surrogate, digest, agent, name=name), budget)
+
     def ranked(self, surrogate: Surrogate) -> Agent:
         """Return the agent with a surrogate, which picks one of the layouts that it draws."""
-        agent = self.entry.agent
-        if not isinstance(agent, TrainedAgent):
-            raise TypeError(f"{agent!r} draws no layouts")
         training = Training(
             self.entry.training.blasts + surrogate.fit.blasts,
             self.entry.training.seconds + surrogate.fit.seconds,
         )
         name = f"{self.entry.name}, ranked by the surrogate"
-        return Agent(RankedAgent(agent, surrogate), name, training)
+        return Agent(RankedAgent(self._drawing, surrogate), name, training)
+
+    @property
+    def _drawing(self) -> TrainedAgent:
+        agent = self.entry.agent
+        if not isinstance(agent, TrainedAgent):
+            raise TypeError(f"{agent!r} draws no layouts")
+        return agent
 
     def is_for(self, track: Track) -> bool:
         """Return whether a track asks what the agent was trained for."""

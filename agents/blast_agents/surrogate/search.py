@@ -183,7 +183,11 @@ class SurrogateSearch:
 
     Attributes:
         surrogate: The surrogate; the digest says which.
-        digest: Of its file, so that results of different ones are told apart.
+        digest: Of its file, and of the agent's weights, so that results of different ones are told
+            apart.
+        agent: An agent whose proposal and draws the search by guesses begins with, too; the
+            proposal is the first to get a blast. `None` begins with the rules alone.
+        agent_draws: How many layouts it draws.
         guesses: Layouts that it is asked about before the first blast.
         drawn: Changes that it picks one out of, afterwards.
         guessed_share: Share of the blasts for what was found by guesses alone.
@@ -192,6 +196,8 @@ class SurrogateSearch:
 
     surrogate: Surrogate = field(repr=False)
     digest: str
+    agent: SamplingAgent | None = field(default=None, repr=False)
+    agent_draws: int = 64
     guesses: int = 600
     drawn: int = 16
     guessed_share: float = 0.4
@@ -213,7 +219,9 @@ class SurrogateSearch:
 
         def explore() -> None:
             ruled = list(layouts_by_rule(problem.scenario, problem.told).values())
-            found = improved(guesses, [(), *ruled], self.guesses, rng)
+            proposed = self._from_agent(problem, seed)
+            session.assess(proposed[:1])
+            found = improved(guesses, [(), *ruled, *proposed], self.guesses, rng)
             share = max(1, round(self.guessed_share * plan.exploring_layouts))
             for first, second in zip(found[:share], [*ruled, *found[share:]], strict=False):
                 session.assess([first])
@@ -221,6 +229,14 @@ class SurrogateSearch:
             self._go_on(session, guesses, plan, rng)
 
         return session.result(self.name, seed, session.run(explore))
+
+    def _from_agent(self, problem: LayoutProblem, seed: int) -> list[Layout]:
+        """Return what the agent proposes, then what it draws."""
+        if self.agent is None:
+            return []
+        scenario, told = problem.scenario, problem.told
+        drawn = self.agent.sample(scenario, told, self.agent_draws, seed)
+        return [self.agent.propose(scenario, told), *drawn]
 
     def _go_on(
         self, session: SearchSession, guesses: Guesses, plan: Plan, rng: np.random.Generator
