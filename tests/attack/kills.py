@@ -243,7 +243,8 @@ def in_process(job: Callable[[Path], None], folder: Path, kill_at: int = -1) -> 
     folder.mkdir(parents=True, exist_ok=True)
     context = multiprocessing.get_context("forkserver")
     # What the main module imports is imported in each process again, unless it is there.
-    context.set_forkserver_preload([__name__, "tests.attack.formats"])
+    # Optimisers of torch import its compiler, which takes them a second and a half.
+    context.set_forkserver_preload([__name__, "tests.attack.formats", "torch._dynamo"])
     steps, said = context.Value("i", 0, lock=False), context.SimpleQueue()
     process = context.Process(target=_run_until, args=(job, folder, kill_at, steps, said))
     process.start()

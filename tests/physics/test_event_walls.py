@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from blast_env.arrays import FloatArray
 from blast_env.physics.event.state import walls_of
 from blast_env.physics.scene import Scene, StructureOutline
 from tests.physics.scenes import EVENT, EXPLOSIVE, KEEP_MASS, balls, parameters, scene, wall
@@ -24,8 +25,8 @@ GRAZING = 1e-5
 
 
 def first_touch(
-    position: np.ndarray, direction: np.ndarray, radius: np.ndarray, centre: np.ndarray
-) -> np.ndarray:
+    position: FloatArray, direction: FloatArray, radius: FloatArray, centre: FloatArray
+) -> FloatArray:
     """Return the way (n,) after which discs touch one square, inf for never.
 
     Args:
@@ -68,7 +69,7 @@ def rays(structures: list[StructureOutline], seed: int) -> Scene:
     return scene(start, [*structures, wall((196.0, 4.0), 1, 1, "far")], parameters(contact=contact))
 
 
-def centres_of(of_scene: Scene) -> np.ndarray:
+def centres_of(of_scene: Scene) -> FloatArray:
     parts = [part for obstacle in of_scene.obstacles() for part in obstacle.parts]
     return np.array([(part.x, part.y) for part in parts])
 
@@ -103,7 +104,7 @@ def check_first_hits(of_scene: Scene) -> int:
     return len(found)
 
 
-def _check_hit(hit: np.void, beyond: np.ndarray, way: float, radius: float) -> None:
+def _check_hit(hit: np.void, beyond: FloatArray, way: float, radius: float) -> None:
     """Compare a hit with brute force.
 
     Args:
