@@ -1,8 +1,10 @@
 """Entries on a track: the same blasts for all, and nothing is done twice."""
 
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from shutil import copytree
 
@@ -195,6 +197,25 @@ def test_a_key_is_the_same_in_every_process() -> None:
     key = search_key(TRACK.cases[0], Search(find_search_method("genetic"), 6), "event")
     assert "random_walls" in key.method
     assert " at 0x" not in key.method
+
+
+def test_the_code_of_a_method_counts_wherever_it_is(tmp_path: Path) -> None:
+    """As that of the surrogate's search does, which is not with the others."""
+    codes = []
+    for number, source in enumerate(("", "", "DRAWN = 4")):
+        (tmp_path / str(number)).mkdir()
+        path = tmp_path / str(number) / "own.py"
+        path.write_text(f"{source}\nclass Own:\n    name = 'own'\n")
+        spec = spec_from_file_location("own", path)
+        assert spec is not None
+        assert spec.loader is not None
+        own = module_from_spec(spec)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setitem(sys.modules, "own", own)
+            spec.loader.exec_module(own)
+            codes.append(search_key(TRACK.cases[0], Search(own.Own(), 6), "event").code)
+    assert codes[0] == codes[1] != codes[2]
+    assert search_key(TRACK.cases[0], Search(RandomSearch(), 6), "event").code not in codes
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import json
 import re
 from functools import cache
 from hashlib import sha256
+from inspect import getfile
 from pathlib import Path
 from typing import Annotated, Final, NamedTuple
 
@@ -58,7 +59,8 @@ class SearchKey(NamedTuple):
         method: The method with its settings.
         budget: Most blasts.
         seed: Of the search.
-        code: Digest of the searches' code, with the versions of what they draw with.
+        code: Digest of the searches' code and of the method's, with the versions of what they draw
+            with.
     """
 
     model: Model
@@ -100,7 +102,7 @@ def search_key(case: Case, search: Search, engine: str | Engine) -> SearchKey:
         method=_ADDRESS.sub("", method),
         budget=search.budget,
         seed=case.seed,
-        code=_search_code(),
+        code=_search_code(Path(getfile(type(search.method))).parent),
     )
 
 
@@ -188,10 +190,16 @@ def _plain(charge: AnyCharge) -> object:
 
 
 @cache
-def _search_code() -> str:
-    """Return a digest of the code that searches depend on, with versions."""
+def _search_code(own: Path) -> str:
+    """Return a digest of the code that a search depends on, with versions.
+
+    Args:
+        own: The folder of its method, for those that are not with all the others.
+    """
     folder = Path(blast_agents.__file__).parent
     paths = sorted((folder / "search").glob("*.py"))
+    if own != folder / "search":
+        paths += sorted(own.glob("*.py"))
     digest = sha256()
     for path in (*paths, folder / "rules.py"):
         if path.name not in _NO_INFLUENCE:
