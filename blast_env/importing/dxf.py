@@ -12,6 +12,7 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError, import_extra, suggestion
 from blast_env.importing.site_map import (
+    MOST_COORDINATE,
     MOST_FEATURES,
     DrawingCoordinates,
     MapFeature,
@@ -48,6 +49,7 @@ _CODES: Final = {
     units.DM: "dm",
 }
 _SAG_M: Final = 0.02  # of arcs made straight
+_LEAST_SAG: Final = 1e-9  # of the largest coordinate: rounding must not ask for ever more points
 
 
 def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
@@ -140,14 +142,19 @@ def _places(
 ) -> list[tuple[float, float]] | None:
     """Return the points of a line, its arcs made straight; `None` for what has no line."""
     try:
-        points: list[Any] = list(make_path(entity).flattening(sag))
+        line = make_path(entity)
     except (TypeError, ValueError, DXFError):
         skipped[entity.dxftype()] += 1
         return None
-    places = [(float(point.x), float(point.y)) for point in points]
-    if not np.isfinite(places).all():
-        raise BlastEnvError(f"{path}: {place}: has a coordinate that is no finite number")
-    return places if len(places) > 1 else None
+    held = np.array([tuple(point) for point in line.control_vertices()])
+    largest = float(np.abs(held).max(initial=0.0))
+    if not largest <= MOST_COORDINATE:
+        raise BlastEnvError(
+            f"{path}: {place}: has, or its arcs have, the coordinate {largest:g}, "
+            f"must be within {MOST_COORDINATE:g}"
+        )
+    points: list[Any] = list(line.flattening(max(sag, _LEAST_SAG * largest)))
+    return [(float(point.x), float(point.y)) for point in points] if len(points) > 1 else None
 
 
 def _closes(places: list[tuple[float, float]]) -> bool:

@@ -169,6 +169,23 @@ def test_units_of_a_drawing_are_needed(tmp_path: Path) -> None:
 # Sites.
 
 
+@pytest.mark.parametrize("bulge", [1e9, 1e-200, 1e150, 1e300])
+@pytest.mark.parametrize("length", [1.0, 1e10, 1e20, 1e300])
+def test_curves_beyond_all_bounds_come_to_an_end(
+    length: float, bulge: float, tmp_path: Path
+) -> None:
+    """Of an arc of such a size a hair's breadth of sag takes billions of points."""
+    path, document = drawing(tmp_path)
+    corners = [(0.0, 0.0, bulge), (length, 0.0, 0.5), (length, length, bulge)]
+    document.modelspace().add_lwpolyline(
+        corners, format="xyb", close=True, dxfattribs={"layer": "WALLS"}
+    )
+    document.saveas(path)
+    text = error_of(path, replace(HALL, **LAYERS))
+    if length == 1e20 and bulge < 1e100:
+        assert "must be within 1e+12" in text
+
+
 def test_map_without_buildings(tmp_path: Path) -> None:
     assert "has no building" in error_of(written(tmp_path))
     assert "has no building" in error_of(written(tmp_path, PLACE))
