@@ -2,9 +2,6 @@
 
 import json
 import multiprocessing
-import signal
-import subprocess
-import sys
 import time
 from dataclasses import astuple, replace
 from importlib import import_module
@@ -24,7 +21,6 @@ from blast_env.errors import BlastEnvError
 from blast_env.scenario import load_scenario
 from tests.agents.training_runs import (
     ROLLOUT,
-    SMALL,
     STEPS,
     hyperparameters,
     scenario_file,
@@ -152,21 +148,22 @@ def test_a_finished_run_stays_as_it_is(finished: Path, tmp_path: Path) -> None:
 
 def test_a_killed_run_loses_at_most_one_rollout(tmp_path: Path) -> None:
     """kill -9 in the middle, with environments in processes of their own."""
-    run, scenario = tmp_path / "run", scenario_file(tmp_path)
-    options = [f"{key}={value}" for key, value in SMALL.items() if key != "n_envs"]
-    steps = 20_000  # more than it will get
-    start = "from blast_env.cli import app; app()"
-    command = [sys.executable, "-c", start, "train", "--scenario", scenario, "--run", run]
-    command += ["--steps", steps, "--envs", 2, "--set", "evaluation_cases=2"]
-    command += [text for option in options for text in ("--set", option)]
-    process = subprocess.Popen([str(part) for part in command], stderr=subprocess.PIPE)
+    run, steps = tmp_path / "run", 20_000  # more than it will get
+    chosen = settings(scenario_file(tmp_path), steps=steps)
+    # From the server of the environments' processes, which has torch by then.
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["blast_agents.training.environments", "torch._dynamo"])
+    process = context.Process(target=train, args=(chosen, hyperparameters({"n_envs": 2}), run))
+    process.start()
     try:
-        wait_for(run / "rollouts.csv", process)
-        while len((run / "rollouts.csv").read_text().splitlines()) < 2:
+        deadline = time.monotonic() + 120.0
+        while not (run / "rollouts.csv").exists() or len(lines_of(run / "rollouts.csv")) < 2:
+            assert process.is_alive()
+            assert time.monotonic() < deadline
             time.sleep(0.02)
     finally:
-        process.send_signal(signal.SIGKILL)
-        process.communicate()
+        process.kill()
+        process.join()
     folder = RunFolder(run)
     before = Checkpoint.load(folder.checkpoint).counters.steps
     assert 0 < before < steps
@@ -192,12 +189,8 @@ def test_the_loss_of_an_environment_s_process_is_told(tmp_path: Path) -> None:
         train(settings(scenario_file(tmp_path)), chosen, tmp_path / "run", progress)
 
 
-def wait_for(path: Path, process: subprocess.Popen) -> None:
-    deadline = time.monotonic() + 120.0
-    while not path.exists():
-        assert process.poll() is None, process.stderr and process.stderr.read()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+def lines_of(path: Path) -> list[str]:
+    return path.read_text().splitlines()
 
 
 def shorten(run: Path, steps: int) -> None:
