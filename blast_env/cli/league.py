@@ -162,7 +162,7 @@ def _by_guesses(found: Surrogate, budgets: Sequence[int]) -> tuple[Entry, ...]:
     search = SurrogateSearch(found, found.digest)
     training = Training(found.fit.blasts, found.fit.seconds)
     agent = Agent(SurrogateAgent(found), "surrogate", training)
-    return (agent, *(Search(search, budget) for budget in budgets))
+    return (agent, *(Search(search, budget, has_learnt=True) for budget in budgets))
 
 
 def _contest(

@@ -39,6 +39,7 @@ def result(
     seconds: Sequence[float] | None = None,
     training: Training | None = None,
     is_rule: bool = False,
+    has_learnt: bool = False,
 ) -> Result:
     """Return a result with a module in each layout, unless it is that of no barrier."""
     layout = () if name == "no barrier" else ((0, 0),)
@@ -51,6 +52,7 @@ def result(
         proposals=tuple(Proposal(layout, each, blasts) for each in times),
         loads=np.array(impulse_pa_s, dtype=np.float64),
         is_rule=is_rule,
+        has_learnt=has_learnt or training is not None,
     )
 
 

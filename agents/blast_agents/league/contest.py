@@ -297,6 +297,8 @@ class Contest:
                 budget=entry.budget if isinstance(entry, Search) else 0,
                 training=entry.training if isinstance(entry, Agent) else None,
                 is_rule=isinstance(entry, Rule | VisibilityLayout),
+                has_learnt=isinstance(entry, Agent)
+                or (isinstance(entry, Search) and entry.has_learnt),
                 proposals=proposals,
                 loads=np.array(loads, dtype=np.float64),
             )

@@ -116,12 +116,14 @@ class Search:
         first_engine: Engine for these blasts, a cheaper one; the engine that judges then decides
             among the best few layouts, by one more blast for each threat. `None` for the judge's.
         finalists: How many these are.
+        has_learnt: Whether it begins with what an agent or a surrogate has learnt.
     """
 
     method: SearchMethod
     budget: int
     first_engine: str | None = None
     finalists: int = 8
+    has_learnt: bool = False
 
     def __post_init__(self) -> None:
         """Check the budget.

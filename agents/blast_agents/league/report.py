@@ -134,7 +134,7 @@ def table_rows(standings: Standings) -> list[tuple[str, ...]]:
 
 def verdict_lines(standings: Standings) -> list[str]:
     """Return what may be said of the agents, or why nothing can be."""
-    if not any(result.training is not None for result in standings.results):
+    if not any(result.has_learnt for result in standings.results):
         return ["No verdict: no trained agent has entered this track."]
     if not standings.references:
         return ["No verdict: neither a rule nor a search has entered."]

@@ -15,7 +15,7 @@ from blast_env.evaluation.comparison import Comparison, check_something_arrives
 from blast_env.statistics import CVAR_LEVEL, Estimate, conditional_value_at_risk, reductions
 
 REFERENCE_METHOD: Final = "genetic"
-"""Agents are held against this search, with the track's budget, and what was best of its kind."""
+"""What has learnt is held against this search, with the track's budget, and the best of a kind."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +28,7 @@ class Result:
         budget: Most blasts of a search for a case; else 0.
         training: What an agent cost before; `None` for all others.
         is_rule: Whether it is a rule, which takes neither training nor a blast.
+        has_learnt: Whether it is an agent, or a search that begins with one or with a surrogate.
         proposals: One a case; the cells are sorted.
         loads: With the layouts, in the unit of the objective (cases, held-out threats).
     """
@@ -39,6 +40,7 @@ class Result:
     proposals: tuple[Proposal, ...]
     loads: FloatArray
     is_rule: bool = False
+    has_learnt: bool = False
 
     @property
     def other_blasts_per_case(self) -> float:
@@ -113,9 +115,10 @@ class Standings:
     def references(self) -> tuple[Result, ...]:
         """What agents are held against, as far as it entered.
 
-        The best rule, the reference, and the best search, by their mean reductions.
+        The best rule, the reference, and the best search that has learnt nothing, by their mean
+        reductions.
         """
-        searches = [result for result in self.results if result.budget]
+        searches = [each for each in self.results if each.budget and not each.has_learnt]
         found = (
             *sorted(self.rules, key=self._mean)[-1:],
             self.reference,
@@ -167,31 +170,34 @@ class Standings:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A trained agent against a rule or a search, case by case.
+    """An agent, or a search that begins with one, against a rule or another search, case by case.
 
     Attributes:
-        agent: Name of the agent.
+        entry: Name of the agent or the search.
         reference: Name of the rule or the search.
-        difference: Mean reduction of the agent minus that of the other.
+        difference: Its mean reduction minus that of the other.
         sample: What the interval is over, e.g. `"16 cases"`.
-        proposal_ms: Time from a case to the agent's layout, median, ms.
+        proposal_ms: Time from a case to its layout, median, ms.
+        blasts_per_case: Blasts that it spends on a case, mean; 0 for an agent.
     """
 
-    agent: str
+    entry: str
     reference: str
     difference: Estimate
     sample: str
     proposal_ms: float
+    blasts_per_case: float = 0.0
 
     @property
     def conclusion(self) -> str:
         """What may be said: the interval decides."""
         if isnan(self.difference.low):
             return "one threat says nothing about the others"
+        subject = "search" if self.blasts_per_case else "agent"
         if self.difference.low > 0.0:
-            return "the agent protects better"
+            return f"the {subject} protects better"
         if self.difference.high < 0.0:
-            return "the agent protects worse"
+            return f"the {subject} protects worse"
         return "no difference shown: the interval contains 0"
 
     @property
@@ -199,28 +205,31 @@ class Verdict:
         """The verdict as a sentence."""
         value, low, high = (100.0 * each for each in self.difference)
         interval = "-" if isnan(low) else f"{low:+.1f} to {high:+.1f}"
+        spent = f"It proposes in {self.proposal_ms:.1f} ms (median)."
+        if self.blasts_per_case:
+            spent = f"It spends {self.blasts_per_case:.0f} blasts a case."
         return (
-            f"{self.agent} minus {self.reference}: {value:+.1f} percentage points of reduction "
-            f"(95 % interval {interval}, paired over {self.sample}); {self.conclusion}. "
-            f"It proposes in {self.proposal_ms:.1f} ms (median)."
+            f"{self.entry} minus {self.reference}: {value:+.1f} percentage points of reduction "
+            f"(95 % interval {interval}, paired over {self.sample}); {self.conclusion}. {spent}"
         )
 
 
 def verdicts(standings: Standings) -> tuple[Verdict, ...]:
-    """Return a verdict for each agent and each of the references."""
+    """Return a verdict for all that has learnt, and each of the references."""
     count = len(standings.track.cases)
     sample = f"{count} cases"
     if standings.has_one_case:
         sample = f"{standings.unprotected.shape[1]} held-out threats of one case"
     return tuple(
         Verdict(
-            agent=result.name,
+            entry=result.name,
             reference=reference.name,
             difference=standings.difference(result, reference),
             sample=sample,
             proposal_ms=result.proposal_ms,
+            blasts_per_case=result.blasts_per_case,
         )
         for result in standings.results
-        if result.training is not None
+        if result.has_learnt
         for reference in standings.references
     )

@@ -60,14 +60,15 @@ class TrainedRun:
         """Return the agent with a search at test time: what it draws, and changes of the best."""
         agent = self._drawing
         method = PolicySearch(agent, agent.digest, name=f"{self.entry.name} with search")
-        return Search(method, budget)
+        return Search(method, budget, has_learnt=True)
 
     def guided(self, surrogate: Surrogate, budget: int) -> Search:
         """Return the agent with a search in which a surrogate picks what gets a blast."""
         agent = self._drawing
         name = f"{self.entry.name} with search by the surrogate"
         digest = f"{surrogate.digest} {agent.digest}"
-        return Search(SurrogateSearch(surrogate, digest, agent, name=name), budget)
+        method = SurrogateSearch(surrogate, digest, agent, name=name)
+        return Search(method, budget, has_learnt=True)
 
     def ranked(self, surrogate: Surrogate) -> Agent:
         """Return the agent with a surrogate, which picks one of the layouts that it draws."""
