@@ -1,7 +1,9 @@
 """The surrogate: what ways are open, what it learns, how it is kept, and what is found with it."""
 
 import json
-from dataclasses import replace
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -340,6 +342,34 @@ def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
     guided = replace(method, agent=Drawing()).search(problem, budget, 0)
     assert guided.load is not None
     assert guided.load <= min(map(problem.load, Drawing().sample(YARD, problem.told, 3)))
+
+
+@dataclass(frozen=True, eq=False)
+class WrongBy(LayoutProblem):
+    """Blasts of which the surrogate is wrong by a factor of the layout, wherever the charge is."""
+
+    met: dict[Layout, int] = field(default_factory=dict)
+
+    def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
+        for layout, _ in pairs:
+            self.met[layout] = self.met.get(layout, 0) + 1
+        return [self.true_load(layout, (threat,)) for layout, threat in pairs]
+
+    def true_load(self, layout: Layout, threats: tuple[Threat, ...]) -> float:
+        factor = 0.7 + 0.6 * random.Random(repr(layout)).random()
+        return factor * Guesses.of(by_hand(), Case(YARD, threats)).loads([layout]).item()
+
+
+def test_against_a_hidden_charge_it_chooses_by_all_places_though_few_are_met() -> None:
+    problem = WrongBy(BlastEvaluator(YARD, FAST), case(10))
+    assert problem.told is None
+    method = SurrogateSearch(by_hand(), "digest", guesses=30, drawn=4)
+    result = method.search(problem, 40, 0)
+    assert result.blasts == sum(problem.met.values()) <= 40
+    assert result.threats == 10  # the chosen one has met all
+    assert set(problem.met.values()) == {4, 10}
+    best = min(problem.met, key=lambda layout: problem.true_load(layout, problem.threats))
+    assert result.layout == best
 
 
 def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from math import ceil
 from typing import Final
 
 import numpy as np
@@ -181,6 +182,10 @@ class SurrogateSearch:
     First the rules' layouts and the best that a search by guesses alone has found, in turn; then
     changes of the best by blasts, of which the surrogate picks one out of many.
 
+    Against a hidden charge layouts meet a few places alone. What the surrogate says of all places,
+    times by how much it was wrong at those, tells more of a layout than its loads there: it decides
+    what is changed, and what meets the other places in the end.
+
     Attributes:
         surrogate: The surrogate; the digest says which.
         digest: Of its file, and of the agent's weights, so that results of different ones are told
@@ -212,23 +217,30 @@ class SurrogateSearch:
             BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
         """
         rng = generator(seed)
-        plan = Plan.of(problem, budget)
+        plan = _plan(problem, budget)
         session = SearchSession(problem, budget, plan, report)
-        met = tuple(problem.threats[: plan.threats])
-        guesses = Guesses.of(self.surrogate, Case(problem.scenario, met, risk=problem.case.risk))
+        estimates = _Estimates.of(self.surrogate, problem, session)
+        guesses = estimates.everywhere
 
         def explore() -> None:
-            ruled = list(layouts_by_rule(problem.scenario, problem.told).values())
+            rules = layouts_by_rule(problem.scenario, problem.told).values()
             proposed = self._from_agent(problem, seed)
             session.assess(proposed[:1])
-            found = improved(guesses, [(), *ruled, *proposed], self.guesses, rng)
+            found = improved(guesses, [(), *rules, *proposed], self.guesses, rng)
             share = max(1, round(self.guessed_share * plan.exploring_layouts))
+            ruled = sorted(rules, key=lambda layout: guesses.loads([layout]).item())
+            ruled = ruled[: ceil(plan.exploring_layouts / _LAYOUTS_A_RULE)]
             for first, second in zip(found[:share], [*ruled, *found[share:]], strict=False):
                 session.assess([first])
                 session.assess([second])
-            self._go_on(session, guesses, plan, rng)
+            self._go_on(session, estimates, rng)
 
-        return session.result(self.name, seed, session.run(explore))
+        def choose() -> None:
+            most = len(problem.threats)
+            for layout in estimates.ranked():
+                session.assess([layout], most)
+
+        return session.result(self.name, seed, session.run(explore, choose))
 
     def _from_agent(self, problem: LayoutProblem, seed: int) -> list[Layout]:
         """Return what the agent proposes, then what it draws."""
@@ -239,15 +251,73 @@ class SurrogateSearch:
         return [self.agent.propose(scenario, told), *drawn]
 
     def _go_on(
-        self, session: SearchSession, guesses: Guesses, plan: Plan, rng: np.random.Generator
+        self, session: SearchSession, estimates: "_Estimates", rng: np.random.Generator
     ) -> None:
         """Change the best by blasts, one of many changes at a time, until the blasts are spent."""
+        guesses = estimates.everywhere
         moves = Moves(guesses.case.scenario)
-        tried: set[Layout] = set(session.ranked(plan.threats))
+        tried: set[Layout] = set(estimates.ranked())
         while True:
-            best = session.ranked(plan.threats)[:_KEPT]
+            best = estimates.ranked()[:_KEPT]
             changed = [moves.near_best(best, rng) for _ in range(self.drawn)]
             new = [each for each in dict.fromkeys(changed) if each not in tried] or changed
             chosen = new[int(guesses.loads(new).argmin())]
             tried.add(chosen)
             session.assess([chosen])
+
+
+_LAYOUTS_A_RULE: Final = 8
+"""Of so many layouts that get a blast one is a rule's, as long as there are some."""
+
+_LEAST_PLACES: Final = 4
+"""Of a hidden charge, that a layout meets before it is said how wrong the surrogate is of it."""
+
+_CHOOSING_SHARE: Final = 0.4
+"""Of the blasts, for the places of a hidden charge that the best layouts have not met."""
+
+
+def _plan(problem: LayoutProblem, budget: int) -> Plan:
+    """Return how the blasts are divided; against a hidden charge for few layouts, met well."""
+    plan = Plan.of(problem, budget)
+    most = len(problem.threats)
+    places = min(max(plan.threats, _LEAST_PLACES), most, budget)
+    if problem.told is not None or places == most:
+        return plan
+    return Plan(places, budget - min(round(_CHOOSING_SHARE * budget), budget - places))
+
+
+@dataclass(frozen=True, eq=False)
+class _Estimates:
+    """What layouts that have met some threats would let through under all of them.
+
+    Attributes:
+        session: Knows the loads under the first threats.
+        everywhere: Guesses under all threats.
+        met: Guesses under those that layouts meet while the search explores.
+    """
+
+    session: SearchSession
+    everywhere: Guesses
+    met: Guesses
+
+    @classmethod
+    def of(
+        cls, surrogate: Surrogate, problem: LayoutProblem, session: SearchSession
+    ) -> "_Estimates":
+        """Begin with none."""
+
+        def under(threats: Sequence[Threat]) -> Guesses:
+            case = Case(problem.scenario, tuple(threats), risk=problem.case.risk)
+            return Guesses.of(surrogate, case)
+
+        first = problem.threats[: session.plan.threats]
+        return cls(session, under(problem.threats), under(first))
+
+    def ranked(self) -> list[Layout]:
+        """Return the layouts that have met the first threats, the least estimate first."""
+        layouts = self.session.ranked(self.session.plan.threats)
+        if not layouts:
+            return []
+        wrong_by = self.session.assess(layouts) / self.met.loads(layouts)
+        order = np.argsort(wrong_by * self.everywhere.loads(layouts), kind="stable")
+        return [layouts[index] for index in order.tolist()]
