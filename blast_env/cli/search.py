@@ -8,12 +8,19 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 import typer
 from blast_agents.search import (
+    SEARCH_METHODS,
     LayoutProblem,
     SearchMethod,
     SearchResult,
     find_search_method,
 )
 from blast_agents.search import Progress as SearchProgress
+from blast_agents.surrogate import (
+    Surrogate,
+    SurrogateSearch,
+    load_surrogate,
+    packaged_surrogate,
+)
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.cluster import ClusterAddress, running_on
@@ -42,7 +49,7 @@ from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
 from blast_env.cli.targets import checked_targets
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.envs.strategies import HiddenThreat
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import (
     BlastEvaluator,
     Case,
@@ -86,6 +93,7 @@ class SearchOptions:
     engine: str
     cell_m: float | None
     start_from: tuple[str, ...]
+    surrogate: str | None  # its digest
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +233,8 @@ def search(
         typer.Option(
             help="random, greedy, annealing, genetic, nsga2, exhaustive, or a rule: "
             "(long_)wall_near_charge, (long_)wall_near_building, ring_around_charge, "
-            "ring_around_building, line_of_posts, posts_and_wall or sight_lines."
+            "ring_around_building, line_of_posts, posts_and_wall or sight_lines; with a catalogue "
+            "also surrogate: guesses of gas dynamics say what gets a blast."
         ),
     ] = "genetic",
     scenario: Annotated[str, typer.Option(help="Bundled name, or a scenario file.")] = "courtyard",
@@ -261,6 +270,13 @@ def search(
     start_from: Annotated[
         list[Path] | None, typer.Option(help="Layout file to begin with; more than one will do.")
     ] = None,
+    surrogate: Annotated[
+        Path | None,
+        typer.Option(
+            help="File of the surrogate for --method surrogate (scripts.surrogate fit).",
+            show_default="the package's",
+        ),
+    ] = None,
     held_out: Annotated[
         int, typer.Option(min=1, help="Threats that the result is checked on at the end.")
     ] = 32,
@@ -279,6 +295,7 @@ def search(
         checked_targets(folders={"--out": out, "--cache": cache}),
         running_on(cluster),
     ):
+        guessing = _surrogate(method, surrogate)
         options = SearchOptions(
             method=method,
             scenario=scenario,
@@ -294,11 +311,13 @@ def search(
             engine=engine,
             cell_m=cell,
             start_from=tuple(str(path) for path in start_from or ()),
+            surrogate=None if guessing is None else guessing.digest,
         )
         evaluator = BlastEvaluator(load_scenario(scenario), find_engine(engine, cell), cache=cache)
         if out is not None:
             make_folder(out)
-        run = _run(options, evaluator, processes)
+        chosen = _method(options, guessing, evaluator.scenario)
+        run = _run(chosen, options, evaluator, processes)
         if run.result.interrupted and not run.result.history:
             raise KeyboardInterrupt  # nothing was found that could be kept
         checked = _check(run, options, held_out)
@@ -315,10 +334,38 @@ def search(
         raise typer.Exit(130)
 
 
-def _run(options: SearchOptions, evaluator: BlastEvaluator, processes: int) -> SearchRun:
-    scenario = evaluator.scenario
+def _surrogate(method: str, path: Path | None) -> Surrogate | None:
+    """Return the surrogate of a method that has one."""
+    if method == SurrogateSearch.name:
+        return packaged_surrogate() if path is None else load_surrogate(path)
+    if path is not None:
+        raise BlastEnvError(f"--surrogate is for --method {SurrogateSearch.name}, not {method}")
+    return None
+
+
+def _method(
+    options: SearchOptions, surrogate: Surrogate | None, scenario: Scenario
+) -> SearchMethod:
     initial = tuple(load_layout(path, scenario) for path in options.start_from)
-    method = find_search_method(options.method, initial)
+    if surrogate is None:
+        known = (*SEARCH_METHODS, SurrogateSearch.name)
+        if options.method not in known:
+            raise UnknownNameError("search method", options.method, known)
+        return find_search_method(options.method, initial)
+    if initial:
+        raise BlastEnvError(f"{options.method} begins with no layouts: leave --start-from out")
+    if not scenario.zone.items:
+        raise BlastEnvError(
+            f"{scenario.name} has no catalogue (build_zone.items): the surrogate knows nothing of "
+            "single modules"
+        )
+    return SurrogateSearch(surrogate, surrogate.digest)
+
+
+def _run(
+    method: SearchMethod, options: SearchOptions, evaluator: BlastEvaluator, processes: int
+) -> SearchRun:
+    scenario = evaluator.scenario
     problem = LayoutProblem(evaluator, _practice(scenario, options, evaluator.engine), processes)
     problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
     hits, begun_s = evaluator.cache_hits, perf_counter()

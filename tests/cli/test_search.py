@@ -4,9 +4,11 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from blast_agents.search import LayoutProblem, find_search_method
+from blast_agents.surrogate import SurrogateSearch, packaged_surrogate
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario
@@ -17,6 +19,7 @@ from blast_env.physics.event.engine import EventRun
 from blast_env.physics.scene import Charge
 from blast_env.scenario import LayoutFile, SegmentSource, load_layout
 from tests.agents.search_cases import small_scenario
+from tests.agents.test_self_labelling import wide_yard
 
 CHARGE = Charge((5.0, 20.5), 100.0)
 
@@ -88,6 +91,22 @@ def test_a_hidden_threat_is_searched_for_wherever_it_may_be(tmp_path: Path) -> N
     assert len({tuple(each["charge_position_m"]) for each in listed}) == 3
 
 
+def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
+    """That of the package, whose first guess gets the only blast."""
+    scenario, out = wide_yard(tnt_kg=1.0), tmp_path / "out"
+    save_scenario(scenario, tmp_path / "yard.toml")
+    options = ("--engine", "gas", "--budget", 1, "--held-out", 1, "--out", out)
+    result = search("--method", "surrogate", "--scenario", tmp_path / "yard.toml", *options)
+    assert result.exit_code == 0, result.output
+    assert "1 of 1 blasts spent" in result.stdout
+    found, provenance = packaged_surrogate(), LayoutFile.load(out / "layout.json").provenance
+    assert provenance["options"]["surrogate"] == found.digest
+    case = practice_visible(scenario, scenario.sample_charge(np.random.default_rng(0)), 1, 0)
+    problem = LayoutProblem(BlastEvaluator(scenario, "gas"), case)
+    expected = SurrogateSearch(found, found.digest).search(problem, 1, 0)
+    assert load_layout(out / "layout.json", scenario) == expected.layout != ()
+
+
 def test_a_rule_spends_nothing(site: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     options = ("--scenario", site, "--held-out", 2, "--out", out)
@@ -125,6 +144,17 @@ def test_it_begins_with_given_layouts_and_keeps_blasts(site: Path, tmp_path: Pat
         (("--scenario", "free_field"), "has no build zone"),
         (("--budget", "0"), "greater than or equal to 1"),
         (("--out", "layout.json"), "layout.json: cannot be a folder"),
+        (("--method", "surogate"), "did you mean 'surrogate'"),
+        (("--method", "surrogate"), "courtyard has no catalogue"),
+        (("--surrogate", "own.json"), "--surrogate is for --method surrogate, not genetic"),
+        (("--method", "surrogate", "--surrogate", "own.json"), "own.json: there is no such file"),
+        (
+            (
+                *("--method", "surrogate", "--scenario", "control_room", "--engine", "gas"),
+                *("--start-from", "layout.json"),
+            ),
+            "surrogate begins with no layouts",
+        ),
     ],
 )
 def test_bad_input_is_one_clear_message(
