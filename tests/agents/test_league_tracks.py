@@ -163,6 +163,11 @@ def test_a_vehicle_is_a_hidden_threat_of_a_site_that_has_one(tmp_path: Path) -> 
     assert (track.name, track.threat) == ("vehicle_gate", "hidden")
     (case,) = track.cases
     assert all(isinstance(charge, VehicleCharge) for charge in case.charges)
+    assert len(case.threats) == 8
+    (alone,) = vehicle_track(gate_site(), 2, noisy=False).cases
+    for threats in (alone.threats, practice_of(alone).threats):
+        places = {each.charge_against(alone.scenario, ()).position_m for each in threats}
+        assert len(places) == len(threats) == 4
     with pytest.raises(BlastEnvError, match="has no vehicle"):
         vehicle_track(SCENARIO, 2)
     path = tmp_path / "gate.toml"

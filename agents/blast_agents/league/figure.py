@@ -14,9 +14,9 @@ with render_extra():
     from matplotlib.ticker import NullLocator, PercentFormatter
 
 # Okabe and Ito's colours, which people with any colour vision can tell apart.
-_SEARCHES: Final = ("#0072B2", "#E69F00", "#009E73", "#56B4E9", "#F0E442")
+_SEARCHES: Final = ("#0072B2", "#E69F00", "#009E73", "#56B4E9", "#C9A800")
 _AGENTS: Final = ("#D55E00", "#CC79A7", "#000000")
-_SEARCH_MARKERS: Final = "osD^v"
+_SEARCH_MARKERS: Final = "osD^v<>"  # one by one another pair of both
 _AGENT_LINES: Final = ("-", "--", "-.", ":")
 _NOTHING_MARKERS: Final = "xP*Xdph8<>+1"
 _APART: Final = 1.05
@@ -128,7 +128,7 @@ def _draw_search(
         markersize=6,
         capsize=3,
         linewidth=1.6,
-        label=f"{method} search",
+        label=method if "search" in method else f"{method} search",
         zorder=4,
     )
 

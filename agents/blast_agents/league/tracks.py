@@ -8,11 +8,13 @@ from typing import Final, Literal
 from blast_env.envs.arguments import check_names
 from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, SeedRange, draw_threats
+from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.cases import practice_hidden, practice_visible, visible_case
 from blast_env.scenario import (
+    AnyCharge,
     AnyScenario,
     Scenario,
+    VehicleCharge,
     bundled_scenarios,
     find_scenario,
     load_scenario,
@@ -109,7 +111,7 @@ def known_track(
     )
 
 
-def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
+def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0, *, noisy: bool = True) -> Track:
     """Return the track of a hidden threat on a known site: one case.
 
     A search meets `HIDDEN_THREATS` charges, one fan and air each.
@@ -118,6 +120,8 @@ def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
         scenario: As for `known_track`.
         seeds: The case meets `HIDDEN_SEEDS` times as many held-out threats.
         seed: As for `known_track`.
+        noisy: As for `known_track`; if not, a charge that is drawn again is the same blast again,
+            and is there once. So it is with a few places, as of a vehicle.
 
     Raises:
         BlastEnvError: As for `known_track`.
@@ -125,25 +129,29 @@ def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
     scenario = find_scenario(scenario)
     scenario.zone  # noqa: B018  # refuses a scenario without one
     (first,) = _first_seeds(1, seeds, seed)
+    case = _hidden_case(scenario.name, scenario, first, HIDDEN_SEEDS * seeds, seed * MOST_CASES)
+    if not noisy:
+        practice = practice_of(case)
+        practice = replace(practice, threats=_distinct(practice.threats))
+        case = replace(case, threats=_distinct(case.threats), practice=practice)
     return Track(
         name=f"hidden_{scenario.name}",
         title=f"Hidden threat on a known site: {scenario.name}",
         threat="hidden",
         site=scenario.content_hash,
-        cases=(
-            _hidden_case(scenario.name, scenario, first, HIDDEN_SEEDS * seeds, seed * MOST_CASES),
-        ),
+        cases=(case,),
         reference_budget=200,
     )
 
 
-def vehicle_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
+def vehicle_track(scenario: AnyScenario, seeds: int, seed: int = 0, *, noisy: bool = True) -> Track:
     """Return the track of a vehicle on a known site: one case, a hidden threat.
 
     Args:
         scenario: As for `known_track`; it has a vehicle.
         seeds: As for `hidden_track`.
         seed: As for `known_track`.
+        noisy: As for `hidden_track`.
 
     Raises:
         BlastEnvError: As for `known_track`, or if there is no vehicle.
@@ -155,7 +163,7 @@ def vehicle_track(scenario: AnyScenario, seeds: int, seed: int = 0) -> Track:
             "'vehicle' is about"
         )
     return replace(
-        hidden_track(scenario, seeds, seed),
+        hidden_track(scenario, seeds, seed, noisy=noisy),
         name=f"vehicle_{scenario.name}",
         title=f"A vehicle on a known site: {scenario.name}",
     )
@@ -217,8 +225,9 @@ def find_tracks(
         scenarios: Bundled names or files for the tracks with a known site; `KNOWN_SCENARIOS`,
             `HIDDEN_SCENARIOS` and the bundled ones with a vehicle unless given. Of those that are
             given, the track `"vehicle"` has the ones with a vehicle if others are asked for too.
-        noisy: As for `known_track`. Engines with noise, those of particles, leave out bundled
-            scenarios with a vehicle that name no calibration; of `"all"` also sites with heights.
+        noisy: As for `known_track` and `hidden_track`. Engines with noise, those of particles,
+            leave out bundled scenarios with a vehicle that name no calibration; of `"all"` also
+            sites with heights.
 
     Raises:
         UnknownNameError: If there is no such track; the message names the nearest one.
@@ -234,7 +243,7 @@ def find_tracks(
         tracks += [known_track(scenario, cases, seeds, seed, noisy=noisy) for scenario in known]
     if name in ("hidden", "all"):
         known = [load_scenario(each) for each in scenarios or HIDDEN_SCENARIOS]
-        tracks += [hidden_track(scenario, seeds, seed) for scenario in known]
+        tracks += [hidden_track(scenario, seeds, seed, noisy=noisy) for scenario in known]
     if name in ("vehicle", "all"):
         known = [load_scenario(each) for each in scenarios or bundled_scenarios()]
         if not scenarios or name == "all":
@@ -246,7 +255,7 @@ def find_tracks(
                 "scenario is missing: the bundled ones with a vehicle name no calibration for "
                 "particles; gas dynamics needs none (--engine gas)"
             )
-        tracks += [vehicle_track(scenario, seeds, seed) for scenario in known]
+        tracks += [vehicle_track(scenario, seeds, seed, noisy=noisy) for scenario in known]
     families = [each for each in FAMILIES if name in (each, "all")]
     if name == "all" and noisy:
         families.remove(ITEM_SITES)
@@ -269,6 +278,17 @@ def _hidden_case(name: str, scenario: Scenario, first: int, seeds: int, search_s
         seed=search_seed,
         practice=practice_hidden(scenario, HIDDEN_THREATS, 1, search_seed),
     )
+
+
+def _distinct(threats: Sequence[Threat]) -> tuple[Threat, ...]:
+    """Return the first threat of each charge; a vehicle has no more than its places."""
+    first: dict[AnyCharge, Threat] = {}
+    for threat in threats:
+        charge = threat.charge
+        if isinstance(charge, VehicleCharge):
+            charge = replace(charge, rank=charge.rank % charge.source.places)
+        first.setdefault(charge, threat)
+    return tuple(first.values())
 
 
 def _first_seeds(cases: int, seeds: int, seed: int) -> list[int]:
