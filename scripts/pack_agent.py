@@ -63,7 +63,7 @@ def league_result(folder: Path, track: str, run: str) -> LeagueResult:
         raise BlastEnvError(f"{folder}: has no league with a track {track!r}: {error}") from error
     entries = [row for row in rows if row.entry.endswith(f"({run})")]
     rules = {row.entry: row.reduction for row in rows if row.is_rule}
-    said = re.search(r"^Engine (\S+), blast-env \S+: `(.+)`$", page, re.MULTILINE)
+    said = re.search(r"^Engine (.+?), blast-env \S+: `(.+)`$", page, re.MULTILINE)
     if len(entries) != 1 or said is None:
         raise BlastEnvError(f"{folder}: {run!r} did not enter {track!r} once, or {PAGE} is damaged")
     if not rules:

@@ -177,11 +177,12 @@ def _train(
 
 def _print_result(result: "TrainingResult") -> None:
     counters, folder = result.progress.counters, result.folder
+    settings = result.configuration.settings
+    blasts = "guesses" if settings.guesses else "blasts"
     print_line(
-        f"{counters.steps:,} steps, {counters.episodes:,} episodes, {counters.blasts:,} blasts "
+        f"{counters.steps:,} steps, {counters.episodes:,} episodes, {counters.blasts:,} {blasts} "
         f"in {counters.seconds:,.0f} s"
     )
-    settings = result.configuration.settings
     scenario = folder.scenario(result.configuration)
     print_line(engine_text(settings.blast_engine, [scenario]))
     if settings.judge.name != settings.blast_engine.name:

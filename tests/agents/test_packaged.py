@@ -72,6 +72,8 @@ def test_the_weights_propose_what_their_run_does(run: Path, folder: Path) -> Non
     assert agent.propose(wide_yard(), CHARGE) == load_agent(run).propose(wide_yard(), CHARGE)
     assert (record.league, record.scenario) == (LEAGUE, "walled_yard")
     assert record.command == (run / "command.txt").read_text().strip()
+    assert "/" not in record.command.partition(" ")[0]  # nor where the program is
+    assert "platform" not in record.versions
     assert "torch" in record.versions
     assert packaged_agent(wide_yard(), "hidden", folder) is None
     assert packaged_agent(yard_with_a_point(), "visible", folder) is None  # of the same name

@@ -57,7 +57,7 @@ class Record(BaseModel):
         configuration: Of the run that they come from, with the scenario's hash.
         scenario: Name of the scenario.
         command: What trained them.
-        versions: With what.
+        versions: With what, without the machine.
         steps: Steps of training at the evaluation that they were chosen by.
         blasts: Blasts of the training.
         seconds: Time that it took.
@@ -104,7 +104,7 @@ def pack(
         configuration=configuration,
         scenario=source.scenario(configuration).name,
         command=source.command,
-        versions=source.versions,
+        versions={name: each for name, each in source.versions.items() if name != "platform"},
         steps=counters.best_steps,
         blasts=counters.blasts,
         seconds=round(counters.seconds, 1),

@@ -76,7 +76,9 @@ def train(
     selection = _selection(configuration, source)
     folder = RunFolder(Path(run))
     start = _start(configuration, scenario)
-    with folder.making(configuration, scenario, shlex.join(sys.argv)):
+    # Of the program its name: where it is installed is nobody's business who gets the run.
+    command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    with folder.making(configuration, scenario, command):
         start.save(folder.checkpoint)
     return _run(_Run(folder, configuration, source, selection), start, progress)
 
