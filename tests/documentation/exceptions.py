@@ -247,6 +247,23 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env league --engine gas --track hidden --scenario scripts/school_street.toml --seeds 12"
     " --methods best_rule --budgets 200 --run out/street_hidden --surrogate street.json"
     " --out out/street_league": "--seeds 1 --budgets 16",
+    "blast-env train --algo self_labelling --engine gas --scenario hotel_forecourt --threat hidden"
+    " --envs 1 --steps 300 --set cases=1 --set cases_per_round=1 --set samples=4"
+    " --set neighbours=8 --set borrowed=0 --set hidden_threats=2 --set first_updates=300"
+    " --set updates=60 --set evaluation_interval=4 --set evaluation_cases=2 --run out/hotel": (
+        "--steps 20 --set first_updates=3 --set updates=2"
+    ),
+    "python -m scripts.surrogate fit --data docs/data/site_blasts.parquet --data out/hotel.parquet"
+    " --no-check --out out/hotel.json": "--epochs 1",
+    "blast-env train --algo maskable_ppo --engine out/hotel.json --scenario hotel_forecourt"
+    " --threat hidden --envs 1 --steps 12288 --start-from out/hotel --set hidden_threats=2"
+    " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
+    " --set evaluation_cases=2 --run out/hotel_ppo": "--steps 32 --set n_steps=32",
+    "blast-env league --engine gas --track vehicle --scenario hotel_forecourt --seeds 4"
+    " --methods best_rule,winners_from_rules,genetic --budgets 200 --agent-search 50"
+    " --run out/hotel --run out/hotel_ppo --surrogate out/hotel.json --out out/hotel_league": (
+        "--seeds 1 --methods best_rule --budgets 2 --agent-search 2"
+    ),
     "blast-env search --method genetic --budget 200 --seed 0 --charge 5 12 --out out/search": (
         "--budget 20 --held-out 2"
     ),
