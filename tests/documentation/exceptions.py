@@ -258,7 +258,7 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env train --algo maskable_ppo --engine out/hotel.json --scenario hotel_forecourt"
     " --threat hidden --envs 1 --steps 12288 --start-from out/hotel --set hidden_threats=2"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
-    " --set evaluation_cases=2 --run out/hotel_ppo": "--steps 32 --set n_steps=32",
+    " --set evaluation_cases=2 --run out/hotel_ppo": _TRAIN,
     "blast-env league --engine gas --track vehicle --scenario hotel_forecourt --seeds 4"
     " --methods best_rule,winners_from_rules,genetic --budgets 200 --agent-search 50"
     " --run out/hotel --run out/hotel_ppo --surrogate out/hotel.json --out out/hotel_league": (
