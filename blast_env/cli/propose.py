@@ -26,6 +26,7 @@ from blast_env.cli.pictures import save_layout_picture
 from blast_env.cli.targets import FileTarget, checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.engines import GAS
 from blast_env.physics.scene import Charge
@@ -131,8 +132,7 @@ def _case(scenario: Scenario, charge: Charge | None) -> Case:
     if charge is not None:
         return Case(scenario, (Threat(charge, first),), charge=charge)
     threats = draw_threats(scenario, range(first, first + _HIDDEN_THREATS))
-    distinct = {threat.charge: threat for threat in threats}
-    return Case(scenario, tuple(distinct.values()))
+    return Case(scenario, one_of_each_charge(threats))
 
 
 @dataclass(frozen=True)

@@ -275,6 +275,20 @@ def practice_hidden(
     return Case(found, tuple(threats), realisations, risk, seed=seed)
 
 
+def one_of_each_charge(threats: Iterable[Threat]) -> tuple[Threat, ...]:
+    """Return the first threat of each charge: without noise another one is the same blast again.
+
+    A vehicle's charges beyond its places are at the same places again.
+    """
+    first: dict[AnyCharge, Threat] = {}
+    for threat in threats:
+        charge = threat.charge
+        if isinstance(charge, VehicleCharge):
+            charge = replace(charge, rank=charge.rank % charge.source.places)
+        first.setdefault(charge, threat)
+    return tuple(first.values())
+
+
 def check_distinct(threats: Sequence[Threat]) -> None:
     """Refuse a threat that is there twice: it would count as evidence twice (`BlastEnvError`)."""
     for index, threat in enumerate(threats):

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange
 from blast_env.physics.scene import Charge
-from blast_env.scenario import VehicleCharge, save_scenario
+from blast_env.scenario import PointSource, VehicleCharge, save_scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SiteSource
 from tests.agents.league_cases import ROAD, road_scenario
 from tests.vehicle_sites import gate_site
@@ -156,6 +156,16 @@ def test_without_noise_a_known_charge_is_one_blast() -> None:
     for case in known_track(SCENARIO, 3, 16, noisy=False).cases:
         assert (len(case.threats), len(practice_of(case).threats)) == (1, 1)
         assert practice_of(case).threats[0].charge == case.threats[0].charge == case.charge
+
+
+def test_without_noise_a_charge_that_is_drawn_again_is_no_other_case() -> None:
+    places = [PointSource(kind="point", position_m=(2.0, y), tnt_kg=5.0) for y in (4.0, 8.0)]
+    scenario = SCENARIO.model_copy(update={"charge": tuple(places)})
+    cases = known_track(scenario, 16, 1, noisy=False).cases
+    met = [case.charge.position_m for case in cases if isinstance(case.charge, Charge)]
+    assert sorted(met) == [(2.0, 4.0), (2.0, 8.0)]
+    assert len(cases) == 2
+    assert len(known_track(scenario, 16, 1).cases) == 16
 
 
 def test_a_vehicle_is_a_hidden_threat_of_a_site_that_has_one(tmp_path: Path) -> None:

@@ -8,13 +8,16 @@ from typing import Final, Literal
 from blast_env.envs.arguments import check_names
 from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
-from blast_env.evaluation.cases import practice_hidden, practice_visible, visible_case
+from blast_env.evaluation import Case, SeedRange, draw_threats
+from blast_env.evaluation.cases import (
+    one_of_each_charge,
+    practice_hidden,
+    practice_visible,
+    visible_case,
+)
 from blast_env.scenario import (
-    AnyCharge,
     AnyScenario,
     Scenario,
-    VehicleCharge,
     bundled_scenarios,
     find_scenario,
     load_scenario,
@@ -81,17 +84,19 @@ def known_track(
         seeds: Held-out fans and airs of each, at most 1,000.
         seed: Decides everything, at most 1,000.
         noisy: Whether the engine has fans and airs to draw; if not, there is one held-out blast a
-            case, whatever `seeds` says.
+            case, whatever `seeds` says, and a charge that is drawn again is no other case.
 
     Raises:
         BlastEnvError: If a number is out of bounds, or there is no build zone.
     """
     scenario = find_scenario(scenario)
     scenario.zone  # noqa: B018  # refuses a scenario without one
-    drawn = []
+    drawn: list[Case] = []
     realisations = VISIBLE_REALISATIONS if noisy else 1
     for index, first in enumerate(_first_seeds(cases, seeds, seed)):
         charge, search_seed = draw_threat(scenario, first), seed * MOST_CASES + index
+        if not noisy and any(charge == case.charge for case in drawn):
+            continue
         judged = visible_case(scenario, charge, range(first, first + (seeds if noisy else 1)))
         drawn.append(
             replace(
@@ -132,8 +137,8 @@ def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0, *, noisy: boo
     case = _hidden_case(scenario.name, scenario, first, HIDDEN_SEEDS * seeds, seed * MOST_CASES)
     if not noisy:
         practice = practice_of(case)
-        practice = replace(practice, threats=_distinct(practice.threats))
-        case = replace(case, threats=_distinct(case.threats), practice=practice)
+        practice = replace(practice, threats=one_of_each_charge(practice.threats))
+        case = replace(case, threats=one_of_each_charge(case.threats), practice=practice)
     return Track(
         name=f"hidden_{scenario.name}",
         title=f"Hidden threat on a known site: {scenario.name}",
@@ -278,17 +283,6 @@ def _hidden_case(name: str, scenario: Scenario, first: int, seeds: int, search_s
         seed=search_seed,
         practice=practice_hidden(scenario, HIDDEN_THREATS, 1, search_seed),
     )
-
-
-def _distinct(threats: Sequence[Threat]) -> tuple[Threat, ...]:
-    """Return the first threat of each charge; a vehicle has no more than its places."""
-    first: dict[AnyCharge, Threat] = {}
-    for threat in threats:
-        charge = threat.charge
-        if isinstance(charge, VehicleCharge):
-            charge = replace(charge, rank=charge.rank % charge.source.places)
-        first.setdefault(charge, threat)
-    return tuple(first.values())
 
 
 def _first_seeds(cases: int, seeds: int, seed: int) -> list[int]:

@@ -16,7 +16,7 @@ from blast_agents.surrogate.network import Surrogate
 from blast_agents.surrogate.walls import Site, site_of
 from blast_env.arrays import FloatArray
 from blast_env.evaluation import Case, Threat
-from blast_env.evaluation.cases import practice_hidden, practice_visible
+from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Scenario
 from blast_env.values import generator
@@ -171,8 +171,7 @@ def _case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
     if charge is not None:
         return practice_visible(scenario, charge, 1, 0)
     drawn = practice_hidden(scenario, _DRAWN_CHARGES, 1, 0)
-    distinct = {threat.charge: threat for threat in drawn.threats}
-    return replace(drawn, threats=tuple(distinct.values())[:_HIDDEN_CHARGES])
+    return replace(drawn, threats=one_of_each_charge(drawn.threats)[:_HIDDEN_CHARGES])
 
 
 @dataclass(frozen=True)
