@@ -241,7 +241,7 @@ class FolderStore:
 
     def items(self) -> Iterator[tuple[str, bytes]]:
         """Yield keys and contents in the order of the files' names; damaged ones are left out."""
-        for path in sorted(entry.path for entry in self._entries()):
+        for path in sorted(entry.path for entry in self._finished()):
             try:
                 stored = Path(path).read_bytes()
                 key = json.loads(stored[_CHECKSUM_BYTES:].partition(b"\n")[0])
@@ -258,7 +258,7 @@ class FolderStore:
             self._path(key).unlink(missing_ok=True)
 
     def __len__(self) -> int:
-        return sum(1 for _ in self._entries())
+        return sum(1 for _ in self._finished())
 
     def _path(self, key: str) -> Path:
         return self.folder / f"{sha256(key.encode()).hexdigest()}{self.suffix}"
@@ -275,6 +275,10 @@ class FolderStore:
                     if not S_ISREG(status.st_mode):
                         continue
                     yield _Entry(status.st_mtime_ns, status.st_size, item.path)
+
+    def _finished(self) -> Iterator[_Entry]:
+        """Yield the files that have their name: a killed process may leave a content twice."""
+        return (entry for entry in self._entries() if not is_temporary(Path(entry.path).name))
 
     def _tidy_up(self, most_bytes: int) -> None:
         """Delete files until the rest is small enough, if all together are too large."""

@@ -1,6 +1,7 @@
 """A full device costs the new file and nothing else, and nobody is told that it was written."""
 
 import gc
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -66,6 +67,21 @@ def test_a_store_keeps_what_it_had_on_a_full_device(tmp_path: Path) -> None:
         store.put("key", bytes(2000))
     assert store.get("key") == b"old"
     assert len(store) == 1
+
+
+def test_what_a_writer_left_that_was_killed_before_its_rename_is_no_second_entry(
+    tmp_path: Path,
+) -> None:
+    store = FolderStore(tmp_path, ".result", most_bytes=10_000)
+    store.put("key", b"kept")
+    (whole,) = tmp_path.iterdir()
+    left = tmp_path / f".{16 * '0'}.result"
+    left.write_bytes(whole.read_bytes())
+    os.utime(left, (0.0, 0.0))
+    assert list(store.items()) == [("key", b"kept")]
+    assert len(store) == 1
+    store.put("large", bytes(9_950))  # it goes when there is no more room
+    assert not left.exists()
 
 
 def test_an_error_about_another_file_names_it(tmp_path: Path) -> None:
