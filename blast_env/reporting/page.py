@@ -67,9 +67,7 @@ def write_report(
         temporary.write_text(page, encoding="utf-8")
     if pdf is None:
         return [Path(html)]
-    with write_atomically(pdf) as temporary, catch_warnings():
-        # WeasyPrint's hint to whoever packages it; without that library fonts are larger, no more.
-        filterwarnings("ignore", "HarfBuzz-Subset", DeprecationWarning)
+    with write_atomically(pdf) as temporary:
         _weasyprint().HTML(string=page).write_pdf(str(temporary))
     return [Path(html), Path(pdf)]
 
@@ -90,7 +88,9 @@ def check_targets(html: str | Path, pdf: str | Path | None) -> None:
 
 def _weasyprint() -> Any:
     """Return the package that makes PDF; it needs libraries of the system, Pango above all."""
-    with import_extra("report", "PDF"):
+    with import_extra("report", "PDF"), catch_warnings():
+        # WeasyPrint's hint to whoever packages it; without that library fonts are larger, no more.
+        filterwarnings("ignore", "HarfBuzz-Subset", DeprecationWarning)
         try:
             import weasyprint
         except OSError as error:
