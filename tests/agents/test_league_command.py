@@ -98,7 +98,10 @@ def test_called_again_it_has_nothing_left_to_simulate(
     arguments = (*SMALL, "--track", "hidden", "--scenario", path, "--out", tmp_path / "out")
     first = league(*arguments)
     assert first.exit_code == 0, first.output
-    assert "One case; intervals and worst case are over its 8 held-out threats" in first.stdout
+    assert (
+        "Reduction of the impulse: one case; intervals and worst case are over its 8"
+        in first.stdout
+    )
 
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("a blast is simulated")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from blast_agents.league import Standings, Verdict, hidden_track, verdicts
+from blast_agents.league import Standings, Verdict, hidden_track, known_track, verdicts
 from blast_agents.league.figure import league_figure
 from blast_agents.league.report import (
     case_table,
@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.scene import Charge
+from blast_env.scenario import ObjectiveSection
 from blast_env.statistics import Estimate, reduction_estimate
 from tests.agents.league_cases import TRAINING, result, road_scenario, standings
 
@@ -251,6 +252,14 @@ def test_the_figure_shows_searches_over_blasts_and_agents_as_lines() -> None:
     assert "blasts" in axes.get_xlabel()
     assert "reduction" in axes.get_ylabel()
     assert all(label.get_text().endswith(" %") for label in axes.get_yticklabels())
+
+
+def test_page_and_figure_say_which_load_the_layouts_lower() -> None:
+    site = road_scenario().model_copy(update={"objective": ObjectiveSection(quantity="peak")})
+    it = standings(BARE, result("agent", AGENT), track=known_track(site, 3, 2))
+    assert "Reduction of the peak overpressure: 3 cases" in markdown([it], "")
+    (axes,) = drawn(it).axes
+    assert axes.get_ylabel() == "reduction of the peak overpressure on held-out threats"
 
 
 def test_many_agents_are_told_apart_and_no_name_is_cut_off() -> None:

@@ -51,7 +51,7 @@ def league_figure(standings: Standings) -> Figure:
     axes.axvline(zero * 2.0, color=unit_interval(QUIET_INK), linewidth=0.8, linestyle=":")
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     axes.set_xlabel("blasts spent on a case (logarithmic from the dotted line on)")
-    axes.set_ylabel("reduction of the impulse on held-out threats")
+    axes.set_ylabel(f"reduction of the {standings.noun} on held-out threats")
     axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)

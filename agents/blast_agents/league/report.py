@@ -142,12 +142,14 @@ def verdict_lines(standings: Standings) -> list[str]:
 
 
 def sample_text(standings: Standings) -> str:
-    """Return what the numbers are means over."""
+    """Return what the numbers are, and means over what."""
     count, threats = standings.unprotected.shape
     held_out = count_of("held-out threat", threats)
     if standings.has_one_case:
-        return f"One case; intervals and worst case are over its {held_out}"
-    return f"{count} cases, {held_out} each; intervals and worst case are over the cases"
+        over = f"one case; intervals and worst case are over its {held_out}"
+    else:
+        over = f"{count} cases, {held_out} each; intervals and worst case are over the cases"
+    return f"Reduction of the {standings.noun}: {over}"
 
 
 def write_league(all_standings: Sequence[Standings], folder: Path, command: str) -> list[Path]:

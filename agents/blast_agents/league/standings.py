@@ -101,6 +101,11 @@ class Standings:
         check_something_arrives(self.track.cases, self.unprotected)
 
     @property
+    def noun(self) -> str:
+        """What the layouts are to lower, in words: that of the first case's objective."""
+        return self.track.cases[0].scenario.objective.noun
+
+    @property
     def has_one_case(self) -> bool:
         """Whether there is but one case, so that intervals and worst are over its threats."""
         return len(self.track.cases) == 1

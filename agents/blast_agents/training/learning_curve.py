@@ -93,7 +93,7 @@ def _draw(axes: Axes, progress: Progress) -> None:
             label=f"best weights: {100.0 * value[best]:.1f} %",
         )
     axes.set_xlabel("blasts spent on training")
-    axes.set_ylabel("reduction of the impulse")
+    axes.set_ylabel("reduction of the load that counts")
     axes.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
     axes.xaxis.set_major_formatter(FuncFormatter(number_on_axis))
     axes.grid(alpha=0.3)
