@@ -65,10 +65,10 @@ def propose(
     """Propose a layout for any site in a second or a few; no blast is run for it.
 
     It comes from weights that were trained for the scenario, if some come with the package; if not,
-    from the surrogate of gas dynamics, which was fitted to other sites. Where peaks count or there
-    is no catalogue, of which the surrogate knows nothing, it is the best rule's layout, which takes
-    a blast of gas dynamics for each rule and threat. Without --charge it is for all places where
-    the charge may be.
+    from the surrogate of gas dynamics, which was fitted to other sites. Where there is no
+    catalogue, of which the surrogate knows nothing, it is the best rule's layout, which takes a
+    blast of gas dynamics for each rule and threat. Without --charge it is for all places where the
+    charge may be.
     """
     with user_errors(), checked_targets({"--out": FileTarget(out, (".json",))}):
         chosen = load_scenario(scenario)
@@ -165,10 +165,11 @@ def _by_weights(scenario: Scenario, charge: Charge | None) -> _Proposal | None:
 
 def _by_surrogate(scenario: Scenario, charge: Charge | None) -> _Proposal | None:
     """Return what the surrogate proposes that comes with the package, if it can."""
-    peaks, items = scenario.objective.needs_peaks, scenario.zone.items
-    if peaks or not items:
-        why = "peaks count" if peaks else "single modules are placed"
-        print_line(f"note: {why}, of which the surrogate knows nothing; the best rule is proposed")
+    if not scenario.zone.items:
+        print_line(
+            "note: single modules are placed, of which the surrogate knows nothing; the best rule "
+            "is proposed"
+        )
         return None
     surrogate = packaged_surrogate()
     return _timed(

@@ -71,7 +71,7 @@ class BlastEvaluator:
         self.scenario = find_scenario(scenario)
         self.engine = find_engine(engine)
         self.calibration: Calibration | None = None
-        if self.scenario.objective.needs_peaks and not is_gas(self.engine):
+        if self.scenario.objective.needs_peaks and has_particles(self.engine):
             raise BlastEnvError(
                 f"scenario {self.scenario.name!r}: objective.quantity is"
                 f" {self.scenario.objective.quantity!r}, but engine {self.engine.name!r} knows no"

@@ -132,7 +132,7 @@ class LoadModel(Engine, Protocol):
     """An engine that tells loads without running a blast; it has no noise and no calibration."""
 
     def loads(self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> BlastLoads:
-        """Return the loads behind a layout, impulses only.
+        """Return the loads behind a layout; peaks where the scenario's objective counts them.
 
         Args:
             scenario: The scenario.

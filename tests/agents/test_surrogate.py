@@ -5,16 +5,26 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from blast_agents.league.trained import TrainedRun
 from blast_agents.rules import random_layout
 from blast_agents.search import LayoutProblem
 from blast_agents.search.by_rule import layouts_by_rule
 from blast_agents.surrogate.engine import SurrogateEngine
 from blast_agents.surrogate.fitting import MEMBERS, Samples, elements, errors, fit, folds
-from blast_agents.surrogate.network import SHAPES, Fit, Member, Surrogate, load_surrogate
+from blast_agents.surrogate.network import (
+    SHAPES,
+    Check,
+    Fit,
+    Member,
+    Surrogate,
+    load_surrogate,
+    packaged_surrogate,
+)
 from blast_agents.surrogate.search import (
     Guesses,
     RankedAgent,
@@ -26,7 +36,9 @@ from blast_agents.surrogate.walls import FEATURES, WallPoints, site_of
 from blast_agents.surrogate.ways import FALLS_M, SHARES, Ways
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+import scripts.surrogate
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats
@@ -34,8 +46,9 @@ from blast_env.geometry import Layout, Piece
 from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, Placement, Scenario, load_scenario
+from blast_env.units import PA_PER_PSI
 from scripts.blast_table import COLUMNS, SITE_NAME, scenario_of
-from scripts.surrogate import varied_layouts, verdict
+from scripts.surrogate import choices, reductions_of, varied_layouts, verdict
 from tests.agents.test_self_labelling import wide_yard
 
 CHARGE_M = np.array([0.0, 0.0, 0.3])
@@ -43,16 +56,22 @@ POINT_M = np.array([[20.0, 0.0, 1.5]])
 NOTHING = np.empty((0, 5))
 FAST = GasEngine(border_m=0.0, time_limit_s=0.02)
 YARD = wide_yard()
+PEAKS = Scenario.from_document(YARD.model_dump() | {"objective": {"quantity": "peak"}}, "peaks")
+CHECK = Check(
+    layouts_rms=0.1,
+    layouts_rank=0.9,
+    layouts_lost=0.02,
+    sites_rms=0.2,
+    sites_rank=0.8,
+    sites_lost=0.03,
+)
 ABOUT = Fit(
     command="by hand",
     versions={},
     engine="made up",
     blasts=1,
     sites=1,
-    layouts_rms=0.1,
-    layouts_rank=0.9,
-    sites_rms=0.1,
-    sites_rank=0.9,
+    impulse=CHECK,
 )
 
 
@@ -69,13 +88,14 @@ def by_hand(seed: int = 0, members: int = 2) -> Surrogate:
     """Return networks that nobody has fitted; what hides a wall lowers their guesses."""
     rng = np.random.default_rng(seed)
     networks = []
-    for _ in range(members):
+    for _ in range(2 * members):
         arrays = [0.05 * rng.standard_normal(shape) for shape in SHAPES]
         arrays[0][-SHARES:] += 0.2
         arrays[2] += 0.02
         arrays[4] += 0.02
         networks.append(Member(*arrays))
-    return Surrogate(np.zeros(FEATURES), np.ones(FEATURES), tuple(networks), ABOUT)
+    of_impulse, of_peak = tuple(networks[:members]), tuple(networks[members:])
+    return Surrogate(np.zeros(FEATURES), np.ones(FEATURES), of_impulse, of_peak, ABOUT)
 
 
 def test_all_is_open_where_nothing_stands_and_nothing_behind_an_endless_wall() -> None:
@@ -152,11 +172,12 @@ def test_a_guess_is_the_same_alone_and_among_others() -> None:
 def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
     surrogate = by_hand()
     path = surrogate.save(tmp_path / "surrogate.json")
-    again = load_surrogate(path)
+    again = load_surrogate(str(path))
     assert again.fit == ABOUT
-    site, charge = site_of(YARD), Charge((1.5, 4.0), 5.0)
-    guesses = [each.guess(site, [()], [charge]).impulse_pa_s for each in (surrogate, again)]
-    assert guesses[0] == pytest.approx(guesses[1], rel=1e-4)
+    charge = Charge((1.5, 4.0), 5.0)
+    for site in (site_of(YARD), site_of(PEAKS)):
+        kept, read = (each.guess(site, [()], [charge]).loads(site) for each in (surrogate, again))
+        assert kept == pytest.approx(read, rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -166,6 +187,9 @@ def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
         (lambda content: content["scale"].__setitem__(3, 0.0), r"scale\[3\]"),
         (lambda content: content["members"][1][2].pop(), "network 1 has arrays of .*2303"),
         (lambda content: content.update(members=[]), "members"),
+        (lambda content: content.pop("peak_members"), "peak_members"),
+        (lambda content: content["peak_members"][0][1].pop(), "network 0 has arrays of .*47"),
+        (lambda content: content["fit"].update(format=1), "fit.format"),
         (lambda content: content["fit"].update(blasts=0), "fit.blasts"),
         (lambda content: content.update(more=1), "more"),
     ],
@@ -180,10 +204,48 @@ def test_what_is_no_surrogate_is_refused(change: object, words: str, tmp_path: P
         load_surrogate(path)
 
 
-def test_peaks_are_not_its_business() -> None:
-    document = YARD.model_dump() | {"objective": {"quantity": "peak"}}
-    with pytest.raises(BlastEnvError, match="'peak', but the surrogate knows impulses only"):
-        site_of(Scenario.from_document(document, "peaks"))
+def test_peaks_are_guessed_where_they_count() -> None:
+    surrogate, charge = by_hand(), Charge((1.5, 4.0), 5.0)
+    layouts = [(), random_layout(YARD, np.random.default_rng(0))]
+    impulses, peaks = (
+        surrogate.guess(site_of(each), layouts, 2 * [charge]) for each in (YARD, PEAKS)
+    )
+    assert impulses.peak_pa is None
+    assert peaks.peak_pa is not None
+    assert peaks.peak_spread is not None
+    assert (peaks.impulse_pa_s == impulses.impulse_pa_s).all()
+    assert (peaks.peak_spread > 0.0).all()
+    assert peaks.loads(site_of(PEAKS)) == pytest.approx(peaks.peak_pa.sum(axis=1) / PA_PER_PSI)
+    both = {"quantity": "both", "reference_impulse_pa_s": 500.0, "reference_peak_pa": 2e4}
+    document = YARD.model_dump() | {"objective": both}
+    of_both = site_of(Scenario.from_document(document, "both"))
+    assert surrogate.guess(of_both, layouts, 2 * [charge]).loads(of_both) == pytest.approx(
+        impulses.impulse_pa_s.sum(axis=1) / 500.0 + peaks.peak_pa.sum(axis=1) / 2e4
+    )
+
+
+def test_the_peak_on_a_structure_is_nearly_the_largest_on_its_walls() -> None:
+    """Of Kingery and Bulmash's alone: networks of zeros change nothing of it."""
+    nothing = Member(*(np.zeros(shape) for shape in SHAPES))
+    surrogate = Surrogate(np.zeros(FEATURES), np.ones(FEATURES), (nothing,), (nothing,), ABOUT)
+    site, charge = site_of(PEAKS), Charge((1.5, 4.0), 5.0)
+    (approach,) = site.approaches(charge)
+    guess = surrogate.guess(site, [()], [charge])
+    assert guess.peak_pa is not None
+    largest_pa, mean_pa = np.exp(approach.log_peak.max()), np.exp(approach.log_peak).mean()
+    assert mean_pa < 0.8 * largest_pa < guess.peak_pa.item() <= largest_pa
+    weights = approach.area_m2 / approach.area_m2.sum()
+    mean_pa_s = (weights * np.exp(approach.log_impulse)).sum()
+    assert guess.impulse_pa_s.item() == pytest.approx(mean_pa_s)
+
+
+def test_what_the_package_brings_was_checked_on_sites_that_it_had_not_met() -> None:
+    """A surrogate that ranks no better than chance has no place in the package."""
+    about = packaged_surrogate().fit
+    for check in (about.impulse, about.peak):
+        assert check is not None
+        assert check.sites_rank > 0.5
+        assert check.sites_lost < 0.1
 
 
 def test_in_the_place_of_an_engine_it_says_what_it_guesses() -> None:
@@ -203,6 +265,18 @@ def test_in_the_place_of_an_engine_it_says_what_it_guesses() -> None:
     assert evaluator.blasts == 2  # a seed changes nothing
     assert evaluator.calibration_name == "none"
     assert SurrogateEngine(by_hand(1)) != SurrogateEngine(surrogate)
+
+
+def test_in_the_place_of_an_engine_it_tells_peaks_where_they_count() -> None:
+    surrogate, (threat,) = by_hand(), draw_threats(PEAKS, range(1))
+    impulses, peaks = (
+        BlastEvaluator(each, SurrogateEngine(surrogate)).loads((), threat) for each in (YARD, PEAKS)
+    )
+    said = surrogate.guess(site_of(PEAKS), [()], [threat.charge_against(PEAKS, ())])
+    assert said.peak_pa is not None
+    assert [each.peak_pa for each in peaks.protected] == pytest.approx(said.peak_pa[0])
+    assert all(each.peak_pa is None for each in impulses.structures)
+    assert peaks.counted(PEAKS.objective) == pytest.approx(said.loads(site_of(PEAKS)).item())
 
 
 def test_an_environment_pays_by_guesses() -> None:
@@ -226,17 +300,19 @@ def table_of_guesses(truth: Surrogate, layouts: int) -> pd.DataFrame:
 
     Ten layouts meet each charge.
     """
-    site, rng = site_of(YARD), np.random.default_rng(1)
+    site, rng = site_of(PEAKS), np.random.default_rng(1)
     tried = [(), *(random_layout(YARD, rng) for _ in range(layouts - 1))]
     places = rng.random((-(-layouts // 10), 2))
     charges = [
         Charge((1.0 + 1.5 * x, 3.0 + 6.0 * y), 5.0)
         for x, y in places[np.arange(layouts) // 10].tolist()
     ]
-    said = truth.guess(site, tried, charges).impulse_pa_s
+    said = truth.guess(site, tried, charges)
+    assert said.peak_pa is not None
     rows = [
         ("", YARD.content_hash, json.dumps(layout), *charge.position_m, 0.0, 5.0, 0, "gas")
-        + (structure.name, True, float(said[number, column]), 1.0)
+        + (structure.name, True)
+        + (float(said.impulse_pa_s[number, column]), float(said.peak_pa[number, column]))
         for number, (layout, charge) in enumerate(zip(tried, charges, strict=True))
         for column, structure in enumerate(site.protected)
     ]
@@ -249,15 +325,14 @@ def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
     held = folds(samples.case, 4, 0)
     assert sum(each.sum() for each in held) == len(samples)
     learnt = fit(samples, ~held[0], 20, 0, ABOUT)
-    assert len(learnt.members) == MEMBERS
-    found = errors(learnt, samples, held[0])
-    spread = float(np.std(samples.target[held[0]]))
-    assert found.rms < 0.35 * spread
-    assert found.cases == held[0].sum() / 10
-    assert found.rank > 0.9
-    assert 0.0 <= found.lost < 0.02
-    twice = fit(samples, ~held[0], 20, 0, ABOUT)
-    assert all((a == b).all() for a, b in zip(learnt.members[0], twice.members[0], strict=True))
+    assert len(learnt.members) == len(learnt.peak_members) == MEMBERS
+    off = errors(learnt, samples, held[0])
+    for found, loads in ((off.impulse, samples.impulse), (off.peak, samples.peak)):
+        assert found.rms < 0.35 * float(np.std(loads.target[held[0]]))
+        assert found.cases == held[0].sum() / 10
+        assert found.rank > 0.9
+        assert 0.0 <= found.lost < 0.02
+    assert fit(samples, ~held[0], 20, 0, ABOUT).digest == learnt.digest
 
 
 def test_rows_of_unknown_scenarios_are_left_out() -> None:
@@ -382,9 +457,62 @@ def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
     assert layouts == varied_layouts(YARD, 8, 1)
 
 
+def test_the_street_where_peaks_count_differs_by_nothing_else() -> None:
+    street, peaks = (
+        load_scenario(f"scripts/school_street{each}.toml").model_dump() for each in ("", "_peak")
+    )
+    assert peaks.pop("objective")["quantity"] == "peak"
+    assert "objective" not in street  # impulses count where none is named
+    assert peaks.pop("name") == f"{street.pop('name')}_peak"
+    assert peaks == street
+
+
+@pytest.mark.parametrize("counts", ["16,many", "0", "-1", "1e3"])
+def test_a_wrong_number_of_draws_is_told(
+    counts: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    surrogate = by_hand().save(tmp_path / "surrogate.json")
+    agent = SimpleNamespace(representative=YARD)
+    monkeypatch.setattr(scripts.surrogate, "load_agent", lambda _: agent)
+    monkeypatch.setattr(scripts.surrogate, "check_runs", lambda *_: None)
+    monkeypatch.setattr(TrainedRun, "load", lambda _: agent)
+    options = ["draws", str(tmp_path), "--surrogate", str(surrogate), "--counts", counts]
+    done = CliRunner().invoke(scripts.surrogate.app, options)
+    assert done.exit_code == 2
+    assert "--counts" in done.output
+
+
 def test_scenarios_of_the_table_are_found_by_their_names() -> None:
     assert scenario_of("visitor_entrance") == load_scenario("visitor_entrance")
     assert scenario_of(f"{SITE_NAME}10000").name == "site_10000"
+
+
+def test_what_the_surrogate_picks_from_draws_is_what_it_likes_best_of_just_these() -> None:
+    charge = Charge((1.5, 5.0), 5.0)
+    told = Case(YARD, (Threat(charge, 0),), charge=charge)
+    picked, liked = choices(Drawing(), by_hand(), told, [3, 1], 4)
+    guesses = Guesses.of(by_hand(), told)
+    assert list(picked) == [
+        "proposal",
+        "liked best of 1 draws",
+        "liked best of 3 draws",
+        "liked best after 4 changes",
+    ]
+    proposed, of_one, of_three, changed = picked.values()
+    drawn = [tuple(sorted(each)) for each in Drawing().sample(YARD, charge, 3)]
+    assert proposed == ()
+    assert of_one == drawn[0]  # a wall is better than none
+    assert set(liked) == {(), *drawn}
+    assert (np.diff(guesses.loads(liked)) >= 0.0).all()
+    assert liked[0] == of_three
+    assert guesses.loads([changed]).item() <= guesses.loads([of_three]).item()
+    evaluator = BlastEvaluator(YARD, FAST)
+    bare, behind = (
+        evaluator.loads(each, told.threats[0]).protected_impulse_pa_s for each in ((), of_three)
+    )
+    assert reductions_of(evaluator, told, [(), of_three], 1) == pytest.approx(
+        [0.0, 1.0 - behind / bare]
+    )
 
 
 def test_a_verdict_holds_promise_and_rules_against_blasts() -> None:

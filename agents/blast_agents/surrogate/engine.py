@@ -10,6 +10,7 @@ import numpy as np
 
 from blast_agents.surrogate.network import Surrogate, load_surrogate, packaged_surrogate
 from blast_agents.surrogate.walls import Site, site_of
+from blast_env.arrays import FloatArray
 from blast_env.envs.arguments import check_names
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.geometry import Element
@@ -28,11 +29,11 @@ _KEPT_SITES: Final = 64
 
 @dataclass(frozen=True)
 class SurrogateEngine:
-    """Tells the impulse on each protected structure by guesses: an engine without a blast.
+    """Tells the loads on each protected structure by guesses: an engine without a blast.
 
     `gymnasium.make("BlastBarrier-v0", scenario=..., engine=SurrogateEngine())` has episodes of
-    milliseconds. What is trained on it has to be judged by gas dynamics. It knows no overpressure,
-    and no structure that is not protected: nothing arrives there.
+    milliseconds. What is trained on it has to be judged by gas dynamics. It tells peaks only where
+    the objective counts them, and knows no structure that is not protected: nothing arrives there.
 
     Attributes:
         surrogate: The surrogate; that of the package unless given.
@@ -72,14 +73,19 @@ class SurrogateEngine:
             known.
 
         Raises:
-            BlastEnvError: If nothing is protected, or the scenario's objective counts peaks.
+            BlastEnvError: If nothing is protected.
         """
         site = self._site(scenario)
         guess = self.surrogate.guess(site, [layout], [charge_against(scenario, layout, charge)])
-        of_protected = dict(
-            zip((each.name for each in site.protected), guess.impulse_pa_s[0].tolist(), strict=True)
-        )
-        impulse_pa_s = [of_protected.get(each.name, 0.0) for each in scenario.structures]
+        names = [each.name for each in site.protected]
+
+        def of_all(on_protected: FloatArray) -> list[float]:
+            known = dict(zip(names, on_protected.tolist(), strict=True))
+            return [known.get(each.name, 0.0) for each in scenario.structures]
+
+        impulse_pa_s = of_all(guess.impulse_pa_s[0])
+        nothing = [None] * len(impulse_pa_s)
+        peak_pa = nothing if guess.peak_pa is None else of_all(guess.peak_pa[0])
         structures = tuple(
             StructureLoad(
                 name=each.name,
@@ -88,12 +94,14 @@ class SurrogateEngine:
                 impulse_sim=np.nan,
                 transferred_impulse_sim=np.nan,
                 impulse_psi_s=load_pa_s / PA_PER_PSI,
-                peak_pa=None,
+                peak_pa=on_peak_pa,
                 peak_weight=each.counted_peak_weight,
                 in_range=False,
                 notes=("a guess of the surrogate, not a blast",),
             )
-            for each, load_pa_s in zip(scenario.structures, impulse_pa_s, strict=True)
+            for each, load_pa_s, on_peak_pa in zip(
+                scenario.structures, impulse_pa_s, peak_pa, strict=True
+            )
         )
         modules = [each.rows * each.columns for each in scenario.structures]
         return BlastLoads(structures, np.repeat(impulse_pa_s, modules))

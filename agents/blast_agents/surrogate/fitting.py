@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,15 @@ import torch
 from scipy.stats import spearmanr
 from torch import Tensor, nn
 
-from blast_agents.surrogate.network import HIDDEN, Fit, Member, Surrogate
+from blast_agents.surrogate.network import (
+    HIDDEN,
+    IMPULSE_POWER,
+    PEAK_POWER,
+    Fit,
+    Member,
+    Surrogate,
+    log_loads,
+)
 from blast_agents.surrogate.walls import FEATURES, Approach, site_of
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
@@ -41,32 +49,47 @@ _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 
 
 @dataclass(frozen=True, eq=False)
+class Loads:
+    """One kind of load on the structures of samples: impulses, Pa s, or peaks, Pa.
+
+    Attributes:
+        known: Logarithm of Kingery and Bulmash's at all points (points,).
+        target: Logarithm of that by gas dynamics (samples,).
+        power: Of the mean that makes the load of a structure from those at its points.
+    """
+
+    known: FloatArray
+    target: FloatArray
+    power: float
+
+
+@dataclass(frozen=True, eq=False)
 class Samples:
     """Loads of structures, with the features of the points on their walls.
 
     Attributes:
         features: Of all points (points, FEATURES).
-        log_impulse: Kingery and Bulmash's, logarithm (points,).
         area_m2: Of each point (points,).
         counts: Points of each sample (samples,).
-        target: Logarithm of the impulse by gas dynamics, Pa s (samples,).
+        impulse: The impulses.
+        peak: The peak overpressures.
         site: Number of its site (samples,).
         case: Number of its site, structure and charge (samples,).
         layout: Number of its site and layout (samples,).
     """
 
     features: FloatArray
-    log_impulse: FloatArray
     area_m2: FloatArray
     counts: np.ndarray
-    target: FloatArray
+    impulse: Loads
+    peak: Loads
     site: np.ndarray
     case: np.ndarray
     layout: np.ndarray
 
     def __len__(self) -> int:
         """Number of samples."""
-        return len(self.target)
+        return len(self.counts)
 
     @classmethod
     def of(cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario]) -> "Samples":
@@ -80,7 +103,7 @@ class Samples:
             BlastEnvError: If no row is left.
         """
         known = blasts["protected"] & blasts["scenario_hash"].isin(list(scenarios))
-        rows = blasts[known & (blasts["impulse_pa_s"] > 0.0)]
+        rows = blasts[known & (blasts["impulse_pa_s"] > 0.0) & (blasts["peak_pa"] > 0.0)]
         if rows.empty:
             raise BlastEnvError("no load of a protected structure of a known scenario")
         sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
@@ -100,10 +123,18 @@ class Samples:
         place = rows[["scenario_hash", "structure", *_CHARGE]]
         return cls(
             features=np.concatenate(features),
-            log_impulse=np.concatenate([each.log_impulse for each in approaches]),
             area_m2=np.concatenate([each.area_m2 for each in approaches]),
             counts=np.array([len(each) for each in features]),
-            target=np.log(rows["impulse_pa_s"].to_numpy()),
+            impulse=Loads(
+                np.concatenate([each.log_impulse for each in approaches]),
+                np.log(rows["impulse_pa_s"].to_numpy()),
+                IMPULSE_POWER,
+            ),
+            peak=Loads(
+                np.concatenate([each.log_peak for each in approaches]),
+                np.log(rows["peak_pa"].to_numpy()),
+                PEAK_POWER,
+            ),
             site=rows.groupby("scenario_hash").ngroup().to_numpy(),
             case=place.groupby(list(place.columns)).ngroup().to_numpy(),
             layout=rows.groupby(["scenario_hash", "layout"]).ngroup().to_numpy(),
@@ -129,16 +160,19 @@ def fit(samples: Samples, chosen: BoolArray, epochs: int, seed: int, about: Fit)
     at_points = np.repeat(chosen, samples.counts)
     mean = samples.features[at_points].mean(axis=0).astype(np.float64)
     scale = samples.features[at_points].std(axis=0).astype(np.float64) + _LEAST_SCALE
-    data = _Tensors.of(samples, mean, scale)
     cases = [np.flatnonzero(chosen & (samples.case == case)) for case in np.unique(samples.case)]
     own = [each for each in cases if len(each)]
-    members = tuple(_member(data, own, epochs, seed + each) for each in range(MEMBERS))
-    return Surrogate(mean, scale, members, about)
+
+    def members(loads: Loads) -> tuple[Member, ...]:
+        data = _Tensors.of(samples, loads, mean, scale)
+        return tuple(_member(data, own, epochs, seed + each) for each in range(MEMBERS))
+
+    return Surrogate(mean, scale, members(samples.impulse), members(samples.peak), about)
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """How far guesses are off.
+    """How far guesses of one load are off.
 
     Attributes:
         rms: Root of the mean square error of the logarithm.
@@ -156,17 +190,34 @@ class Errors:
     cases: int
 
 
-def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> Errors:
+class ErrorsOfBoth(NamedTuple):
+    """How far guesses are off: of impulses, and of peaks."""
+
+    impulse: Errors
+    peak: Errors
+
+
+def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> ErrorsOfBoth:
     """Compare guesses with gas dynamics on some samples."""
     starts = np.cumsum([0, *samples.counts[:-1]])
     scaled = (samples.features - surrogate.mean) / surrogate.scale
-    logs = surrogate.log_means(scaled, samples.log_impulse, samples.area_m2, starts)
-    guess = logs.mean(axis=0)
-    off = (guess - samples.target)[chosen]
+
+    def of(members: Sequence[Member], loads: Loads) -> Errors:
+        logs = log_loads(members, scaled, loads.known, samples.area_m2, starts, loads.power)
+        return _errors(logs.mean(axis=0), loads.target, samples.case, chosen)
+
+    return ErrorsOfBoth(
+        of(surrogate.members, samples.impulse), of(surrogate.peak_members, samples.peak)
+    )
+
+
+def _errors(guess: FloatArray, target: FloatArray, cases: np.ndarray, chosen: BoolArray) -> Errors:
+    """Compare logarithms of loads."""
+    off = (guess - target)[chosen]
     ranks, lost = [], []
-    for case in np.unique(samples.case[chosen]):
-        own = chosen & (samples.case == case)
-        true = samples.target[own]
+    for case in np.unique(cases[chosen]):
+        own = chosen & (cases == case)
+        true = target[own]
         if own.sum() >= _LEAST_CASE and np.ptp(true) > 0.0:
             ranks.append(float(spearmanr(guess[own], true).statistic))
             shares = np.exp(true - true.max())
@@ -195,21 +246,25 @@ def folds(numbers: np.ndarray, count: int, seed: int) -> list[BoolArray]:
 @dataclass(frozen=True, eq=False)
 class _Tensors:
     features: Tensor
-    log_impulse: Tensor
+    known: Tensor
     area_m2: Tensor
     starts: np.ndarray
     counts: np.ndarray
     target: Tensor
+    power: float
 
     @classmethod
-    def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray) -> "_Tensors":
+    def of(cls, samples: Samples, loads: Loads, mean: FloatArray, scale: FloatArray) -> "_Tensors":
+        # Single precision has no room for high powers of pascals.
+        dtype = np.float32 if loads.power == 1.0 else np.float64
         return cls(
             torch.from_numpy(((samples.features - mean) / scale).astype(np.float32)),
-            torch.from_numpy(samples.log_impulse.astype(np.float32)),
-            torch.from_numpy(samples.area_m2.astype(np.float32)),
+            torch.from_numpy(loads.known.astype(dtype)),
+            torch.from_numpy(samples.area_m2.astype(dtype)),
             np.cumsum([0, *samples.counts[:-1]]),
             samples.counts,
-            torch.from_numpy(samples.target.astype(np.float32)),
+            torch.from_numpy(loads.target.astype(dtype)),
+            loads.power,
         )
 
     def loss(self, network: nn.Module, groups: Sequence[np.ndarray]) -> Tensor:
@@ -232,10 +287,10 @@ class _Tensors:
         owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), self.counts[numbers]))
         area_m2 = self.area_m2[rows]
         over = network(self.features[rows])[:, 0]
-        loads = area_m2 * torch.exp(self.log_impulse[rows] + over)
-        empty = torch.zeros(len(numbers))
+        loads = area_m2 * torch.exp(self.power * (self.known[rows] + over))
+        empty = torch.zeros(len(numbers), dtype=loads.dtype)
         mean = empty.index_add(0, owner, loads) / empty.index_add(0, owner, area_m2)
-        return torch.log(mean) - self.target[torch.from_numpy(numbers)]
+        return torch.log(mean) / self.power - self.target[torch.from_numpy(numbers)]
 
 
 def _member(data: _Tensors, cases: Sequence[np.ndarray], epochs: int, seed: int) -> Member:

@@ -18,6 +18,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
+from blast_env.units import PA_PER_PSI
 
 IntArray = NDArray[np.int64]
 
@@ -28,6 +29,36 @@ HIDDEN: Final = 48
 
 SHAPES: Final = ((FEATURES, HIDDEN), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (HIDDEN, 1), (1,))
 """Of the arrays of a network, in the order of `Member`."""
+
+IMPULSE_POWER: Final = 1.0
+"""The impulse on a structure is the mean over its walls."""
+
+PEAK_POWER: Final = 16.0
+"""The peak on a structure is nearly the largest: a mean of so high a power."""
+
+
+class Check(BaseModel):
+    """How far guesses of one load are off where the surrogate was not fitted.
+
+    Attributes:
+        layouts_rms: Root of the mean square error of the logarithm of a load, on layouts that were
+            held out, of sites that were not.
+        layouts_rank: Rank correlation with the engine among the layouts of a case, likewise.
+        layouts_lost: What choosing by it costs, likewise: by how much the load behind the layout
+            that it likes best is above the least one of the case, as a share of the largest.
+        sites_rms: The error on sites that were held out.
+        sites_rank: The correlation on them.
+        sites_lost: What choosing by it costs on them.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    layouts_rms: float
+    layouts_rank: float
+    layouts_lost: float
+    sites_rms: float
+    sites_rank: float
+    sites_lost: float
 
 
 class Fit(BaseModel):
@@ -41,31 +72,21 @@ class Fit(BaseModel):
         blasts: How many loads of structures it was fitted to.
         sites: Of how many sites.
         seconds: Time that the fit took, without the check.
-        layouts_rms: Root of the mean square error of the logarithm of an impulse, on layouts that
-            were held out, of sites that were not.
-        layouts_rank: Rank correlation with the engine among the layouts of a case, likewise.
-        layouts_lost: What choosing by it costs, likewise: by how much the load behind the layout
-            that it likes best is above the least one of the case, as a share of the largest.
-        sites_rms: The error on sites that were held out.
-        sites_rank: The correlation on them.
-        sites_lost: What choosing by it costs on them.
+        impulse: How far impulses are off, if that was told.
+        peak: How far peak overpressures are off, likewise.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    format: Literal[1] = 1
+    format: Literal[2] = 2
     command: str
     versions: dict[str, str]
     engine: str
     blasts: Annotated[int, Field(ge=1)]
     sites: Annotated[int, Field(ge=1)]
     seconds: Annotated[float, Field(ge=0.0)] = 0.0
-    layouts_rms: float | None = None
-    layouts_rank: float | None = None
-    layouts_lost: float | None = None
-    sites_rms: float | None = None
-    sites_rank: float | None = None
-    sites_lost: float | None = None
+    impulse: Check | None = None
+    peak: Check | None = None
 
 
 class Guess(NamedTuple):
@@ -75,10 +96,34 @@ class Guess(NamedTuple):
         impulse_pa_s: Mean impulse on each protected structure (layouts, structures).
         spread: By how much its members differ about that, as a share of it: the standard deviation
             of the logarithm (layouts, structures).
+        peak_pa: Largest overpressure on each, likewise; `None` where the objective counts none.
+        peak_spread: By how much its members differ about that, likewise.
     """
 
     impulse_pa_s: FloatArray
     spread: FloatArray
+    peak_pa: FloatArray | None = None
+    peak_spread: FloatArray | None = None
+
+    def loads(self, site: Site) -> FloatArray:
+        """Return the load that counts behind each layout, as rewards are paid (layouts,).
+
+        Args:
+            site: The site that was guessed.
+        """
+        counted, structures = site.scenario.objective.counted, site.protected
+        impulse_psi_s = self.impulse_pa_s / PA_PER_PSI
+        peak_pa = np.zeros_like(impulse_psi_s) if self.peak_pa is None else self.peak_pa
+        both = np.stack((impulse_psi_s, peak_pa), axis=2).tolist()
+        return np.array(
+            [
+                sum(
+                    counted(impulse, peak, each.weight, each.counted_peak_weight)
+                    for each, (impulse, peak) in zip(structures, of_layout, strict=True)
+                )
+                for of_layout in both
+            ]
+        )
 
 
 class Member(NamedTuple):
@@ -92,7 +137,7 @@ class Member(NamedTuple):
     last_bias: FloatArray
 
     def __call__(self, features: FloatArray) -> FloatArray:
-        """Return by how much the logarithm of the impulse differs from Kingery and Bulmash's."""
+        """Return by how much the logarithm of a load differs from Kingery and Bulmash's."""
         hidden = _silu(features @ self.first + self.first_bias)
         hidden = _silu(hidden @ self.second + self.second_bias)
         return (hidden @ self.last + self.last_bias)[:, 0]
@@ -105,19 +150,22 @@ class Surrogate:
     Attributes:
         mean: Of each feature (FEATURES,).
         scale: Its spread, likewise.
-        members: The networks.
+        members: The networks that know impulses.
+        peak_members: Those that know peak overpressures.
         fit: What they were fitted to.
     """
 
     mean: FloatArray
     scale: FloatArray
     members: tuple[Member, ...]
+    peak_members: tuple[Member, ...]
     fit: Fit
 
     @property
     def digest(self) -> str:
         """Tells surrogates apart: of their numbers."""
-        arrays = (self.mean, self.scale, *(each for member in self.members for each in member))
+        members = (*self.members, *self.peak_members)
+        arrays = (self.mean, self.scale, *(each for member in members for each in member))
         numbers = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
         return sha256(numbers).hexdigest()[:16]
 
@@ -137,67 +185,88 @@ class Surrogate:
         barriers = [site.barrier(layout) for layout in layouts]
         approaches = [site.approaches(charge) for charge in charges]
         columns = [
-            self._impulses([each[number] for each in approaches], barriers)
+            self._on_structure([each[number] for each in approaches], barriers, site.counts_peaks)
             for number in range(len(site.protected))
         ]
-        means, spreads = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
-        return Guess(means, spreads)
+        return Guess(*(np.stack(each, axis=1) for each in zip(*columns, strict=True)))
 
-    def log_means(
-        self, scaled: FloatArray, known: FloatArray, area_m2: FloatArray, starts: IntArray
-    ) -> FloatArray:
-        """Return the logarithm of the mean impulse on each wall, by each network (members, walls).
-
-        Args:
-            scaled: Features of all points, less `mean`, over `scale` (points, FEATURES).
-            known: Logarithm of Kingery and Bulmash's impulse there (points,).
-            area_m2: What each point stands for (points,).
-            starts: The first point of each wall (walls,).
-        """
-        area_of_wall_m2 = np.add.reduceat(area_m2, starts)
-        loads = [
-            np.add.reduceat(area_m2 * np.exp(known + member(scaled)), starts)
-            for member in self.members
-        ]
-        logs: FloatArray = np.log(np.array(loads) / area_of_wall_m2)
-        return logs
-
-    def save(self, path: Path) -> Path:
+    def save(self, path: str | Path) -> Path:
         """Write everything as one JSON file, numbers to six digits.
 
         Raises:
             BlastEnvError: If it cannot be written.
         """
+        path = Path(path)
         content = _File(
             fit=self.fit,
             mean=_numbers(self.mean),
             scale=_numbers(self.scale),
-            members=[[_numbers(array) for array in member] for member in self.members],
+            members=_flat(self.members),
+            peak_members=_flat(self.peak_members),
         )
         with write_atomically(path) as temporary:
             temporary.write_text(f"{content.model_dump_json()}\n", encoding="utf-8")
         return path
 
-    def _impulses(
-        self, approaches: Sequence[Approach], barriers: Sequence[FloatArray]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return mean and spread of the impulse on one structure, one a layout."""
+    def _on_structure(
+        self, approaches: Sequence[Approach], barriers: Sequence[FloatArray], peaks: bool
+    ) -> tuple[FloatArray, ...]:
+        """Return mean and spread of the impulse on one structure, then of its peak if asked."""
         features = [each.features(b) for each, b in zip(approaches, barriers, strict=True)]
         counts = [len(each) for each in features]
         starts: IntArray = np.cumsum([0, *counts[:-1]])
         area_m2 = np.concatenate([each.area_m2 for each in approaches])
-        known = np.concatenate([each.log_impulse for each in approaches])
         scaled = (np.concatenate(features) - self.mean) / self.scale
-        logs = self.log_means(scaled, known, area_m2, starts)
-        return np.exp(logs.mean(axis=0)), logs.std(axis=0)
+        known = np.concatenate([each.log_impulse for each in approaches])
+        impulse = log_loads(self.members, scaled, known, area_m2, starts, IMPULSE_POWER)
+        if not peaks:
+            return _mean_and_spread(impulse)
+        known = np.concatenate([each.log_peak for each in approaches])
+        peak = log_loads(self.peak_members, scaled, known, area_m2, starts, PEAK_POWER)
+        return (*_mean_and_spread(impulse), *_mean_and_spread(peak))
 
 
-def load_surrogate(path: Path) -> Surrogate:
+def _mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what the networks say on the mean, and by how much they differ (structures,)."""
+    return np.exp(logs.mean(axis=0)), logs.std(axis=0)
+
+
+def log_loads(
+    members: Sequence[Member],
+    scaled: FloatArray,
+    known: FloatArray,
+    area_m2: FloatArray,
+    starts: IntArray,
+    power: float,
+) -> FloatArray:
+    """Return the logarithm of the load on each structure, by each network (members, structures).
+
+    It is the power mean of the loads at its points, each by the area that it stands for.
+
+    Args:
+        members: The networks.
+        scaled: Features of all points, less their `mean`, over their `scale` (points, FEATURES).
+        known: Logarithm of Kingery and Bulmash's load there (points,).
+        area_m2: What each point stands for (points,).
+        starts: The first point of each structure (structures,).
+        power: Of the mean.
+    """
+    area_of_all_m2 = np.add.reduceat(area_m2, starts)
+    sums = [
+        np.add.reduceat(area_m2 * np.exp(power * (known + member(scaled))), starts)
+        for member in members
+    ]
+    logs: FloatArray = np.log(np.array(sums) / area_of_all_m2) / power
+    return logs
+
+
+def load_surrogate(path: str | Path) -> Surrogate:
     """Return a surrogate from its file.
 
     Raises:
         BlastEnvError: If there is no such file, or it is no surrogate or damaged.
     """
+    path = Path(path)
     try:
         text = read_text(path)
     except DocumentError as error:
@@ -206,11 +275,13 @@ def load_surrogate(path: Path) -> Surrogate:
         content = checked_as(_File, parse_json(text))
     except DocumentError as error:
         raise BlastEnvError(f"{path}: is no surrogate, or damaged: {error}") from error
-    members = tuple(
-        Member(*(np.array(flat).reshape(shape) for flat, shape in zip(each, SHAPES, strict=True)))
-        for each in content.members
+    return Surrogate(
+        np.array(content.mean),
+        np.array(content.scale),
+        _members(content.members),
+        _members(content.peak_members),
+        content.fit,
     )
-    return Surrogate(np.array(content.mean), np.array(content.scale), members, content.fit)
 
 
 def packaged_surrogate() -> Surrogate:
@@ -220,6 +291,9 @@ def packaged_surrogate() -> Surrogate:
     bundled ones.
     """
     return load_surrogate(_PACKAGED)
+
+
+_Networks = Annotated[list[list[list[float]]], Field(min_length=1, max_length=100)]
 
 
 class _File(BaseModel):
@@ -232,9 +306,10 @@ class _File(BaseModel):
     scale: Annotated[
         list[Annotated[float, Field(gt=0.0)]], Field(min_length=FEATURES, max_length=FEATURES)
     ]
-    members: Annotated[list[list[list[float]]], Field(min_length=1, max_length=100)]
+    members: _Networks
+    peak_members: _Networks
 
-    @field_validator("members")
+    @field_validator("members", "peak_members")
     @classmethod
     def _check_sizes(cls, members: list[list[list[float]]]) -> list[list[list[float]]]:
         wanted = [prod(shape) for shape in SHAPES]
@@ -243,6 +318,17 @@ class _File(BaseModel):
             if sizes != wanted:
                 raise ValueError(f"network {number} has arrays of {sizes}, must be {wanted}")
         return members
+
+
+def _flat(members: Sequence[Member]) -> list[list[list[float]]]:
+    return [[_numbers(array) for array in member] for member in members]
+
+
+def _members(networks: Sequence[Sequence[Sequence[float]]]) -> tuple[Member, ...]:
+    return tuple(
+        Member(*(np.array(flat).reshape(shape) for flat, shape in zip(each, SHAPES, strict=True)))
+        for each in networks
+    )
 
 
 def _numbers(array: FloatArray) -> list[float]:

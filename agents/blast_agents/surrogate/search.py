@@ -50,12 +50,12 @@ class Guesses:
         """Begin with none.
 
         Raises:
-            BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
+            BlastEnvError: If nothing is protected.
         """
         return cls(surrogate, case, site_of(case.scenario))
 
     def loads(self, layouts: Sequence[Layout]) -> FloatArray:
-        """Return the load that counts behind each layout, by the surrogate, Pa s (layouts,)."""
+        """Return the load that counts behind each layout, as rewards are paid (layouts,)."""
         new = [each for each in dict.fromkeys(layouts) if each not in self._known]
         if new:
             by_threat = [self._weighted(new, threat) for threat in self.case.threats]
@@ -74,10 +74,7 @@ class Guesses:
 
     def _weighted(self, layouts: Sequence[Layout], threat: Threat) -> FloatArray:
         charges = [threat.charge_against(self.case.scenario, each) for each in layouts]
-        guess = self.surrogate.guess(self.site, layouts, charges)
-        weights = np.array([each.weight for each in self.site.protected])
-        loads: FloatArray = (guess.impulse_pa_s * weights).sum(axis=1)
-        return loads
+        return self.surrogate.guess(self.site, layouts, charges).loads(self.site)
 
 
 def improved(
@@ -128,7 +125,7 @@ class SurrogateAgent:
                 places where the scenario may have one.
 
         Raises:
-            BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
+            BlastEnvError: If nothing is protected.
         """
         guesses = Guesses.of(self.surrogate, _case_for(scenario, charge))
         ruled = layouts_by_rule(scenario, charge).values()
@@ -157,7 +154,7 @@ class RankedAgent:
             charge: Likewise.
 
         Raises:
-            BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
+            BlastEnvError: If nothing is protected.
         """
         guesses = Guesses.of(self.surrogate, _case_for(scenario, charge))
         proposed = self.agent.propose(scenario, charge)
@@ -213,7 +210,7 @@ class SurrogateSearch:
         """Return the best layout that was met.
 
         Raises:
-            BlastEnvError: If the scenario's objective counts peaks, or nothing is protected.
+            BlastEnvError: If nothing is protected.
         """
         rng = generator(seed)
         plan = _plan(problem, budget)

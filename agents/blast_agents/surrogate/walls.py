@@ -23,7 +23,7 @@ _LEAST_HEIGHT_M: Final = 0.3
 """A charge on the ground begins so high: its middle."""
 
 _LEAST_Z: Final = 0.2
-"""A point that is nearer to the charge, m/kg^(1/3), has the reflected impulse from there."""
+"""A point that is nearer to the charge, m/kg^(1/3), has the reflected loads from there."""
 
 _OUTWARD: Final = {"west": (-1, 0), "east": (1, 0), "south": (0, -1), "north": (0, 1)}
 
@@ -80,12 +80,14 @@ class Approach:
         ways: From the charge to the points.
         fixed: The first features of each point (points, FEATURES - SHARES).
         log_impulse: Logarithm of Kingery and Bulmash's reflected impulse there, Pa s (points,).
+        log_peak: Of their reflected overpressure, Pa, likewise.
         area_m2: What each point stands for (points,).
     """
 
     ways: Ways
     fixed: FloatArray
     log_impulse: FloatArray
+    log_peak: FloatArray
     area_m2: FloatArray
 
     def features(self, barrier: FloatArray) -> FloatArray:
@@ -102,11 +104,13 @@ class Site:
     Attributes:
         scenario: The scenario.
         protected: Its protected structures.
+        counts_peaks: Whether its objective counts peak overpressures.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self.protected = tuple(each for each in scenario.structures if each.protected)
+        self.counts_peaks = scenario.objective.needs_peaks
         air_m = scenario.air_height_m
         self._solids = np.array(
             [[*each.rectangle_m, each.height_m or air_m] for each in scenario.structures]
@@ -155,22 +159,17 @@ class Site:
         )
         met_m = np.maximum(distance_m, _LEAST_Z * scale)
         impulse = kingery_bulmash("reflected_impulse", met_m, charge.tnt_kg)
+        peak = kingery_bulmash("reflected_overpressure", met_m, charge.tnt_kg)
         fixed = np.hstack((geometry, ways.shares()))
-        return Approach(ways, fixed, np.log(impulse), points.area_m2)
+        return Approach(ways, fixed, np.log(impulse), np.log(peak), points.area_m2)
 
 
 def site_of(scenario: Scenario) -> Site:
     """Return a scenario as the surrogate sees it.
 
     Raises:
-        BlastEnvError: If nothing on it is protected, or its objective counts peaks, of which the
-            surrogate knows nothing.
+        BlastEnvError: If nothing on it is protected.
     """
-    if scenario.objective.needs_peaks:
-        raise BlastEnvError(
-            f"{scenario.name}: objective.quantity is {scenario.objective.quantity!r}, but the"
-            " surrogate knows impulses only"
-        )
     site = Site(scenario)
     if not site.protected:
         raise BlastEnvError(f"{scenario.name}: no structure is protected")
