@@ -99,18 +99,22 @@ GIVEN: Final = (
         f" --run agent {_LABEL}",
     ),
     *(
-        Given(("docs/researchers/league.md",), path, "agent", f"{_STREET} {options}")
+        Given(("docs/studies/league_gas.md",), path, "agent", f"{_STREET} {options}")
         for path, options in {
             "out/street": f"--algo self_labelling {_LABEL}",
             "out/street_ppo": _TRAIN,
             "out/street_hidden": f"--threat hidden {_TRAIN}",
+            "out/street_on_ppo": _TRAIN,
         }.items()
     ),
-    Given(
-        ("docs/researchers/league.md",),
-        "street.json",
-        "street.json",
-        "python -m scripts.surrogate fit --epochs 1 --no-check --out street.json",
+    *(
+        Given(
+            ("docs/studies/league_gas.md",),
+            path,
+            "street.json",
+            "python -m scripts.surrogate fit --epochs 1 --no-check --out street.json",
+        )
+        for path in ("street.json", "street_on.json")
     ),
     *(
         Given(
@@ -247,6 +251,27 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env league --engine gas --track hidden --scenario scripts/school_street.toml --seeds 12"
     " --methods best_rule --budgets 200 --run out/street_hidden --surrogate street.json"
     " --out out/street_league": "--seeds 1 --budgets 16",
+    "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 6"
+    " --seeds 1 --methods winners_from_rules --budgets 1000 --agent-search 50"
+    " --run out/street_on_ppo --surrogate street_on.json --out out/street_league": (
+        "--cases 1 --budgets 2 --agent-search 2"
+    ),
+    "python -m scripts.surrogate draws out/street_ppo --surrogate street.json --cases 16"
+    " --counts 16,64,256": "--cases 2 --counts 2 --changes 2 --top 1",
+    "blast-env train --algo maskable_ppo --engine street.json --scenario"
+    " scripts/school_street_peak.toml --threat hidden --start-from out/street --envs 1"
+    " --steps 12288 --set hidden_threats=4 --set learning_rate=1.0e-3 --set n_steps=512"
+    " --set evaluation_interval=8 --set evaluation_cases=8 --run out/street_peak": _TRAIN,
+    "blast-env league --engine gas --track hidden --scenario scripts/school_street_peak.toml"
+    " --seeds 12 --methods best_rule,winners_from_rules --budgets 200 --agent-search 50"
+    " --run out/street_peak --surrogate street.json --out out/peak_league": (
+        "--seeds 1 --methods best_rule --budgets 2 --agent-search 2"
+    ),
+    "blast-env league --engine gas --track hidden --scenario scripts/demo_site.toml --seeds 8"
+    " --methods winners_from_rules --budgets 200 --agent-search 50"
+    " --surrogate agents/blast_agents/surrogate/gas.json --out out/kerb_league": (
+        "--seeds 1 --budgets 2 --agent-search 2"
+    ),
     "blast-env train --algo self_labelling --engine gas --scenario hotel_forecourt --threat hidden"
     " --envs 1 --steps 300 --set cases=1 --set cases_per_round=1 --set samples=4"
     " --set neighbours=8 --set borrowed=0 --set hidden_threats=2 --set first_updates=300"
@@ -286,6 +311,18 @@ SMALLER: Final[dict[str, str]] = {
     " scripts/school_street.toml --start-from out/street --envs 1 --steps 12288"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
     " --set evaluation_cases=8 --run out/street_ppo": _TRAIN,
+    "blast-env train --algo self_labelling --engine gas --scenario scripts/school_street.toml"
+    " --start-from out/street_ppo --envs 1 --steps 740 --seed 1 --set cases=40"
+    " --set cases_per_round=40 --set samples=6 --set neighbours=4 --set borrowed=0"
+    " --set first_updates=1 --set updates=1 --set evaluation_interval=2 --set evaluation_cases=8"
+    " --run out/street_on": _LABEL,
+    "python -m scripts.surrogate fit --data docs/data/site_blasts.parquet"
+    " --data docs/data/street_blasts.parquet --data docs/data/street_agent_blasts.parquet"
+    " --no-check --out street_on.json": "--epochs 1",
+    "blast-env train --algo maskable_ppo --engine street_on.json --scenario"
+    " scripts/school_street.toml --start-from out/street_ppo --envs 1 --steps 12288 --seed 1"
+    " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
+    " --set evaluation_cases=8 --run out/street_on_ppo": _TRAIN,
     "blast-env evaluate --run runs/courtyard --seeds 64 --processes 2 --export out/layouts": (
         "--seeds 4"
     ),
