@@ -243,6 +243,15 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env league --track all --cases 16 --seeds 16 --budgets 50,200,1000 --out out/league": (
         _LEAGUE
     ),
+    "blast-env train --algo self_labelling --engine surrogate --scenario item_sites --threat hidden"
+    " --envs 1 --steps 100000 --set cases=300 --set cases_per_round=150 --set samples=8"
+    " --set neighbours=16 --set hidden_threats=4 --set first_updates=400 --set updates=150"
+    " --set evaluation_interval=4 --set evaluation_cases=12 --run out/sites": (
+        f"{_LABEL} --set hidden_threats=2"
+    ),
+    "blast-env league --engine gas --track item_sites --cases 24 --seeds 2 --methods best_rule"
+    " --budgets 16 --run out/sites --surrogate agents/blast_agents/surrogate/gas.json"
+    " --out out/sites_league": "--cases 2 --seeds 1 --budgets 2",
     "blast-env league --engine gas --first-engine event --agent-search 50 --run runs/own_best"
     " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario courtyard",
     "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 16"
