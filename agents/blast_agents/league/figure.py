@@ -19,7 +19,7 @@ _SEARCHES: Final = ("#0072B2", "#E69F00", "#009E73", "#56B4E9", "#C9A800")
 _AGENTS: Final = ("#D55E00", "#CC79A7", "#000000")
 _SEARCH_MARKERS: Final = "osD^v<>"  # 7 beside 5 colours: 35 searches differ in one or both
 _AGENT_LINES: Final = ("-", "--", "-.", ":")
-_NOTHING_MARKERS: Final = "xP*Xdph8<>+1"
+_NOTHING_MARKERS: Final = "xP*Xdpv^<>+1"
 _APART: Final = 1.05
 """What stands at the same number of blasts is this factor apart, so that all of it is seen."""
 
