@@ -265,6 +265,10 @@ SMALLER: Final[dict[str, str]] = {
     " --run out/street_on_ppo --surrogate street_on.json --out out/street_league": (
         "--cases 1 --budgets 2 --agent-search 2"
     ),
+    "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 3"
+    " --seeds 1 --methods best_rule,random,greedy,nsga2,genetic,annealing --budgets 50,200"
+    " --agent-search 50 --run out/street_on_ppo --surrogate street_on.json"
+    " --out out/street_league": "--cases 1 --methods best_rule --budgets 2 --agent-search 2",
     "python -m scripts.surrogate draws out/street_ppo --surrogate street.json --cases 16"
     " --counts 16,64,256": "--cases 2 --counts 2 --changes 2 --top 1",
     "blast-env train --algo maskable_ppo --engine street.json --scenario"
