@@ -4,6 +4,7 @@ import json
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -33,7 +34,7 @@ from blast_agents.surrogate.search import (
     improved,
 )
 from blast_agents.surrogate.walls import FEATURES, WallPoints, site_of
-from blast_agents.surrogate.ways import FALLS_M, SHARES, Ways
+from blast_agents.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -72,6 +73,13 @@ ABOUT = Fit(
     blasts=1,
     sites=1,
     impulse=CHECK,
+)
+
+
+BOXES = st.lists(
+    st.tuples(st.floats(2.0, 16.0), st.floats(-6.0, 6.0), st.floats(0.5, 6.0)),
+    min_size=1,
+    max_size=5,
 )
 
 
@@ -126,11 +134,7 @@ def test_long_detours_count_for_more_where_the_weight_falls_slowly() -> None:
 
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(
-    boxes=st.lists(
-        st.tuples(st.floats(2.0, 16.0), st.floats(-6.0, 6.0), st.floats(0.5, 6.0)),
-        min_size=1,
-        max_size=5,
-    ),
+    boxes=BOXES,
     more=st.tuples(st.floats(2.0, 16.0), st.floats(-6.0, 6.0), st.floats(0.5, 6.0)),
 )
 def test_more_barrier_never_opens_a_way_and_mirrors_change_nothing(
@@ -142,6 +146,42 @@ def test_more_barrier_never_opens_a_way_and_mirrors_change_nothing(
     assert (shares(*solids, wall(x, y - 1.0, y + 1.0, height)) <= found + 1e-12).all()
     mirrored = [[left, -top, right, -bottom, h] for left, bottom, right, top, h in solids]
     assert shares(*mirrored) == pytest.approx(found, abs=1e-9)
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(boxes=BOXES)
+def test_what_is_open_is_the_weight_of_the_ways_that_meet_no_solid(
+    boxes: list[tuple[float, float, float]],
+) -> None:
+    """Way by way, at many points of each: no slab, and no way spared for one below it."""
+    solids = np.array([wall(x, y - 1.0, y + 1.0, height) for x, y, height in boxes])
+    found = shares(*solids.tolist())[:-1].reshape(len(STATIONS), len(FALLS_M))
+    ways = Ways.between(CHARGE_M, POINT_M, 100.0, NOTHING)
+    along = np.linspace(0.0, 1.0, 200)[:, np.newaxis]
+    for station, _ in enumerate(STATIONS):
+        open_ones, all_of_them = np.zeros(len(FALLS_M)), np.zeros(len(FALLS_M))
+        for (x_m, y_m), above_m in product(ways.by_m[0, station], ABOVE_M):
+            corner_m = np.array([x_m, y_m, ways.by_height_m[0, station] + above_m])
+            there = CHARGE_M + along * (corner_m - CHARGE_M)
+            way_m = np.vstack((there, corner_m + along * (POINT_M[0] - corner_m)))
+            detour_m = np.linalg.norm(np.diff(way_m, axis=0), axis=1).sum()
+            detour_m -= np.linalg.norm(POINT_M[0] - CHARGE_M)
+            weights = np.exp(-detour_m / np.array(FALLS_M))
+            x, y, z = (each[:, np.newaxis] for each in way_m.T)
+            inside = (solids[:, 0] < x) & (x < solids[:, 2]) & (solids[:, 1] < y)
+            inside &= (y < solids[:, 3]) & (z < solids[:, 4])
+            all_of_them += weights
+            open_ones += 0.0 if inside.any() else weights
+        assert found[station] == pytest.approx(open_ones / all_of_them, abs=0.02)
+
+
+def test_points_above_each_other_are_told_what_each_is_told_alone() -> None:
+    point_m = np.array([[20.0, y, z] for y in (-1.0, 2.0) for z in (0.5, 1.5, 2.5)])
+    solids = np.array([wall(5.0, -2.0, 2.0, 3.0), wall(9.0, 0.0, 4.0, 1.0)])
+    together = Ways.between(CHARGE_M, point_m, 100.0, NOTHING).shares(solids)
+    alone = [Ways.between(CHARGE_M, each[np.newaxis], 100.0, NOTHING) for each in point_m]
+    assert (together == np.vstack([each.shares(solids) for each in alone])).all()
+    assert (np.diff(together[:3, 0]) > 0.0).all()
 
 
 def test_points_stand_for_the_walls_that_count() -> None:

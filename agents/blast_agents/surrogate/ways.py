@@ -6,6 +6,10 @@ by one place beside or above the straight one; a way is stopped by any solid tha
 counts is the share of the ways that is open, in which a way weighs the less the longer its detour
 is: for detours near the charge, half way, and near the wall, and for several lengths over which the
 weight falls. Gaps, several rows and heights need no rule of their own.
+
+Of the ways that make their detour by the same place in plan and differ in height alone, what stops
+one stops all below it. So it is enough to know how many a solid stops, and where it is met in plan
+is found once for all of them, at all heights of a wall.
 """
 
 from dataclasses import dataclass
@@ -14,13 +18,15 @@ from typing import Final
 import numpy as np
 from numba import njit
 
-from blast_env.arrays import BoolArray, FloatArray
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 
 STATIONS: Final = (0.2, 0.5, 0.8)
 """Where on the straight way a detour is made, as a share of it."""
 
-_ASIDE_M: Final = (0.0, 0.7, -0.7, 1.5, -1.5, 2.5, -2.5, 4.0, -4.0, 6.0, -6.0, 9.0, -9.0)
-_ABOVE_M: Final = (0.0, 0.7, 1.5, 2.5, 4.0, 6.0)
+ASIDE_M: Final = (0.0, 0.7, -0.7, 1.5, -1.5, 2.5, -2.5, 4.0, -4.0, 6.0, -6.0, 9.0, -9.0)
+ABOVE_M: Final = np.array((0.0, 0.7, 1.5, 2.5, 4.0, 6.0))
+"""So far above the straight way, and beside it, detours are made; upwards."""
+
 FALLS_M: Final = (0.1, 0.3, 1.0, 3.0)
 """Lengths of a detour, m, at which its weight is 1/e, for 100 kg; others as Hopkinson-Cranz."""
 
@@ -36,17 +42,21 @@ class Ways:
 
     Attributes:
         start_m: Where the charge is (3,).
-        points_m: The points (points, 3).
-        by_m: Where each way makes its detour (points, stations, ways, 3).
-        is_open: Which ways no structure stops (points, stations, ways).
+        points_m: The points; those above each other follow one another (points, 3).
+        by_m: Where ways make their detour, in plan (points, stations, asides, 2).
+        by_height_m: How high the straight way is there (points, stations).
+        stopped: How many ways by each place structures stop, from the lowest up (points, stations,
+            asides).
         is_straight_open: Whether none stops the straight one (points,).
-        weights: Of the ways (points, stations, ways, falls); they add up to 1.
+        weights: Of the ways by each place that are left if so many are stopped (points, stations,
+            asides, ways above each other + 1, falls). Those of a station add up to 1 if none is.
     """
 
     start_m: FloatArray
     points_m: FloatArray
     by_m: FloatArray
-    is_open: BoolArray
+    by_height_m: FloatArray
+    stopped: IntArray
     is_straight_open: BoolArray
     weights: FloatArray
 
@@ -65,23 +75,19 @@ class Ways:
         towards = points_m - start_m
         flat_m = np.hypot(towards[:, 0], towards[:, 1])
         across = np.stack((-towards[:, 1], towards[:, 0]), axis=1) / flat_m[:, np.newaxis]
-        aside, above = (each.ravel() for each in np.meshgrid(_ASIDE_M, _ABOVE_M, indexing="ij"))
-        stations = np.array(STATIONS)[:, np.newaxis]
-        by_m = np.empty((len(points_m), len(STATIONS), len(aside), 3))
-        for axis in range(2):
-            straight = start_m[axis] + stations * towards[:, axis, np.newaxis, np.newaxis]
-            by_m[..., axis] = straight + aside * across[:, axis, np.newaxis, np.newaxis]
-        by_m[..., 2] = start_m[2] + stations * towards[:, 2, np.newaxis, np.newaxis] + above
-        to_m = np.linalg.norm(by_m - start_m, axis=3)
-        from_m = np.linalg.norm(by_m - points_m[:, np.newaxis, np.newaxis], axis=3)
-        longer_m = to_m + from_m - np.linalg.norm(towards, axis=1)[:, np.newaxis, np.newaxis]
+        stations, asides = np.array(STATIONS), np.array(ASIDE_M)
+        straight_m = start_m + stations[:, np.newaxis] * towards[:, np.newaxis]
+        by_m = straight_m[:, :, np.newaxis, :2] + (
+            asides[:, np.newaxis] * across[:, np.newaxis, np.newaxis]
+        )
+        by_height_m = straight_m[..., 2]
         falls_m = np.array(FALLS_M) * np.cbrt(tnt_kg / _REFERENCE_KG)
-        weights = np.exp(-longer_m[..., np.newaxis] / falls_m)
-        weights /= weights.sum(axis=2, keepdims=True)
-        is_open = np.ones(by_m.shape[:3], dtype=bool)
+        weights = _weights_left(start_m, points_m, by_m, by_height_m, falls_m)
+        stopped = np.zeros(by_m.shape[:3], dtype=np.int64)
         is_straight_open = np.ones(len(points_m), dtype=bool)
-        _close(start_m, points_m, by_m, solids, is_open, is_straight_open)
-        return cls(start_m, points_m, by_m, is_open, is_straight_open, weights)
+        ways = cls(start_m, points_m, by_m, by_height_m, stopped, is_straight_open, weights)
+        ways._stop(solids, stopped, is_straight_open)
+        return ways
 
     def shares(self, barrier: FloatArray | None = None) -> FloatArray:
         """Return what is open to each point (points, SHARES), from 0 to 1.
@@ -89,41 +95,119 @@ class Ways:
         Args:
             barrier: Left, bottom, right, top, height of each piece of it, m (pieces, 5).
         """
-        is_open, is_straight_open = self.is_open, self.is_straight_open
+        stopped, is_straight_open = self.stopped, self.is_straight_open
         if barrier is not None and len(barrier):
-            is_open, is_straight_open = is_open.copy(), is_straight_open.copy()
-            _close(self.start_m, self.points_m, self.by_m, barrier, is_open, is_straight_open)
-        open_shares = np.einsum("psw,pswf->psf", is_open.astype(float), self.weights)
-        flat = open_shares.reshape(len(self.points_m), -1)
-        return np.hstack((flat, is_straight_open[:, np.newaxis]))
+            stopped, is_straight_open = stopped.copy(), is_straight_open.copy()
+            self._stop(barrier, stopped, is_straight_open)
+        return _open_shares(stopped, is_straight_open, self.weights)
+
+    def _stop(self, solids: FloatArray, stopped: IntArray, is_straight_open: BoolArray) -> None:
+        """Mark what solids stop, beside what was stopped before."""
+        by = (self.by_m, self.by_height_m)
+        _stop(self.start_m, self.points_m, *by, solids, stopped, is_straight_open)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _close(
+def _weights_left(
     start_m: FloatArray,
     points_m: FloatArray,
     by_m: FloatArray,
-    solids: FloatArray,
-    is_open: BoolArray,
-    is_straight_open: BoolArray,
-) -> None:
-    """Mark the ways as closed that meet a solid; those that are closed are not looked at."""
-    points, stations, ways = is_open.shape
+    by_height_m: FloatArray,
+    falls_m: FloatArray,
+) -> FloatArray:
+    """Return `Ways.weights`."""
+    points, stations, asides, _ = by_m.shape
+    aboves, falls = len(ABOVE_M), len(falls_m)
+    left = np.zeros((points, stations, asides, aboves + 1, falls))
     for point in range(points):
         end_m = points_m[point]
-        if is_straight_open[point] and _meets(start_m, end_m, solids):
-            is_straight_open[point] = False
+        straight_m = np.sqrt(((end_m - start_m) ** 2).sum())
         for station in range(stations):
-            for way in range(ways):
-                if is_open[point, station, way]:
-                    corner_m = by_m[point, station, way]
-                    if _meets(start_m, corner_m, solids) or _meets(corner_m, end_m, solids):
-                        is_open[point, station, way] = False
+            of_all = np.zeros(falls)
+            for aside in range(asides):
+                corner_m = by_m[point, station, aside]
+                to_m2 = ((corner_m - start_m[:2]) ** 2).sum()
+                from_m2 = ((corner_m - end_m[:2]) ** 2).sum()
+                for above in range(aboves - 1, -1, -1):
+                    z_m = by_height_m[point, station] + ABOVE_M[above]
+                    to_m = np.sqrt(to_m2 + (z_m - start_m[2]) ** 2)
+                    from_m = np.sqrt(from_m2 + (z_m - end_m[2]) ** 2)
+                    weight = np.exp((straight_m - to_m - from_m) / falls_m)
+                    left[point, station, aside, above] = (
+                        left[point, station, aside, above + 1] + weight
+                    )
+                of_all += left[point, station, aside, 0]
+            left[point, station] /= of_all
+    return left
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _meets(start_m: FloatArray, end_m: FloatArray, solids: FloatArray) -> bool:
-    """Return whether a straight line meets any solid: slab by slab, then its least height."""
+def _open_shares(stopped: IntArray, is_straight_open: BoolArray, weights: FloatArray) -> FloatArray:
+    """Return `Ways.shares`."""
+    points, stations, asides = stopped.shape
+    falls = weights.shape[-1]
+    shares = np.zeros((points, stations * falls + 1))
+    for point in range(points):
+        for station in range(stations):
+            for aside in range(asides):
+                left = weights[point, station, aside, stopped[point, station, aside]]
+                for fall in range(falls):
+                    shares[point, station * falls + fall] += left[fall]
+        shares[point, -1] = is_straight_open[point]
+    return shares
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _stop(
+    start_m: FloatArray,
+    points_m: FloatArray,
+    by_m: FloatArray,
+    by_height_m: FloatArray,
+    solids: FloatArray,
+    stopped: IntArray,
+    is_straight_open: BoolArray,
+) -> None:
+    """Mark the ways as stopped that meet a solid; those that are stopped are not looked at."""
+    points, stations, asides = stopped.shape
+    met = np.empty((2 * len(solids), 3))
+    first = 0
+    while first < points:
+        last = first + 1
+        while last < points and (points_m[last, :2] == points_m[first, :2]).all():
+            last += 1
+        end_m = points_m[first]
+        straight = met[: _meet(start_m, end_m, solids, met)]
+        for point in range(first, last):
+            if _is_stopped(start_m[2], points_m[point, 2], straight):
+                is_straight_open[point] = False
+        for station in range(stations):
+            for aside in range(asides):
+                corner_m = by_m[first, station, aside]
+                near = _meet(start_m, corner_m, solids, met)
+                far = near + _meet(corner_m, end_m, solids, met[near:])
+                if far == 0:
+                    continue
+                to, beyond = met[:near], met[near:far]
+                for point in range(first, last):
+                    above = stopped[point, station, aside]
+                    while above < len(ABOVE_M):
+                        z_m = by_height_m[point, station] + ABOVE_M[above]
+                        if not _is_stopped(start_m[2], z_m, to) and not _is_stopped(
+                            z_m, points_m[point, 2], beyond
+                        ):
+                            break
+                        above += 1
+                    stopped[point, station, aside] = above
+        first = last
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _meet(start_m: FloatArray, end_m: FloatArray, solids: FloatArray, met: FloatArray) -> int:
+    """Note where a straight line in plan enters and leaves solids, and how high these are.
+
+    Slab by slab. Returns how many it meets.
+    """
+    count = 0
     for solid in range(len(solids)):
         enter, leave = 0.0, 1.0
         for axis in range(2):
@@ -135,9 +219,17 @@ def _meets(start_m: FloatArray, end_m: FloatArray, solids: FloatArray) -> bool:
                 continue
             one, other = (low - start_m[axis]) / way, (high - start_m[axis]) / way
             enter, leave = max(enter, min(one, other)), min(leave, max(one, other))
-        if enter >= leave:
-            continue
-        rise = end_m[2] - start_m[2]
-        if min(start_m[2] + enter * rise, start_m[2] + leave * rise) < solids[solid, 4]:
+        if enter < leave:
+            met[count, 0], met[count, 1], met[count, 2] = enter, leave, solids[solid, 4]
+            count += 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _is_stopped(start_m: float, end_m: float, met: FloatArray) -> bool:
+    """Return whether a line between two heights is below any solid that it meets in plan."""
+    rise_m = end_m - start_m
+    for enter, leave, height_m in met:
+        if min(start_m + enter * rise_m, start_m + leave * rise_m) < height_m:
             return True
     return False
