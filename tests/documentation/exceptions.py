@@ -310,6 +310,22 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env train --algo maskable_ppo --scenario courtyard --run runs/courtyard": _TRAIN,
     "blast-env train --algo self_labelling --engine gas --scenario visitor_entrance"
     " --run runs/own_best": _LABEL,
+    "blast-env train --algo maskable_ppo --engine event --scenario courtyard --envs 1"
+    " --steps 20480 --set evaluation_cases=8 --set evaluation_interval=4 --run out/particle": (
+        _TRAIN
+    ),
+    "blast-env train --algo self_labelling --engine gas --scenario courtyard"
+    " --start-from out/particle --envs 1 --steps 100 --set evaluation_cases=4"
+    " --set evaluation_interval=3 --set cases=8 --set cases_per_round=8 --set samples=2"
+    " --set neighbours=3 --set borrowed=1 --set first_updates=50 --set updates=50"
+    " --run out/particle_gas": _LABEL,
+    "blast-env train --algo self_labelling --engine gas --scenario courtyard --envs 1 --steps 220"
+    " --set evaluation_cases=4 --set evaluation_interval=3 --set cases=8 --set cases_per_round=8"
+    " --set samples=2 --set neighbours=3 --set borrowed=1 --set first_updates=200"
+    " --set updates=50 --run out/gas_alone": _LABEL,
+    "blast-env league --engine gas --track known --scenario courtyard --cases 8 --seeds 1"
+    " --methods best_rule --budgets 8 --run out/particle --run out/particle_gas"
+    " --run out/gas_alone --out out/fidelity": "--cases 1 --budgets 1",
     "blast-env train --algo self_labelling --engine gas --scenario scripts/demo_site.toml"
     " --steps 700 --envs 1 --set cases=24 --set cases_per_round=12 --set samples=3"
     " --set neighbours=5 --set first_updates=300 --set updates=100 --set evaluation_cases=8"
