@@ -14,6 +14,8 @@ import torch
 import yaml
 from blast_agents.training import resume, train
 from blast_agents.training.checkpoint import Checkpoint, Weights
+from blast_agents.training.learning_curve import learning_curve
+from blast_agents.training.recorder import Progress
 from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunFolder, read_rows
 from blast_agents.training.train import TrainingResult
 
@@ -101,6 +103,21 @@ def test_the_best_weights_are_those_of_the_best_evaluation(finished: Path) -> No
     assert checkpoint.counters.best_steps == best.steps
     same = [torch.equal(checkpoint.best_policy[n], v) for n, v in checkpoint.policy.items()]
     assert all(same) == (best.steps == checkpoint.counters.steps)
+
+
+@pytest.mark.parametrize(("engine", "spent"), [("event", "blasts"), ("surrogate", "guesses")])
+def test_the_learning_curve_tells_blasts_from_guesses(
+    finished: Path, engine: str, spent: str
+) -> None:
+    configuration = RunFolder(finished).configuration()
+    settings = configuration.settings.model_copy(update={"engine": engine})
+    progress = Progress(
+        Checkpoint.load(finished / "checkpoint.pt").counters,
+        read_rows(finished / "rollouts.csv", RolloutRow),
+        read_rows(finished / "evaluations.csv", EvaluationRow),
+    )
+    figure = learning_curve(progress, configuration.model_copy(update={"settings": settings}))
+    assert figure.axes[0].get_xlabel() == f"{spent} spent on training"
 
 
 def test_tensorboard_has_what_there_is_to_watch(finished: Path) -> None:

@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from blast_agents.surrogate.engine import is_surrogate
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.recorder import Progress
 from blast_agents.training.run_folder import RunConfiguration
@@ -24,23 +25,25 @@ _BEST: Final = "#000000"
 
 
 def learning_curve(progress: Progress, configuration: RunConfiguration) -> Figure:
-    """Return the reduction in training and on held-out threats over the blasts spent.
+    """Return the reduction in training and on held-out threats over the blasts, or guesses, spent.
 
     Args:
         progress: The tables of the run.
         configuration: Of the run.
     """
+    settings, counters = configuration.settings, progress.counters
+    spent = "guesses" if is_surrogate(settings.engine) else "blasts"
     figure = Figure(figsize=(9.0, 5.4), layout="constrained")
     axes = figure.add_subplot()
     _draw(axes, progress)
+    axes.set_xlabel(f"{spent} spent on training")
     figure.legend(loc="outside lower center", ncols=2)  # where it hides nothing
-    settings, counters = configuration.settings, progress.counters
     write_heading(
         figure,
         f"{ALGORITHM_NAMES[settings.algorithm]} on {Path(settings.scenario).stem}, "
         f"{settings.threat} threat",
         f"seed {settings.seed}, {counters.steps:,} steps, {counters.episodes:,} episodes, "
-        f"{counters.blasts:,} blasts with engine {settings.engine}, {counters.seconds:,.0f} s; "
+        f"{counters.blasts:,} {spent} with engine {settings.engine}, {counters.seconds:,.0f} s; "
         f"{settings.evaluation_cases} held-out threats",
     )
     return figure
@@ -92,7 +95,6 @@ def _draw(axes: Axes, progress: Progress) -> None:
             ls="",
             label=f"best weights: {100.0 * value[best]:.1f} %",
         )
-    axes.set_xlabel("blasts spent on training")
     axes.set_ylabel("reduction of the load that counts")
     axes.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
     axes.xaxis.set_major_formatter(FuncFormatter(number_on_axis))
