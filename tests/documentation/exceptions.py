@@ -352,6 +352,10 @@ SMALLER: Final[dict[str, str]] = {
     " scripts/school_street.toml --start-from out/street_ppo --envs 1 --steps 12288 --seed 1"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
     " --set evaluation_cases=8 --run out/street_on_ppo": _TRAIN,
+    "blast-env train --algo maskable_ppo --engine street_on.json --scenario"
+    " scripts/school_street.toml --start-from out/street_ppo --envs 1 --steps 61440 --seed 1"
+    " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=16"
+    " --set evaluation_cases=8 --run out/street_long": _TRAIN,
     "blast-env evaluate --run runs/courtyard --seeds 64 --processes 2 --export out/layouts": (
         "--seeds 4"
     ),
