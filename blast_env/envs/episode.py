@@ -174,7 +174,7 @@ class Episode:
             "calibration": self.objective.evaluator.calibration_name,
             "calibration_in_range": protected.in_range,
             "charges": tuple(
-                charge_against(case.scenario, self.placement.cells, each) for each in case.charges
+                charge_against(case.scenario, self.placement.layout, each) for each in case.charges
             ),
             "blast_seeds": tuple(
                 tuple(seeds[index :: len(case.charges)]) for index in range(len(case.charges))

@@ -11,7 +11,9 @@ from blast_env.envs.observations import FeaturesObservation, GridObservation
 from blast_env.envs.strategies import check_size
 from blast_env.envs.vehicle_observations import EMPTY_REACH, REACH
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Piece
 from blast_env.scenario.build_scene import vehicle_reach, worst_places
+from tests.catalogue_sites import item
 from tests.vehicle_sites import POSTS, gate_site, site_document, vehicle_document, vehicle_of
 
 SITE = gate_site(vehicle_document(places=2))
@@ -43,6 +45,21 @@ def test_the_charges_are_where_the_layout_let_the_vehicle_come(
     assert expected[2] == expected[0]
     assert info["reduction"] > 0.4
     assert info["impulse_pa_s"] < info["unprotected_impulse_pa_s"]
+
+
+def test_pieces_stop_the_vehicle_as_what_they_are() -> None:
+    """A wall of eight cells shuts half of the site; what it drives over shuts nothing."""
+    items = [item("wall", 8, 1, 1.0), item("mat", 4, 1, 0.5, stock=2, stops_vehicles=False)]
+    zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4, "items": items}
+    site = gate_site(build_zone=zone)
+    layout = (Piece(4, 1, "wall", True), Piece(12, 0, "mat", True), Piece(0, 0, "mat", True))
+    barrier = BlastBarrierEnv(site, engine="gas", observation="grid")
+    barrier.reset(seed=0, options={"layout": layout})
+    *_, info = barrier.step(site.zone.catalogue.finish)
+    worst = worst_places(site, vehicle_of(site), info["layout"])
+    assert info["layout"] == layout
+    assert info["charges"] == (worst.charge(0),)
+    assert worst.stand_off_m == pytest.approx(worst_places(site, vehicle_of(site)).stand_off_m)
 
 
 def test_incremental_rewards_add_up_though_the_charge_moves(
