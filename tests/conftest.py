@@ -3,8 +3,10 @@
 import gc
 import multiprocessing
 import os
+from collections.abc import Iterator
 
 import hypothesis  # noqa: F401  # looks for what refers to it, which is not found once frozen
+import pytest
 
 # The modules that tests import, and the tests, all stay: it would look through them for nothing,
 # which takes a third of their time. Afterwards most of what becomes garbage needs no collector.
@@ -22,6 +24,14 @@ os.environ.pop("COLUMNS", None)
 # TorchRL, once imported, has every process of Python's started from nothing, which takes seconds;
 # it leaves alone what has been chosen, and asking chooses Python's own way.
 multiprocessing.get_start_method()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _nothing_here_outlives_a_power_failure() -> Iterator[None]:
+    """Spare the tests the waiting for disks; processes that they start and kill still do wait."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda _: None)
+        yield
 
 
 def pytest_collection_finish() -> None:
