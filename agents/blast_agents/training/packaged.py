@@ -13,9 +13,11 @@ from blast_agents.training.agent import TrainedAgent, policy_for
 from blast_agents.training.checkpoint import Checkpoint, load_archive, load_weights
 from blast_agents.training.run_folder import RunConfiguration, RunFolder
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
+from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.scenario import Scenario
+from blast_env.sites import FAMILIES, training_sites
 
 WEIGHTS: Final = Path(__file__).parents[1] / "weights"
 """The folder of the weights that come with the package."""
@@ -55,7 +57,7 @@ class Record(BaseModel):
     Attributes:
         format: Version of this form.
         configuration: Of the run that they come from, with the scenario's hash.
-        scenario: Name of the scenario.
+        scenario: Name of the scenario, or of the family of generated sites.
         command: What trained them.
         versions: With what, without the machine.
         steps: Steps of training at the evaluation that they were chosen by.
@@ -100,9 +102,10 @@ def pack(
     if not checkpoint.best_policy:
         raise BlastEnvError(f"{source.path}: has no weights yet, before its first evaluation")
     counters = checkpoint.counters
+    family = configuration.settings.scenario
     record = Record(
         configuration=configuration,
-        scenario=source.scenario(configuration).name,
+        scenario=family if family in FAMILIES else source.scenario(configuration).name,
         command=source.command,
         versions={name: each for name, each in source.versions.items() if name != "platform"},
         steps=counters.best_steps,
@@ -142,7 +145,8 @@ def packaged_agent(
 ) -> tuple[TrainedAgent, Record] | None:
     """Return the agent that comes with the package for a scenario, or `None` if there is none.
 
-    Nothing but weights is read: no file can hold code.
+    One that was trained for this scenario comes before one for the family of generated sites that
+    it is of. Nothing but weights is read: no file can hold code.
 
     Args:
         scenario: The scenario; its content decides, not its name.
@@ -152,12 +156,29 @@ def packaged_agent(
     Raises:
         BlastEnvError: If a file is damaged.
     """
-    for path, record in records(folder):
-        configuration = record.configuration
-        fits = configuration.scenario_hash == scenario.content_hash
-        if fits and configuration.settings.threat == threat:
-            return _agent(path, configuration, scenario), record
+    found = [each for each in records(folder) if each[1].configuration.settings.threat == threat]
+    for path, record in found:
+        if record.configuration.scenario_hash == scenario.content_hash:
+            return _agent(path, record.configuration, scenario), record
+    for path, record in found:
+        representative = _of_family(record.configuration, scenario)
+        if representative is not None:
+            return _agent(path, record.configuration, representative), record
     return None
+
+
+def _of_family(configuration: RunConfiguration, scenario: Scenario) -> Scenario | None:
+    """Return the site that stands for the family that weights are for, if a scenario is like it."""
+    family, size = configuration.settings.scenario, configuration.hyperparameters.policy_kwargs
+    if family not in FAMILIES or (size.rows, size.columns) != scenario.zone.shape:
+        return None
+    representative = training_sites(family).representative
+    try:
+        check_size(scenario, representative)
+    except BlastEnvError:
+        return None
+    is_as_then = representative.content_hash == configuration.scenario_hash
+    return representative if is_as_then else None
 
 
 def _agent(path: Path, configuration: RunConfiguration, scenario: Scenario) -> TrainedAgent:
