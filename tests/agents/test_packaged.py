@@ -17,7 +17,8 @@ from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.physics.scene import Charge
-from blast_env.scenario import LayoutFile, Scenario, load_scenario, save_scenario
+from blast_env.scenario import LayoutFile, Placement, Scenario, load_scenario, save_scenario
+from blast_env.sites import FAMILIES, generate_site
 from tests.agents.test_self_labelling import own, run_settings, wide_yard
 from tests.catalogue_sites import yard as yard_with_a_point
 
@@ -81,12 +82,43 @@ def test_the_weights_propose_what_their_run_does(run: Path, folder: Path) -> Non
 
 def test_the_weights_of_the_package_are_for_its_scenarios_as_they_are() -> None:
     for path, record in records():
-        scenario = load_scenario(record.scenario)
-        assert record.configuration.scenario_hash == scenario.content_hash, path.name
+        family = FAMILIES.get(record.scenario)
+        if family is None:
+            scenario = load_scenario(record.scenario)
+            assert record.configuration.scenario_hash == scenario.content_hash, path.name
+        else:
+            scenario = generate_site(0, family)
         found = packaged_agent(scenario, record.configuration.settings.threat)
         assert found is not None
         assert record.league is not None
         assert path.stat().st_size < 500_000
+
+
+def test_weights_for_generated_sites_are_for_each_site_of_their_family(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    chosen = {"engine": "surrogate", "evaluation_engine": "event", "evaluation_cases": 2}
+    settings = run_settings(Path("item_sites"), threat="hidden", steps=1, **chosen)
+    train(settings, own(cases=1, first_updates=2), run)
+    pack(run, "sites", folder=tmp_path)
+
+    site, other = (generate_site(seed, FAMILIES["item_sites"]) for seed in range(2))
+    found = packaged_agent(site, "hidden", tmp_path)
+    assert found is not None
+    agent, record = found
+    assert record.scenario == "item_sites"
+    layouts = [agent.propose(each) for each in (site, other)]
+    assert layouts == [load_agent(run).propose(each) for each in (site, other)]
+    assert layouts[0] != layouts[1]
+    for each, layout in zip((site, other), layouts, strict=True):
+        assert Placement.of(each, layout).modules  # refuses what is not legal
+
+    assert packaged_agent(site, "visible", tmp_path) is None
+    assert packaged_agent(wide_yard(), "hidden", tmp_path) is None  # of another size
+    document = site.model_dump() | {"objective": {"quantity": "peak"}}
+    assert packaged_agent(Scenario.from_document(document, "p"), "hidden", tmp_path) is None
+    text = (tmp_path / "sites.json").read_text()
+    (tmp_path / "sites.json").write_text(text.replace(record.configuration.scenario_hash, "0" * 64))
+    assert packaged_agent(site, "hidden", tmp_path) is None  # sites are drawn in another way now
 
 
 def test_a_damaged_file_is_told(folder: Path, tmp_path: Path) -> None:

@@ -177,7 +177,8 @@ def _of_family(configuration: RunConfiguration, scenario: Scenario) -> Scenario 
         check_size(scenario, representative)
     except BlastEnvError:
         return None
-    is_as_then = representative.content_hash == configuration.scenario_hash
+    learnt = (configuration.scenario_hash, scenario.objective.quantity)
+    is_as_then = learnt == (representative.content_hash, representative.objective.quantity)
     return representative if is_as_then else None
 
 
