@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import Annotated, Final
 
 import typer
+from blast_agents.training.cases import training_cases
+from blast_agents.training.environments import training_source
+from blast_agents.training.run_folder import RunFolder
 
 from blast_env import load_scenario
 from blast_env.cli.output import print_line, user_errors
@@ -61,6 +64,10 @@ def main(
     scenario: Annotated[
         list[str] | None, typer.Option(help="Scenario files to name, beside the bundled ones.")
     ] = None,
+    run: Annotated[
+        list[Path] | None,
+        typer.Option(help="Run folders of self-labelling whose generated sites are to be named."),
+    ] = None,
 ) -> None:
     """Write the table, each blast once."""
     with user_errors():
@@ -69,6 +76,8 @@ def main(
         for number in range(sites):
             name = f"{SITE_NAME}{HELD_OUT_SITES + number}"
             names[scenario_of(name).content_hash] = name
+        for folder in run or ():
+            names |= _sites_of(folder)
         rows: dict[str, list[dict[str, object]]] = {}
         for folder in folders:
             if not folder.is_dir():
@@ -81,6 +90,18 @@ def main(
         make_folder(out.parent)
         write_table(table, COLUMNS, {"blasts": len(rows), **versions()}, out)
     print_line(f"{len(rows):,} blasts; wrote {out}")
+
+
+def _sites_of(folder: Path) -> dict[str, str]:
+    """Return the names of the generated sites that a run by self-labelling learnt from, by hash."""
+    configuration = RunFolder(folder).configuration()
+    settings = configuration.settings
+    if settings.scenario != ITEM_SITES or settings.algorithm != "self_labelling":
+        raise BlastEnvError(f"{folder}: is no run by self-labelling on {ITEM_SITES}")
+    source = training_source(settings.scenario)
+    cases = training_cases(settings, source, configuration.self_labelling.cases)
+    sites = [case.scenario for case in cases]
+    return {each.content_hash: each.name.replace("site_", SITE_NAME) for each in sites}
 
 
 def _row(names: dict[str, str], key: BlastKey, load: StructureLoad) -> dict[str, object]:

@@ -6,13 +6,15 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import typer
+from blast_agents.training import train
 from typer.testing import CliRunner
 
 from blast_env.evaluation import BlastEvaluator, DiskCache, draw_threats
 from blast_env.geometry import Piece
 from blast_env.scenario import save_scenario
 from scripts import blast_table
-from tests.agents.training_runs import small_scenario
+from tests.agents.test_self_labelling import own, run_settings
+from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 from tests.evaluation.cases import COURTYARD
 from tests.evaluation.test_disk_cache import key, loads, same
 
@@ -50,6 +52,24 @@ def test_own_scenarios_are_named_if_they_are_given(tmp_path: Path) -> None:
         assert run(tmp_path / "blasts", *options, "--out", out)[0] == 0
         assert set(pd.read_parquet(out)["scenario"]) == names
     assert blast_table.scenario_of(str(own)) == small_scenario()
+
+
+def test_the_sites_that_a_run_learnt_from_are_named(tmp_path: Path) -> None:
+    agent, out = tmp_path / "agent", tmp_path / "blasts.parquet"
+    few = {"engine": "event", "threat": "hidden", "hidden_threats": 1, "evaluation_cases": 2}
+    train(run_settings(Path("item_sites"), steps=1, **few), own(cases=1, first_updates=1), agent)
+    assert run(agent / "blasts", "--run", agent, "--out", out)[0] == 0
+    table = pd.read_parquet(out)
+    learnt_from = {name for name in table["scenario"] if name}  # the others chose the weights
+    (site,) = learnt_from
+    assert set(table["scenario_hash"][table["scenario"] == site]) == {
+        blast_table.scenario_of(site).content_hash
+    }
+    other = tmp_path / "other"
+    train(settings(scenario_file(tmp_path)), hyperparameters(), other)
+    code, words = run(agent / "blasts", "--run", other)
+    assert code != 0
+    assert "is no run by self-labelling on item_sites" in words
 
 
 def test_a_folder_without_blasts_is_an_error(tmp_path: Path) -> None:
