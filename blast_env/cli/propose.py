@@ -39,6 +39,7 @@ from blast_env.scenario import (
     load_scenario,
 )
 from blast_env.scenario.zone import source_bounds_m
+from blast_env.sites import FAMILIES
 from blast_env.statistics import reductions
 from blast_env.units import MS_PER_S
 
@@ -64,8 +65,8 @@ def propose(
 ) -> None:
     """Propose a layout for any site in a second or a few; no blast is run for it.
 
-    It comes from weights that were trained for the scenario, if some come with the package; if not,
-    from the surrogate of gas dynamics, which was fitted to other sites. Where there is no
+    It comes from weights that were trained for the very scenario, if some come with the package; if
+    not, from the surrogate of gas dynamics, which was fitted to other sites. Where there is no
     catalogue, of which the surrogate knows nothing, it is the best rule's layout, which takes a
     blast of gas dynamics for each rule and threat. Without --charge it is for all places where the
     charge may be.
@@ -151,7 +152,7 @@ def _by_weights(scenario: Scenario, charge: Charge | None) -> _Proposal | None:
         from blast_agents.training.packaged import packaged_agent
 
     found = packaged_agent(scenario, "hidden" if charge is None else "visible")
-    if found is None:
+    if found is None or found[1].scenario in FAMILIES:  # there the surrogate's are better
         return None
     agent, record = found
     return _timed(

@@ -94,7 +94,9 @@ def test_the_weights_of_the_package_are_for_its_scenarios_as_they_are() -> None:
         assert path.stat().st_size < 500_000
 
 
-def test_weights_for_generated_sites_are_for_each_site_of_their_family(tmp_path: Path) -> None:
+def test_weights_for_generated_sites_are_for_each_site_of_their_family(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = tmp_path / "run"
     chosen = {"engine": "surrogate", "evaluation_engine": "event", "evaluation_cases": 2}
     settings = run_settings(Path("item_sites"), threat="hidden", steps=1, **chosen)
@@ -111,6 +113,10 @@ def test_weights_for_generated_sites_are_for_each_site_of_their_family(tmp_path:
     assert layouts[0] != layouts[1]
     for each, layout in zip((site, other), layouts, strict=True):
         assert Placement.of(each, layout).modules  # refuses what is not legal
+
+    save_scenario(site, tmp_path / "site.toml")
+    done = proposed(tmp_path, monkeypatch, tmp_path / "site.toml")
+    assert "by guesses of gas dynamics" in done.output  # which are better there
 
     assert packaged_agent(site, "visible", tmp_path) is None
     assert packaged_agent(wide_yard(), "hidden", tmp_path) is None  # of another size

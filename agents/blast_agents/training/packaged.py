@@ -61,7 +61,7 @@ class Record(BaseModel):
         command: What trained them.
         versions: With what, without the machine.
         steps: Steps of training at the evaluation that they were chosen by.
-        blasts: Blasts of the training.
+        blasts: Blasts of the training; guesses, where a surrogate made them.
         seconds: Time that it took.
         league: What they did in a league.
     """
