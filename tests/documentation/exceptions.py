@@ -47,6 +47,9 @@ _TRAIN: Final = (
     "--steps 64 --envs 1 --set n_steps=64 --set batch_size=64 --set evaluation_cases=2"
     " --set evaluation_interval=1"
 )
+_TRAIN_SITES: Final = (
+    "--steps 120 --set n_steps=120 --set evaluation_cases=2 --set evaluation_interval=1"
+)
 _LABEL: Final = (
     "--steps 4 --envs 1 --set cases=2 --set cases_per_round=1 --set samples=1 --set neighbours=1"
     " --set first_updates=2 --set updates=1 --set evaluation_cases=2"
@@ -249,9 +252,25 @@ SMALLER: Final[dict[str, str]] = {
     " --set evaluation_interval=4 --set evaluation_cases=12 --run out/sites": (
         f"{_LABEL} --set hidden_threats=2"
     ),
+    "blast-env train --algo maskable_ppo --engine surrogate --scenario item_sites --threat hidden"
+    " --start-from out/sites --envs 1 --steps 122880 --set hidden_threats=4"
+    " --set learning_rate=5.0e-4 --set n_steps=480 --set evaluation_interval=32"
+    " --set evaluation_cases=12 --run out/sites_ppo": _TRAIN_SITES,
     "blast-env league --engine gas --track item_sites --cases 24 --seeds 2 --methods best_rule"
-    " --budgets 16 --run out/sites --surrogate agents/blast_agents/surrogate/gas.json"
+    " --budgets 16 --run out/sites --run out/sites_ppo"
+    " --surrogate agents/blast_agents/surrogate/gas.json"
     " --out out/sites_league": "--cases 2 --seeds 1 --budgets 2",
+    "blast-env train --algo self_labelling --engine gas --scenario item_sites --threat hidden"
+    " --start-from out/sites_ppo --envs 2 --steps 1300 --seed 1 --set cases=100"
+    " --set cases_per_round=100 --set samples=4 --set neighbours=1 --set borrowed=0"
+    " --set hidden_threats=1 --set first_updates=1 --set updates=1 --set evaluation_interval=100"
+    " --set evaluation_cases=2 --run out/sites_on": _LABEL,
+    "python -m scripts.surrogate fit --data docs/data/site_blasts.parquet"
+    " --data docs/data/site_agent_blasts.parquet --no-check --out sites_on.json": "--epochs 1",
+    "blast-env train --algo maskable_ppo --engine sites_on.json --scenario item_sites --threat"
+    " hidden --start-from out/sites_ppo --envs 1 --steps 30720 --seed 1 --set hidden_threats=4"
+    " --set learning_rate=5.0e-4 --set n_steps=480 --set evaluation_interval=16"
+    " --set evaluation_cases=12 --run out/sites_on_ppo": _TRAIN_SITES,
     "blast-env league --engine gas --first-engine event --agent-search 50 --run runs/own_best"
     " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario courtyard",
     "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 16"
