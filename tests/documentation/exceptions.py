@@ -271,6 +271,10 @@ SMALLER: Final[dict[str, str]] = {
     " hidden --start-from out/sites_ppo --envs 1 --steps 30720 --seed 1 --set hidden_threats=4"
     " --set learning_rate=5.0e-4 --set n_steps=480 --set evaluation_interval=16"
     " --set evaluation_cases=12 --run out/sites_on_ppo": _TRAIN_SITES,
+    "blast-env league --engine gas --first-engine event --track known --scenario courtyard"
+    " --cases 3 --seeds 1 --methods annealing --budgets 50 --out out/first_engine": (
+        "--cases 1 --budgets 3"
+    ),
     "blast-env league --engine gas --first-engine event --agent-search 50 --run runs/own_best"
     " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario courtyard",
     "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 16"
