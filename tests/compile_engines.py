@@ -7,12 +7,13 @@ may: nothing depends on this but the time.
 from typing import Literal
 
 import numpy as np
+from blast_agents.surrogate.ways import Ways
 
 from blast_env import load_scenario, simulate
 from blast_env.physics.gas.faces import ground_faces
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import FaceLoads, Gauges, GroundMap
-from blast_env.physics.gas.solver import GasSolver
+from blast_env.physics.gas.solver import GasSolver, Settling
 from blast_env.physics.gas.source import GasCharge, set_charge
 
 
@@ -32,16 +33,24 @@ def gas_engine(precision: Literal["single", "double"]) -> None:
         precision=precision,
         with_fuel=True,
         burning=charge.burning,
+        settling=Settling(0.0, 2.0),
     )
     set_charge(solver, charge)
-    solver.step()
+    for _ in range(4):  # hot gas is cooled at every fourth
+        solver.step()
     solver.largest_overpressure_pa()
+
+
+def surrogate() -> None:
+    piece = np.array([[4.0, -1.0, 5.0, 1.0, 2.0]])
+    Ways.between(np.zeros(3), np.array([[9.0, 0.0, 1.0]]), 100.0, piece).shares(piece)
 
 
 def main() -> None:
     event_engine()
     gas_engine("single")
     gas_engine("double")
+    surrogate()
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ is found once for all of them, at all heights of a wall.
 """
 
 from dataclasses import dataclass
+from math import exp, sqrt
 from typing import Final
 
 import numpy as np
@@ -72,6 +73,7 @@ class Ways:
             tnt_kg: Its mass.
             solids: Left, bottom, right, top, height of each structure, m (solids, 5).
         """
+        points_m = np.ascontiguousarray(points_m)  # one kind of arrays is compiled once
         towards = points_m - start_m
         flat_m = np.hypot(towards[:, 0], towards[:, 1])
         across = np.stack((-towards[:, 1], towards[:, 0]), axis=1) / flat_m[:, np.newaxis]
@@ -80,7 +82,7 @@ class Ways:
         by_m = straight_m[:, :, np.newaxis, :2] + (
             asides[:, np.newaxis] * across[:, np.newaxis, np.newaxis]
         )
-        by_height_m = straight_m[..., 2]
+        by_height_m = np.ascontiguousarray(straight_m[..., 2])
         falls_m = np.array(FALLS_M) * np.cbrt(tnt_kg / _REFERENCE_KG)
         weights = _weights_left(start_m, points_m, by_m, by_height_m, falls_m)
         stopped = np.zeros(by_m.shape[:3], dtype=np.int64)
@@ -119,26 +121,36 @@ def _weights_left(
     points, stations, asides, _ = by_m.shape
     aboves, falls = len(ABOVE_M), len(falls_m)
     left = np.zeros((points, stations, asides, aboves + 1, falls))
+    of_all = np.empty(falls)
     for point in range(points):
         end_m = points_m[point]
-        straight_m = np.sqrt(((end_m - start_m) ** 2).sum())
+        straight_m = sqrt(_flat_m2(start_m, end_m) + (end_m[2] - start_m[2]) ** 2)
         for station in range(stations):
-            of_all = np.zeros(falls)
+            of_all[:] = 0.0
             for aside in range(asides):
                 corner_m = by_m[point, station, aside]
-                to_m2 = ((corner_m - start_m[:2]) ** 2).sum()
-                from_m2 = ((corner_m - end_m[:2]) ** 2).sum()
+                to_m2, from_m2 = _flat_m2(start_m, corner_m), _flat_m2(end_m, corner_m)
                 for above in range(aboves - 1, -1, -1):
                     z_m = by_height_m[point, station] + ABOVE_M[above]
-                    to_m = np.sqrt(to_m2 + (z_m - start_m[2]) ** 2)
-                    from_m = np.sqrt(from_m2 + (z_m - end_m[2]) ** 2)
-                    weight = np.exp((straight_m - to_m - from_m) / falls_m)
-                    left[point, station, aside, above] = (
-                        left[point, station, aside, above + 1] + weight
-                    )
-                of_all += left[point, station, aside, 0]
-            left[point, station] /= of_all
+                    to_m = sqrt(to_m2 + (z_m - start_m[2]) ** 2)
+                    from_m = sqrt(from_m2 + (z_m - end_m[2]) ** 2)
+                    for fall in range(falls):
+                        left[point, station, aside, above, fall] = left[
+                            point, station, aside, above + 1, fall
+                        ] + exp((straight_m - to_m - from_m) / falls_m[fall])
+                for fall in range(falls):
+                    of_all[fall] += left[point, station, aside, 0, fall]
+            for aside in range(asides):
+                for above in range(aboves):
+                    for fall in range(falls):
+                        left[point, station, aside, above, fall] /= of_all[fall]
     return left
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _flat_m2(one_m: FloatArray, other_m: FloatArray) -> float:
+    """Return the square of a distance in plan."""
+    return float((other_m[0] - one_m[0]) ** 2 + (other_m[1] - one_m[1]) ** 2)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -173,7 +185,7 @@ def _stop(
     first = 0
     while first < points:
         last = first + 1
-        while last < points and (points_m[last, :2] == points_m[first, :2]).all():
+        while last < points and _flat_m2(points_m[first], points_m[last]) == 0.0:
             last += 1
         end_m = points_m[first]
         straight = met[: _meet(start_m, end_m, solids, met)]

@@ -53,6 +53,10 @@ _EVENTS_PER_CALL: Final = 10_000
 """After which the loop comes back, so that Ctrl-C is heard: an event takes 1 to 10 us."""
 
 
+_NUMBER: Final[Any] = np.int64
+"""Of a ball, as in loops over them: for two kinds of integers most would be compiled twice."""
+
+
 @njit(error_model="numpy")
 def run_until(
     balls: RecordArray,
@@ -96,12 +100,12 @@ def run_until(
             return OUT_OF_REACH  # nothing will ever happen again
         if heap[1].time_s > until_s:
             return UNTIL
-        ball, time_s = heap[1].ball, heap[1].time_s
+        ball, time_s = _NUMBER(heap[1].ball), heap[1].time_s
         if balls[ball].contact_s > time_s:
             progress.crossings += 1
             cross(balls, cells, heap, surfaces, rules, ball)
             continue
-        partner = balls[ball].partner
+        partner = _NUMBER(balls[ball].partner)
         if partner >= 0 and balls[partner].collisions != balls[ball].partner_collisions:
             progress.outdated += 1
             look_ahead(balls, cells, heap, surfaces, rules, ball)
