@@ -15,7 +15,7 @@ unexport PYTHONDONTWRITEBYTECODE
 demo: $(STAMP)
 	$(BIN)/python scripts/demo.py
 
-# Types are checked beside everything else: they keep one core busy for two minutes.
+# Types are checked beside everything else: they keep one core busy for a minute.
 test: $(STAMP)
 	$(MAKE) --jobs 2 types suite
 
