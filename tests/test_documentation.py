@@ -83,16 +83,23 @@ def parse(application: Typer, words: tuple[str, ...], in_sentence: bool) -> None
     command.make_context("command", list(words))
 
 
+def _main_of(name: str) -> str:
+    """Return the module that `python -m` runs: of a package, the one inside."""
+    found = importlib.util.find_spec(name)
+    inside = found is not None and found.submodule_search_locations is not None
+    return f"{name}.__main__" if inside else name
+
+
 def parse_command(words: tuple[str, ...], in_sentence: bool = False) -> None:
     if words[0] == "blast-env":
         parse(app, words[1:], in_sentence)
         return
     package = words[2].partition(".")[0]
     if package == "blast_env" or shlex.join(words) in exceptions.NOT_RUN:
-        elsewhere = package not in ("blast_env", "scripts", "tests")
+        elsewhere = package not in ("blast_env", "studies", "tests")
         assert elsewhere or importlib.util.find_spec(words[2]) is not None
         return
-    module = importlib.import_module(words[2])
+    module = importlib.import_module(_main_of(words[2]))
     application = getattr(module, "app", None)
     if application is None:
         application = Typer(add_completion=False)
@@ -187,16 +194,16 @@ def test_a_page_is_run_in_one_folder_and_what_fails_is_told(
 def test_the_documentation_names_every_command_of_the_studies() -> None:
     named = {each.words[2:4] for each in COMMANDS if each.words[0] == "python"}
     for script in ("engines", "gas", "layouts", "validity", "presets"):
-        registered = importlib.import_module(f"scripts.{script}").app.registered_commands
+        registered = importlib.import_module(_main_of(f"studies.{script}")).app.registered_commands
         found = {each.name or each.callback.__name__.replace("_", "-") for each in registered}
-        documented = {words[-1] for words in named if words[0] == f"scripts.{script}"}
+        documented = {words[-1] for words in named if words[0] == f"studies.{script}"}
         # The others are named where their results are used, in the code.
         assert found - documented <= {"noise", "deposit"}
 
 
 def test_pages_that_code_and_texts_name_exist() -> None:
     texts = dict(TEXTS)
-    for folder in ("blast_env", "agents", "scripts", "tests"):
+    for folder in ("blast_env", "agents", "studies", "tests"):
         for suffix in ("*.py", "*.j2"):
             for path in (ROOT / folder).rglob(suffix):
                 texts[str(path.relative_to(ROOT))] = path.read_text(encoding="utf-8")

@@ -128,7 +128,7 @@ def test_the_source_archive_has_what_its_tests_read(tmp_path: Path) -> None:
     (archive,) = tmp_path.glob("*.tar.gz")
     with tarfile.open(archive) as opened:
         names = {name.partition("/")[2] for name in opened.getnames()}
-    for folder in ("blast_env", "agents", "scenarios", "scripts", "tests", "docs"):
+    for folder in ("blast_env", "agents", "scenarios", "scripts", "studies", "tests", "docs"):
         here = {str(path.relative_to(REPOSITORY)) for path in (REPOSITORY / folder).rglob("*.*")}
         assert {name for name in here if "__pycache__" not in name} <= names
     assert {"Makefile", "README.md", "constraints.txt", "hatch_build.py"} <= names

@@ -31,10 +31,7 @@ from blast_env.cli.output import (
 from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
-from blast_env.physics.engines import find_engine
-from blast_env.scenario import Scenario, load_scenario
-from blast_env.statistics import Estimate
-from blast_env.studies.calibration.study import (
+from blast_env.fitting.free_field import (
     CalibrationReport,
     FreeFieldStudy,
     LawName,
@@ -42,7 +39,10 @@ from blast_env.studies.calibration.study import (
     kingery_bulmash_reference,
     paper_reference,
 )
-from blast_env.studies.calibration.study import calibrate as fit_laws
+from blast_env.fitting.free_field import calibrate as fit_laws
+from blast_env.physics.engines import find_engine
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.statistics import Estimate
 from blast_env.studies.shielding.ratios import check_exponent
 from blast_env.studies.shielding.reflection import ReflectionReport, ReflectionStudy
 from blast_env.studies.shielding.report import (
@@ -173,8 +173,8 @@ def _write(report: CalibrationReport, stored: Calibration, stem: str) -> list[Pa
 
 def _save_figure(report: CalibrationReport, stored: Calibration, path: Path) -> list[Path]:
     # Here, because pictures need the extra `render`.
+    from blast_env.fitting.figure import calibration_figure
     from blast_env.rendering.figures import save_figure
-    from blast_env.studies.calibration.figure import calibration_figure
 
     return [save_figure(calibration_figure(report, stored.name), path)]
 

@@ -1,4 +1,4 @@
-"""The option `--cluster` of all commands and scripts that run many blasts."""
+"""The option `--cluster` of all commands and studies that run many blasts."""
 
 import logging
 from collections.abc import Iterator

@@ -92,7 +92,7 @@ def league(
     surrogate: Annotated[
         Path | None,
         typer.Option(
-            help="Surrogate of gas dynamics (scripts.surrogate fit): enters by itself, and as a "
+            help="Surrogate of gas dynamics (studies.surrogate fit): enters by itself, and as a "
             "search with the blasts of --agent-search; what agents draw enters ranked by it, and "
             "their searches guided by it, too."
         ),

@@ -273,7 +273,7 @@ def search(
     surrogate: Annotated[
         Path | None,
         typer.Option(
-            help="File of the surrogate for --method surrogate (scripts.surrogate fit).",
+            help="File of the surrogate for --method surrogate (studies.surrogate fit).",
             show_default="the package's",
         ),
     ] = None,

@@ -79,7 +79,7 @@ PARTICLES_OVERRATE: Final = (
     " gas dynamics, with a rank correlation of 0.61 (docs/engineers/validity.md). Judge what"
     " matters with engine 'gas'."
 )
-"""Said of every evaluation with particles; measured by `python -m scripts.gas judge`."""
+"""Said of every evaluation with particles; measured by `python -m studies.gas judge`."""
 
 
 THREAT_COLUMNS: Final = (

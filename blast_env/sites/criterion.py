@@ -206,7 +206,7 @@ class VisibilityCriterion:
     """Sites where a good layout does much, none does everything, and places make a difference.
 
     Told from the lines of sight (`SiteMeasures`) in a few milliseconds, without a blast.
-    `scripts/check_sites.py` compares it with blasts.
+    `studies/check_sites.py` compares it with blasts.
 
     Attributes:
         least_open_share: Share of the lines of sight that other structures must leave open.

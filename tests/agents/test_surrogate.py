@@ -39,7 +39,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-import scripts.surrogate
+import studies.surrogate
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats
@@ -48,8 +48,8 @@ from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, Placement, Scenario, load_scenario
 from blast_env.units import PA_PER_PSI
-from scripts.blast_table import COLUMNS, SITE_NAME, scenario_of
-from scripts.surrogate import choices, reductions_of, varied_layouts, verdict
+from studies.blast_table import COLUMNS, SITE_NAME, scenario_of
+from studies.surrogate import choices, reductions_of, varied_layouts, verdict
 from tests.agents.test_self_labelling import wide_yard
 
 CHARGE_M = np.array([0.0, 0.0, 0.3])
@@ -517,7 +517,7 @@ def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
 
 def test_the_street_where_peaks_count_differs_by_nothing_else() -> None:
     street, peaks = (
-        load_scenario(f"scripts/school_street{each}.toml").model_dump() for each in ("", "_peak")
+        load_scenario(f"studies/school_street{each}.toml").model_dump() for each in ("", "_peak")
     )
     assert peaks.pop("objective")["quantity"] == "peak"
     assert "objective" not in street  # impulses count where none is named
@@ -531,11 +531,11 @@ def test_a_wrong_number_of_draws_is_told(
 ) -> None:
     surrogate = by_hand().save(tmp_path / "surrogate.json")
     agent = SimpleNamespace(representative=YARD)
-    monkeypatch.setattr(scripts.surrogate, "load_agent", lambda _: agent)
-    monkeypatch.setattr(scripts.surrogate, "check_runs", lambda *_: None)
+    monkeypatch.setattr(studies.surrogate, "load_agent", lambda _: agent)
+    monkeypatch.setattr(studies.surrogate, "check_runs", lambda *_: None)
     monkeypatch.setattr(TrainedRun, "load", lambda _: agent)
     options = ["draws", str(tmp_path), "--surrogate", str(surrogate), "--counts", counts]
-    done = CliRunner().invoke(scripts.surrogate.app, options)
+    done = CliRunner().invoke(studies.surrogate.app, options)
     assert done.exit_code == 2
     assert "--counts" in done.output
 

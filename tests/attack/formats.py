@@ -31,6 +31,7 @@ from blast_env.cluster import address_of
 from blast_env.evaluation import Threat
 from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastKey, DiskCache
+from blast_env.fitting.free_field import FreeFieldRun
 from blast_env.importing import ImportOptions, import_site
 from blast_env.journal import Journal
 from blast_env.physics.scene import Charge
@@ -38,9 +39,8 @@ from blast_env.recording.parquet import read_parquet
 from blast_env.reporting.study import front_layouts
 from blast_env.scenario import LayoutFile, Scenario, load_scenario, save_scenario, write_layout
 from blast_env.simulation import simulate
-from blast_env.studies.calibration.candidates import HIGH, LOW, Candidate, Score, ScoredCandidate
-from blast_env.studies.calibration.study import FreeFieldRun
-from scripts.pack_agent import league_result
+from studies.pack_agent import league_result
+from studies.particles.candidates import HIGH, LOW, Candidate, Score, ScoredCandidate
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
 from tests.importing.maps import Places, charge, outline, rectangle, written
 from tests.scenario.documents import full_document

@@ -58,8 +58,8 @@ _ELSEWHERE: Final = {
     "agents/blast_agents/training/recorder.py: self.logger.dump": "likewise",
     "agents/blast_agents/training/self_labelling.py: self.logger.dump": "likewise",
     "agents/blast_agents/training/run_folder.py: os.replace": "makes the folder a run's",
-    "scripts/scale.py: sqlite3.connect": "a store that is measured, in a scratch folder",
-    "scripts/scale.py: TemporaryDirectory": "for a measurement",
+    "studies/scale.py: sqlite3.connect": "a store that is measured, in a scratch folder",
+    "studies/scale.py: TemporaryDirectory": "for a measurement",
 }
 """What does not write through `blast_env.files`, and why it need not."""
 
@@ -126,7 +126,7 @@ def _unsafe_writes(source: str) -> Iterator[str]:
 
 def test_every_writer_goes_through_one_place() -> None:
     found = set()
-    for part in ("blast_env", "agents", "scripts"):
+    for part in ("blast_env", "agents", "studies"):
         for path in (ROOT / part).rglob("*.py"):
             file = path.relative_to(ROOT).as_posix()
             others = set(_unsafe_writes(path.read_text(encoding="utf-8"))) - _OWN

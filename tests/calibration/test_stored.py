@@ -19,18 +19,18 @@ from blast_env.calibration.model import (
     stored_calibrations,
 )
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.geometry import Rectangle
-from blast_env.physics.engines import PARTICLE_ENGINES
-from blast_env.physics.parameters import with_overrides
-from blast_env.physics.presets import preset
-from blast_env.scenario import Scenario
-from blast_env.studies.calibration.study import (
+from blast_env.fitting.free_field import (
     FreeFieldStudy,
     calibrate,
     free_field,
     kingery_bulmash_reference,
     paper_reference,
 )
+from blast_env.geometry import Rectangle
+from blast_env.physics.engines import PARTICLE_ENGINES
+from blast_env.physics.parameters import with_overrides
+from blast_env.physics.presets import preset
+from blast_env.scenario import Scenario
 from tests.scenarios import BALLISTIC_COURTYARD
 
 CALIBRATION = load_calibration("ballistic_kb_100kg")

@@ -56,7 +56,7 @@ _LABEL: Final = (
 )
 _AGENT: Final = f"blast-env train --scenario courtyard --run agent {_TRAIN}"
 _STREET: Final = (
-    "blast-env train --engine surrogate --scenario scripts/school_street.toml --run agent"
+    "blast-env train --engine surrogate --scenario studies/school_street.toml --run agent"
 )
 _LEAGUE_AGENTS: Final = {
     "out/runs/ppo_courtyard": "--scenario courtyard",
@@ -115,7 +115,7 @@ GIVEN: Final = (
             ("docs/studies/league_gas.md",),
             path,
             "street.json",
-            "python -m scripts.surrogate fit --epochs 1 --no-check --out street.json",
+            "python -m studies.surrogate fit --epochs 1 --no-check --out street.json",
         )
         for path in ("street.json", "street_on.json")
     ),
@@ -160,7 +160,7 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env report courtyard --layout wall.json --out report.html --pdf report.pdf": (
         "--threats 1 --places 1 --stills 1 --no-items"
     ),
-    "python -m scripts.gas judge": "--random-layouts 1 --charges 1 --seeds 1",
+    "python -m studies.gas judge": "--random-layouts 1 --charges 1 --seeds 1",
     # docs/start.md
     "blast-env search --engine gas --scenario depot.toml --threat hidden --method annealing"
     " --budget 300 --start-from building/layout.json --processes 2 --cache blasts --out found": (
@@ -195,20 +195,20 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --layout wall.json --scenario my_site.toml --engine gas --seeds 8": (
         "--seeds 1"
     ),
-    "python -m scripts.gas source": "--cell 1",
-    "python -m scripts.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
-    "python -m scripts.gas corners": "--sizes 0.5",
-    "python -m scripts.gas handover": "--radii 3,6 --until 0.05",
-    "python -m scripts.gas settling": "--until 0.02",
-    "python -m scripts.gas ending --until 0.25 --random-layouts 1": (
+    "python -m studies.gas source": "--cell 1",
+    "python -m studies.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
+    "python -m studies.gas corners": "--sizes 0.5",
+    "python -m studies.gas handover": "--radii 3,6 --until 0.05",
+    "python -m studies.gas settling": "--until 0.02",
+    "python -m studies.gas ending --until 0.25 --random-layouts 1": (
         "--until 0.02 --random-layouts 0"
     ),
-    "python -m scripts.gas borders --places 2/0,2/12,2/24,8/48": ("--places 2/0,2/12 --until 0.05"),
-    "python -m scripts.gas air-height": "--heights 9,12 --until 0.05",
-    "python -m scripts.gas cells --random-layouts 18 --finest 0.125": (
+    "python -m studies.gas borders --places 2/0,2/12,2/24,8/48": ("--places 2/0,2/12 --until 0.05"),
+    "python -m studies.gas air-height": "--heights 9,12 --until 0.05",
+    "python -m studies.gas cells --random-layouts 18 --finest 0.125": (
         "--sizes 0.5 --random-layouts 0 --finest 0.5"
     ),
-    "python -m scripts.gas cells --scenario visitor_entrance --random-layouts 18 --finest 0.125": (
+    "python -m studies.gas cells --scenario visitor_entrance --random-layouts 18 --finest 0.125": (
         "--sizes 0.5 --random-layouts 0 --finest 0.5"
     ),
     # docs/studies/scenarios.md
@@ -217,27 +217,27 @@ SMALLER: Final[dict[str, str]] = {
         "--cell 0.5 --seeds 1"
     ),
     # docs/researchers/surrogate.md
-    "python -m scripts.surrogate blasts --sites 79 --layouts 4": (
+    "python -m studies.surrogate blasts --sites 79 --layouts 4": (
         "--sites 1 --layouts 1 --cache blasts"
     ),
-    "python -m scripts.surrogate fit --out surrogate.json": "--epochs 1 --no-check",
-    "blast-env league --engine gas --track item_sites --cases 24 --seeds 2 --methods best_rule"
+    "python -m studies.surrogate fit --out surrogate.json": "--epochs 1 --no-check",
+    "blast-env league --engine gas --track item_sites --cases 48 --seeds 2 --methods best_rule"
     " --budgets 16 --surrogate surrogate.json --out out/league": (
         "--cases 1 --seeds 1 --budgets 2"
     ),
-    "python -m scripts.surrogate judge control_room school_and_clinic visitor_entrance"
+    "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
     " hotel_forecourt shopping_street --charges 3 --surrogate surrogate.json": (
         "--charges 1 --changes 1"
     ),
     # docs/paper
-    "python -m scripts.presets ballistic": (
+    "python -m studies.presets ballistic": (
         "--candidates 1 --refinements 1 --seeds 1 --finalists 1 --finalist-seeds 1"
     ),
     # docs/researchers
-    "python -m scripts.check_sites --blasted 16 --random-layouts 12 --threats 4": (
+    "python -m studies.check_sites --blasted 16 --random-layouts 12 --threats 4": (
         "--sites 2 --blasted 2 --random-layouts 2 --threats 1"
     ),
-    "python -m scripts.check_sites --family item_sites --blasted 40 --random-layouts 3 --threats 1"
+    "python -m studies.check_sites --family item_sites --blasted 40 --random-layouts 3 --threats 1"
     " --no-rejected --picture docs/pictures/item_sites.png": (
         "--sites 2 --blasted 2 --random-layouts 2"
     ),
@@ -256,7 +256,7 @@ SMALLER: Final[dict[str, str]] = {
     " --start-from out/sites --envs 1 --steps 122880 --set hidden_threats=4"
     " --set learning_rate=5.0e-4 --set n_steps=480 --set evaluation_interval=32"
     " --set evaluation_cases=12 --run out/sites_ppo": _TRAIN_SITES,
-    "blast-env league --engine gas --track item_sites --cases 24 --seeds 2 --methods best_rule"
+    "blast-env league --engine gas --track item_sites --cases 48 --seeds 2 --methods best_rule"
     " --budgets 16 --run out/sites --run out/sites_ppo"
     " --surrogate agents/blast_agents/surrogate/gas.json"
     " --out out/sites_league": "--cases 2 --seeds 1 --budgets 2",
@@ -265,7 +265,7 @@ SMALLER: Final[dict[str, str]] = {
     " --set cases_per_round=100 --set samples=4 --set neighbours=1 --set borrowed=0"
     " --set hidden_threats=1 --set first_updates=1 --set updates=1 --set evaluation_interval=100"
     " --set evaluation_cases=2 --run out/sites_on": _LABEL,
-    "python -m scripts.surrogate fit --data docs/data/site_blasts.parquet"
+    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet"
     " --data docs/data/site_agent_blasts.parquet --no-check --out sites_on.json": "--epochs 1",
     "blast-env train --algo maskable_ppo --engine sites_on.json --scenario item_sites --threat"
     " hidden --start-from out/sites_ppo --envs 1 --steps 30720 --seed 1 --set hidden_threats=4"
@@ -277,33 +277,33 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "blast-env league --engine gas --first-engine event --agent-search 50 --run runs/own_best"
     " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario courtyard",
-    "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 16"
+    "blast-env league --engine gas --track known --scenario studies/school_street.toml --cases 16"
     " --seeds 1 --methods best_rule --budgets 16 --run out/street --run out/street_ppo"
     " --surrogate street.json --out out/street_league": "--cases 1 --budgets 1",
-    "blast-env league --engine gas --track hidden --scenario scripts/school_street.toml --seeds 12"
+    "blast-env league --engine gas --track hidden --scenario studies/school_street.toml --seeds 12"
     " --methods best_rule --budgets 200 --run out/street_hidden --surrogate street.json"
     " --out out/street_league": "--seeds 1 --budgets 16",
-    "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 6"
+    "blast-env league --engine gas --track known --scenario studies/school_street.toml --cases 6"
     " --seeds 1 --methods winners_from_rules --budgets 1000 --agent-search 50"
     " --run out/street_on_ppo --surrogate street_on.json --out out/street_league": (
         "--cases 1 --budgets 2 --agent-search 2"
     ),
-    "blast-env league --engine gas --track known --scenario scripts/school_street.toml --cases 3"
+    "blast-env league --engine gas --track known --scenario studies/school_street.toml --cases 3"
     " --seeds 1 --methods best_rule,random,greedy,nsga2,genetic,annealing --budgets 50,200"
     " --agent-search 50 --run out/street_on_ppo --surrogate street_on.json"
     " --out out/street_league": "--cases 1 --methods best_rule --budgets 2 --agent-search 2",
-    "python -m scripts.surrogate draws out/street_ppo --surrogate street.json --cases 16"
+    "python -m studies.surrogate draws out/street_ppo --surrogate street.json --cases 16"
     " --counts 16,64,256": "--cases 2 --counts 2 --changes 2 --top 1",
     "blast-env train --algo maskable_ppo --engine street.json --scenario"
-    " scripts/school_street_peak.toml --threat hidden --start-from out/street --envs 1"
+    " studies/school_street_peak.toml --threat hidden --start-from out/street --envs 1"
     " --steps 12288 --set hidden_threats=4 --set learning_rate=1.0e-3 --set n_steps=512"
     " --set evaluation_interval=8 --set evaluation_cases=8 --run out/street_peak": _TRAIN,
-    "blast-env league --engine gas --track hidden --scenario scripts/school_street_peak.toml"
+    "blast-env league --engine gas --track hidden --scenario studies/school_street_peak.toml"
     " --seeds 12 --methods best_rule,winners_from_rules --budgets 200 --agent-search 50"
     " --run out/street_peak --surrogate street.json --out out/peak_league": (
         "--seeds 1 --methods best_rule --budgets 2 --agent-search 2"
     ),
-    "blast-env league --engine gas --track hidden --scenario scripts/demo_site.toml --seeds 8"
+    "blast-env league --engine gas --track hidden --scenario studies/demo_site.toml --seeds 8"
     " --methods winners_from_rules --budgets 200 --agent-search 50"
     " --surrogate agents/blast_agents/surrogate/gas.json --out out/kerb_league": (
         "--seeds 1 --budgets 2 --agent-search 2"
@@ -314,7 +314,7 @@ SMALLER: Final[dict[str, str]] = {
     " --set updates=60 --set evaluation_interval=4 --set evaluation_cases=2 --run out/hotel": (
         "--steps 20 --set first_updates=3 --set updates=2"
     ),
-    "python -m scripts.surrogate fit --data docs/data/site_blasts.parquet --data out/hotel.parquet"
+    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet --data out/hotel.parquet"
     " --no-check --out out/hotel.json": "--epochs 1",
     "blast-env train --algo maskable_ppo --engine out/hotel.json --scenario hotel_forecourt"
     " --threat hidden --envs 1 --steps 12288 --start-from out/hotel --set hidden_threats=2"
@@ -349,47 +349,47 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env league --engine gas --track known --scenario courtyard --cases 8 --seeds 1"
     " --methods best_rule --budgets 8 --run out/particle --run out/particle_gas"
     " --run out/gas_alone --out out/fidelity": "--cases 1 --budgets 1",
-    "blast-env train --algo self_labelling --engine gas --scenario scripts/demo_site.toml"
+    "blast-env train --algo self_labelling --engine gas --scenario studies/demo_site.toml"
     " --steps 700 --envs 1 --set cases=24 --set cases_per_round=12 --set samples=3"
     " --set neighbours=5 --set first_updates=300 --set updates=100 --set evaluation_cases=8"
     " --set evaluation_interval=1 --run out/kerb": _LABEL,
-    "blast-env train --algo self_labelling --engine gas --scenario scripts/school_street.toml"
+    "blast-env train --algo self_labelling --engine gas --scenario studies/school_street.toml"
     " --envs 1 --steps 1800 --set cases=96 --set cases_per_round=32 --set samples=2"
     " --set neighbours=4 --set borrowed=2 --set first_updates=600 --set updates=200"
     " --set evaluation_interval=2 --set evaluation_cases=8 --run out/street": _LABEL,
-    "python -m scripts.surrogate fit --data docs/data/site_blasts.parquet"
+    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet"
     " --data docs/data/street_blasts.parquet --no-check --out street.json": "--epochs 1",
     "blast-env train --algo maskable_ppo --engine street.json --scenario"
-    " scripts/school_street.toml --start-from out/street --envs 1 --steps 12288"
+    " studies/school_street.toml --start-from out/street --envs 1 --steps 12288"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
     " --set evaluation_cases=8 --run out/street_ppo": _TRAIN,
-    "blast-env train --algo self_labelling --engine gas --scenario scripts/school_street.toml"
+    "blast-env train --algo self_labelling --engine gas --scenario studies/school_street.toml"
     " --start-from out/street_ppo --envs 1 --steps 740 --seed 1 --set cases=40"
     " --set cases_per_round=40 --set samples=6 --set neighbours=4 --set borrowed=0"
     " --set first_updates=1 --set updates=1 --set evaluation_interval=2 --set evaluation_cases=8"
     " --run out/street_on": _LABEL,
-    "python -m scripts.surrogate fit --data docs/data/site_blasts.parquet"
+    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet"
     " --data docs/data/street_blasts.parquet --data docs/data/street_agent_blasts.parquet"
     " --no-check --out street_on.json": "--epochs 1",
     "blast-env train --algo maskable_ppo --engine street_on.json --scenario"
-    " scripts/school_street.toml --start-from out/street_ppo --envs 1 --steps 12288 --seed 1"
+    " studies/school_street.toml --start-from out/street_ppo --envs 1 --steps 12288 --seed 1"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
     " --set evaluation_cases=8 --run out/street_on_ppo": _TRAIN,
     "blast-env train --algo maskable_ppo --engine street_on.json --scenario"
-    " scripts/school_street.toml --start-from out/street_ppo --envs 1 --steps 61440 --seed 1"
+    " studies/school_street.toml --start-from out/street_ppo --envs 1 --steps 61440 --seed 1"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=16"
     " --set evaluation_cases=8 --run out/street_long": _TRAIN,
     "blast-env evaluate --run runs/courtyard --seeds 64 --processes 2 --export out/layouts": (
         "--seeds 4"
     ),
     # docs/studies
-    "python -m scripts.engines compare": "--seeds 20 --event-seeds 20",
-    "python -m scripts.engines modules": "--seeds 20 --event-seeds 2",
-    "python -m scripts.engines front": "--seeds 1",
-    "python -m scripts.engines profile": "--repeats 1",
-    "python -m scripts.engines cost --repeats 10": "--repeats 1 --most-balls 5000",
-    "python -m scripts.layouts engines --charges 8": "--layouts 10 --charges 1",
-    "python -m scripts.layouts resolutions --seeds 4": "--layouts 3 --seeds 2",
+    "python -m studies.engines compare": "--seeds 20 --event-seeds 20",
+    "python -m studies.engines modules": "--seeds 20 --event-seeds 2",
+    "python -m studies.engines front": "--seeds 1",
+    "python -m studies.engines profile": "--repeats 1",
+    "python -m studies.engines cost --repeats 10": "--repeats 1 --most-balls 5000",
+    "python -m studies.layouts engines --charges 8": "--layouts 10 --charges 1",
+    "python -m studies.layouts resolutions --seeds 4": "--layouts 3 --seeds 2",
     "blast-env bench --repeats 7 --no-environment --no-gas": "--repeats 1 --no-memory",
     "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
     "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,
@@ -433,25 +433,25 @@ SMALLER: Final[dict[str, str]] = {
     " --calibration collisional_kb": "--seeds 2",
     "blast-env calibrate --name mine --reference reflected_impulse --distances 8,12,20,40"
     " --seeds 16 --out out/mine": "--seeds 2",
-    "python -m scripts.presets front": "--seeds 2",
-    "python -m scripts.presets collisional": "--population 4 --generations 1 --seeds 2",
+    "python -m studies.presets front": "--seeds 2",
+    "python -m studies.presets collisional": "--population 4 --generations 1 --seeds 2",
     "blast-env league --run runs/courtyard --out out/league": _LEAGUE,
     "blast-env calibrate --name ballistic_ufc --reference paper_ufc --seeds 32": "--seeds 2",
-    "python -m scripts.validity scaling": "--seeds 2",
-    "python -m scripts.validity facade-width": "--seeds 2",
-    "python -m scripts.validity pressure": "--distances 10 --seeds 2",
-    "python -m scripts.validity thermal-share --seeds 8": "--resolutions 2 --seeds 2",
-    "python -m scripts.validity mach-stem --preset collisional --resolution 2 --seeds 60"
+    "python -m studies.validity scaling": "--seeds 2",
+    "python -m studies.validity facade-width": "--seeds 2",
+    "python -m studies.validity pressure": "--distances 10 --seeds 2",
+    "python -m studies.validity thermal-share --seeds 8": "--resolutions 2 --seeds 2",
+    "python -m studies.validity mach-stem --preset collisional --resolution 2 --seeds 60"
     " --first-ms 5 --last-ms 13": "--resolution 1 --seeds 2 --times 4",
-    "python -m scripts.scale workers --gas-blasts 12 --episodes 4": (
+    "python -m studies.scale workers --gas-blasts 12 --episodes 4": (
         "--workers 1 --pauses 5 --gas-blasts 1 --episodes 1"
     ),
-    "python -m scripts.scale store": "--entries 100",
-    "python -m scripts.scale costs --price 0.04": "--blasts 1",
-    "python -m scripts.scenario_difficulty": (
+    "python -m studies.scale store": "--entries 100",
+    "python -m studies.scale costs --price 0.04": "--blasts 1",
+    "python -m studies.difficulty": (
         "courtyard --layouts 2 --seeds 2 --charges 2 --realisations 1"
     ),
-    "python -m scripts.scenario_difficulty visitor_entrance shopping_street hotel_forecourt"
+    "python -m studies.difficulty visitor_entrance shopping_street hotel_forecourt"
     " school_and_clinic control_room --processes 1": "--random 2 --budget 2 --place-budget 1",
 }
 """Options that are appended to studies and trainings of minutes to hours."""
@@ -460,27 +460,27 @@ NOT_RUN: Final[dict[str, str]] = {
     "blast-env --install-completion": "changes the shell of whoever runs it",
     "blast-env import FILE --out site.toml": "FILE is a placeholder; the page's next commands run",
     "blast-env validate FILE...": "FILE is a placeholder; docs/start.md has a file to validate",
-    "python -m scripts.other_codes openfoam": "needs OpenFOAM; tests/studies/test_other_codes.py",
-    "python -m scripts.other_codes pyclaw --python PYTHON": (
+    "python -m studies.other_codes openfoam": "needs OpenFOAM; tests/studies/test_other_codes.py",
+    "python -m studies.other_codes pyclaw --python PYTHON": (
         "needs clawpack; tests/studies/test_other_codes.py"
     ),
-    "python -m scripts.pack_agent RUN NAME --league out/league --track known_NAME": (
+    "python -m studies.pack_agent RUN NAME --league out/league --track known_NAME": (
         "writes into the package; tests/agents has it"
     ),
-    "python -m scripts.blast_table FOLDER --sites 79 --out blasts.parquet": (
-        "FOLDER is a placeholder; tests/scripts/test_blast_table.py"
+    "python -m studies.blast_table FOLDER --sites 79 --out blasts.parquet": (
+        "FOLDER is a placeholder; tests/studies/test_blast_table.py"
     ),
-    "python -m scripts.blast_table out/street/blasts --scenario scripts/school_street.toml"
-    " --out FILE": "FILE is a placeholder; tests/scripts/test_blast_table.py",
-    "python -m scripts.blast_table FOLDER --out blasts.parquet": (
-        "FOLDER is a placeholder; tests/scripts/test_blast_table.py"
+    "python -m studies.blast_table out/street/blasts --scenario studies/school_street.toml"
+    " --out FILE": "FILE is a placeholder; tests/studies/test_blast_table.py",
+    "python -m studies.blast_table FOLDER --out blasts.parquet": (
+        "FOLDER is a placeholder; tests/studies/test_blast_table.py"
     ),
     "python -m rl_zoo3.train --algo ppo --env BlastBarrier-v0 --gym-packages blast_env"
     " -conf agents/blast_agents/hyperparameters/ppo.yml --vec-env subproc"
     """ --env-kwargs 'engine:'"'"'event'"'"'' realisations:1""": "needs RL Zoo",
     "python -m rl_zoo3.enjoy --algo ppo --env BlastBarrier-v0 --gym-packages blast_env -f logs"
     " --stochastic": "needs RL Zoo",
-    "python -m scripts.engines steps": "minutes, without an option that makes it smaller",
+    "python -m studies.engines steps": "minutes, without an option that makes it smaller",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
 }
 """Commands that are parsed only, and why."""

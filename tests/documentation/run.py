@@ -35,7 +35,7 @@ from tests.documentation.exceptions import (
 )
 from tests.documentation.pages import OTHERS, ROOT, STEPS, Cell, Command, Step
 
-COPIED: Final = ("docs", "scenarios", "scripts", "tests", "agents/blast_agents/surrogate")
+COPIED: Final = ("docs", "scenarios", "studies", "tests", "agents/blast_agents/surrogate")
 MOST_S: Final = 1200.0
 """The longest that a step may take."""
 

@@ -1,6 +1,6 @@
 """The front of a strong blast: laws of gas dynamics that no rule of the engine knows of.
 
-The laws are in `studies.blast_front`; `scripts.engines front` shows them on more balls, where
+The laws are in `studies.blast_front`; `studies.engines front` shows them on more balls, where
 the elastic front follows its law within 1 % from 50 spacings on.
 """
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blast_env.physics.event.engine import EventEngine
-from blast_env.studies.blast_front import (
+from studies.particles.blast_front import (
     SEDOV_GAS,
     FrontCase,
     density_peak,

@@ -6,7 +6,7 @@ from blast_agents.rules import random_layout
 
 from blast_env.scenario import Placement, Scenario
 from blast_env.sites import SiteMeasures, SiteRanges
-from scripts.check_sites import (
+from studies.check_sites import (
     Measured,
     drawn_sites,
     facade_and_depth_m,

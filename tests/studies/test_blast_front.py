@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blast_env.studies.blast_front import HEADERS, STUDIES, FrontTrace, front_figure, front_rows
+from studies.particles.blast_front import HEADERS, STUDIES, FrontTrace, front_figure, front_rows
 
 
 def power_law(exponent: float, factor: float = 1.0) -> FrontTrace:

@@ -5,15 +5,15 @@ import pytest
 
 from blast_env import load_scenario, simulate
 from blast_env.calibration import Friedlander
-from blast_env.studies.calibration.figure import calibration_figure
-from blast_env.studies.calibration.study import (
+from blast_env.fitting.figure import calibration_figure
+from blast_env.fitting.free_field import (
     CalibrationReport,
     FreeFieldStudy,
     calibrate,
     kingery_bulmash_reference,
 )
-from blast_env.studies.pressure.figure import PressureCase, pressure_figure
-from blast_env.studies.pressure.pulses import facade_history
+from studies.particles.pressure.figure import PressureCase, pressure_figure
+from studies.particles.pressure.pulses import facade_history
 
 SMALL = load_scenario("free_field").with_simulation(
     overrides={"explosive": {"ball_count": 180}, "stepping": {"time_limit_s": 0.12}}

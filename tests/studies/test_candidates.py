@@ -8,7 +8,7 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.journal import Journal
 from blast_env.physics.presets import preset
-from blast_env.studies.calibration.candidates import (
+from studies.particles.candidates import (
     HIGH,
     LOW,
     Candidate,

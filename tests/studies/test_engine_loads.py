@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from blast_env import load_scenario, simulate
-from blast_env.studies.agreement.loads import (
+from studies.particles.agreement.loads import (
     DIFFERENCE_HEADERS,
     QUANTITIES,
     BlastSet,

@@ -7,14 +7,14 @@ import pytest
 
 from blast_env import simulate
 from blast_env.arrays import FloatArray
-from blast_env.studies.agreement.modules import (
+from blast_env.studies.benchmark.engines import BenchmarkScene
+from studies.particles.agreement.modules import (
     agreement,
     distribution_distance,
     module_impulses,
     profile_distance,
     stepped,
 )
-from blast_env.studies.benchmark.engines import BenchmarkScene
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 
 

@@ -8,7 +8,7 @@ from blast_env import simulate
 from blast_env.physics.event.engine import EventRun
 from blast_env.scenario.build_scene import build_scene
 from blast_env.studies.benchmark.engines import BenchmarkScene
-from blast_env.studies.benchmark.event_engine import (
+from studies.particles.event_engine import (
     Cost,
     Profile,
     cost_figure,

@@ -13,14 +13,14 @@ from blast_env.physics.gas.source import TNT
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.simulation.gas import GasBlast
-from blast_env.studies.gas.cells import CellLoads, cell_loads, difference
-from blast_env.studies.gas.corners import corner_waves
-from blast_env.studies.gas.ending import Ending, ending
-from blast_env.studies.gas.loads import protected_impulse_pa_s
-from blast_env.studies.gas.reference import free_field, wide_wall
-from blast_env.studies.gas.sites import with_heights, yard
-from blast_env.studies.gas.sources import CHOSEN, source_ratios, trade_off_figure
 from blast_env.studies.shielding.scenes import BlockGeometry
+from studies.gas.cells import CellLoads, cell_loads, difference
+from studies.gas.corners import corner_waves
+from studies.gas.ending import Ending, ending
+from studies.gas.loads import protected_impulse_pa_s
+from studies.gas.reference import free_field, wide_wall
+from studies.gas.sites import with_heights, yard
+from studies.gas.sources import CHOSEN, source_ratios, trade_off_figure
 from tests.gas_sites import hut
 
 WALL = tuple((row, 4) for row in range(4, 12))

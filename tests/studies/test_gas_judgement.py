@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blast_env.studies.gas.judgement import Judgement
+from studies.gas.judgement import Judgement
 
 
 def test_order_overstatement_and_regret() -> None:

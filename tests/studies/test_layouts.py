@@ -7,8 +7,8 @@ from scipy.stats import spearmanr
 from blast_env import simulate
 from blast_env.physics.presets import preset
 from blast_env.physics.scene import Charge
-from blast_env.studies.agreement import layouts as study
-from blast_env.studies.agreement.layouts import (
+from studies.particles.agreement import layouts as study
+from studies.particles.agreement.layouts import (
     AVERAGED,
     ENGINES,
     STATISTICS,

@@ -13,7 +13,7 @@ from blast_env.physics.particles import CollisionType
 from blast_env.recording.tables import faces_hit
 from blast_env.scenario import Scenario
 from blast_env.simulation import Blast, BlastResult
-from blast_env.studies.pressure.pulses import Face, PressureHistory, facade_history
+from studies.particles.pressure.pulses import Face, PressureHistory, facade_history
 
 FACES: tuple[Face, ...] = ("left", "right", "bottom", "top")
 NORMALS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "bottom": (0.0, -1.0), "top": (0.0, 1.0)}

@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 from matplotlib.container import ErrorbarContainer
 
+from blast_env.fitting.free_field import free_field
 from blast_env.scenario import load_scenario
-from blast_env.studies.calibration.scaling import scaling_figure
-from blast_env.studies.calibration.study import free_field
+from studies.particles.scaling import scaling_figure
 
 
 @pytest.mark.parametrize("tnt_kg", [20.0, 1000.0])

@@ -93,7 +93,7 @@ class Samples:
 
     @classmethod
     def of(cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario]) -> "Samples":
-        """Return the loads on protected structures of a table of `scripts.blast_table`.
+        """Return the loads on protected structures of a table of `studies.blast_table`.
 
         Args:
             blasts: The table.

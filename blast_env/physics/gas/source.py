@@ -5,7 +5,7 @@ first obstacle, or where one could stand. Then density, momentum, energy and unb
 onto the grid, and the solver goes on, fuel burning with the same time constant.
 
 One run, for 1 kg in free air, serves all charges: lengths and times grow with the cube root of the
-mass (Hopkinson-Cranz), the time constant of afterburning too. `python -m scripts.gas source` shows
+mass (Hopkinson-Cranz), the time constant of afterburning too. `python -m studies.gas source` shows
 what speaks for the numbers of `TNT`.
 """
 
@@ -87,9 +87,9 @@ Kingery and Bulmash's own curves for charges on the ground and in free air, with
 impulses.
 
 Sources that meet the reflected impulse have too little incident impulse close to the charge, and
-the other way round (`python -m scripts.gas source`). This one keeps the reflected impulse. Over the
+the other way round (`python -m studies.gas source`). This one keeps the reflected impulse. Over the
 curves it has for 20, 100 and 1000 kg with cells of 0.5 m, 0.25 m for 20 kg
-(`python -m scripts.gas kingery-bulmash`): reflected impulse 0.94 to 1.06 at Z = 1.7 to 8.7,
+(`python -m studies.gas kingery-bulmash`): reflected impulse 0.94 to 1.06 at Z = 1.7 to 8.7,
 incident impulse 0.89 to 0.94 at 2.7 to 8.6, but 0.88 at 2.1 and 0.84 at 1.7; arrival 0.96 to 1.03.
 Peaks are 0.39 to 0.83: they need finer cells.
 """

@@ -1,1 +1,1 @@
-"""What was checked about the gas engine: docs/engineers/gas.md has the results."""
+"""Other codes: they run what `blast-env bench --gas` times them by."""

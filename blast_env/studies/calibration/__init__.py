@@ -1,1 +1,0 @@
-"""Fitting a power law to a reference on many blasts in a free field."""

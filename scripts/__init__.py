@@ -1,1 +1,0 @@
-"""Studies and demonstrations whose results can be looked at."""

@@ -1,0 +1,248 @@
+"""`make demo`: train an agent for a few minutes by gas dynamics, and see what it has learnt.
+
+Trains an agent by self-labelling: it begins with the best layout by rule for each of some charges,
+then learns from its own best. Holds its layouts against no barrier, random layouts and all rules,
+on charges that the training has not met, and films one blast with and without its layout.
+"""
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from time import perf_counter
+from types import MappingProxyType
+from typing import Any, Final
+
+from blast_agents.league import Contest, ResultStore, known_track, standard_entries
+from blast_agents.league.trained import TrainedRun
+from blast_agents.training import TrainingSettings, load_hyperparameters, train
+from blast_agents.training.environments import environment_id
+from blast_agents.training.hyperparameters import SELF_LABELLING
+from blast_agents.training.run_folder import EvaluationRow, RunFolder, read_rows
+from blast_agents.training.train import TrainingResult
+
+from blast_env.cli.evaluation_report import percent
+from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
+from blast_env.errors import BlastEnvError
+from blast_env.export import LayoutPlan, export_layouts
+from blast_env.physics.engines import GAS
+from blast_env.rendering.figures import save_figure
+from blast_env.rendering.gas import facades
+from blast_env.rendering.pressure_film import write_pressure_film
+from blast_env.rendering.site_picture import site_picture
+from blast_env.simulation.gas import GasBlast
+from studies.demo_comparison import HEADERS, Comparison
+
+AGENT: Final = "trained agent"
+
+_CHANGES: Final[Mapping[str, Any]] = MappingProxyType(
+    {
+        "cases": 16,
+        "cases_per_round": 8,
+        "samples": 3,
+        "neighbours": 5,
+        "first_updates": 300,
+        "updates": 100,
+    }
+)
+"""For a site along which the charge moves on one line, and a few minutes."""
+
+
+@dataclass(frozen=True)
+class DemoSettings:
+    """What the demonstration does.
+
+    Attributes:
+        out: Folder for everything.
+        scenario: Scenario file, or a bundled name.
+        steps: Steps of training: layouts that meet a charge.
+        seed: Of the training.
+        changes: Hyperparameters in the place of those of the package.
+        evaluation_interval: Rounds from one point of the learning curve to the next.
+        evaluation_cases: Held-out threats of such a point.
+        threats: Unseen threats of the comparison.
+        processes: Worker processes of training and comparison.
+        film_width_px: Width of the film.
+        frames_per_s: Frames in a second of the film.
+    """
+
+    out: Path = Path("out/demo")
+    scenario: str = str(Path(__file__).with_name("demo_site.toml"))
+    steps: int = 240
+    seed: int = 0
+    changes: Mapping[str, Any] = field(default_factory=lambda: dict(_CHANGES))
+    evaluation_interval: int = 1
+    evaluation_cases: int = 8
+    threats: int = 8
+    processes: int = 2
+    film_width_px: int = 1600
+    frames_per_s: float = 25.0
+
+    @property
+    def run(self) -> Path:
+        """The run folder."""
+        return self.out / "run"
+
+
+def main() -> None:
+    """Run the demonstration."""
+    with user_errors():
+        demonstrate(DemoSettings())
+
+
+def demonstrate(settings: DemoSettings) -> Comparison:
+    """Train, compare, film; print a table and the paths.
+
+    Returns:
+        The comparison that the verdict rests on.
+
+    Raises:
+        BlastEnvError: If a setting is of no use, or a file cannot be written.
+    """
+    began = perf_counter()
+    trained = train_agent(settings)
+    comparison = compare_methods(settings, trained)
+    print_comparison(comparison)
+    written = [trained.folder.learning_curve]
+    written += write_pictures(settings, comparison)
+    print_line(f"\n{comparison.verdict}\n", style="bold")
+    for path in written:
+        print_line(f"wrote {path}")
+    print_line(f"the run folder is {settings.run}; try: blast-env evaluate --run {settings.run}")
+    print_line(f"{perf_counter() - began:.0f} s in all")
+    return comparison
+
+
+def train_agent(settings: DemoSettings) -> TrainingResult:
+    """Train an agent in a fresh run folder, and print the learning curve as it grows."""
+    hyperparameters = load_hyperparameters(
+        SELF_LABELLING, environment_id(settings.scenario), settings.changes, settings.processes
+    )
+    training = TrainingSettings(
+        algorithm=SELF_LABELLING,
+        scenario=settings.scenario,
+        steps=settings.steps,
+        seed=settings.seed,
+        engine=GAS,
+        evaluation_interval=settings.evaluation_interval,
+        evaluation_cases=settings.evaluation_cases,
+    )
+    clear(settings.run)
+    print_line("training by gas dynamics, beginning with the best layouts by rule")
+    with _learning_curve(RunFolder(settings.run)) as progress:
+        result = train(training, hyperparameters, settings.run, progress)
+    counters = result.progress.counters
+    print_line(
+        f"{counters.episodes:,} layouts tried with {counters.blasts:,} blasts of the engine "
+        f"{GAS} in {counters.seconds:.0f} s\n"
+    )
+    return result
+
+
+@contextmanager
+def _learning_curve(folder: RunFolder) -> Iterator[Callable[[float], None]]:
+    """Show a progress bar, and print each evaluation as soon as it is there."""
+    printed = 0
+
+    def print_new() -> None:
+        nonlocal printed
+        rows = _evaluations(folder)
+        for row in rows[printed:]:
+            print_line(
+                f"  after {row.episodes:>5,} layouts, {row.seconds:>4.0f} s: reduction "
+                f"{percent(row.reduction):>6} (95 % interval {percent(row.low)} to "
+                f"{percent(row.high)})"
+            )
+        printed = len(rows)
+
+    with progress_bar("training") as show:
+
+        def progress(share: float) -> None:
+            show(share)
+            print_new()
+
+        yield progress
+    print_new()
+
+
+def _evaluations(folder: RunFolder) -> list[EvaluationRow]:
+    if not folder.evaluations.exists():
+        return []
+    return read_rows(folder.evaluations, EvaluationRow)
+
+
+def clear(run: Path) -> None:
+    """Remove the run of an earlier demonstration; anything else is left alone."""
+    if (run / "config.yaml").exists():
+        try:
+            shutil.rmtree(run)
+        except OSError as error:
+            raise BlastEnvError(f"{run}: cannot be removed: {error.strerror or error}") from error
+
+
+def compare_methods(settings: DemoSettings, trained: TrainingResult) -> Comparison:
+    """Hold the best weights of the training against the other methods, on unseen threats."""
+    scenario = trained.folder.scenario(trained.configuration)
+    agent = replace(TrainedRun.load(settings.run).entry, name=AGENT)
+    contest = Contest(
+        known_track(scenario, settings.threats, seeds=1, noisy=False),
+        (*standard_entries(methods=(), budgets=(), items=bool(scenario.zone.items)), agent),
+        ResultStore(settings.out / "results"),
+        trained.configuration.settings.engine,
+    )
+    with progress_bar(f"{settings.threats} unseen threats") as progress:
+        return Comparison(contest.play(settings.processes, progress))
+
+
+def print_comparison(comparison: Comparison) -> None:
+    """Print a row a method: mean impulse, reduction, time to propose a layout."""
+    cases = comparison.standings.track.cases
+    table = make_table(
+        f"{cases[0].scenario.name}: {len(cases)} threats that the training has not met, the same "
+        f"for all; judged by the engine {comparison.standings.engine}\n(Pa s: mean impulse on the "
+        "protected structures; ahead: in percentage points, paired; ms: time to propose a layout)",
+        HEADERS,
+    )
+    for row in comparison.rows():
+        table.add_row(*row)
+    result_console().print(table)
+
+
+def write_pictures(settings: DemoSettings, comparison: Comparison) -> list[Path]:
+    """Film a blast without barrier and with the agent's layout; write the layout and the loads.
+
+    Args:
+        settings: The settings.
+        comparison: Its first threat is filmed.
+
+    Returns:
+        The files.
+    """
+    standings, agent = comparison.standings, comparison.agent
+    case, layout = standings.track.cases[0], agent.proposals[0].layout
+    scenario, threat, out = case.scenario, case.threats[0], settings.out
+    blasts = [GasBlast(scenario, each, threat.seed, charge=threat.charge) for each in ((), layout)]
+    film = out / "side_by_side.mp4"
+    with progress_bar("film") as progress:
+        bare, protected = write_pressure_film(
+            blasts[1],
+            film,
+            beside=blasts[0],
+            frames_per_s=settings.frames_per_s,
+            width_px=settings.film_width_px,
+            progress=progress,
+        )
+    charge = threat.charge_against(scenario, layout)
+    plan = LayoutPlan(scenario, layout, charge, {"run": str(settings.run)})
+    return [
+        film,
+        save_figure(facades(protected, beside=bare), out / "facade.png"),
+        save_figure(site_picture(scenario, layout), out / "site.png"),
+        protected.to_excel(out / "loads.xlsx"),
+        *export_layouts({"layout": plan}, out),
+    ]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""What the study of the scenarios, `studies.difficulty`, is made of."""

@@ -1,0 +1,361 @@
+"""What rules, random layouts and a search take off the impulse where items are placed, by gas.
+
+The places of the charge are known, it is not known which of them it will be: one layout meets all
+of them. Gas dynamics has no noise, so a layout needs one blast a place. Beside that every place has
+a search of its own, which tells what a layout for one place is worth at another one.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property, partial
+from itertools import product
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+import numpy as np
+from blast_agents.posts import VEHICLE_RULES
+from blast_agents.rules import (
+    Rule,
+    expected_charge,
+    line_of_sight_wall,
+    random_layout,
+    ring_around_building,
+    ring_around_charge,
+)
+from blast_agents.search import LayoutProblem, find_search_method
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
+from blast_env.evaluation.comparison import check_something_arrives
+from blast_env.geometry import Layout, Piece
+from blast_env.physics.engine import Engine
+from blast_env.physics.scene import Charge
+from blast_env.scenario import (
+    AnyCharge,
+    Placement,
+    PointSource,
+    Scenario,
+    VehicleCharge,
+    VehicleSource,
+)
+from studies.difficulty.outcomes import Outcome, TaskResult
+from studies.difficulty.study import STAND_OFFS
+
+METHOD: Final = "annealing"
+"""The search; it begins with the best of rules, random layouts and random walls."""
+
+_BARE: Final = "no barrier"
+_RANDOM: Final = "random layouts (mean)"
+_CACHE_SIZE: Final = 100_000
+_BEST_RANDOM: Final = 3  # random layouts that the search begins with
+
+
+class Purchase(Enum):
+    """What a rule spends the budget on first."""
+
+    HEIGHT = "height"
+    LENGTH = "length"
+    DISTANCE = "distance"
+
+
+class NamedRule(NamedTuple):
+    """A rule with what it buys; `None` where it buys more than one thing."""
+
+    rule: Rule
+    buys: Purchase | None
+
+
+def _walls(word: str, kind: str, buys: Purchase) -> dict[str, NamedRule]:
+    return {
+        f"{word} wall {where}": NamedRule(
+            partial(line_of_sight_wall, share=share, kind=kind),  # type: ignore[arg-type]
+            buys,
+        )
+        for share, where in STAND_OFFS.items()
+    }
+
+
+RULES: Final[Mapping[str, NamedRule]] = MappingProxyType(
+    {
+        **_walls("high", "high", Purchase.HEIGHT),
+        **_walls("long", "long", Purchase.LENGTH),
+        "ring around the charge": NamedRule(ring_around_charge, None),
+        "ring around the building": NamedRule(ring_around_building, None),
+    }
+)
+"""The rules by hand where items are placed; where a vehicle comes, `POST_RULES` as well."""
+
+
+POST_RULES: Final[Mapping[str, NamedRule]] = MappingProxyType(
+    {
+        name: NamedRule(rule, buys)
+        for (name, rule), buys in zip(VEHICLE_RULES.items(), (Purchase.DISTANCE, None), strict=True)
+    }
+)
+
+
+def rules_of(scenario: Scenario) -> Mapping[str, NamedRule]:
+    """Return the rules that can be followed in a scenario."""
+    return {**RULES, **POST_RULES} if scenario.vehicles else RULES
+
+
+@dataclass(frozen=True)
+class ItemEffort:
+    """How many blasts a study may cost.
+
+    Attributes:
+        layouts: Random layouts.
+        budget: Blasts of the search for one layout against all places.
+        tried: Places that this search meets; what it finds is judged at all of them.
+        finalists: Of its best layouts so far, how many of the last are judged.
+        place_budget: Blasts of the search for each place alone.
+    """
+
+    layouts: int = 50
+    budget: int = 1000
+    tried: int = 2
+    finalists: int = 8
+    place_budget: int = 100
+
+    def blasts(self, scenario: Scenario) -> int:
+        """Return the most blasts that a study of a scenario costs."""
+        places, rules = len(every_place(scenario)), len(rules_of(scenario))
+        judged = 1 + self.layouts + rules + self.finalists + places
+        return judged * places + self.budget + places * self.place_budget
+
+
+def every_place(scenario: Scenario) -> tuple[Threat, ...]:
+    """Return one threat for each place of the charge: each point, and each rank of a vehicle.
+
+    Raises:
+        BlastEnvError: If the charge may be anywhere on a line or area, or not all places are as
+            likely: the mean over them would not be what the scenario says.
+    """
+    charges: list[AnyCharge] = []
+    shares = []
+    for source in scenario.charge:
+        if isinstance(source, PointSource):
+            own: list[AnyCharge] = [Charge(source.position_m, source.tnt_kg, source.height_m)]
+        elif isinstance(source, VehicleSource):
+            own = [VehicleCharge(source, rank) for rank in range(source.places)]
+        else:
+            raise BlastEnvError(
+                f"{scenario.name}: a source of kind {source.kind!r} has no end of places, must be "
+                "points or vehicles"
+            )
+        charges += own
+        shares += [source.weight / len(own)] * len(own)
+    if not np.allclose(shares, shares[0]):
+        raise BlastEnvError(
+            f"{scenario.name}: the places of the charge have weights from {min(shares):g} to "
+            f"{max(shares):g}, must all be as likely"
+        )
+    seeds = SeedRange.JUDGEMENT.seeds(0, len(charges))
+    return tuple(Threat(charge, seed) for charge, seed in zip(charges, seeds, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class ItemResult:
+    """What was found in a scenario.
+
+    Attributes:
+        scenario: The scenario.
+        effort: What it cost at most.
+        places: The places of the charge.
+        task: The rows of the table: all of them met all places.
+        finalists: What the search thought best, one after the other.
+        of_places: For each place what its own search found.
+        buys: What each rule of the table buys.
+        searched_blasts: Blasts that the search spent.
+    """
+
+    scenario: Scenario
+    effort: ItemEffort
+    places: tuple[Threat, ...]
+    task: TaskResult
+    finalists: Outcome
+    of_places: Outcome
+    buys: tuple[Purchase | None, ...]
+    searched_blasts: int
+
+    @property
+    def best(self) -> Outcome:
+        """What reduces most of all that was found."""
+        return self.task.best
+
+    @cached_property
+    def over_rules(self) -> float:
+        """By how much the best found reduces more than the best rule, at least 0."""
+        return self.best.reduction.value - self.task.best_rule.reduction.value
+
+    def rule_loss(self, name: str) -> float | None:
+        """Return by how much a rule falls short of the best found; `None` if it is not there."""
+        for row in self.task.rules:
+            if row.name == name:
+                return self.best.reduction.value - row.reduction.value
+        return None
+
+    @cached_property
+    def random_percentiles(self) -> tuple[float, float]:
+        """10th and 90th percentile of the reduction by random layouts."""
+        low, high = np.quantile(self.task.random.layout_reductions, (0.1, 0.9))
+        return float(low), float(high)
+
+    @cached_property
+    def elsewhere(self) -> FloatArray:
+        """Reduction by the best layout for one place at another one (places, places).
+
+        The best layout for a place is the one that reduces most there of all that were judged.
+        """
+        rows = (self.task.random, *self.task.rules, self.finalists, self.of_places)
+        impulse = np.concatenate([each.impulse_pa_s for each in rows])
+        best = impulse[impulse.argmin(axis=0)]
+        return np.asarray(1.0 - best / self.task.bare.unprotected_pa_s)
+
+    @property
+    def loss_elsewhere(self) -> float:
+        """The most by which the best layout for one place falls short at another one."""
+        return float((np.diag(self.elsewhere) - self.elsewhere).max())
+
+    @cached_property
+    def purchases(self) -> Mapping[Purchase, float]:
+        """The reduction of the best rule that buys one thing, by what that is."""
+        found: dict[Purchase, float] = {}
+        for row, buys in zip(self.task.rules, self.buys, strict=True):
+            if buys is not None:
+                found[buys] = max(row.reduction.value, found.get(buys, -np.inf))
+        return found
+
+    @property
+    def better_buy(self) -> Purchase:
+        """What the budget is best spent on, if it is on one thing."""
+        return max(self.purchases, key=lambda each: self.purchases[each])
+
+
+def cost_of(scenario: Scenario, layout: Layout) -> float:
+    """Return what a layout costs."""
+    return Placement.of(scenario, layout).cost
+
+
+def pieces_text(layout: Layout) -> str:
+    """Return how many pieces of which items a layout has, the most frequent first."""
+    counts = Counter(each.item for each in layout if isinstance(each, Piece))
+    return ", ".join(f"{count} {item}" for item, count in counts.most_common()) or "-"
+
+
+class ItemStudy:
+    """Runs the blasts of a scenario with a catalogue.
+
+    Args:
+        scenario: The scenario.
+        effort: How much it may cost.
+        engine: Name of the engine, or an engine.
+        processes: Worker processes.
+        progress: Called with the share of the blasts that is done.
+        cache: Folder in which blasts are kept, so that a study goes on where it was interrupted.
+
+    Attributes:
+        evaluator: Runs the blasts and remembers them.
+        places: The places of the charge.
+
+    Raises:
+        BlastEnvError: As `every_place`, or if nothing can be placed.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        effort: ItemEffort,
+        engine: str | Engine = "gas",
+        processes: int = 2,
+        progress: Callable[[float], None] | None = None,
+        cache: Path | None = None,
+    ) -> None:
+        self.evaluator = BlastEvaluator(scenario, engine, cache_size=_CACHE_SIZE, cache=cache)
+        self.places = every_place(scenario)
+        self._scenario = scenario
+        self._effort = effort
+        self._processes = processes
+        self._progress = progress
+        self._rules = rules_of(scenario)
+
+    def result(self) -> ItemResult:
+        """Return what was found."""
+        scenario, effort = self._scenario, self._effort
+        bare = self._impulses([()])
+        check_something_arrives([Case(scenario, self.places)], bare)
+
+        def outcome(name: str, layouts: Sequence[Layout]) -> Outcome:
+            return Outcome(name, tuple(layouts), self._impulses(layouts), bare[0])
+
+        rng = np.random.default_rng(0)
+        random = outcome(_RANDOM, [random_layout(scenario, rng) for _ in range(effort.layouts)])
+        hidden = expected_charge(scenario.charge)
+        rules = {name: each.rule(scenario, hidden) for name, each in self._rules.items()}
+        task_rules = tuple(outcome(name, [layout]) for name, layout in rules.items())
+        best_random = np.argsort(random.impulse_pa_s.mean(axis=1), kind="stable")[:_BEST_RANDOM]
+        starts = (*rules.values(), *(random.layouts[index] for index in best_random))
+        found, blasts = self._searched(starts)
+        finalists = outcome("finalists", found)
+        best = int(finalists.impulse_pa_s.mean(axis=1).argmin())
+        of_places = [self._for_place(place) for place in self.places]
+        return ItemResult(
+            scenario=scenario,
+            effort=effort,
+            places=self.places,
+            task=TaskResult(
+                bare=Outcome(_BARE, ((),), bare, bare[0]),
+                random=random,
+                rules=task_rules,
+                searched=outcome(f"{METHOD}, {blasts} blasts", [found[best]]),
+            ),
+            finalists=finalists,
+            of_places=outcome("best for a place", of_places),
+            buys=tuple(each.buys for each in self._rules.values()),
+            searched_blasts=blasts,
+        )
+
+    def _searched(self, starts: tuple[Layout, ...]) -> tuple[list[Layout], int]:
+        """Return the last best layouts of the search for all places, and the blasts it spent."""
+        effort = self._effort
+        # The first and the last place: those between are known to the judge alone.
+        chosen = np.linspace(0, len(self.places) - 1, min(effort.tried, len(self.places)))
+        tried = [self.places[round(each)] for each in chosen]
+        case = Case(self._scenario, tuple(tried))
+        problem = LayoutProblem(self.evaluator, case, self._processes)
+        method = find_search_method(METHOD, _distinct(starts))
+        result = method.search(problem, effort.budget, 0, lambda _: self._report(0.0))
+        history = [each.layout for each in result.history[-effort.finalists :]]
+        return history or [result.layout], result.blasts
+
+    def _for_place(self, place: Threat) -> Layout:
+        """Return what a search finds that knows the place of the charge."""
+        scenario = self._scenario
+        starts = tuple(each.rule(scenario, place.charge) for each in self._rules.values())
+        problem = LayoutProblem(self.evaluator, Case(scenario, (place,)), self._processes)
+        method = find_search_method(METHOD, _distinct(starts))
+        return method.search(
+            problem, self._effort.place_budget, 0, lambda _: self._report(0.0)
+        ).layout
+
+    def _impulses(self, layouts: Sequence[Layout]) -> FloatArray:
+        """Return the impulse on the protected structures, Pa*s (layouts, places)."""
+        pairs = product(layouts, self.places)
+        loads = self.evaluator.loads_of_many(pairs, self._processes, self._report)
+        impulses = np.array([each.protected_impulse_pa_s for each in loads])
+        return impulses.reshape(len(layouts), len(self.places))
+
+    def _report(self, _: float) -> None:
+        """Report the share of all blasts that is done, whatever share of a batch that is."""
+        if self._progress is not None:
+            done = self.evaluator.blasts + self.evaluator.cache_hits
+            self._progress(min(done / self._effort.blasts(self._scenario), 1.0))
+
+
+def _distinct(layouts: Sequence[Layout]) -> tuple[Layout, ...]:
+    """Return layouts without those that are there twice or have nothing."""
+    return tuple({tuple(sorted(each)): each for each in layouts if each}.values())

@@ -1,0 +1,195 @@
+"""What hand-made, random and searched layouts take off the impulse in a scenario.
+
+Two tasks. Where the charge is *hidden*, one layout meets every threat that the scenario draws.
+Where it is *visible*, every charge gets a layout of its own. Layouts are chosen on training seeds
+and compared on held-out seeds, all on the same threats.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Final
+
+import numpy as np
+from blast_agents.rules import expected_charge, line_of_sight_wall, random_layout
+
+from blast_env.arrays import FloatArray
+from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.comparison import check_something_arrives
+from blast_env.geometry import Layout
+from blast_env.scenario import AnyCharge, Scenario
+from studies.difficulty.outcomes import Outcome, TaskResult
+
+STAND_OFFS: Final = {0.0: "near the charge", 0.5: "in the middle", 1.0: "near the building"}
+"""Shares of the way through the build zone at which the hand-made walls stand."""
+
+_BARE: Final = "no barrier"
+_RANDOM: Final = "random layouts (mean)"
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many blasts a study may cost.
+
+    Attributes:
+        layouts: Random layouts of which the best is searched.
+        seeds: Held-out threats of the hidden task.
+        charges: Charges of the visible task; the first round of both searches has them as well.
+        realisations: Held-out seeds of fan and air for each charge of the visible task.
+        finalists: Layouts that reach the second round of a search.
+        hidden_round: Training threats of that round in the hidden task.
+        visible_round: Training seeds a charge of that round in the visible task.
+        random_hidden: Random layouts that are compared as they are, in the hidden task.
+        random_visible: Likewise in the visible task.
+    """
+
+    layouts: int = 500
+    seeds: int = 32
+    charges: int = 6
+    realisations: int = 5
+    finalists: int = 20
+    hidden_round: int = 16
+    visible_round: int = 6
+    random_hidden: int = 30
+    random_visible: int = 10
+
+    @property
+    def blasts(self) -> int:
+        """How many blasts a study costs, unless some ways give the same layout."""
+        others = 2 + len(STAND_OFFS)  # no barrier, the walls, the best
+        return (
+            self.charges * self.layouts
+            + self.finalists * (self.hidden_round + self.charges * self.visible_round)
+            + self.seeds * (self.random_hidden + others)
+            + self.charges * self.realisations * (self.random_visible + others)
+        )
+
+
+class Study:
+    """Runs the blasts of both tasks in a scenario.
+
+    Args:
+        scenario: The scenario; it has a build zone and names a calibration.
+        effort: How much it may cost.
+        engine: Name of an engine.
+        processes: Worker processes.
+        progress: Called with the share of the blasts that is done.
+
+    Attributes:
+        evaluator: Runs the blasts and remembers them.
+        held_out: The threats that layouts are compared on in the hidden task.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        effort: Effort,
+        engine: str = "event",
+        processes: int = 2,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        self.evaluator = BlastEvaluator(scenario, engine, cache_size=effort.blasts)
+        self._scenario = scenario
+        self._effort = effort
+        self._processes = processes
+        self._progress = progress
+        self.held_out = draw_threats(scenario, SeedRange.JUDGEMENT.seeds(0, effort.seeds))
+        rng = np.random.default_rng(0)
+        self._pool = [random_layout(scenario, rng) for _ in range(effort.layouts)]
+        self._tried = draw_threats(scenario, SeedRange.SEARCH.seeds(0, effort.charges))
+
+    def hidden(self) -> TaskResult:
+        """Return the outcomes where one layout has to do for all threats."""
+        effort, scenario = self._effort, self._scenario
+        more = draw_threats(scenario, SeedRange.SEARCH.seeds(effort.charges, effort.hidden_round))
+        searched = self._best_of_pool(self._first_round, more)
+        bare = self._impulses([()], self.held_out)
+        check_something_arrives([Case(scenario, self.held_out)], bare)
+
+        def outcome(name: str, layouts: Sequence[Layout]) -> Outcome:
+            return Outcome(name, tuple(layouts), self._impulses(layouts, self.held_out), bare[0])
+
+        middle = expected_charge(scenario.charge)
+        return TaskResult(
+            bare=Outcome(_BARE, ((),), bare, bare[0]),
+            random=outcome(_RANDOM, self._pool[: effort.random_hidden]),
+            rules=tuple(
+                outcome(f"wall {where}", [line_of_sight_wall(scenario, middle, share)])
+                for share, where in STAND_OFFS.items()
+            ),
+            searched=outcome(f"best of {effort.layouts} random ones", [searched]),
+        )
+
+    def visible(self) -> TaskResult:
+        """Return the outcomes where every charge has a layout of its own."""
+        effort, scenario = self._effort, self._scenario
+        charges = [threat.charge for threat in self._tried]
+        bare = np.stack([self._on_charge([()], charge)[0] for charge in charges])
+
+        def outcome(name: str, layouts: Sequence[Layout]) -> Outcome:
+            pairs = zip(layouts, charges, strict=True)
+            impulse = np.array([self._on_charge([layout], charge) for layout, charge in pairs])
+            return Outcome(name, tuple(layouts), impulse.reshape(1, -1), bare)
+
+        random = self._pool[: effort.random_visible]
+        on_charges = np.stack([self._on_charge(random, charge) for charge in charges], axis=1)
+        searched = [
+            self._best_of_pool(self._first_round[:, [number]], self._again(charge))
+            for number, charge in enumerate(charges)
+        ]
+        return TaskResult(
+            bare=Outcome(_BARE, ((),), bare[np.newaxis], bare),
+            random=Outcome(_RANDOM, tuple(random), on_charges, bare),
+            rules=tuple(
+                outcome(
+                    f"wall {where}",
+                    [line_of_sight_wall(scenario, charge, share) for charge in charges],
+                )
+                for share, where in STAND_OFFS.items()
+            ),
+            searched=outcome(f"best of {effort.layouts} random ones", searched),
+        )
+
+    @cached_property
+    def _first_round(self) -> FloatArray:
+        """Impulses of all random layouts on the first training threats (layouts, charges)."""
+        return self._impulses(self._pool, self._tried)
+
+    def _again(self, charge: AnyCharge) -> tuple[Threat, ...]:
+        """Return a charge with further training seeds."""
+        first = self._effort.charges
+        seeds = SeedRange.SEARCH.seeds(first, self._effort.visible_round)
+        return tuple(Threat(charge, seed) for seed in seeds)
+
+    def _best_of_pool(self, first: FloatArray, more: Sequence[Threat]) -> Layout:
+        """Return the random layout that does best in two rounds on training threats.
+
+        Args:
+            first: Impulses of the first round (layouts, threats).
+            more: The threats of the second round, which only the best ones reach.
+        """
+        order = np.argsort(first.mean(axis=1), kind="stable")[: self._effort.finalists]
+        second = self._impulses([self._pool[index] for index in order], more)
+        both = np.concatenate((first[order], second), axis=1).mean(axis=1)
+        return self._pool[int(order[np.argmin(both)])]
+
+    def _on_charge(self, layouts: Sequence[Layout], charge: AnyCharge) -> FloatArray:
+        """Return the impulses of layouts, means over the held-out realisations (layouts,)."""
+        seeds = SeedRange.JUDGEMENT.seeds(0, self._effort.realisations)
+        means: FloatArray = self._impulses(layouts, [Threat(charge, seed) for seed in seeds]).mean(
+            axis=1
+        )
+        return means
+
+    def _impulses(self, layouts: Sequence[Layout], threats: Sequence[Threat]) -> FloatArray:
+        """Return the impulse on the protected structures, Pa*s (layouts, threats)."""
+        pairs = product(layouts, threats)
+        loads = self.evaluator.loads_of_many(pairs, self._processes, self._report)
+        impulses = np.array([each.protected_impulse_pa_s for each in loads])
+        return impulses.reshape(len(layouts), len(threats))
+
+    def _report(self, _: float) -> None:
+        """Report the share of all blasts that is done, whatever share of a batch that is."""
+        if self._progress is not None:
+            self._progress(self.evaluator.blasts / self._effort.blasts)

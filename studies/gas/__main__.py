@@ -1,0 +1,481 @@
+"""The tables and figures of docs/engineers/gas.md: what was checked about the gas engine."""
+
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+from math import cbrt, isnan
+from pathlib import Path
+from time import process_time
+from typing import Annotated, Final
+
+import numpy as np
+import typer
+from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
+
+from blast_env.arrays import FloatArray
+from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.files import make_folder
+from blast_env.geometry import Layout
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
+from blast_env.rendering.figures import save_figure
+from blast_env.runner import run_all
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario.build_scene import draw_charge
+from blast_env.simulation.gas import GasBlast
+from blast_env.studies.shielding.ratios import EXPERIMENT, REGIONS, ExperimentalBand
+from blast_env.tables import markdown_table
+from blast_env.units import MS_PER_S
+from studies.gas.cells import CellLoads, cell_loads, difference
+from studies.gas.corners import corner_waves
+from studies.gas.ending import Ending, ending
+from studies.gas.handover import load_from_radius
+from studies.gas.judgement import Judgement
+from studies.gas.judgement import judge as judgement
+from studies.gas.loads import impulse_until
+from studies.gas.reference import free_field, wide_wall
+from studies.gas.sites import BARRIER_M, BUILDING_M, with_heights, yard
+from studies.gas.sources import source_ratios, trade_off_figure
+
+CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
+"""With which cells a charge is held against Kingery and Bulmash, by its mass in kg."""
+PEAK_CHARGE_KG: Final = 100.0
+PEAK_DISTANCE_M: Final = 12.5
+YARD: Final = "yard"
+
+Cell = Annotated[float, typer.Option(help="Side of a cell, m.")]
+Processes = Annotated[int, typer.Option(min=1)]
+app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
+
+
+def _numbers(text: str) -> list[float]:
+    """Return the numbers of a list separated by commas; none for an empty one."""
+    try:
+        return [float(part) for part in text.split(",") if part]
+    except ValueError as error:
+        raise typer.BadParameter(f"{text!r}: {error}") from error
+
+
+@app.command()
+def source(cell: Cell = 0.5, out: Path = Path("out/gas_source.png")) -> None:
+    """Print and draw what the charge could be: sources against Kingery and Bulmash.
+
+    100 kg on the ground. No source meets the incident and the reflected impulse at once.
+    """
+    with user_errors():
+        make_folder(out.parent)
+        with progress_bar("sources") as progress:
+            found = source_ratios(cell_m=cell, progress=progress)
+        rows = [
+            (
+                each.name,
+                ", ".join(f"{wall.z_m_kg:.2f}" for wall in each.reflected),
+                ", ".join(f"{wall.impulse:.3f}" for wall in each.reflected),
+                ", ".join(f"{wave.impulse:.3f}" for wave in each.incident),
+                ", ".join(f"{wall.arrival:.3f}" for wall in each.reflected),
+            )
+            for each in found
+        ]
+        headers = ("source", "Z (m/kg^(1/3))", "reflected", "incident", "arrival at the wall")
+        print_line(markdown_table(headers, rows))
+        print_line(f"wrote {save_figure(trade_off_figure(found, cell), out)}")
+
+
+@app.command()
+def kingery_bulmash(
+    charges: Annotated[str, typer.Option(help="kg, separated by commas.")] = "20,100,1000",
+    distances: Annotated[
+        str, typer.Option(help="m/kg^(1/3), separated by commas.")
+    ] = "1.7,2.15,2.7,3.45,4.3,5.4,8.6",
+    peak_cells: Annotated[
+        str, typer.Option(help="m, for 100 kg at 12.5 m; empty: leave that table out.")
+    ] = "1,0.5,0.25",
+) -> None:
+    """Hold the waves of charges on the ground against Kingery and Bulmash.
+
+    Impulses of the first positive phase, arrival and peak over the curves; then the reflected peak
+    by the size of the cells.
+    """
+    headers = ("charge (kg)", "cell (m)", "", "Z (m/kg^(1/3))", "impulse", "arrival", "peak")
+    wanted, rows = _numbers(distances), []
+    with user_errors():
+        for charge_kg in _numbers(charges):
+            cell_m = CELLS_M.get(charge_kg, 0.5)
+            walls = [wide_wall(charge_kg, z * cbrt(charge_kg), cell_m) for z in wanted]
+            waves = free_field(charge_kg, wanted, cell_m)
+            for name, ratios in (("reflected", walls), ("incident", waves)):
+                for ratio in ratios:
+                    values = (ratio.impulse, ratio.arrival, ratio.peak)
+                    start = (f"{charge_kg:g}", f"{cell_m:g}", name, f"{ratio.z_m_kg:.2f}")
+                    rows.append((*start, *(f"{value:.3f}" for value in values)))
+        print_line(markdown_table(headers, rows))
+        peaks = []
+        for cell_m in _numbers(peak_cells):
+            ratio = wide_wall(PEAK_CHARGE_KG, PEAK_DISTANCE_M, cell_m)
+            cells = f"{cbrt(PEAK_CHARGE_KG) / cell_m:.1f}"
+            peaks.append((f"{cell_m:g}", cells, f"{ratio.impulse:.3f}", f"{ratio.peak:.3f}"))
+        if peaks:
+            columns = ("cell (m)", "cells per kg^(1/3)", "reflected impulse", "reflected peak")
+            print_line("\n" + markdown_table(columns, peaks))
+
+
+@app.command()
+def borders(
+    scenario: str = "courtyard",
+    places: Annotated[
+        str, typer.Option(help="MARGIN/BORDER in m, separated by commas.")
+    ] = "2/0,2/12,2/24,2/48,8/48",
+    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.2,
+    all_layouts: Annotated[bool, typer.Option(help="Also the wall near the building.")] = False,
+    cell: Cell = 0.5,
+) -> None:
+    """Print how loads depend on where the open borders at the sides and above are.
+
+    The margin is where cells begin to grow, the border where they end. With everything as high as
+    the air, and with real heights; the others are compared with the last of the places.
+    """
+    rows = []
+    with user_errors():
+        wanted = [_numbers(place.replace("/", ",")) for place in places.split(",")]
+        loaded = load_scenario(scenario)
+        for heights, site in (("endless", loaded), (_HEIGHTS, with_heights(loaded))):
+            for name, layout in list(_rule_layouts(site).items())[: None if all_layouts else 2]:
+                engines = [
+                    GasEngine(cell_m=cell, margin_m=margin_m, border_m=border_m)
+                    for margin_m, border_m in wanted
+                ]
+                loads = [impulse_until(GasBlast(site, layout, engine=e), until) for e in engines]
+                rows.append((heights, name, *_against_last(loads)))
+    headers = (f"{margin_m:g} m + {border_m:g} m" for margin_m, border_m in wanted)
+    print_line(markdown_table(("heights", "layout", *headers), rows))
+
+
+@app.command()
+def air_height(
+    scenario: str = "courtyard",
+    heights_m: Annotated[
+        str, typer.Option("--heights", help="m, separated by commas.")
+    ] = "9,12,18,24",
+    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.2,
+    all_layouts: Annotated[bool, typer.Option(help="Also the wall near the charge.")] = False,
+    cell: Cell = 0.5,
+) -> None:
+    """Print how loads depend on how high the air is, above which cells grow.
+
+    With real heights. The others are compared with the last of the heights.
+    """
+    rows, wanted = [], _numbers(heights_m)
+    with user_errors():
+        loaded, engine = load_scenario(scenario), GasEngine(cell_m=cell)
+        for name, layout in _rule_layouts(loaded).items():
+            if name == "wall near the charge" and not all_layouts:
+                continue
+            sites = [with_heights(loaded, air_m=air_m) for air_m in wanted]
+            loads = [impulse_until(GasBlast(site, layout, engine=engine), until) for site in sites]
+            rows.append((name, *_against_last(loads)))
+    print_line(markdown_table(("layout", *(f"{m:g} m" for m in wanted)), rows))
+
+
+@app.command()
+def handover(
+    scenario: str = "courtyard",
+    radii_m: Annotated[
+        str, typer.Option("--radii", help="m, separated by commas.")
+    ] = "1.5,3,4,6,8,12,16,22",
+    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.09,
+    cell: Cell = 0.5,
+) -> None:
+    """Print how loads depend on where the front is when the grid takes a charge over.
+
+    Without a barrier, with real heights. Layouts of a scenario never differ in that.
+    """
+    with user_errors():
+        blast = GasBlast(with_heights(load_scenario(scenario)), engine=GasEngine(cell_m=cell))
+        own_m = blast.engine.start_on(blast.site).handover_radius_m
+        rows = [
+            (f"{radius_m:g}", f"{load_from_radius(blast, radius_m, until):.1f}")
+            for radius_m in _numbers(radii_m)
+        ]
+    print_line(markdown_table(("radius (m)", f"impulse (Pa s) at {until:g} s"), rows))
+    print_line(f"the engine's own radius is {own_m:.3g} m")
+
+
+@app.command()
+def cost(
+    scenarios: Annotated[list[str], typer.Argument(help="Bundled names or paths.")],
+    cell: Cell = 0.5,
+) -> None:
+    """Print what a blast of each scenario costs on the empty site: CPU time, steps, updates."""
+    with user_errors():
+        blasts = [GasBlast(name, engine=GasEngine(cell_m=cell)) for name in scenarios]
+        for blast in blasts[:1]:  # so that all is compiled
+            blast.engine.start_on(blast.site).advance(0.01)
+        rows = []
+        for name, blast in zip(scenarios, blasts, strict=True):
+            began = process_time()
+            run = blast.run().run
+            cells = " x ".join(map(str, run.grid.shape))
+            updates = f"{1e-6 * run.solver.cell_updates:.0f}"
+            spent = f"{process_time() - began:.2f}"
+            rows.append(
+                (name, cells, f"{MS_PER_S * run.time_s:.0f}", f"{run.steps}", updates, spent)
+            )
+    headers = ("scenario", "cells", "ms", "steps", "million cell updates", "CPU s")
+    print_line(markdown_table(headers, rows))
+
+
+@app.command()
+def settling(
+    scenario: str = "school_and_clinic",
+    times_s: Annotated[
+        str, typer.Option("--times", help="s, of 100 kg, separated by commas.")
+    ] = "0.02,0.04,0.06,0.09,inf",
+    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.18,
+    cell: Cell = 0.5,
+) -> None:
+    """Print how loads depend on when the products settle: never, in the last column by default.
+
+    A settled gas has a bound on its temperature, which lengthens the time step.
+    """
+    with user_errors():
+        loaded, wanted = load_scenario(scenario), _numbers(times_s)
+        engines = [GasEngine(cell_m=cell, settled_s=time_s) for time_s in wanted]
+        rows = []
+        for name, layout in _rule_layouts(loaded).items():
+            blasts = [GasBlast(loaded, layout, engine=engine) for engine in engines]
+            rows.append((name, *_against_last([impulse_until(each, until) for each in blasts])))
+    print_line(markdown_table(("layout", *(f"{1e3 * time_s:g} ms" for time_s in wanted)), rows))
+
+
+_HEIGHTS: Final = f"building {BUILDING_M:g} m, wall {BARRIER_M:g} m"
+
+
+def _against_last(loads: list[float]) -> list[str]:
+    """Return loads in Pa s, with how far they are from the last one."""
+    return [f"{load:.1f} ({100.0 * (load / loads[-1] - 1.0):+.2f} %)" for load in loads]
+
+
+def _rule_layouts(scenario: Scenario) -> dict[str, Layout]:
+    """Return no barrier and the two walls by rule, for the charge of seed 0."""
+    charge = draw_charge(scenario, 0)
+    return {
+        "no barrier": (),
+        "wall near the charge": wall_near_charge(scenario, charge),
+        "wall near the building": wall_near_building(scenario, charge),
+    }
+
+
+def _random_layouts(scenario: Scenario, count: int) -> dict[str, Layout]:
+    rng = np.random.default_rng(0)
+    return {f"random {number}": random_layout(scenario, rng) for number in range(1, count + 1)}
+
+
+@app.command("ending")
+def endings(
+    scenario: str = "courtyard",
+    until: Annotated[float, typer.Option(help="When loads are looked at again, s.")] = 0.2,
+    random_layouts: Annotated[int, typer.Option(min=0)] = 2,
+    cell: Cell = 0.5,
+    processes: Processes = 1,
+    cluster: ClusterAddress = None,
+) -> None:
+    """Print what the end of a run cuts off: the impulse then and later, with several layouts."""
+    with user_errors(), running_on(cluster):
+        loaded, engine = load_scenario(scenario), GasEngine(cell_m=cell)
+        layouts = _rule_layouts(loaded) | _random_layouts(loaded, random_layouts)
+        jobs = {
+            (heights, name): GasBlast(site, layout, engine=engine)
+            for heights, site in (("endless", loaded), (_HEIGHTS, with_heights(loaded)))
+            for name, layout in layouts.items()
+        }
+        with progress_bar("blasts") as progress:
+            run = partial(ending, later_s=until)
+            found = run_all(run, list(jobs.values()), processes, progress)
+    headers = ("heights", "layout", "end (ms)", "impulse (Pa s)", f"at {until:g} s", "cut off")
+    rows = [(*job, *_ending_row(each)) for job, each in zip(jobs, found, strict=True)]
+    print_line(markdown_table(headers, rows))
+    print_line("ended because: " + ", ".join(sorted({str(each.reason) for each in found})))
+
+
+def _ending_row(found: Ending) -> tuple[str, ...]:
+    return (
+        f"{MS_PER_S * found.time_s:.0f}",
+        f"{found.impulse_pa_s:.1f}",
+        f"{found.later_pa_s:.1f}",
+        f"{100.0 * found.cut_off:.2f} %",
+    )
+
+
+@app.command()
+def cells(
+    scenario: Annotated[
+        str, typer.Option(help=f"{YARD!r} is a small site for small cells.")
+    ] = YARD,
+    endless: Annotated[bool, typer.Option(help="Everything as high as the air.")] = False,
+    charges: Annotated[int, typer.Option(min=1, help="Charges, those of seeds from 0.")] = 1,
+    random_layouts: Annotated[int, typer.Option(min=0)] = 2,
+    sizes: Annotated[str, typer.Option(help="Sides of cells, m, all layouts.")] = "0.5,0.25",
+    finest: Annotated[
+        float | None, typer.Option(help="m, for none and the first three layouts only.")
+    ] = None,
+    until: Annotated[
+        float | None, typer.Option(help="When loads are looked at, s; at the end of the runs.")
+    ] = None,
+    processes: Processes = 2,
+    cluster: ClusterAddress = None,
+) -> None:
+    """Print whether smaller cells change loads, reductions and the order of layouts."""
+    with user_errors(), running_on(cluster):
+        site = _cells_site(scenario, endless)
+        for seed in range(charges):
+            charge = draw_charge(site, seed)
+            run = partial(cell_loads, site, charge=charge, until_s=until, processes=processes)
+            _print_cells(site, charge, random_layouts, (_numbers(sizes), finest), run)
+
+
+def _cells_site(scenario: str, endless: bool) -> Scenario:
+    if scenario == YARD:
+        return yard()
+    loaded = load_scenario(scenario)
+    has_heights = any(each.height_m is not None for each in loaded.structures)
+    return loaded if endless or has_heights else with_heights(loaded)
+
+
+def _print_cells(
+    site: Scenario,
+    charge: Charge,
+    random_layouts: int,
+    sizes: tuple[list[float], float | None],
+    run: Callable[..., CellLoads],
+) -> None:
+    rules: dict[str, Callable[[Scenario, Charge], Layout]] = {
+        "wall near the charge": wall_near_charge,
+        "wall near the building": wall_near_building,
+    }
+    layouts = {name: rule(site, charge) for name, rule in rules.items()}
+    layouts |= _random_layouts(site, random_layouts)
+    all_sizes, finest = sizes
+    jobs = [(size, list(layouts.values())) for size in all_sizes]
+    if finest is not None:
+        jobs.append((finest, list(layouts.values())[:3]))
+    found = []
+    for size, tried in jobs:
+        with progress_bar(f"{site.name}, {size:g} m") as progress:
+            found.append(run(tried, cell_m=size, progress=progress))
+    x_m, y_m = charge.position_m
+    print_line(f"{site.name}, {charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m")
+    rows = [
+        ("no barrier (Pa s)", *(f"{each.unprotected_pa_s:.1f}" for each in found)),
+        *(
+            (name, *(_reduction(each.reduction.tolist(), number) for each in found))
+            for number, name in enumerate(layouts)
+        ),
+        ("CPU time of a blast (s)", *(f"{each.cpu_s:.1f}" for each in found)),
+    ]
+    print_line(markdown_table(("", *(f"{each.cell_m:g} m" for each in found)), rows) + "\n")
+    rows = []
+    for coarse, fine in pairwise(found):
+        apart = difference(coarse, fine)
+        rows.append(
+            (
+                f"{coarse.cell_m:g} m less {fine.cell_m:g} m",
+                f"{100.0 * apart.impulse:+.2f} %",
+                f"{100.0 * apart.reduction:+.2f}",
+                f"{100.0 * apart.largest:+.2f}",
+                "-" if isnan(apart.rank) else f"{apart.rank:.2f}",
+            )
+        )
+    headers = ("", "impulse", "reduction (points)", "at most", "rank correlation")
+    print_line(markdown_table(headers, rows) + "\n")
+
+
+def _reduction(reductions: list[float], number: int) -> str:
+    return f"{100.0 * reductions[number]:.1f} %" if number < len(reductions) else "-"
+
+
+@app.command()
+def corners(
+    sizes: Annotated[str, typer.Option(help="Sides of cells, m.")] = "0.5,0.25",
+    heights: Annotated[
+        str, typer.Option(help="Heights of the block, m; empty: as high as wide.")
+    ] = "",
+) -> None:
+    """Print what gets round one and two corners of a block: first waves over the free field's."""
+    rows = []
+    with user_errors():
+        wanted: list[float | None] = [*_numbers(heights)] or [None]
+        for height_m in wanted:
+            for cell_m in _numbers(sizes):
+                waves = corner_waves(cell_m, height_m)
+                for region in REGIONS:
+                    gauges, band = waves.gauges_of(region), EXPERIMENT.get(region)
+                    rows.append(
+                        (
+                            f"{waves.height_m:g}",
+                            f"{cell_m:g}",
+                            region.replace("_", " "),
+                            "-" if band is None else f"{band.value:.2f} ± {band.tolerance:.2f}",
+                            "-" if band is None else _within(gauges, band),
+                            f"{waves.mean(region):.2f}",
+                            f"{gauges.min():.2f} to {gauges.max():.2f}",
+                            f"{waves.mean(region, all_phases=True):.2f}",
+                            f"{100.0 * waves.unfinished:.0f} %",
+                        )
+                    )
+    headers = ("block (m high)", "cell (m)", "gauges", "experiments", "within", "first wave")
+    print_line(markdown_table((*headers, "gauge by gauge", "all phases", "unfinished"), rows))
+
+
+def _within(gauges: FloatArray, band: ExperimentalBand) -> str:
+    """Return how many gauges are within a band."""
+    low, high = band.bounds
+    return f"{((gauges >= low) & (gauges <= high)).sum()} of {len(gauges)}"
+
+
+@app.command()
+def judge(
+    scenario: str = "courtyard",
+    random_layouts: Annotated[int, typer.Option(min=1)] = 58,
+    charges: Annotated[int, typer.Option(min=1)] = 3,
+    seeds: Annotated[int, typer.Option(min=1)] = 4,
+    store: Annotated[
+        Path | None, typer.Option(help="Folder from which a study that was broken off goes on.")
+    ] = None,
+    processes: Processes = 2,
+    cluster: ClusterAddress = None,
+) -> None:
+    """Judge the presets of the particle model by gas dynamics: order, overstatement, regret.
+
+    Random layouts and the two walls by rule, each under charges that the scenario draws.
+    """
+    with user_errors(), running_on(cluster):
+        chosen = load_scenario(scenario)
+        rng = np.random.default_rng(0)
+        drawn = [draw_charge(chosen, seed) for seed in range(charges)]
+        layouts = [rule(chosen, drawn[0]) for rule in (wall_near_charge, wall_near_building)]
+        layouts += [random_layout(chosen, rng) for _ in range(random_layouts)]
+        with progress_bar(f"gas blasts in {chosen.name}") as progress:
+            found = judgement(chosen, layouts, drawn, seeds, processes, progress, store=store)
+    headers = ("preset", "mean (gas)", "overstated", "rank correlation", "by charge", "regret")
+    rows = [(preset, *_judgement_row(each)) for preset, each in found.items()]
+    print_line(markdown_table((*headers, "best factor", "error with it", "without"), rows))
+
+
+def _judgement_row(found: Judgement) -> tuple[str, ...]:
+    particle, gas = found.means
+    error, spread = found.errors
+    return (
+        f"{100.0 * particle:.1f} % ({100.0 * gas:.1f} %)",
+        f"{found.overstatement:.1f} times",
+        f"{found.all_pairs:.2f}",
+        ", ".join(f"{each:.2f}" for each in found.rank_correlations),
+        f"{100.0 * found.regret.value:.1f} points",
+        f"{found.factor:.2f}",
+        f"{100.0 * error:.1f} points",
+        f"{100.0 * spread:.1f} points",
+    )
+
+
+if __name__ == "__main__":
+    app()

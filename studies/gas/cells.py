@@ -1,0 +1,109 @@
+"""Whether smaller cells would change what a layout is worth, and the order of layouts."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from time import process_time
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from blast_env.arrays import FloatArray
+from blast_env.geometry import Layout
+from blast_env.physics.gas.engine import GasEngine
+from blast_env.physics.scene import Charge
+from blast_env.runner import run_all
+from blast_env.scenario import Scenario
+from blast_env.simulation.gas import GasBlast
+from blast_env.statistics import reductions
+from studies.gas.loads import impulse_until, protected_impulse_pa_s
+
+
+@dataclass(frozen=True, eq=False)
+class CellLoads:
+    """Loads of layouts with cells of one size.
+
+    Attributes:
+        cell_m: Side of a cell.
+        unprotected_pa_s: Impulse without a barrier.
+        impulse_pa_s: Impulse with each layout (layouts,).
+        cpu_s: Mean CPU time of a blast.
+    """
+
+    cell_m: float
+    unprotected_pa_s: float
+    impulse_pa_s: FloatArray
+    cpu_s: float
+
+    @property
+    def reduction(self) -> FloatArray:
+        """What each layout takes off (layouts,)."""
+        without = np.full_like(self.impulse_pa_s, self.unprotected_pa_s)
+        return reductions(self.impulse_pa_s, without)
+
+
+@dataclass(frozen=True)
+class CellDifference:
+    """How far loads with coarse cells are from those with fine ones.
+
+    Attributes:
+        impulse: Mean of the coarse impulse over the fine one less 1, all layouts and none.
+        reduction: Mean difference of the reductions, coarse less fine.
+        largest: Largest difference of a reduction.
+        rank: Rank correlation of the impulses of the layouts; NaN below 3 layouts.
+    """
+
+    impulse: float
+    reduction: float
+    largest: float
+    rank: float
+
+
+def cell_loads(
+    scenario: Scenario,
+    layouts: Sequence[Layout],
+    charge: Charge,
+    cell_m: float,
+    until_s: float | None = None,
+    processes: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> CellLoads:
+    """Run one blast without a barrier and one with each layout.
+
+    Args:
+        scenario: The scenario.
+        layouts: The layouts.
+        charge: The charge.
+        cell_m: Side of a cell.
+        until_s: When loads are looked at; at the end of the run unless given.
+        processes: Worker processes.
+        progress: Called with the share of the blasts that is done.
+    """
+    run = partial(_load, scenario, charge, GasEngine(cell_m=cell_m), until_s)
+    loads, times_s = np.array(run_all(run, [(), *layouts], processes, progress)).T
+    return CellLoads(cell_m, float(loads[0]), loads[1:], float(times_s.mean()))
+
+
+def _load(
+    scenario: Scenario, charge: Charge, engine: GasEngine, until_s: float | None, layout: Layout
+) -> tuple[float, float]:
+    start, blast = process_time(), GasBlast(scenario, layout, 0, engine, charge)
+    if until_s is None:
+        impulse = protected_impulse_pa_s(blast.run())
+    else:
+        impulse = impulse_until(blast, until_s)
+    return impulse, process_time() - start
+
+
+def difference(coarse: CellLoads, fine: CellLoads) -> CellDifference:
+    """Return how far two sizes are apart, on the layouts that both have (the first ones)."""
+    count = min(len(coarse.impulse_pa_s), len(fine.impulse_pa_s))
+    one, other = coarse.impulse_pa_s[:count], fine.impulse_pa_s[:count]
+    off = np.append(one / other, coarse.unprotected_pa_s / fine.unprotected_pa_s) - 1.0
+    apart = coarse.reduction[:count] - fine.reduction[:count]
+    return CellDifference(
+        impulse=float(off.mean()),
+        reduction=float(apart.mean()),
+        largest=float(apart[np.abs(apart).argmax()]),
+        rank=float(spearmanr(one, other).statistic) if count > 2 else np.nan,
+    )

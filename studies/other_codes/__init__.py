@@ -1,0 +1,1 @@
+"""The gas engine against other codes on the same scene."""

@@ -1,0 +1,51 @@
+"""Film a blast as overpressure, without a barrier and behind a wall: the animation of the README.
+
+`python -m studies.pressure_film FILM` films the site of docs/data/depot.toml with the wall that a
+rule puts near the building, by gas dynamics in cells of 0.5 m.
+"""
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+from blast_agents.rules import wall_near_building
+
+from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.rendering.pressure_film import write_pressure_film
+from blast_env.rendering.pressure_frames import Section
+from blast_env.scenario import Charge, load_scenario
+from blast_env.simulation.gas import GasBlast
+
+SITE: Final = Path(__file__).parents[1] / "docs" / "data" / "depot.toml"
+CHARGE: Final = Charge((4.0, 11.0), 100.0)
+SECTION: Final = Section("y", 9.25)
+"""Through the wall; at the charge there is the path that must stay open."""
+
+
+def main(
+    film: Annotated[Path, typer.Argument(help="The film to write: .gif or .mp4.")],
+    frames_per_s: Annotated[float, typer.Option(help="Frames in a second of the film.")] = 10.0,
+    slow_motion: Annotated[
+        float, typer.Option(help="Seconds of the film for a second of the blast.")
+    ] = 100.0,
+) -> None:
+    """Write the film, and say what the control room takes in it."""
+    with user_errors():
+        scenario = load_scenario(SITE)
+        wall = wall_near_building(scenario, CHARGE)
+        with progress_bar("film") as progress:
+            results = write_pressure_film(
+                GasBlast(scenario, wall, charge=CHARGE),
+                film,
+                beside=GasBlast(scenario, charge=CHARGE),
+                section=SECTION,
+                frames_per_s=frames_per_s,
+                slow_motion=slow_motion,
+                progress=progress,
+            )
+        without, behind = (result.impulse("control_room").pa_s for result in results)
+    print_line(f"wrote {film}: {without:.0f} Pa s without a barrier, {behind:.0f} Pa s behind it")
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,368 @@
+"""The surrogate of gas dynamics: blasts to fit it to, the fit, and whether a search exploits it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from shlex import join
+from statistics import fmean, median
+from time import perf_counter
+from typing import Annotated, Final
+
+import numpy as np
+import pandas as pd
+import torch
+import typer
+from blast_agents.league import known_track
+from blast_agents.league.trained import TrainedRun, check_runs
+from blast_agents.rules import random_layout
+from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.search.from_policy import SamplingAgent
+from blast_agents.search.moves import Moves, random_walls
+from blast_agents.surrogate.fitting import Errors, Samples, errors, fit, folds
+from blast_agents.surrogate.network import Check, Fit, Surrogate, load_surrogate
+from blast_agents.surrogate.search import Guesses, SurrogateAgent, improved
+from blast_agents.training import load_agent
+
+from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
+from blast_env.files import make_folder
+from blast_env.geometry import Layout
+from blast_env.provenance import command, versions
+from blast_env.recording.parquet import read_frame
+from blast_env.runner import run_all
+from blast_env.scenario import Scenario, load_scenario
+from blast_env.sites import FAMILIES, HELD_OUT_SITES, ITEM_SITES, generate_site
+from blast_env.statistics import mean_estimate, reductions
+from blast_env.tables import markdown_table
+from blast_env.units import MS_PER_S
+from blast_env.values import whole_number
+from studies.blast_table import COLUMNS, scenario_of
+
+DATA: Final = Path("docs/data/site_blasts.parquet")
+_FOLDS: Final = 5
+_MOST_DRAWN: Final = 10_000
+
+Processes = Annotated[int, typer.Option(min=1)]
+app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
+
+
+@app.command()
+def blasts(
+    sites: Annotated[int, typer.Option(min=1, help="Generated sites, of training's seeds.")] = 100,
+    layouts: Annotated[int, typer.Option(min=1, help="On each, beside the rules' and none.")] = 12,
+    threats: Annotated[int, typer.Option(min=1, help="Charges on each.")] = 1,
+    cache: Annotated[Path, typer.Option(help="Folder in which they are kept.")] = Path(
+        "out/surrogate/blasts"
+    ),
+    processes: Processes = 2,
+    cluster: ClusterAddress = None,
+) -> None:
+    """Run blasts on generated sites: every rule, random layouts, walls, and changes of the rules'.
+
+    Those that are there already are not run again. `studies.blast_table` makes a table of them.
+    """
+    with user_errors(), running_on(cluster):
+        make_folder(cache)
+        run = partial(site_blasts, layouts=layouts, threats=threats, cache=cache)
+        with progress_bar("sites") as progress:
+            run_all(run, range(HELD_OUT_SITES, HELD_OUT_SITES + sites), processes, progress)
+
+
+def site_blasts(seed: int, layouts: int, threats: int, cache: Path) -> int:
+    """Run the blasts of one site; return how many were not there before."""
+    site = generate_site(seed, FAMILIES[ITEM_SITES])
+    evaluator = BlastEvaluator(site, "gas", cache=cache)
+    tried = varied_layouts(site, layouts, seed)
+    pairs = [(each, threat) for threat in draw_threats(site, range(threats)) for each in tried]
+    evaluator.loads_of_many(pairs)
+    return evaluator.blasts
+
+
+def varied_layouts(site: Scenario, count: int, seed: int) -> list[Layout]:
+    """Return no barrier, the rules' layouts, and as many others of all kinds."""
+    rng, moves = np.random.default_rng(seed), Moves(site)
+    ruled = list(dict.fromkeys(layouts_by_rule(site).values()))
+    found: list[Layout] = [(), *ruled]
+    for number in range(count):
+        if number % 4 == 0 or not ruled:
+            found.append(random_layout(site, rng))
+        elif number % 4 == 1:
+            found.append(random_walls(site, rng))
+        else:
+            layout = ruled[int(rng.integers(len(ruled)))]
+            for _ in range(int(rng.integers(1, 5))):
+                layout = moves.neighbour(layout, rng)
+            found.append(layout)
+    return list(dict.fromkeys(tuple(sorted(each)) for each in found))
+
+
+@app.command("fit")
+def fit_it(
+    data: Annotated[list[Path] | None, typer.Option(help="Tables of blasts.")] = None,
+    without: Annotated[
+        list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option(help="First tell the errors, with a fifth held out in turn.")
+    ] = True,
+    epochs: Annotated[int, typer.Option(min=1)] = 20,
+    seed: int = 0,
+    out: Annotated[Path, typer.Option(help="The surrogate, .json.")] = Path("out/surrogate.json"),
+) -> None:
+    """Fit the surrogate; print its errors on layouts and on sites that it was not fitted to."""
+    torch.set_num_threads(1)  # more of them only wait for each other, for minutes on busy cores
+    with user_errors():
+        make_folder(out.parent)
+        names = [column.name for column in COLUMNS]
+        tables = [read_frame(path, names) for path in data or [DATA]]
+        table = pd.concat(tables, ignore_index=True)
+        named = table[~table["scenario"].isin(["", *(without or ())])]
+        scenarios = [scenario_of(name) for name in named["scenario"].unique()]
+        samples = Samples.of(named, {each.content_hash: each for each in scenarios})
+        about = Fit(
+            command=join(("python", "-m", "studies.surrogate", *command()[1:])),
+            versions=versions(),
+            engine=str(named["engine"].iloc[0]),
+            blasts=len(samples),
+            sites=len(np.unique(samples.site)),
+        )
+        if check:
+            about = checked(samples, about, epochs, seed)
+        began_s = perf_counter()
+        fitted = fit(samples, np.ones(len(samples), dtype=bool), epochs, seed, about)
+        about = about.model_copy(update={"seconds": round(perf_counter() - began_s, 1)})
+        surrogate = replace(fitted, fit=about)
+        print_line(f"{len(samples):,} loads of {about.sites} sites; wrote {surrogate.save(out)}")
+
+
+def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
+    """Print how far the surrogate is off on what it was not fitted to; return it with that."""
+    held_out = {"layouts": samples.layout, "sites": samples.site}
+    found = {}
+    for name, numbers in held_out.items():
+        with progress_bar(f"held-out {name}") as progress:
+            of_folds = []
+            for out_of in folds(numbers, _FOLDS, seed):
+                surrogate = fit(samples, ~out_of, epochs, seed, about)
+                of_folds.append(errors(surrogate, samples, out_of))
+                progress(len(of_folds) / _FOLDS)
+        found[name] = of_folds
+    impulses = [[each.impulse for each in of_folds] for of_folds in found.values()]
+    peaks = [[each.peak for each in of_folds] for of_folds in found.values()]
+    rows = [
+        _error_row(f"{load}, held-out {name}", of_folds)
+        for load, by_name in (("impulse", impulses), ("peak", peaks))
+        for name, of_folds in zip(held_out, by_name, strict=True)
+    ]
+    headers = (
+        "",
+        "error of ln(load), rms",
+        "cases of 8 layouts",
+        "rank correlation in a case",
+        "worst fold",
+        "lost by choosing",
+    )
+    print_line(markdown_table(headers, rows))
+    return about.model_copy(update={"impulse": _check(*impulses), "peak": _check(*peaks)})
+
+
+def _error_row(name: str, of_folds: Sequence[Errors]) -> tuple[str, ...]:
+    ranks = [each.rank for each in of_folds]
+    return (
+        name,
+        f"{_rms(of_folds):.3f}",
+        str(sum(each.cases for each in of_folds)),
+        f"{np.nanmean(ranks):.2f}",
+        f"{np.nanmin(ranks):.2f}",
+        f"{100.0 * np.nanmean([each.lost for each in of_folds]):.1f} points",
+    )
+
+
+def _check(layouts: Sequence[Errors], sites: Sequence[Errors]) -> Check:
+    return Check(
+        layouts_rms=_rms(layouts),
+        layouts_rank=float(np.nanmean([each.rank for each in layouts])),
+        layouts_lost=float(np.nanmean([each.lost for each in layouts])),
+        sites_rms=_rms(sites),
+        sites_rank=float(np.nanmean([each.rank for each in sites])),
+        sites_lost=float(np.nanmean([each.lost for each in sites])),
+    )
+
+
+def _rms(of_folds: Sequence[Errors]) -> float:
+    return float(np.sqrt(np.mean([each.rms**2 for each in of_folds])))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What layouts do against one charge, by gas dynamics; shares of the load without a barrier.
+
+    Attributes:
+        reduction: Of the surrogate's layout.
+        promised: What it said of that.
+        rules: Of each rule's layout.
+        ms: Time that the proposal took.
+    """
+
+    reduction: float
+    promised: float
+    rules: Mapping[str, float]
+    ms: float
+
+
+def verdict(
+    agent: SurrogateAgent, evaluator: BlastEvaluator, threat: Threat, processes: int = 1
+) -> Verdict:
+    """Judge what the surrogate proposes against a charge, and the rules' layouts."""
+    scenario = evaluator.scenario
+    began_s = perf_counter()
+    proposed = agent.propose(scenario, threat.charge)
+    ms = MS_PER_S * (perf_counter() - began_s)
+    case = Case(scenario, (threat,), charge=threat.charge)
+    bare, guessed = Guesses.of(agent.surrogate, case).loads([(), proposed])
+    rules = layouts_by_rule(scenario, threat.charge)
+    reduction, *ruled = reductions_of(evaluator, case, [proposed, *rules.values()], processes)
+    return Verdict(
+        reduction=reduction,
+        promised=float(1.0 - guessed / bare),
+        rules=dict(zip(rules, ruled, strict=True)),
+        ms=ms,
+    )
+
+
+def _verdict_row(name: str, found: list[Verdict]) -> tuple[str, ...]:
+    names = set.intersection(*(set(each.rules) for each in found))
+    single = max(names, key=lambda rule: fmean(each.rules[rule] for each in found))
+    percent = (
+        fmean(each.reduction for each in found),
+        fmean(each.promised for each in found),
+        fmean(max(each.rules.values()) for each in found),
+    )
+    return (
+        name,
+        *(f"{100.0 * each:.1f} %" for each in percent),
+        f"{100.0 * fmean(each.rules[single] for each in found):.1f} % ({single})",
+        f"{median(each.ms for each in found):.0f}",
+    )
+
+
+@app.command()
+def judge(
+    scenarios: Annotated[list[str], typer.Argument(help="Bundled names or paths.")],
+    surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
+    charges: Annotated[int, typer.Option(min=1, help="Held-out charges of each.")] = 6,
+    changes: Annotated[int, typer.Option(min=0, help="Layouts that it looks at.")] = 300,
+    cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
+    processes: Processes = 2,
+    cluster: ClusterAddress = None,
+) -> None:
+    """Let gas dynamics judge what the surrogate proposes, beside every rule, and what it promised.
+
+    A surrogate that is exploited promises more than gas dynamics gives.
+    """
+    with user_errors(), running_on(cluster):
+        agent = SurrogateAgent(load_surrogate(surrogate), changes)
+        rows = []
+        for name in scenarios:
+            scenario = load_scenario(name)
+            evaluator = BlastEvaluator(scenario, "gas", cache=cache)
+            threats = draw_threats(scenario, SeedRange.JUDGEMENT.seeds(0, charges))
+            found = []
+            with progress_bar(scenario.name) as progress:
+                for done, threat in enumerate(threats, start=1):
+                    found.append(verdict(agent, evaluator, threat, processes))
+                    progress(done / len(threats))
+            rows.append(_verdict_row(scenario.name, found))
+    headers = ("scenario", "surrogate", "it promised", "best rule each", "best single rule", "ms")
+    print_line(markdown_table(headers, rows))
+
+
+@app.command()
+def draws(
+    run: Annotated[Path, typer.Argument(help="Run folder of an agent for told charges.")],
+    surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
+    cases: Annotated[int, typer.Option(min=2, help="Those of the league's track `known`.")] = 16,
+    counts: Annotated[str, typer.Option(help="How many layouts the agent draws.")] = "16,64,256",
+    changes: Annotated[int, typer.Option(min=1, help="Of the best draws, by guesses alone.")] = 60,
+    top: Annotated[int, typer.Option(min=1, help="Layouts that all get a blast.")] = 12,
+    cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
+    processes: Processes = 2,
+    cluster: ClusterAddress = None,
+) -> None:
+    """Let gas dynamics judge which of an agent's draws the surrogate picks: what limits both?"""
+    with user_errors(), running_on(cluster):
+        agent, guessing = load_agent(run), load_surrogate(surrogate)
+        track = known_track(agent.representative, cases, 1, noisy=False)
+        check_runs([TrainedRun.load(run)], [track])
+        evaluator = BlastEvaluator(agent.representative, "gas", cache=cache)
+        numbers = [_count(each) for each in counts.split(",")]
+        found: list[dict[str, float]] = []
+        with progress_bar(track.title) as progress:
+            for case in track.cases:
+                picked, liked = choices(agent, guessing, case, numbers, changes)
+                gains = reductions_of(evaluator, case, [*picked.values(), *liked[:top]], processes)
+                of_top = gains[len(picked) :]
+                found.append(
+                    dict(zip(picked, gains, strict=False))
+                    | {f"mean of the {top} liked best": fmean(of_top)}
+                    | {f"best of these {top} by gas dynamics": max(of_top)}
+                )
+                progress(len(found) / len(track.cases))
+    rows = []
+    for name in found[0]:
+        gain = mean_estimate(np.array([each[name] for each in found])).scaled(100.0)
+        rows.append((name, f"{gain.value:.1f} %", f"{gain.low:.1f} to {gain.high:.1f} %"))
+    print_line(markdown_table(("layout", "reduction", "95 % interval"), rows))
+
+
+def _count(text: str) -> int:
+    """Return how many layouts are drawn, of those in `--counts`."""
+    if not text.strip().isdecimal():
+        raise BlastEnvError(f"--counts has {text.strip()!r}, must be whole numbers and commas")
+    return whole_number("--counts", int(text), 1, _MOST_DRAWN)
+
+
+def choices(
+    agent: SamplingAgent, surrogate: Surrogate, case: Case, counts: Sequence[int], changes: int
+) -> tuple[dict[str, Layout], list[Layout]]:
+    """Return what may be proposed for a case without a blast, by how it is chosen.
+
+    Args:
+        agent: Proposes and draws.
+        surrogate: Chooses.
+        case: The case, of a told charge.
+        counts: How many layouts are drawn.
+        changes: How many changes of the most draws are looked at, in the end.
+
+    Returns:
+        The layouts by name, and the most draws, those first that the surrogate likes best.
+    """
+    scenario, charge = case.scenario, case.threats[0].charge
+    proposed: Layout = tuple(sorted(agent.propose(scenario, charge)))
+    picked, liked = {"proposal": proposed}, [proposed]
+    guesses = Guesses.of(surrogate, case)
+    for count in sorted(counts):
+        drawn = [tuple(sorted(each)) for each in agent.sample(scenario, charge, count, 0)]
+        own = [*dict.fromkeys([proposed, *drawn])]
+        liked = [own[index] for index in np.argsort(guesses.loads(own), kind="stable")]
+        picked[f"liked best of {count} draws"] = liked[0]
+    changed = improved(guesses, liked, changes, np.random.default_rng(0))
+    picked[f"liked best after {changes} changes"] = changed[0]
+    return picked, liked
+
+
+def reductions_of(
+    evaluator: BlastEvaluator, case: Case, layouts: Sequence[Layout], processes: int
+) -> list[float]:
+    """Return by which share each layout lowers the load that counts, by gas dynamics."""
+    (threat,) = case.threats
+    loads = evaluator.loads_of_many([(each, threat) for each in ((), *layouts)], processes)
+    bare, *values = (each.load(case.scenario.objective) for each in loads)
+    return [float(each) for each in reductions(np.array(values), np.full(len(values), bare))]
+
+
+if __name__ == "__main__":
+    app()

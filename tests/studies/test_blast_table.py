@@ -1,0 +1,88 @@
+"""The table of the blasts that a study has kept."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import typer
+from blast_agents.training import train
+from typer.testing import CliRunner
+
+from blast_env.evaluation import BlastEvaluator, DiskCache, draw_threats
+from blast_env.geometry import Piece
+from blast_env.scenario import save_scenario
+from studies import blast_table
+from tests.agents.test_self_labelling import own, run_settings
+from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
+from tests.evaluation.cases import COURTYARD
+from tests.evaluation.test_disk_cache import key, loads, same
+
+PIECES = (Piece(0, 0, "wall"),)
+
+
+def run(*arguments: object) -> tuple[int, str]:
+    app = typer.Typer()
+    app.command()(blast_table.main)
+    result = CliRunner().invoke(app, [*map(str, arguments)])
+    return result.exit_code, " ".join(result.output.split())
+
+
+def test_each_blast_is_there_once_with_what_was_asked(tmp_path: Path) -> None:
+    scenario, out = COURTYARD, tmp_path / "blasts.parquet"
+    evaluator = BlastEvaluator(scenario, "event", cache=tmp_path / "blasts")
+    threats = draw_threats(scenario, range(2))
+    found = [evaluator.loads((), each) for each in threats]
+    (tmp_path / "blasts" / "broken.loads").write_bytes(b"no blast at all")
+    code, words = run(tmp_path / "blasts", tmp_path / "blasts", "--out", out)
+    assert (code, words.split(";")[0]) == (0, "2 blasts")
+    table = pd.read_parquet(out).sort_values("seed")
+    assert table["impulse_pa_s"].tolist() == [each.structures[0].impulse_pa_s for each in found]
+    assert set(table["scenario_hash"]) == {scenario.content_hash}
+    assert table["seed"].tolist() == [each.seed for each in threats]
+    assert [json.loads(each) for each in table["layout"]] == [[], []]
+
+
+def test_own_scenarios_are_named_if_they_are_given(tmp_path: Path) -> None:
+    own, out = tmp_path / "own.toml", tmp_path / "blasts.parquet"
+    save_scenario(small_scenario(), own)
+    evaluator = BlastEvaluator(small_scenario(), "event", cache=tmp_path / "blasts")
+    evaluator.loads((), draw_threats(small_scenario(), [0])[0])
+    for options, names in (((), {""}), (("--scenario", own), {str(own)})):
+        assert run(tmp_path / "blasts", *options, "--out", out)[0] == 0
+        assert set(pd.read_parquet(out)["scenario"]) == names
+    assert blast_table.scenario_of(str(own)) == small_scenario()
+
+
+def test_the_sites_that_a_run_learnt_from_are_named(tmp_path: Path) -> None:
+    agent, out = tmp_path / "agent", tmp_path / "blasts.parquet"
+    few = {"engine": "event", "threat": "hidden", "hidden_threats": 1, "evaluation_cases": 2}
+    train(run_settings(Path("item_sites"), steps=1, **few), own(cases=1, first_updates=1), agent)
+    assert run(agent / "blasts", "--run", agent, "--out", out)[0] == 0
+    table = pd.read_parquet(out)
+    learnt_from = {name for name in table["scenario"] if name}  # the others chose the weights
+    (site,) = learnt_from
+    assert set(table["scenario_hash"][table["scenario"] == site]) == {
+        blast_table.scenario_of(site).content_hash
+    }
+    other = tmp_path / "other"
+    train(settings(scenario_file(tmp_path)), hyperparameters(), other)
+    code, words = run(agent / "blasts", "--run", other)
+    assert code != 0
+    assert "is no run by self-labelling on item_sites" in words
+
+
+def test_a_folder_without_blasts_is_an_error(tmp_path: Path) -> None:
+    code, words = run(tmp_path)
+    assert code != 0
+    assert "no blasts in" in words
+    assert "is no folder of blasts" in run(tmp_path / "none")[1]
+
+
+@pytest.mark.parametrize("layout", [(), PIECES, ((1, 2), (3, 4))])
+def test_keys_come_back_as_they_were(tmp_path: Path, layout: tuple) -> None:
+    cache, asked = DiskCache(tmp_path), key(3)._replace(layout=layout)
+    cache.add(asked, loads(3))
+    ((found, kept),) = cache.items()
+    assert found == asked
+    assert same(kept, loads(3))

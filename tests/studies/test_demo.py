@@ -1,0 +1,135 @@
+"""The demonstration with a training of a second, and its verdict on known loads."""
+
+import shutil
+from contextlib import redirect_stdout
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from blast_agents.league import RandomLayout
+from blast_agents.rules import ITEM_RULES
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import SeedRange
+from blast_env.export import SUFFIXES
+from blast_env.scenario import Placement, save_scenario
+from studies.demo import AGENT, DemoSettings, clear, demonstrate
+from studies.demo_comparison import Comparison
+from tests.agents.league_cases import TRAINING, result, standings
+from tests.agents.test_self_labelling import SMALL, wide_yard
+
+SITE = wide_yard(tnt_kg=1.0)
+"""A small charge, whose blasts are soon over."""
+
+
+def tiny(folder: Path) -> DemoSettings:
+    save_scenario(SITE, folder / "yard.toml")
+    return DemoSettings(
+        out=folder / "out",
+        scenario=str(folder / "yard.toml"),
+        steps=17,  # the rules, and one round
+        changes={**SMALL, "cases": 2, "samples": 0, "neighbours": 1, "borrowed": 0},
+        evaluation_cases=2,
+        threats=2,
+        processes=1,
+        film_width_px=640,
+        frames_per_s=2.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSettings, Comparison, str]:
+    """The settings of a demonstration, what it found and what it printed."""
+    settings = tiny(tmp_path_factory.mktemp("demo"))
+    with redirect_stdout(StringIO()) as printed:
+        comparison = demonstrate(settings)
+    return settings, comparison, printed.getvalue()
+
+
+def test_it_trains_compares_and_films(first: tuple[DemoSettings, Comparison, str]) -> None:
+    settings, comparison, printed = first
+    assert comparison.verdict in printed
+    assert "judged by the engine gas" in printed
+    assert sum(line.startswith("  after") for line in printed.splitlines()) == 2
+    names = [each.name for each in comparison.standings.results]
+    by_rule = [*ITEM_RULES, "most sight lines cut"]
+    assert names == ["no barrier", "random layout", *by_rule, AGENT]
+    assert all(name in printed for name in (*names, "best rule for each case"))
+    files = ["run/learning_curve.png", "side_by_side.mp4", "facade.png", "site.png", "loads.xlsx"]
+    files += [f"layout{suffix}" for suffix in SUFFIXES]
+    for name in files:
+        assert f"wrote {settings.out / name}" in printed
+        assert (settings.out / name).stat().st_size > 0
+    seeds = {case.threats[0].seed for case in comparison.standings.track.cases}
+    assert len(seeds) == 2
+    assert all(seed in SeedRange.JUDGEMENT.value for seed in seeds)
+    for proposal in comparison.agent.proposals:
+        assert Placement.of(SITE, proposal.layout).layout == proposal.layout
+
+
+def test_it_clears_its_own_run_and_nothing_of_others(
+    tmp_path: Path, first: tuple[DemoSettings, Comparison, str]
+) -> None:
+    settings = replace(first[0], out=tmp_path / "out")
+    shutil.copytree(first[0].out, settings.out)
+    clear(settings.run)
+    assert not settings.run.exists()
+    settings.run.mkdir()
+    (settings.run / "letter.txt").write_text("mine")
+    with pytest.raises(BlastEnvError, match="must be empty"):
+        demonstrate(settings)
+    assert (settings.run / "letter.txt").read_text() == "mine"
+
+
+def comparison_of(
+    agent: list[float],
+    random: list[float],
+    rule: list[float] | None = None,
+    other: list[float] | None = None,
+) -> Comparison:
+    """Loads by hand, a threat each; without a barrier it is 10 Pa s everywhere."""
+    return Comparison(
+        standings(
+            [[10.0]] * len(agent),
+            result(RandomLayout.name, [[each] for each in random]),
+            result("wall near the charge", [[each] for each in rule or random], is_rule=True),
+            result("wall near the building", [[each] for each in other or random], is_rule=True),
+            result(AGENT, [[each] for each in agent], training=TRAINING),
+        )
+    )
+
+
+def test_the_verdict_needs_intervals_that_do_not_overlap() -> None:
+    clear = comparison_of([2.0, 2.1, 1.9, 2.0], [7.0, 7.2, 6.8, 7.0])
+    assert clear.has_learnt
+    assert "takes off 50.0 percentage points more" in clear.verdict
+    # Better in every case, so the paired difference is sure, but no more than the scatter.
+    close = comparison_of([1.0, 4.0, 2.0, 8.0], [1.5, 4.5, 2.5, 8.5])
+    assert close.standings.difference(close.agent, close.random).low > 0.0
+    assert not close.has_learnt
+    assert close.verdict.startswith("Not shown that the agent has learnt")
+    worse = comparison_of([7.0, 7.2, 6.8, 7.0], [2.0, 2.1, 1.9, 2.0])
+    assert not worse.has_learnt
+    assert "takes off -50.0 percentage points more" in worse.verdict
+    assert comparison_of([2.0], [7.0]).verdict.startswith("No verdict")
+
+
+def test_a_row_says_by_how_much_the_agent_is_ahead() -> None:
+    """Paired: 20 points in every case leave no spread, however much the cases differ."""
+    bare, random, *_, agent = comparison_of([1.0, 4.0, 2.0, 6.0], [3.0, 6.0, 4.0, 8.0]).rows()
+    assert bare[:5] == ("no barrier", "10", "0.0 %", "0.0 % to 0.0 %", "67.5 %")
+    assert random[:3] == (RandomLayout.name, "5", "47.5 %")
+    assert random[4:6] == ("20.0 %", "20.0 % to 20.0 %")
+    assert agent[4:] == ("-", "-", "10.0")
+
+
+def test_the_best_rule_for_each_case_is_one_that_nobody_can_name_beforehand() -> None:
+    """The two rules are best in two cases each; the agent is between them and the best."""
+    rule, other = [2.0, 2.0, 6.0, 6.0], [6.0, 6.0, 2.0, 1.0]
+    comparison = comparison_of([3.0, 3.0, 3.0, 3.0], [8.0, 8.0, 8.0, 8.0], rule, other)
+    assert comparison.best_rule.name == "wall near the building"
+    best = comparison.rows()[-2]
+    assert best[:3] == ("best rule for each case", "2", "82.5 %")
+    assert best[4] == "-12.5 %"
+    assert "+7.5 points beside the best rule, 'wall near the building'" in comparison.verdict
