@@ -38,9 +38,10 @@ from blast_env.geometry import Layout
 from blast_env.physics.engines import find_engine
 from blast_env.physics.gas.engine import GasEngine
 from blast_env.provenance import versions
+from blast_env.rendering.canvas import Frame
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.film import largest_load, paint_at, plan_film
-from blast_env.rendering.frames import Frame, FramePainter
+from blast_env.rendering.frames import FramePainter
 from blast_env.rendering.gas import Quantity, facades, full_load
 from blast_env.rendering.ground_map import ground_map, ground_recorders, map_levels
 from blast_env.rendering.pressure_film import record_planes, scale_end_kpa

@@ -144,7 +144,7 @@ class Display:
         painter = self._placing_painter(episode)
         if is_gas(episode.objective.evaluator.engine):
             return _gas_screening(episode, painter.size_px).frames(self._frames_per_s)
-        return map(painter.padded, _screening(episode).frames(self._frames_per_s))
+        return _screening(episode, painter.size_px).frames(self._frames_per_s)
 
     def begin_film(self, episode: Episode) -> None:
         """Begin the film of the blast: from now on its frames are shown, one after the other."""
@@ -196,7 +196,7 @@ class Display:
         if not has_particles(episode.objective.evaluator.engine):  # no balls to be drawn
             return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
         if self._last_frame is None:
-            self._last_frame = painter.padded(_screening(episode).last_frame())
+            self._last_frame = _screening(episode, painter.size_px).last_frame()
         return self._last_frame
 
     def _placing_painter(self, episode: Episode) -> "PlacingPainter":
@@ -219,14 +219,14 @@ class Display:
         self._window.show(frame)
 
 
-def _screening(episode: Episode) -> "BlastScreening":
+def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening":
     """Return the blast of particles that is shown."""
     from blast_env.rendering.placing import BlastScreening
 
     shown, engine = _shown_threat(episode), episode.objective.evaluator.engine
     scenario, layout = episode.objective.evaluator.scenario, _sorted_layout(episode)
     blast = Blast(scenario, layout, shown.seed, engine, shown.charge)
-    return BlastScreening(blast, _outcome(episode), _remark(episode))
+    return BlastScreening(blast, _outcome(episode), _remark(episode), size_px)
 
 
 def _gas_screening(episode: Episode, size_px: tuple[int, int]) -> "PressureScreening":

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.calibration import LoadUnit
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.physics.scene import Scene, StructureOutline
 from blast_env.physics.structure import Colour, ModularObstacle, ModularPart, load_colour
@@ -18,6 +19,7 @@ from blast_env.rendering.style import (
     EXPLOSIVE,
     FAINT,
     INK,
+    PAGE,
     PROTECTED,
     QUIET_INK,
     SITE,
@@ -105,7 +107,12 @@ class Lettering:
 
 
 Point = tuple[int, int]
+Frame = NDArray[np.uint8]
+"""A picture: rows from above, pixels, red, green and blue."""
 
+_NARROWEST_PX, _WIDEST_PX = 320, 4096
+_MOST_HIGH = 0.8  # of the width: what a site takes at most
+_HEADING_SHARE = 0.55  # of the width: what lines at the left may take
 
 _SMOOTHING = 4
 
@@ -173,6 +180,9 @@ def scale_bar(lettering: Lettering, pixels_per_m: float, longest_px: int) -> pyg
     return surface
 
 
+_WIDEST_LOAD = "≥ 0.0888"
+
+
 def colour_bar(
     lettering: Lettering, full_impulse: float, length: int, unit: LoadUnit
 ) -> pygame.Surface:
@@ -181,7 +191,8 @@ def colour_bar(
     full = unit.factor * full_impulse
     texts = ("0", short_number(full / 2.0, 3), f"≥ {short_number(full, 3)}")
     numbers = [lettering.write(text) for text in texts]
-    margin = numbers[-1].get_width() // 2 + 1
+    # Room for any number: frames of an episode have one size whatever their loads are.
+    margin = lettering.write(_WIDEST_LOAD).get_width() // 2 + 1
     width = max(line.get_width(), length + 2 * margin)
     height = 2 * line.get_height() + thickness + lettering.size_px // 2
     surface = empty_surface(width, height)
@@ -301,6 +312,104 @@ def flow(
             left += block.get_width() + between
         top += height + gap
     return placed, top - gap
+
+
+_FOOTER_LINES = 7.5
+"""Lines of small letters that the signs below a site have room for, whatever the site has."""
+
+
+class Sheet:
+    """The page of a frame: lines of text, below them a site to scale, below that its signs.
+
+    Args:
+        site: The simulated area, units.
+        width_px: Width of the frame, 320 to 4096.
+
+    Attributes:
+        view: The site on the page.
+        width_px: Width of the page.
+        small: Lettering of everything but the heading.
+        large: Lettering of the heading.
+        margin_px: What stays free around.
+        line_tops_px: Where the three lines over the site begin.
+        border: The border lines, just outside of the site.
+
+    Raises:
+        BlastEnvError: If the width is out of bounds.
+    """
+
+    def __init__(self, site: Rectangle, width_px: int) -> None:
+        if not _NARROWEST_PX <= width_px <= _WIDEST_PX:
+            raise BlastEnvError(f"width_px is {width_px}, must be {_NARROWEST_PX} to {_WIDEST_PX}")
+        self.width_px = width_px
+        self.small = Lettering(max(round(width_px / 68), 10))
+        self.large = Lettering(max(round(width_px / 52), 13))
+        self.margin_px = max(round(width_px / 48), 8)
+        first = self.margin_px // 2
+        second = first + round(1.3 * self.large.size_px)
+        third = second + round(1.4 * self.small.size_px)
+        self.line_tops_px = (first, second, third)
+        header_px = third + round(1.6 * self.small.size_px) + self.margin_px // 3
+        width, height = site.right - site.left, site.top - site.bottom
+        # Neither width nor height gets out of hand.
+        scale = min(self.room_px / width, _MOST_HIGH * width_px / height)
+        self.view = View(site, (width_px - round(scale * width)) // 2, header_px, scale)
+        self._footer_top_px = header_px + round(scale * height) + round(0.8 * self.margin_px)
+        self.border = self.view.rectangle(site).inflate(6, 6)
+
+    @property
+    def room_px(self) -> int:
+        """Width between the margins."""
+        return self.width_px - 2 * self.margin_px
+
+    def height_px(self, signs: Sequence[pygame.Surface]) -> int:
+        """Return the height of a page with some signs below the site; it is even."""
+        least_px = round(_FOOTER_LINES * self.small.size_px)
+        footer_px = max(flow(signs, self.room_px, self.margin_px)[1], least_px)
+        height_px = self._footer_top_px + footer_px + self.margin_px // 2
+        return height_px + height_px % 2
+
+    def ground(
+        self, lines: Sequence[str], signs: Sequence[pygame.Surface], height_px: int
+    ) -> pygame.Surface:
+        """Return the page with the empty site.
+
+        Args:
+            lines: At most three lines of text, the first one as a heading.
+            signs: What stands below the site.
+            height_px: Height of the page, at least that of `height_px(signs)`.
+        """
+        ground = pygame.Surface((self.width_px, height_px), 0, 32)
+        ground.fill(PAGE)
+        for block, (left, top) in flow(signs, self.room_px, self.margin_px)[0]:
+            ground.blit(block, (self.margin_px + left, self._footer_top_px + top))
+        self.write(ground, lines, _HEADING_SHARE)
+        ground.fill(SITE, self.view.rectangle(self.view.site))
+        return ground
+
+    def write(
+        self, surface: pygame.Surface, lines: Sequence[str], share: float, *, right: bool = False
+    ) -> None:
+        """Write the lines over the site, the first one as a heading.
+
+        Args:
+            surface: The page.
+            lines: At most three lines of text.
+            share: Of the width between the margins, which longer lines are cut to.
+            right: Whether they end at the right margin rather than begin at the left one.
+        """
+        for number, (text, top) in enumerate(zip(lines, self.line_tops_px, strict=False)):
+            lettering, colour = (self.small, QUIET_INK) if number else (self.large, INK)
+            line = lettering.write_within(text, round(share * self.room_px), colour, not number)
+            left = self.width_px - self.margin_px - line.get_width() if right else self.margin_px
+            surface.blit(line, (left, top))
+
+
+def pixels_of(surface: pygame.Surface) -> Frame:
+    """Return a picture as an array, uint8 (height, width, 3)."""
+    width, height = surface.get_size()
+    pixels = np.frombuffer(pygame.image.tobytes(surface, "RGB"), dtype=np.uint8)
+    return pixels.reshape(height, width, 3).copy()
 
 
 _SMALLEST_GRID_PX = 6

@@ -16,7 +16,8 @@ from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.engine import BlastRun
-from blast_env.rendering.frames import ONE_SEED, SIMULATION_UNITS, Frame, FramePainter
+from blast_env.rendering.canvas import Frame
+from blast_env.rendering.frames import ONE_SEED, SIMULATION_UNITS, FramePainter
 from blast_env.rendering.style import (
     PAGE,
     nice_load,

@@ -11,27 +11,26 @@ from blast_env.geometry import Cell, Element, Rectangle
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import Colour, load_colour
 from blast_env.rendering.canvas import (
+    Frame,
     Lettering,
+    Sheet,
     View,
     dashed_rectangle,
     draw_obstacle,
     empty_surface,
-    flow,
     name_plates,
+    pixels_of,
     scale_bar,
 )
 from blast_env.rendering.film import plan_film
-from blast_env.rendering.frames import Frame, FramePainter
+from blast_env.rendering.frames import FramePainter
 from blast_env.rendering.style import (
     BARRIER,
     BORDER,
     EXPLOSIVE,
     FAINT,
-    INK,
-    PAGE,
     PROTECTED,
     QUIET_INK,
-    SITE,
     STRUCTURE,
     nice_ceiling,
     render_extra,
@@ -207,8 +206,8 @@ _SHARE_OF_LINES: Final = 0.6  # of the width
 class PlacingPainter:
     """Draws the layouts of one episode, all on the same ground.
 
-    The frames are of the same size, and the site in the same place, as those of `FramePainter`
-    padded by `padded`: both fit into one film.
+    The site is in the same place as in the frames of `FramePainter`, and with this height in
+    those, all are of the same size: both fit into one film.
 
     Args:
         scenario: The scenario; it has a build zone.
@@ -221,12 +220,14 @@ class PlacingPainter:
     ) -> None:
         self._scenario = scenario
         self._sources = sources
-        self._small = Lettering(max(round(width_px / 68), 10))
-        self._large = Lettering(max(round(width_px / 52), 13))
-        self._margin = max(round(width_px / 48), 8)
-        blast_painter = FramePainter(_fullest_scene(scenario), width_px=width_px)
-        self._view = blast_painter.view
-        self._ground = self._draw_ground(*blast_painter.size_px)
+        self._sheet = Sheet(build_site(scenario).site, width_px)
+        self._view = self._sheet.view
+        signs = self._signs()
+        zone, fullest = scenario.build_zone, _fullest_scene(scenario)
+        blast_px = FramePainter(fullest, width_px=width_px, build_zone=zone).size_px[1]
+        height_px = max(self._sheet.height_px(signs), blast_px)
+        lines = (scenario.name, sources_text(sources))
+        self._ground = self._sheet.ground(lines, signs, height_px)
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -253,26 +254,13 @@ class PlacingPainter:
         for obstacle in scene.obstacles():
             draw_obstacle(surface, self._view, obstacle, full_impulse=1.0)
         draw_charges(surface, self._view, self._sources, self._scenario.charge_radius_m)
-        for plate, place in name_plates(self._small, self._view, scene.structures):
+        for plate, place in name_plates(self._sheet.small, self._view, scene.structures):
             surface.blit(plate, place)
         if marked is not None:
             self._mark(surface, placement, marked)
-        pygame.draw.rect(surface, BORDER, _border(self._view), 3)
-        right = self.size_px[0] - self._margin
-        for line, top, lettering, colour in zip(
-            lines, self._line_tops, (self._large, self._small), (INK, QUIET_INK), strict=False
-        ):
-            room_px = round(_SHARE_OF_LINES * self.size_px[0])
-            text = lettering.write_within(line, room_px, colour, bold=lettering is self._large)
-            surface.blit(text, text.get_rect(topright=(right, top)))
-        width, height = self.size_px
-        pixels = np.frombuffer(pygame.image.tobytes(surface, "RGB"), dtype=np.uint8)
-        return pixels.reshape(height, width, 3).copy()
-
-    def padded(self, frame: Frame) -> Frame:
-        """Return a frame of the blast with the height of the frames drawn here."""
-        missing = self.size_px[1] - len(frame)
-        return np.pad(frame, ((0, max(missing, 0)), (0, 0), (0, 0)), constant_values=PAGE[0])
+        pygame.draw.rect(surface, BORDER, self._sheet.border, 3)
+        self._sheet.write(surface, lines, _SHARE_OF_LINES, right=True)
+        return pixels_of(surface)
 
     def cell_at(self, place_px: tuple[int, int]) -> Cell | None:
         """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one."""
@@ -294,35 +282,14 @@ class PlacingPainter:
             around = places[0].unionall(places[1:]).inflate(4, 4)
             pygame.draw.rect(surface, colour, around, 3)
 
-    @property
-    def _line_tops(self) -> tuple[int, int]:
-        """Where the two lines over the site begin."""
-        first = self._margin // 2
-        return first, first + round(1.3 * self._large.size_px)
-
-    def _draw_ground(self, width_px: int, least_height_px: int) -> pygame.Surface:
-        """Draw everything that is the same in all frames."""
+    def _signs(self) -> list[pygame.Surface]:
+        """Return what explains the frames: the scale and the signs."""
         others = any(not structure.protected for structure in self._scenario.structures)
-        signs = placing_signs(self._sources, others)
-        blocks = [
-            scale_bar(self._small, self._view.pixels_per_m, round(0.16 * width_px)),
-            legend_of(self._small, signs, _LEGEND_COLUMNS),
+        signs, width_px = placing_signs(self._sources, others), self._sheet.width_px
+        return [
+            scale_bar(self._sheet.small, self._view.pixels_per_m, round(0.16 * width_px)),
+            legend_of(self._sheet.small, signs, _LEGEND_COLUMNS),
         ]
-        room_px = width_px - 2 * self._margin
-        placed, footer_px = flow(blocks, room_px, self._margin)
-        footer_top_px = _border(self._view).bottom + round(0.8 * self._margin)
-        height_px = max(footer_top_px + footer_px + self._margin // 2, least_height_px)
-        ground = pygame.Surface((width_px, height_px + height_px % 2), 0, 32)
-        ground.fill(PAGE)
-        for block, (left, top) in placed:
-            ground.blit(block, (self._margin + left, footer_top_px + top))
-        title = self._large.write_within(self._scenario.name, round(0.6 * room_px), bold=True)
-        known = sources_text(self._sources)
-        subtitle = self._small.write_within(known, round(0.7 * room_px), QUIET_INK)
-        for text, top in zip((title, subtitle), self._line_tops, strict=True):
-            ground.blit(text, (self._margin, top))
-        ground.fill(SITE, self._view.rectangle(self._view.site))
-        return ground
 
     @property
     def _vehicles(self) -> list[VehicleSource]:
@@ -378,11 +345,6 @@ def sources_text(sources: Sequence[AnySource]) -> str:
     return f"{what} {' to '.join(f'{mass:g}' for mass in bounds)} kg TNT"
 
 
-def _border(view: View) -> pygame.Rect:
-    """Return the border lines, just outside of the site."""
-    return view.rectangle(view.site).inflate(6, 6)
-
-
 def _fullest_scene(scenario: Scenario) -> Scene:
     """Return a scene with everything that a blast of the scenario may show: it needs most room."""
     empty = Placement.empty(scenario)
@@ -403,13 +365,13 @@ class BlastScreening:
         blast: The blast.
         outcome: What came of it; in every frame.
         remark: About which blast is shown; after the scenario's name.
-        width_px: Width of the frames, as for `FramePainter`.
+        size_px: Width and least height of the frames, as for `FramePainter`.
     """
 
     blast: Blast
     outcome: str
     remark: str = ""
-    width_px: int = 960
+    size_px: tuple[int, int] = (960, 0)
 
     def last_frame(self) -> Frame:
         """Return the state at the end, uint8 (height, width, 3)."""
@@ -443,7 +405,8 @@ class BlastScreening:
             self.blast.scene,
             title=f"{self.blast.scenario.name}{self.remark}",
             subtitle=charge_text(self.blast.scene.charge),
-            width_px=self.width_px,
+            width_px=self.size_px[0],
+            height_px=self.size_px[1],
             full_impulse=nice_ceiling(max(*loads, _LEAST_FULL_IMPULSE)),
             build_zone=self.blast.scenario.build_zone,
         )

@@ -17,8 +17,8 @@ from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import Snapshots
 from blast_env.physics.gas.solver import Recorder
 from blast_env.physics.scene import BlastSite, StructureOutline
+from blast_env.rendering.canvas import Frame
 from blast_env.rendering.film import FilmPlan, for_gif, known_suffix, open_film, plan_until
-from blast_env.rendering.frames import Frame
 from blast_env.rendering.gas import (
     PA_PER_KPA,
     check_comparable,

@@ -21,7 +21,7 @@ from blast_env.physics.gas.opening import Opening
 from blast_env.physics.gas.probes import Snapshot
 from blast_env.physics.scene import BlastSite, StructureOutline
 from blast_env.physics.structure import Colour
-from blast_env.rendering.frames import Frame
+from blast_env.rendering.canvas import Frame
 from blast_env.rendering.gas import (
     MINUS,
     PA_PER_KPA,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from blast_env.errors import BlastEnvError
-from blast_env.rendering.frames import Frame
+from blast_env.rendering.canvas import Frame
 from blast_env.rendering.style import render_extra
 
 with render_extra():

@@ -2,11 +2,15 @@
 
 import re
 from itertools import pairwise
+from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pygame
 import pytest
+from gymnasium.wrappers import HumanRendering, RecordVideo
 
+import blast_env  # noqa: F401  # registers
 from tests.envs.small import make, play
 
 pytestmark = pytest.mark.slow
@@ -27,6 +31,50 @@ def test_frames_are_of_one_size_from_the_first_module_to_the_film() -> None:
     assert all(frame.dtype == np.uint8 for frame in frames)
     for earlier, later in pairwise(frames):
         assert (earlier != later).any()
+
+
+BARRIER_IDS = [each for each in gym.registry if each.startswith("BlastBarrier")]
+
+
+@pytest.mark.parametrize("environment_id", BARRIER_IDS)
+def test_every_episode_of_an_environment_has_frames_of_one_size(environment_id: str) -> None:
+    env = gym.make(environment_id, render_mode="rgb_array")
+    sizes = set()
+    for seed in range(3):
+        env.reset(seed=seed)
+        sizes.add(np.asarray(env.render()).shape)
+    assert len(sizes) == 1
+
+
+@pytest.mark.parametrize(
+    "environment_id",
+    ["BlastBarrier-v0", "BlastBarrier/PerimeterGate-v0", "BlastBarrier/StreetJunction-v0"],
+)
+def test_the_blast_on_a_bundled_site_has_frames_of_the_size_that_placing_has(
+    environment_id: str,
+) -> None:
+    env = gym.make(environment_id, render_mode="rgb_array", realisations=1)
+    env.reset(seed=1)
+    placing = np.asarray(env.render()).shape
+    env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
+    assert np.asarray(env.render()).shape == placing
+    film = env.unwrapped.blast_frames()  # type: ignore[attr-defined]
+    assert next(film).shape == placing
+
+
+def test_gymnasiums_wrappers_record_and_show_the_default_environment(tmp_path: Path) -> None:
+    for wrapped in (
+        RecordVideo(_finishing(), str(tmp_path / "films"), episode_trigger=lambda _: True),
+        HumanRendering(_finishing()),
+    ):
+        wrapped.reset(seed=1)
+        wrapped.step(wrapped.action_space.n - 1)  # type: ignore[attr-defined]
+        wrapped.close()  # type: ignore[no-untyped-call]
+    assert len(list(tmp_path.rglob("*.mp4"))) == 1
+
+
+def _finishing() -> gym.Env:
+    return gym.make("BlastBarrier-v0", render_mode="rgb_array", realisations=1)
 
 
 def test_the_film_comes_to_an_end_and_shows_the_blast() -> None:

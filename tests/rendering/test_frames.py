@@ -10,7 +10,8 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import load_colour
-from blast_env.rendering.frames import Frame, FramePainter, balls_at_start
+from blast_env.rendering.canvas import Frame
+from blast_env.rendering.frames import FramePainter, balls_at_start
 from blast_env.rendering.style import AIR, BARRIER, BORDER, EXPLOSIVE, PROTECTED
 from blast_env.simulation import Blast
 from blast_env.units import MODULE_SIDE_UNITS
@@ -56,6 +57,12 @@ def test_balls_are_where_they_should_be_in_the_papers_colours(blast: Blast) -> N
             # The dark rim of a neighbour may cover a centre.
             seen = np.array(pixel_at(painter, frame, x, y))
             assert np.abs(seen / seen.max() - np.array(colour) / max(colour)).max() < 0.1
+
+
+def test_the_size_of_frames_does_not_depend_on_the_loads(blast: Blast) -> None:
+    loads = (1e-3, 0.0888, 7.0, 888.0, 8.88e4, 3e9)
+    painters = [FramePainter.for_blast(blast, full_impulse=load) for load in loads]
+    assert len({painter.size_px for painter in painters}) == 1
 
 
 def test_small_balls_stay_visible(blast: Blast) -> None:

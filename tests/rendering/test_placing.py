@@ -28,14 +28,15 @@ def test_free_cells_are_told_from_cells_that_are_not() -> None:
     assert empty > one > full > 0
 
 
-def test_all_frames_have_the_size_of_the_blast_s_when_padded() -> None:
-    painter = PlacingPainter(SCENARIO, SCENARIO.charge, width_px=640)
+@pytest.mark.parametrize("width_px", [400, 640, 961])
+def test_frames_of_the_blast_have_the_same_size(width_px: int) -> None:
+    painter = PlacingPainter(SCENARIO, SCENARIO.charge, width_px=width_px)
     width, height = painter.size_px
     assert painter.paint(Placement.empty(SCENARIO)).shape == (height, width, 3)
     for layout in ((), LAYOUT):
-        blast_painter = FramePainter(build_scene(SCENARIO, layout), width_px=640)
-        padded = painter.padded(np.zeros((*blast_painter.size_px[::-1], 3), dtype=np.uint8))
-        assert padded.shape == (height, width, 3)
+        scene, zone = build_scene(SCENARIO, layout), SCENARIO.build_zone
+        blast = FramePainter(scene, width_px=width_px, height_px=height, build_zone=zone)
+        assert blast.size_px == (width, height)
 
 
 def test_a_known_charge_is_a_disc_and_a_hidden_one_a_veil() -> None:
