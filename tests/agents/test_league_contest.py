@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import islice
 from pathlib import Path
 from shutil import copytree
 
@@ -33,6 +34,7 @@ from blast_agents.search import (
     SearchResult,
     find_search_method,
 )
+from blast_agents.search.methods import every_layout
 
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
@@ -62,6 +64,50 @@ class CountedSearch:
         self.calls.append(seed)
         found = RandomSearch(batch=2).search(problem, budget, seed, report)
         return replace(found, interrupted=self.interrupted)
+
+
+@dataclass(frozen=True)
+class Cheat:
+    """Spends blasts and reports one.
+
+    Attributes:
+        layouts: How many layouts it looks at under every threat.
+        past_the_meter: Whether it asks the evaluator, and not the problem.
+    """
+
+    layouts: int
+    past_the_meter: bool = False
+    name: str = "cheat"
+
+    def search(
+        self,
+        problem: LayoutProblem,
+        budget: int,
+        seed: int,
+        report: Report | None = None,  # noqa: ARG002
+    ) -> SearchResult:
+        layouts = tuple(islice(every_layout(problem), self.layouts))
+        pairs = [(layout, threat) for layout in layouts for threat in problem.threats]
+        if self.past_the_meter:
+            problem.evaluator.loads_of_many(pairs)
+        else:
+            problem.loads(pairs)
+        return SearchResult(self.name, layouts[-1], None, 1, 1, budget, seed, (), False)
+
+
+@pytest.mark.parametrize("past_the_meter", [False, True])
+def test_a_league_counts_blasts_itself(tmp_path: Path, past_the_meter: bool) -> None:
+    """What a method says of its blasts enters no table; beyond the budget there is no result."""
+    threats = len(practice_of(TRACK.cases[0]).threats)
+    honest = Search(Cheat(3, past_the_meter), 3 * threats)
+    _, result = Contest(TRACK, (NoBarrier(), honest), store(tmp_path)).play().results
+    assert [each.blasts for each in result.proposals] == [3 * threats] * len(TRACK.cases)
+    beyond = Search(Cheat(3, past_the_meter), 3 * threats - 1)
+    contest = Contest(TRACK, (NoBarrier(), beyond), store(tmp_path))
+    named = f"cheat, {3 * threats - 1} blasts.* {3 * threats} blasts.*budget is {3 * threats - 1}"
+    with pytest.raises(BlastEnvError, match=named):
+        contest.play()
+    assert contest.outlook().kept_searches == 0
 
 
 def store(folder: Path) -> ResultStore:

@@ -21,7 +21,7 @@ from blast_agents.league.standings import Result, Standings
 from blast_agents.league.store import ResultStore, evaluation_key, search_key
 from blast_agents.league.tracks import Track, practice_of
 from blast_agents.proposal import Proposal, timed_proposal
-from blast_agents.search import LayoutProblem, SearchResult
+from blast_agents.search import BlastMeter, BudgetError, LayoutProblem, SearchResult
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Objective
 from blast_env.geometry import Layout
@@ -54,7 +54,10 @@ class SearchJob:
     def __call__(self) -> Proposal:
         """Return what the search proposes; it shares no blast with any other.
 
+        Its blasts are those that the problem has counted, whatever the method says of them.
+
         Raises:
+            BlastEnvError: If the method runs more blasts than its budget.
             KeyboardInterrupt: If the search was interrupted: what it has by then is not its
                 answer.
         """
@@ -64,13 +67,11 @@ class SearchJob:
         for each in {engine, self.engine}:
             BlastEvaluator(practice.scenario, each).loads((), practice.threats[0])
         began_s, began_cpu_s = perf_counter(), process_time()
-        problem = LayoutProblem(BlastEvaluator(practice.scenario, engine), practice)
-        result = self.search.method.search(problem, self.search.budget, self.case.seed)
-        if result.interrupted:
-            raise KeyboardInterrupt
-        layout, blasts, other_blasts = result.layout, result.blasts, 0
+        problem = self._problem(engine, BlastMeter(self.search.budget))
+        result = self._result(problem)
+        layout, blasts, other_blasts = result.layout, problem.blasts_run, 0
         if self.search.first_engine is not None:
-            layout, blasts, other_blasts = *self._judged(result), result.blasts
+            layout, blasts, other_blasts = *self._judged(result), problem.blasts_run
         return Proposal(
             layout=tuple(sorted(layout)),
             seconds=perf_counter() - began_s,
@@ -79,14 +80,36 @@ class SearchJob:
             cpu_s=process_time() - began_cpu_s,
         )
 
+    def _problem(self, engine: str | Engine, meter: BlastMeter) -> LayoutProblem:
+        practice = practice_of(self.case)
+        # All that may be asked for is remembered: what is simulated is simulated once.
+        most = meter.budget + len(practice.threats)
+        evaluator = BlastEvaluator(practice.scenario, engine, cache_size=most)
+        return LayoutProblem(evaluator, practice, meter=meter)
+
+    def _result(self, problem: LayoutProblem) -> SearchResult:
+        """Return what the method finds, unless it went round the meter."""
+        method, budget = self.search.method, self.search.budget
+        try:
+            result = method.search(problem, budget, self.case.seed)
+        except BudgetError as error:
+            raise BudgetError(f"{self.search.name}, case {self.case.name!r}: {error}") from None
+        if result.interrupted:
+            raise KeyboardInterrupt
+        if problem.blasts_run > budget:
+            raise BudgetError(
+                f"{self.search.name}, case {self.case.name!r}: {problem.blasts_run:,} blasts were "
+                f"run, the budget is {budget:,}"
+            )
+        return result
+
     def _judged(self, result: SearchResult) -> tuple[Layout, int]:
         """Return the best of a search's last best layouts by the judge, and its blasts for that."""
-        practice = practice_of(self.case)
         latest = [each.layout for each in reversed(result.history)]
         finalists = list(dict.fromkeys(latest))[: self.search.finalists]
-        judge = LayoutProblem(BlastEvaluator(practice.scenario, self.engine), practice)
-        best = min(finalists, key=judge.load)
-        return best, judge.evaluator.blasts
+        meter = BlastMeter(len(finalists) * len(practice_of(self.case).threats))
+        best = min(finalists, key=self._problem(self.engine, meter).load)
+        return best, meter.blasts
 
 
 @dataclass(frozen=True, eq=False)

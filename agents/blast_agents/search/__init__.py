@@ -9,6 +9,8 @@ from blast_agents.search.methods import (
     RandomSearch,
 )
 from blast_agents.search.problem import (
+    BlastMeter,
+    BudgetError,
     Candidate,
     LayoutProblem,
     Progress,
@@ -24,6 +26,8 @@ __all__ = [
     "SEARCH_METHODS",
     "AnnealingSearch",
     "BestRuleSearch",
+    "BlastMeter",
+    "BudgetError",
     "Candidate",
     "ExhaustiveSearch",
     "FromRulesSearch",

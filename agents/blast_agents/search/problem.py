@@ -1,7 +1,7 @@
 """What a search is asked, and what it answers."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final, Protocol
 
@@ -19,6 +19,40 @@ from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.statistics import reductions
 
 
+class BudgetError(BlastEnvError):
+    """A search asks for more blasts than its budget has."""
+
+
+@dataclass(eq=False)
+class BlastMeter:
+    """Counts distinct pairs of layout and threat, and refuses those beyond a budget.
+
+    Attributes:
+        budget: Most pairs.
+    """
+
+    budget: int
+    _asked: set[tuple[Layout, Threat]] = field(default_factory=set, init=False, repr=False)
+
+    @property
+    def blasts(self) -> int:
+        """Pairs that were asked for so far; one that comes again counts once."""
+        return len(self._asked)
+
+    def add(self, pairs: Iterable[tuple[Sequence[Element], Threat]]) -> None:
+        """Count pairs.
+
+        Raises:
+            BudgetError: If the budget does not pay for all of them; none is counted then.
+        """
+        asked = {(tuple(sorted(layout)), threat) for layout, threat in pairs} | self._asked
+        if len(asked) > self.budget:
+            raise BudgetError(
+                f"the search asks for {len(asked):,} blasts in all, the budget is {self.budget:,}"
+            )
+        self._asked = asked
+
+
 @dataclass(frozen=True, eq=False)
 class LayoutProblem:
     """A case to search a layout for, and what runs its blasts.
@@ -28,6 +62,7 @@ class LayoutProblem:
         case: What layouts meet, and how that becomes one number. A search may look at the first
             few threats alone, so different charges should come first.
         processes: Worker processes; they change nothing but the time.
+        meter: Counts the blasts that are asked for; `None` counts none.
 
     Raises:
         BlastEnvError: If a threat is there twice, the scenario has no build zone, or `processes` is
@@ -37,6 +72,7 @@ class LayoutProblem:
     evaluator: BlastEvaluator
     case: Case
     processes: int = 1
+    meter: BlastMeter | None = None
 
     def __post_init__(self) -> None:
         """Check that there is something to search."""
@@ -79,19 +115,43 @@ class LayoutProblem:
         """The charge if it is known, else the middle of where the scenario lets one be."""
         return self.told or expected_charge(self.scenario.charge)
 
+    def metered(self, budget: int) -> "LayoutProblem":
+        """Return the same problem, which pays for so many blasts and no more.
+
+        The loads without a barrier, `unprotected`, are free.
+        """
+        return replace(self, meter=BlastMeter(budget))
+
+    @property
+    def blasts_run(self) -> int:
+        """Blasts that were asked for or, where those are more, simulated past the meter.
+
+        Without those of `unprotected`. The evaluator has to be a fresh one that forgets nothing.
+        """
+        free = len(self.threats) if "unprotected" in vars(self) else 0
+        asked = 0 if self.meter is None else self.meter.blasts
+        return max(asked, self.evaluator.blasts - free)
+
     def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
         """Return the load that counts in each blast, in the unit of the scenario's objective.
 
         Raises:
+            BudgetError: If the problem is metered, and its budget does not pay for them.
             LayoutError: If a layout does not fit the build zone.
         """
+        if self.meter is not None:
+            self.meter.add(pairs)
+        return self._unmetered(pairs)
+
+    def _unmetered(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
         loads = self.evaluator.loads_of_many(pairs, self.processes)
         return [each.load(self.scenario.objective) for each in loads]
 
     def load(self, layout: Sequence[Element]) -> float:
-        """Return the load with a layout over all threats, in that unit; outside any budget.
+        """Return the load with a layout over all threats, in that unit.
 
         Raises:
+            BudgetError: As for `loads`.
             LayoutError: If the layout does not fit the build zone.
         """
         pairs = [(tuple(layout), threat) for threat in self.threats]
@@ -104,7 +164,7 @@ class LayoutProblem:
         Raises:
             BlastEnvError: If nothing arrives: there is nothing to reduce.
         """
-        bare = self.loads([((), threat) for threat in self.threats])
+        bare = self._unmetered([((), threat) for threat in self.threats])
         check_something_arrives([self.case], np.array(bare))
         return tuple(bare)
 
