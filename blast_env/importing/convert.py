@@ -25,6 +25,7 @@ from blast_env.importing.site_map import DrawingCoordinates, MapCoordinates, Sit
 from blast_env.importing.threats import charge_sources
 from blast_env.importing.zone import build_zone
 from blast_env.provenance import package_version
+from blast_env.reading import read_apart
 from blast_env.scenario import Scenario, SimulationSection
 from blast_env.scenario.checks import charge_radius_m
 from blast_env.scenario.versions import SCHEMA_VERSION
@@ -32,6 +33,9 @@ from blast_env.values import path_of
 
 _MOST_DESCRIPTION: Final = 2000
 _HASH_DIGITS: Final = 12
+_PLAIN_SUFFIXES: Final = (".geojson", ".json", ".osm", ".dxf")
+_READ_HERE_BYTES: Final = 100_000
+"""So little is read at once, where nothing unfolds: a process takes half a second to begin."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,8 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> Impor
     """Return the site that a map or drawing shows.
 
     The site is turned to the direction of most walls, its grid laid where most walls are, and the
-    buildings are cut into modules.
+    buildings are cut into modules. What is large or packed is read in a process of its own, which
+    may take only so much time and memory; see `ReadingLimits`.
 
     Args:
         path: GeoJSON (`.geojson`, `.json`), OpenStreetMap (`.osm`, `.osm.pbf`) or DXF (`.dxf`).
@@ -63,11 +68,18 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> Impor
 
     Raises:
         BlastEnvError: If the file cannot be read, the site cannot be placed, a building deviates
-            too far from its outline, none is protected, there is no place for a charge, or the
-            scenario would not be sound (`ScenarioError`).
+            too far from its outline, none is protected, there is no place for a charge, the
+            scenario would not be sound (`ScenarioError`), or all this takes too much time or
+            memory (`ReadingError`).
     """
-    options = options or ImportOptions()
-    path = path_of(path)
+    path, options = path_of(path), options or ImportOptions()
+    is_plain = path.suffix.lower() in _PLAIN_SUFFIXES
+    if is_plain and path.is_file() and path.stat().st_size <= _READ_HERE_BYTES:
+        return _imported(path, options)
+    return read_apart(str(path), _imported, path, options)
+
+
+def _imported(path: Path, options: ImportOptions) -> ImportedSite:
     site_map = _read(path, options)
     things, unclear = things_of(
         site_map, _selectors(site_map, options), options.level_height_m, options.height_from

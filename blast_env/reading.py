@@ -1,0 +1,196 @@
+"""Reading what others wrote, in a process of its own that has limits and can be ended.
+
+A file that was made on purpose can keep a parser busy for hours, or ask for all memory. Readers
+count before they build; this is for what they do not foresee.
+"""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Generic, Self, TypeVar
+
+from blast_env.errors import BlastEnvError
+
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True)
+class ReadingLimits:
+    """What reading something may take.
+
+    Attributes:
+        processor_s: Processor time of all threads; where the system limits it, not on Windows.
+        memory_bytes: Memory beyond that of the libraries; where the system limits it, on Linux.
+        wall_s: Time on the clock, everywhere. It is longer, because a computer may be busy.
+    """
+
+    processor_s: int = 8
+    memory_bytes: int = 300_000_000
+    wall_s: float = 60.0
+
+
+LIMITS: Final = ReadingLimits()
+
+
+class ReadingError(BlastEnvError):
+    """Reading something took more than it may, or ended its process."""
+
+
+class Reading(Generic[Found]):
+    """A function at work on what others wrote, in a process of its own.
+
+    Its process starts at once, and gets its work when `result` waits for it. As a context manager
+    it is ended with the block, whatever happens.
+
+    Args:
+        what: What is read, for errors: the name of the file.
+        function: What reads it. It, its arguments and its result pickle.
+        arguments: Its arguments.
+        limits: What it may take.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        function: Callable[..., Found],
+        *arguments: Any,
+        limits: ReadingLimits = LIMITS,
+    ) -> None:
+        self._what, self._limits = what, limits
+        self._message = pickle.dumps(limits) + pickle.dumps((function, arguments))
+        # Not multiprocessing: that runs the caller's script once more in the new process.
+        program = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", program],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def result(self) -> Found:
+        """Wait, and return what the function returned.
+
+        Raises:
+            ReadingError: If it took more than it may, or its process was ended.
+            BaseException: What the function raised.
+        """
+        try:
+            answer, _ = self._process.communicate(self._message, self._limits.wall_s)
+        except subprocess.TimeoutExpired as error:
+            raise self._exceeded(f"{self._limits.wall_s:g} s on the clock") from error
+        finally:
+            self.end()
+        try:
+            found, fault = pickle.loads(answer)
+        except (EOFError, pickle.UnpicklingError):
+            raise self._died() from None
+        if isinstance(fault, MemoryError):
+            raise self._too_large()
+        if fault is not None:
+            raise fault
+        return found  # type: ignore[no-any-return]
+
+    def end(self) -> None:
+        """End the process, if it is still at work; another thread may do so."""
+        with suppress(OSError):
+            self._process.kill()
+        self._process.wait()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with suppress(OSError):
+                    pipe.close()
+
+    def _died(self) -> ReadingError:
+        """Return the error of a process that has ended without an answer."""
+        code = self._process.returncode
+        if -code == getattr(signal, "SIGXCPU", None):
+            return self._exceeded(f"{self._limits.processor_s} s of processor time")
+        if -code == getattr(signal, "SIGABRT", None):  # C++ without memory
+            return self._too_large()
+        return ReadingError(f"{self._what}: cannot be read: the process that did was ended")
+
+    def _too_large(self) -> ReadingError:
+        return self._exceeded(f"{self._limits.memory_bytes / 1e6:.0f} MB of memory")
+
+    def _exceeded(self, bound: str) -> ReadingError:
+        return ReadingError(
+            f"{self._what}: takes more than {bound} to read, must take at most that: is it damaged,"
+            " or can it be made smaller?"
+        )
+
+
+def read_apart(
+    what: str,
+    function: Callable[..., Found],
+    *arguments: Any,
+    limits: ReadingLimits = LIMITS,
+) -> Found:
+    """Return what a function returns, called in a process of its own; see `Reading`.
+
+    Raises:
+        ReadingError: If it took more than it may, or its process was ended.
+        BaseException: What the function raised.
+    """
+    with Reading(what, function, *arguments, limits=limits) as reading:
+        return reading.result()
+
+
+def serve() -> None:
+    """Do in this process what standard input says, and answer on standard output."""
+    with os.fdopen(os.dup(1), "wb") as answers:
+        os.dup2(2, 1)  # what a library prints is no answer
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
+        limits = pickle.load(sys.stdin.buffer)
+        function, arguments = pickle.load(sys.stdin.buffer)
+        _limit(limits)
+        answers.write(_answer(function, arguments))
+
+
+def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+    """Return what came of a call: its result or its error."""
+    try:
+        return pickle.dumps((function(*arguments), None))
+    except Exception as error:
+        if isinstance(error, MemoryError) or "bad_alloc" in str(error):
+            return pickle.dumps((None, MemoryError()))
+        if not isinstance(error, BlastEnvError):  # a fault of ours
+            error.add_note("".join(traceback.format_exception(error)))
+        return pickle.dumps((None, error))
+
+
+def _limit(limits: ReadingLimits) -> None:
+    """Limit this process, beyond what its libraries have taken already."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    used_s = int(usage.ru_utime + usage.ru_stime) + 1
+    _lower(resource.RLIMIT_CPU, used_s + limits.processor_s)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    pages = Path("/proc/self/statm")
+    if pages.exists():
+        data = int(pages.read_text(encoding="ascii").split()[5]) * resource.getpagesize()
+        _lower(resource.RLIMIT_DATA, data + limits.memory_bytes)
+
+
+def _lower(kind: int, most: int) -> None:
+    """Lower a limit of this process, unless it is lower already."""
+    import resource
+
+    hard = resource.getrlimit(kind)[1]
+    allowed = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(kind, (allowed, hard))
