@@ -72,7 +72,8 @@ def train(
     observation: Annotated[
         str | None,
         typer.Option(
-            help="What the agent sees: grid, grid_with_load, or features (with an MlpPolicy).",
+            help="What the agent sees: grid, grid_with_load, image (with a CnnPolicy), or features"
+            " (with an MlpPolicy).",
             show_default="grid",
         ),
     ] = None,

@@ -73,9 +73,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     ## Observation space
     By the argument `observation`:
 
-    - `"grid"`: `Box(0, 255, (9, rows, columns), uint8)`, planes over the site with one square a
-      module of 0.5 m, 255 for 1; channel by channel in
-      `blast_env.envs.observations.GridObservation`;
+    - `"grid"`: `Box(0, 1, (9, rows, columns), float32)`, planes over the site with one square a
+      module of 0.5 m; channel by channel in `blast_env.envs.observations.GridObservation`;
+    - `"image"`: `Box(0, 255, (height, width, 9), uint8)`, the same planes as an image, 255 for 1,
+      large enough for image policies such as stable-baselines3's `CnnPolicy`
+      (`ImageObservation`);
     - `"grid_with_load"`: a tenth plane, the load on each module of the structures without a
       barrier (`GridWithLoadObservation`), for four more blasts a charge;
     - `"features"`: `Box(0, 1, (features,), float32)`, a flat vector, value by value in

@@ -1,7 +1,7 @@
 """What an agent sees: the observations and what they are made of."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, Final, Protocol
 
@@ -185,7 +185,7 @@ def cost_shares(scenario: Scenario) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class GridObservation:
-    """Planes of (rows, columns) squares of 0.5 m over the site, uint8: 255 stands for 1.
+    """Planes of (rows, columns) squares of 0.5 m over the site, float32 from 0 to 1.
 
     Row 0 is the lower edge of the site and column 0 the left one, as in the build zone. Whatever
     lies on the 0.5 m grid fills whole squares; what does not is shown by the share of a square
@@ -231,8 +231,10 @@ class GridObservation:
     | `reach_without_barrier` | 1 where the vehicle gets to on the empty site |
     | `reach` | 1 where it gets to with what stands so far |
 
-    Whole numbers up to 255 are how stable-baselines3 knows an image: its `CnnPolicy` takes the
-    planes as they are and divides by 255 itself. Its network wants sites of 18 m x 18 m or more.
+    Values are in steps of 1/255, as in `ImageObservation`. They are no whole numbers, because
+    stable-baselines3 takes those for an image whose order of axes it guesses from their sizes, and
+    may then learn on planes that it has turned. So convolutions of your own see the same planes in
+    every library; image policies take `"image"`.
     """
 
     channels: ClassVar[tuple[str, ...]] = (
@@ -264,7 +266,7 @@ class GridObservation:
         """Return the space: (channels, rows, columns)."""
         grid = SiteGrid.of(scenario.site)
         shape = (len(self.channels_of(scenario)), grid.rows, grid.columns)
-        return spaces.Box(0, 255, shape, np.uint8)
+        return spaces.Box(0.0, 1.0, shape, np.float32)
 
     def episode(self, observable: Observable) -> "GridEpisode":
         """Draw the planes that do not change."""
@@ -289,9 +291,9 @@ class GridObservation:
         if scenario.vehicles:
             planes[EMPTY_REACH] = vehicles.reached(()).astype(np.float32)
         channels = self.channels_of(scenario, observable.shows_vehicles)
-        static = np.zeros((len(channels), grid.rows, grid.columns), dtype=np.uint8)
+        static = np.zeros((len(channels), grid.rows, grid.columns), dtype=np.float32)
         for name, plane in planes.items():
-            static[channels.index(name)] = _levels(plane)
+            static[channels.index(name)] = _in_steps(plane)
         return GridEpisode(static, lattice, channels, items, vehicles)
 
 
@@ -326,8 +328,67 @@ class GridWithLoadObservation(GridObservation):
                 values
             )
             first += modules
-        episode.static[self.channels.index("unprotected_load")] = _levels(plane)
+        episode.static[self.channels.index("unprotected_load")] = _in_steps(plane)
         return episode
+
+
+_LEVELS: Final = np.float32(255.0)
+
+
+LEAST_IMAGE_SIDE: Final = 36
+"""Pixels of an image's shorter side, at least: fewer are too few for the convolutions of the
+network that most image policies have (Mnih et al. 2015), with kernels of 8, 4 and 3."""
+
+
+@dataclass(frozen=True)
+class ImageObservation:
+    """The planes of `GridObservation` as an image: uint8 (height, width, channels), 255 for 1.
+
+    What image policies take as it is: stable-baselines3's `CnnPolicy`, with no network of your
+    own. A pixel is a square of 0.5 m. Row 0 and column 0 of the image are those of the planes.
+    Rows and columns of zeros follow after the site, until both sides are at least 36 pixels and
+    longer than there are channels: by that libraries that guess the order of axes find it.
+
+    Attributes:
+        planes: The planes.
+    """
+
+    planes: GridObservation = field(default_factory=GridObservation)
+
+    def space(self, scenario: Scenario) -> spaces.Space[Array]:
+        """Return the space: (height, width, channels)."""
+        shape = self.planes.space(scenario).shape
+        assert shape is not None
+        channels, rows, columns = shape
+        least = max(LEAST_IMAGE_SIDE, channels + 1)
+        return spaces.Box(0, 255, (max(rows, least), max(columns, least), channels), np.uint8)
+
+    def episode(self, observable: Observable) -> "ImageEpisode":
+        """Draw the planes that do not change."""
+        shape = self.space(observable.scenario).shape
+        assert shape is not None
+        return ImageEpisode(self.planes.episode(observable), shape[:2])
+
+
+@dataclass(frozen=True, eq=False)
+class ImageEpisode:
+    """The images of one episode.
+
+    Attributes:
+        planes: Gives the planes.
+        size: Height and width of the image, pixels.
+    """
+
+    planes: "GridEpisode"
+    size: tuple[int, ...]
+
+    def observe(self, placement: Placement) -> NDArray[np.uint8]:
+        """Return the image for the modules placed so far, (height, width, channels)."""
+        planes = np.moveaxis(self.planes.observe(placement), 0, -1)
+        rows, columns, channels = planes.shape
+        image = np.zeros((*self.size, channels), dtype=np.uint8)
+        image[:rows, :columns] = np.rint(_LEVELS * planes)
+        return image
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,42 +403,43 @@ class GridEpisode:
         vehicles: The vehicles that may be seen.
     """
 
-    static: NDArray[np.uint8]
+    static: Plane
     zone: Lattice
     channels: tuple[str, ...]
     items: ItemChannels
     vehicles: VehicleView
 
-    def observe(self, placement: Placement) -> NDArray[np.uint8]:
+    def observe(self, placement: Placement) -> Plane:
         """Return all planes for the modules placed so far, (channels, rows, columns)."""
         planes = self.static.copy()
         cells = np.stack((occupied_cells(placement), placement.free))
-        planes[self._of("barrier", "free")] = _levels(self.zone.plane(cells))
+        planes[self._of("barrier", "free")] = _in_steps(self.zone.plane(cells))
         shares = np.array(stock_shares(placement), dtype=np.float32)
-        levels = _levels(shares)[:, np.newaxis, np.newaxis]
-        planes[self._of("stock_share", "stock", "budget_share")] = levels
+        same = _in_steps(shares)[:, np.newaxis, np.newaxis]
+        planes[self._of("stock_share", "stock", "budget_share")] = same
         if self.items.all:
             self._show_items(planes, placement)
         if REACH in self.channels:
             reached = self.vehicles.reached(placement.layout)
-            planes[self.channels.index(REACH)] = _levels(reached.astype(np.float32))
+            planes[self.channels.index(REACH)] = _in_steps(reached.astype(np.float32))
         return planes
 
-    def _show_items(self, planes: NDArray[np.uint8], placement: Placement) -> None:
+    def _show_items(self, planes: Plane, placement: Placement) -> None:
         """Fill in what changes of the planes of the catalogue."""
         placed = PlacedItems.of(placement)
         cells = np.concatenate(([placed.heights, placed.stops_vehicles], placement.legal))
-        planes[self._of(*CHANGING_SITE, *self.items.legal)] = _levels(self.zone.plane(cells))
-        left = _levels(items_left(placement).astype(np.float32))
+        planes[self._of(*CHANGING_SITE, *self.items.legal)] = _in_steps(self.zone.plane(cells))
+        left = _in_steps(items_left(placement).astype(np.float32))
         planes[self._of(*self.items.left)] = left[:, np.newaxis, np.newaxis]
 
     def _of(self, *names: str) -> list[int]:
         return [self.channels.index(name) for name in names]
 
 
-def _levels(values: Plane) -> NDArray[np.uint8]:
-    """Return values from 0 to 1 as whole numbers from 0 to 255."""
-    return np.rint(255.0 * np.minimum(values, 1.0)).astype(np.uint8)
+def _in_steps(values: Plane) -> Plane:
+    """Return values from 0 to 1 in steps of 1/255; what is larger counts as 1."""
+    steps = np.rint(_LEVELS * np.minimum(values, np.float32(1.0))) / _LEVELS
+    return steps.astype(np.float32, copy=False)
 
 
 def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane]:
@@ -578,6 +640,7 @@ OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(
     {
         "grid": GridObservation(),
         "grid_with_load": GridWithLoadObservation(),
+        "image": ImageObservation(),
         "features": FeaturesObservation(),
     }
 )

@@ -283,7 +283,7 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"observation": "grid_with_load"}, "must be 'grid' or 'features' for self_labelling"),
+        ({"observation": "grid_with_load"}, "must be 'grid', 'image' or 'features' for self"),
         ({"engine": "gass"}, "did you mean 'gas'"),
         ({"engine": "surrogat"}, "did you mean 'surrogate'"),
         ({"engine": "surrogate", "cell_m": 0.5}, "engine 'surrogate' has no cells"),

@@ -233,6 +233,8 @@ def test_an_archive_needs_trust(run: Path, tmp_path: Path) -> None:
     expected = TrainedAgent(model.policy, small_scenario())
     charge = CHARGES[0]
     assert agent.propose(small_scenario(), charge) == expected.propose(small_scenario(), charge)
+    with pytest.raises(BlastEnvError, match=r"observation_space is .* must be .* 'courtyard'"):
+        load_archive(archive, "maskable_ppo", "courtyard", trust_archive=True)
 
 
 def test_what_is_no_archive_is_refused(tmp_path: Path) -> None:
@@ -240,3 +242,7 @@ def test_what_is_no_archive_is_refused(tmp_path: Path) -> None:
     path.write_bytes(np.arange(64, dtype=np.uint8).tobytes())
     with pytest.raises(BlastEnvError, match="cannot be read"):
         load_archive(path, "ppo", small_scenario(), trust_archive=True)
+    with pytest.raises(
+        BlastEnvError, match=r"none\.zip: cannot be read: .*No such file .*none\.zip'$"
+    ):
+        load_archive(tmp_path / "none.zip", "ppo", small_scenario(), trust_archive=True)

@@ -494,9 +494,9 @@ CODE_OF_THE_BUILD: Final = {
 
 CODE_NOT_RUN: Final = {
     ("docs/howto/cluster.md", 2): "needs Slurm and submitit",
-    ("docs/researchers/libraries.md", 4): (
+    ("docs/researchers/libraries.md", 6): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
     ),
-    ("docs/researchers/libraries.md", 5): "needs Ray; tests/libraries/run_rllib.py is this code",
+    ("docs/researchers/libraries.md", 7): "needs Ray; tests/libraries/run_rllib.py is this code",
 }
 """Blocks of Python, by their number on the page, that are compiled only, and why."""

@@ -108,7 +108,7 @@ def planes(placement: Placement) -> dict[str, np.ndarray]:
     observed = episode.observe(placement)
     assert GridObservation().space(scenario).contains(observed)
     # The zone begins at 3.5 m and 2.5 m.
-    zone = observed[:, 5 : 5 + 14, 7 : 7 + 6] / 255.0
+    zone = observed[:, 5 : 5 + 14, 7 : 7 + 6]
     return dict(zip(CHANNELS, zone, strict=True))
 
 
@@ -145,7 +145,7 @@ def test_planes_show_heights_items_and_where_they_may_go() -> None:
 
 def test_structures_show_their_heights() -> None:
     episode = GridObservation().episode(Observable(yard(), yard().charge))
-    height = episode.observe(Placement.empty(yard()))[CHANNELS.index("structure_height")] / 255.0
+    height = episode.observe(Placement.empty(yard()))[CHANNELS.index("structure_height")]
     assert height[9:15, 15:21] == pytest.approx(2.5 / 12.0, abs=0.002)
     assert height.max() == height[9, 15]
 

@@ -22,13 +22,13 @@ def plane(env: Any, name: str, *, action: int | None = None, **options: Any) -> 
     if action is not None:
         observation = env.step(action)[0]
     assert observation in env.observation_space
-    return observation[CHANNEL[name]] / 255.0
+    return observation[CHANNEL[name]]
 
 
 def test_the_shape_is_channels_rows_columns_of_half_metres() -> None:
     space = make().observation_space
     assert space.shape == (9, 36, 38)
-    assert space.dtype == np.uint8
+    assert space.dtype == np.float32
     assert make(observation="grid_with_load").observation_space.shape == (10, 36, 38)
 
 
@@ -61,7 +61,7 @@ def test_free_cells_are_the_action_mask() -> None:
     rng = np.random.default_rng(0)
     for _ in range(4):
         mask = info["action_mask"][:-1]
-        in_zone = observation[CHANNEL["free"]][12:26, 14:24] == 255
+        in_zone = observation[CHANNEL["free"]][12:26, 14:24] == 1.0
         assert (in_zone.ravel() == mask).all()
         observation, _, _, _, info = env.step(rng.choice(np.flatnonzero(mask)))
 
@@ -114,7 +114,7 @@ def test_a_hidden_charge_shows_all_places_where_it_may_be() -> None:
 
 
 def test_a_hidden_observation_tells_nothing_about_the_charges_that_were_drawn() -> None:
-    for observation in ("grid", "grid_with_load", "features"):
+    for observation in ("grid", "grid_with_load", "image", "features"):
         env = make(observation=observation, threat="hidden", threats=2)
         first, second = env.reset(seed=1)[0], env.reset(seed=2)[0]
         assert (first == second).all()

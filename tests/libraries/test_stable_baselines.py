@@ -3,6 +3,7 @@
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 import pytest
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
@@ -10,11 +11,7 @@ from stable_baselines3.common.utils import obs_as_tensor
 
 from tests.libraries.ids import BARRIER_IDS, IDS, arguments
 
-pytestmark = [
-    pytest.mark.slow,
-    # Of sites with fewer rows than planes; a policy that flattens them does not care.
-    pytest.mark.filterwarnings("ignore:Treating image space as channels-last"),
-]
+pytestmark = pytest.mark.slow
 _STEPS = 4
 _SMALL: dict[str, Any] = {
     "n_steps": _STEPS,
@@ -34,6 +31,28 @@ def test_ppo(name: str) -> None:
         "MultiInputPolicy" if planes else "MlpPolicy", env, policy_kwargs=_POLICY, **_SMALL
     ).learn(_STEPS)
     assert model.num_timesteps == _STEPS
+
+
+@pytest.mark.parametrize("name", BARRIER_IDS)
+def test_cnn_policy_takes_every_image_and_finds_its_channels(name: str) -> None:
+    env = gym.make(name, **arguments(name), observation="image")
+    model = PPO("CnnPolicy", env, policy_kwargs=_POLICY, **_SMALL).learn(_STEPS)
+    assert env.observation_space.shape is not None
+    height, width, channels = env.observation_space.shape
+    assert model.observation_space.shape == (channels, height, width)
+    observation, _ = env.reset(seed=0)
+    assert model.env is not None
+    model.env.seed(0)
+    learnt_on = model.env.reset()
+    assert isinstance(learnt_on, np.ndarray)
+    assert (learnt_on[0] == observation.transpose(2, 0, 1)).all()
+
+
+@pytest.mark.parametrize("name", BARRIER_IDS)
+def test_a_network_of_ones_own_gets_the_planes_in_their_order(name: str) -> None:
+    env = gym.make(name, **arguments(name))
+    model = PPO("MlpPolicy", env, policy_kwargs=_POLICY, **_SMALL)
+    assert model.observation_space == env.observation_space
 
 
 @pytest.mark.parametrize("name", BARRIER_IDS)

@@ -390,7 +390,7 @@ class Planes:
     """The planes of an observation by the names of their channels.
 
     Attributes:
-        values: From 0 to 255 (batch, channels, height, width).
+        values: From 0 to 1 (batch, channels, height, width).
         channels: Their names; those of `GridObservation`, in any order and among others.
     """
 
@@ -407,6 +407,7 @@ class Planes:
 
 
 _LEVELS: Final = 255.0
+"""Planes have values in steps of 1 over this; as whole numbers their sums are exact."""
 
 
 _LENGTH: Final = 20.0
@@ -473,10 +474,10 @@ class ZoneGeometry(NamedTuple):
             places: Places that stand for where the charge may be; 1 takes the middle.
         """
         row, column = _corner(planes["cost"])
-        cost = _crop(planes["cost"], row, column, rows, columns).float() / _LEVELS
+        cost = _crop(planes["cost"], row, column, rows, columns)
         # The plane shows the root of how likely the charge is in a square.
-        likely = planes["charge"].float().square()
-        target = Spread.of(planes["protected"].float())
+        likely = (planes["charge"] * _LEVELS).round().square()
+        target = Spread.of((planes["protected"] * _LEVELS).round())
         lines = LinesOfSight.between(*likely_places(likely, places), target)
         x = (column[:, None, None] + torch.arange(columns, device=row.device) + 0.5).float()
         y = (row[:, None, None] + torch.arange(rows, device=row.device)[:, None] + 0.5).float()
@@ -508,7 +509,7 @@ class ZoneGeometry(NamedTuple):
 
     def crop(self, plane: Tensor) -> Tensor:
         """Return the build zone's part of a plane, from 0 to 1 (batch, rows, columns)."""
-        return _crop(plane, self.row, self.column, self.rows, self.columns).float() / _LEVELS
+        return _crop(plane, self.row, self.column, self.rows, self.columns)
 
     def view(self, planes: Planes) -> ZoneView:
         """Return what the policy sees now.
@@ -529,7 +530,7 @@ class ZoneGeometry(NamedTuple):
             free=free.flatten(1),
         )
         cells = torch.cat((self.cells, torch.stack(changing, dim=-1)), dim=-1)
-        shares = planes.of(SHARES)[:, :, 0, 0].float() / _LEVELS
+        shares = planes.of(SHARES)[:, :, 0, 0]
         site = (self.site, seen.open_facade[:, None], shares, seen.hidden)
         return ZoneView(cells.view(*barrier.shape, -1), barrier, free, torch.cat(site, dim=1))
 
@@ -545,7 +546,7 @@ def _measures(planes: Planes, likely: Tensor, target: Spread) -> SiteMeasures:
         half_depth=target.half_width(along_x, along_y) / _LENGTH,
         charge_half_length=charge.half_width(along_x, along_y) / _LENGTH,
         charge_half_width=charge.half_width(-along_y, along_x) / _LENGTH,
-        charge=planes["charge"].float().amax(dim=(1, 2))[:, None] / _LEVELS,
+        charge=planes["charge"].amax(dim=(1, 2))[:, None],
     )
 
 

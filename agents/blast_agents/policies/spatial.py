@@ -7,7 +7,7 @@ from gymnasium import spaces
 from sb3_contrib.common.maskable.policies import MaskableActorCriticPolicy
 from stable_baselines3.common.policies import ActorCriticPolicy, BasePolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, MlpExtractor
-from stable_baselines3.common.type_aliases import PyTorchObs, Schedule
+from stable_baselines3.common.type_aliases import Schedule
 from torch import Tensor, nn
 
 from blast_agents.policies.features import (
@@ -18,6 +18,7 @@ from blast_agents.policies.features import (
     ZoneGeometry,
 )
 from blast_env.envs.observations import GridObservation
+from blast_env.errors import BlastEnvError
 
 _LOGIT_GAIN: Final = 0.01
 
@@ -52,6 +53,9 @@ class ZoneExtractor(BaseFeaturesExtractor):
         places: Places that stand for where the charge may be.
         width: Number of features.
         channels: Names of the planes.
+
+    Raises:
+        BlastEnvError: If the space is not one of these planes on a site that the zone fits in.
     """
 
     def __init__(
@@ -63,6 +67,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
         width: int,
         channels: tuple[str, ...],
     ) -> None:
+        self.shape = _planes_shape(observation_space, len(channels), rows, columns)
         super().__init__(observation_space, width * (rows * columns + 1))
         self.channels = tuple(channels)
         self.shown = tuple(name for name in _OVERVIEW if name in self.channels)
@@ -93,16 +98,24 @@ class ZoneExtractor(BaseFeaturesExtractor):
         """Return the features (batch, width * (rows * columns + 1)).
 
         Args:
-            observations: From 0 to 255 (batch, channels, height, width).
+            observations: From 0 to 1 (batch, channels, height, width).
+
+        Raises:
+            BlastEnvError: If their shape is not that of the space.
         """
+        if observations.shape[1:] != self.shape:
+            raise BlastEnvError(
+                f"observations have the shape {tuple(observations.shape[1:])}, must have the "
+                f"policy's {self.shape}: (channels, rows, columns)"
+            )
         with torch.no_grad():  # nothing in here has weights
             named = Planes(observations, self.channels)
             geometry = self._geometry(named)
             view = geometry.view(named)
-            planes = named.of(self.shown).float() / 255.0
+            planes = named.of(self.shown)
             own = [geometry.crop(named[name]) for name in self.around]
             around = torch.stack((view.barrier, view.free, *own), dim=1)
-            items = named.of(self.items)[:, :, 0, 0].float() / 255.0
+            items = named.of(self.items)[:, :, 0, 0]
         site = self.site(torch.cat((view.site, self.overview(planes), items), dim=1))
         near = self.near(around).permute(0, 2, 3, 1)
         cells = torch.relu(self.cells(view.cells) + near + site[:, None, None, :])
@@ -117,6 +130,23 @@ class ZoneExtractor(BaseFeaturesExtractor):
             geometry = ZoneGeometry.of(planes, self.rows, self.columns, self.places)
             self._known = static, geometry
         return self._known[1]
+
+
+def _planes_shape(
+    space: spaces.Space[Any], channels: int, rows: int, columns: int
+) -> tuple[int, ...]:
+    """Return the shape of a space of planes (channels, rows, columns).
+
+    Raises:
+        BlastEnvError: If it has another number of planes, or is smaller than the build zone.
+    """
+    shape = tuple(space.shape or ())
+    if len(shape) != 3 or shape[0] != channels or shape[1] < rows or shape[2] < columns:
+        raise BlastEnvError(
+            f"observation_space has the shape {shape}, must have (channels, rows, columns) with "
+            f"{channels} channels, at least {rows} rows and at least {columns} columns"
+        )
+    return shape
 
 
 class ZoneLatents(MlpExtractor):
@@ -214,18 +244,8 @@ class ZonePolicy(BasePolicy):
                 "width": width,
                 "channels": channels,
             },
-            "normalize_images": False,  # the extractor does it, for the planes that it needs
         }
         super().__init__(observation_space, action_space, **arguments, **others)
-
-    def extract_features(
-        self,
-        obs: PyTorchObs,
-        features_extractor: BaseFeaturesExtractor | None = None,  # noqa: ARG002
-    ) -> Tensor:
-        """Return the features, without a conversion of all the planes."""
-        features: Tensor = self.features_extractor(obs)
-        return features
 
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor = ZoneLatents(self.width, self.critic_width)

@@ -19,7 +19,8 @@ from sb3_contrib.common.maskable.policies import (
 )
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticCnnPolicy, ActorCriticPolicy
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.preprocessing import is_image_space
+from stable_baselines3.common.vec_env import VecEnv, VecTransposeImage
 
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
 from blast_agents.training.checkpoint import Checkpoint
@@ -104,7 +105,9 @@ def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenari
     spatial = _SPATIAL[settings.algorithm]
     names = ["MlpPolicy"]
     if channels_of(settings.observation):
-        names = [f"{spatial.__module__}.{spatial.__name__}", "CnnPolicy", *names]
+        names = [f"{spatial.__module__}.{spatial.__name__}", *names]
+    if settings.observation == "image":
+        names = ["CnnPolicy", *names]
     if hyperparameters.policy not in names:
         raise BlastEnvError(
             f"policy is {hyperparameters.policy}, must be one of {', '.join(names)} for "
@@ -166,9 +169,29 @@ def make_policy(
 
 def policy_for(configuration: RunConfiguration, scenario: Scenario) -> Policy:
     """Return the policy of a run on a scenario of its size, with fresh weights."""
-    space = OBSERVATIONS[configuration.settings.observation].space(scenario)
-    actions = spaces.Discrete(scenario.zone.catalogue.finish + 1)
-    return make_policy(configuration, space, actions)
+    spaces_of = policy_spaces(configuration.settings.observation, scenario)
+    return make_policy(configuration, *spaces_of)
+
+
+def policy_spaces(
+    observation: str, scenario: Scenario
+) -> tuple[spaces.Space[Any], spaces.Discrete]:
+    """Return the spaces of observations and actions that a policy for a scenario is made with.
+
+    Those of the environment, but for an image: stable-baselines3 puts its channels first.
+    """
+    space = OBSERVATIONS[observation].space(scenario)
+    if isinstance(space, spaces.Box) and is_image_space(space):
+        space = VecTransposeImage.transpose_space(space)
+    return space, spaces.Discrete(scenario.zone.catalogue.finish + 1)
+
+
+def as_tensor(policy: Policy, observations: Array) -> torch.Tensor:
+    """Return several observations as a policy takes them, of an image the channels first."""
+    tensor, _ = policy.obs_to_tensor(observations)
+    if not isinstance(tensor, torch.Tensor):
+        raise TypeError(f"observations are arrays, not {type(tensor).__name__}")
+    return tensor
 
 
 def logits_of(policy: Policy, observations: torch.Tensor) -> torch.Tensor:
@@ -341,7 +364,7 @@ class TrainedAgent:
         """Return an action for each of the numbered observations; to finish is always legal."""
         legal = torch.as_tensor(np.pad(placeable, ((0, 0), (0, 1)), constant_values=True))
         with torch.no_grad():
-            logits = logits_of(self.policy, torch.as_tensor(observations))
+            logits = logits_of(self.policy, as_tensor(self.policy, observations))
             logits = logits.masked_fill(~legal, -torch.inf)[numbers]
             if draw is None:
                 chosen = logits.argmax(dim=1)
@@ -416,15 +439,28 @@ def load_archive(
         engine: For an observation that shows loads; see `TrainedAgent`.
 
     Raises:
-        BlastEnvError: If the archive is not trusted, or cannot be read.
+        BlastEnvError: If the archive is not trusted, or cannot be read, or is for other
+            observations or actions than those of the scenario.
     """
     if not trust_archive:
         raise BlastEnvError(f"{path}: {_ARCHIVES_HOLD_CODE}; trust_archive is False, must be True")
     model = PPO if algorithm == "ppo" else MaskablePPO
     unread = dict.fromkeys(_SCHEDULES, 1.0)
     try:
-        policy = model.load(path, device="cpu", custom_objects=unread).policy
+        with Path(path).open("rb") as archive:  # by its name it would look for .zip.zip, too
+            policy = model.load(archive, device="cpu", custom_objects=unread).policy
     except (OSError, ImportError, ValueError, KeyError, RuntimeError, AttributeError) as error:
         raise BlastEnvError(f"{path}: cannot be read: {error}") from error
     policy.set_training_mode(False)
-    return TrainedAgent(policy, find_scenario(scenario), observation, engine)
+    agent = TrainedAgent(policy, find_scenario(scenario), observation, engine)
+    seen, actions = policy_spaces(observation, agent.representative)
+    for name, found, wanted in (
+        ("observation_space", policy.observation_space, seen),
+        ("action_space", policy.action_space, actions),
+    ):
+        if found != wanted:
+            raise BlastEnvError(
+                f"{path}: {name} is {found}, must be {wanted}, as the observation "
+                f"{observation!r} and the scenario {agent.representative.name!r} say"
+            )
+    return agent

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from blast_agents.training.agent import Policy
+from blast_agents.training.agent import Policy, as_tensor
 from blast_env.envs.observations import OBSERVATIONS, EpisodeObservation, Observable
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case
@@ -95,7 +95,8 @@ def check_observation(observation: str) -> None:
     """
     if observation == "grid_with_load":
         raise BlastEnvError(
-            "observation is 'grid_with_load', must be 'grid' or 'features' for self_labelling"
+            "observation is 'grid_with_load', must be 'grid', 'image' or 'features' for "
+            "self_labelling"
         )
 
 
@@ -158,7 +159,7 @@ def imitate(
     for _ in range(updates):
         chosen = rng.integers(len(demonstrations), size=batch_size).tolist()
         steps = [demonstrations[index].draw(rng) for index in sorted(chosen)]
-        observations = torch.as_tensor(np.stack([step.observation for step in steps]))
+        observations = as_tensor(policy, np.stack([step.observation for step in steps]))
         legal = torch.as_tensor(np.stack([step.legal for step in steps]))
         wanted = torch.as_tensor(np.stack([step.wanted for step in steps]))
         worth = torch.tensor([step.value for step in steps], dtype=torch.float32)

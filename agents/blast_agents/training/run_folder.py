@@ -90,7 +90,7 @@ class TrainingSettings(BaseModel):
     threat: Literal["visible", "hidden"] = "visible"
     engine: str = "event"
     cell_m: Annotated[float, Field(gt=0.0)] | None = None
-    observation: Literal["grid", "grid_with_load", "features"] = "grid"
+    observation: Literal["grid", "grid_with_load", "image", "features"] = "grid"
     hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
     evaluation_interval: Annotated[int, Field(ge=1, le=10**6)] = 5
     evaluation_cases: Annotated[int, Field(ge=2, le=100)] = 16
@@ -104,7 +104,8 @@ class TrainingSettings(BaseModel):
         """Refuse to show loads of modules, of which a surrogate knows only the mean."""
         if self.guesses and self.observation == "grid_with_load":
             raise ValueError(
-                "observation is 'grid_with_load', must be 'grid' or 'features' with a surrogate"
+                "observation is 'grid_with_load', must be 'grid', 'image' or 'features' with a "
+                "surrogate"
             )
         return self
 
