@@ -1,0 +1,1 @@
+"""From load to consequence: what breaks, what stands, and what that costs."""

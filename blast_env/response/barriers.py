@@ -1,0 +1,180 @@
+"""Barriers as rigid bodies: does a piece stand, slide or overturn under what it stops?
+
+A piece of mass M, height H and base width B stands on the ground. The pressures on its two sides
+push it with a force F(t) that acts at half its height:
+
+    sliding       M x'' = F(t) - mu M g sign(x'), from where |F| passes mu M g
+    overturning   I theta'' = F(t) H / 2 cos theta - M g (B / 2 cos theta - H / 2 sin theta)
+
+about the far edge of its base, with I = M (H^2 + B^2) / 3. It overturns when its middle passes the
+edge. An anchored piece neither slides nor rocks until its anchors' capacity is passed, and then
+goes on as one that is not anchored.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+from numba import njit
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+
+_GRAVITY_M_S2: Final = 9.81
+_STEP_S: Final = 1e-4
+_AFTER_S: Final = 3.0
+
+
+class Standing(StrEnum):
+    """What becomes of a piece."""
+
+    STANDS = "stands"
+    SLIDES = "slides"
+    ROCKS = "rocks"
+    OVERTURNS = "overturns"
+
+
+@dataclass(frozen=True)
+class RigidPiece:
+    """A barrier piece on the ground, per metre of its length.
+
+    Attributes:
+        height_m: Height.
+        base_m: Width of its base.
+        mass_kg_m: Mass per metre of length.
+        friction: Coefficient of friction with the ground.
+        anchor_n_m: Horizontal force that its anchors hold, N per metre; 0 without anchors.
+    """
+
+    height_m: float
+    base_m: float
+    mass_kg_m: float
+    friction: float = 0.5
+    anchor_n_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            BlastEnvError: If one is out of bounds.
+        """
+        for name in ("height_m", "base_m", "mass_kg_m"):
+            value = getattr(self, name)
+            if not 0.0 < value < np.inf:
+                raise BlastEnvError(f"piece: {name} is {value}, must be above 0")
+        for name in ("friction", "anchor_n_m"):
+            value = getattr(self, name)
+            if not 0.0 <= value < np.inf:
+                raise BlastEnvError(f"piece: {name} is {value}, must be at least 0")
+
+
+@dataclass(frozen=True, eq=False)
+class PieceResponses:
+    """What pieces did.
+
+    Attributes:
+        slide_m: How far they slid, m (pieces,).
+        tilt: Largest tilt over that at which they overturn (pieces,); 1 and more have overturned.
+        overturn_s: When they overturned; infinite where they did not (pieces,).
+        held: Whether the anchors held (pieces,).
+    """
+
+    slide_m: FloatArray
+    tilt: FloatArray
+    overturn_s: FloatArray
+    held: FloatArray
+
+    @property
+    def standing(self) -> list[Standing]:
+        """In a word, one a piece: the worst that happened."""
+        return [
+            Standing.OVERTURNS
+            if tilt >= 1.0
+            else Standing.ROCKS
+            if tilt > 0.05
+            else Standing.SLIDES
+            if slide > 0.01
+            else Standing.STANDS
+            for slide, tilt in zip(self.slide_m.tolist(), self.tilt.tolist(), strict=True)
+        ]
+
+
+def piece_responses(
+    pieces: Sequence[RigidPiece], time_s: FloatArray, pressure_pa: FloatArray
+) -> PieceResponses:
+    """Return what each piece does under the difference of the pressures on its sides.
+
+    Args:
+        pieces: The pieces.
+        time_s: Times of the histories, ascending (times,).
+        pressure_pa: Mean pressure on one side less that on the other, a piece (pieces, times).
+
+    Raises:
+        BlastEnvError: If the histories are not one a piece.
+    """
+    if pressure_pa.shape != (len(pieces), len(time_s)):
+        raise BlastEnvError(
+            f"pressure_pa has shape {pressure_pa.shape}, must be ({len(pieces)}, {len(time_s)})"
+        )
+    rows = np.zeros((len(pieces), 4))
+    steps = int(np.ceil((float(time_s[-1] - time_s[0]) + _AFTER_S) / _STEP_S))
+    begin_s = float(time_s[0])
+    at_s = begin_s + _STEP_S * np.arange(steps + 1)
+    for index, piece in enumerate(pieces):
+        force = piece.height_m * np.interp(at_s, time_s, pressure_pa[index], left=0.0, right=0.0)
+        held = bool(piece.anchor_n_m > 0.0 and np.abs(force).max() <= piece.anchor_n_m)
+        if held:
+            rows[index] = 0.0, 0.0, np.inf, 1.0
+            continue
+        weight = piece.mass_kg_m * _GRAVITY_M_S2
+        slide_m = _slide(force, piece.mass_kg_m, piece.friction * weight, _STEP_S)
+        tilt, overturn_s = _rock(force, piece.mass_kg_m, piece.height_m, piece.base_m, _STEP_S)
+        rows[index] = slide_m, tilt, begin_s + overturn_s, 0.0
+    return PieceResponses(*rows.T)
+
+
+@njit(cache=True)
+def _slide(force: FloatArray, mass: float, friction: float, step_s: float) -> float:
+    """Return the largest distance from where it stood, per metre of length."""
+    x, v, most = 0.0, 0.0, 0.0
+    for push in force:
+        if v == 0.0:
+            net = max(abs(push) - friction, 0.0) * (1.0 if push >= 0.0 else -1.0)
+        else:
+            net = push - friction * (1.0 if v > 0.0 else -1.0)
+        new_v = v + net / mass * step_s
+        if v != 0.0 and new_v * v < 0.0:
+            new_v = 0.0  # friction stops it, and does not push it back
+        x += 0.5 * (v + new_v) * step_s
+        v = new_v
+        most = max(most, abs(x))
+    return most
+
+
+@njit(cache=True)
+def _rock(
+    force: FloatArray, mass: float, height: float, base: float, step_s: float
+) -> tuple[float, float]:
+    """Return the largest tilt over that at which it overturns, and when it did."""
+    inertia = mass * (height * height + base * base) / 3.0
+    limit = np.arctan(base / height)
+    angle, speed, most = 0.0, 0.0, 0.0
+    for step, push in enumerate(force):
+        side = 1.0 if angle > 0.0 or (angle == 0.0 and push >= 0.0) else -1.0
+        size = abs(angle)
+        weight = 0.5 * mass * 9.81 * (base * np.cos(size) - height * np.sin(size))
+        moment = 0.5 * height * push * np.cos(size) - side * weight
+        if angle == 0.0 and side * moment <= 0.0:
+            speed = 0.0
+            continue
+        speed += moment / inertia * step_s
+        new_angle = angle + speed * step_s
+        if angle != 0.0 and new_angle * angle < 0.0:
+            new_angle, speed = 0.0, 0.0  # it comes down on its base, and stays
+        angle = new_angle
+        most = max(most, abs(angle))
+        if most >= limit:
+            return most / limit, step * step_s
+    return most / limit, np.inf

@@ -1,0 +1,102 @@
+"""Whole buildings and people on the ground: probabilities from side-on pressure and impulse.
+
+For neighbours without a facade description, and for contours on the ground. Probits give a
+probability P = normal(Y - 5); P_s is the side-on peak in Pa, i_s the side-on impulse in Pa s:
+
+    minor damage      Y = 5 - 0.26 ln[(4600 / P_s)^3.9 + (110 / i_s)^5.0]
+    major damage      Y = 5 - 0.26 ln[(17500 / P_s)^8.4 + (290 / i_s)^9.3]
+    collapse          Y = 5 - 0.22 ln[(40000 / P_s)^7.4 + (460 / i_s)^11.3]
+    eardrum rupture   Y = -15.6 + 1.93 ln P_s
+
+The first three: TNO, Methods for the determination of possible damage (Green Book), ordinary
+masonry houses. The last: Eisenberg and others 1975, as in Crowl & Louvar, Chemical process safety.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+
+import numpy as np
+from scipy.special import ndtr
+
+from blast_env.arrays import FloatArray
+from blast_env.response.walls import DamageLevel
+
+
+@dataclass(frozen=True)
+class _BuildingProbit:
+    share: float
+    peak_pa: float
+    peak_power: float
+    impulse_pa_s: float
+    impulse_power: float
+
+
+class BuildingDamage(StrEnum):
+    """Damage to an ordinary masonry house in the terms of the Green Book."""
+
+    MINOR = "minor"
+    MAJOR = "major"
+    COLLAPSE = "collapse"
+
+
+_BUILDINGS = {
+    BuildingDamage.MINOR: _BuildingProbit(0.26, 4600.0, 3.9, 110.0, 5.0),
+    BuildingDamage.MAJOR: _BuildingProbit(0.26, 17500.0, 8.4, 290.0, 9.3),
+    BuildingDamage.COLLAPSE: _BuildingProbit(0.22, 40000.0, 7.4, 460.0, 11.3),
+}
+
+
+def building_damage_probability(
+    damage: BuildingDamage, peak_pa: FloatArray, impulse_pa_s: FloatArray
+) -> FloatArray:
+    """Return how likely a house is damaged so badly.
+
+    Args:
+        damage: The damage.
+        peak_pa: Side-on peak overpressures (places,).
+        impulse_pa_s: Side-on impulses of the positive phase (places,).
+    """
+    probit = _BUILDINGS[damage]
+    with np.errstate(divide="ignore", over="ignore"):
+        demand = (probit.peak_pa / np.asarray(peak_pa)) ** probit.peak_power
+        demand = demand + (probit.impulse_pa_s / np.asarray(impulse_pa_s)) ** probit.impulse_power
+        return _probability(5.0 - probit.share * np.log(demand))
+
+
+def eardrum_rupture_probability(peak_pa: FloatArray) -> FloatArray:
+    """Return how likely an eardrum ruptures at side-on peak overpressures (places,)."""
+    with np.errstate(divide="ignore"):
+        return _probability(-15.6 + 1.93 * np.log(np.asarray(peak_pa)))
+
+
+def _probability(probit: FloatArray) -> FloatArray:
+    result: FloatArray = ndtr(probit - 5.0)
+    return result
+
+
+class LevelOfProtection(IntEnum):
+    """Level of protection of a building in the terms of UFC 4-010-01, the better the larger."""
+
+    BELOW_STANDARDS = 0
+    VERY_LOW = 1
+    LOW = 2
+    MEDIUM = 3
+    HIGH = 4
+
+    @property
+    def label(self) -> str:
+        """Its name in lower case."""
+        return self.name.lower().replace("_", " ")
+
+
+def level_of_protection(worst: DamageLevel) -> LevelOfProtection:
+    """Return the level that a component's damage allows a building.
+
+    Superficial damage is in keeping with a high level, moderate with medium, heavy with low, and
+    hazardous failure with very low (PDC-TR 06-08 bands the four levels of UFC 4-010-01 by the
+    damage of its components; non-structural exterior walls are taken as they are here).
+
+    Args:
+        worst: The worst damage among its components.
+    """
+    return LevelOfProtection(DamageLevel.BLOWOUT - worst)

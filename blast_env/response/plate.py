@@ -1,0 +1,248 @@
+"""Large deflection of a simply supported glass plate: von Karman's equations, solved once.
+
+Everything is dimensionless, so that one table serves all panes. With the short side b, the
+thickness h, Young's modulus E and the pressure q
+
+    load        q b^4 / (E h^4)
+    deflection  w / h
+    stress      sigma b^2 / (E h^2)
+
+The edges carry no moment, do not deflect, and slip freely in the plane of the plate, as a pane in
+its gaskets does and as ASTM E1300 assumes:
+
+    D lap^2 w = q + h L(w, F)          lap^2 F = -(E / 2) L(w, w)
+    L(u, v)   = u_xx v_yy - 2 u_xy v_xy + u_yy v_xx
+    w = w_nn = 0 and F = F_n = 0 along the edge
+
+(Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells, chapter 13). Galerkin's method:
+cosines for w, clamped polynomials for F, Newton's method in small steps of load.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.polynomial.legendre import leggauss
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+
+POISSON_RATIO: Final = 0.22
+"""Of soda-lime glass, as in ASTM E1300."""
+
+_COSINES: Final = 9
+_POLYNOMIALS: Final = 9
+_POINTS: Final = 32
+_TOLERANCE: Final = 1e-10
+_MOST_ITERATIONS: Final = 40
+
+
+@dataclass(frozen=True, eq=False)
+class PlateState:
+    """A plate under one load.
+
+    Attributes:
+        load: q b^4 / (E h^4).
+        deflection: Of the centre, w / h.
+        volume: Mean deflection over the plate, w / h.
+        shape_square: Mean of the squared shape (w / w_centre)^2, for the mass factor.
+        principal: Principal stresses sigma b^2 / (E h^2) at the points of a quarter, larger first
+            (2 faces, points, points, 2); the face away from the load first.
+        weights: Share of the plate's area that a point stands for (points, points); they sum to 1.
+    """
+
+    load: float
+    deflection: float
+    volume: float
+    shape_square: float
+    principal: FloatArray
+    weights: FloatArray
+
+    @property
+    def largest_stress(self) -> float:
+        """Largest principal stress on the face away from the load, sigma b^2 / (E h^2)."""
+        return float(self.principal[0, ..., 0].max())
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A rectangular plate of unit short side.
+
+    Attributes:
+        aspect_ratio: Long over short side, from 1 to 5.
+    """
+
+    aspect_ratio: float
+
+    def __post_init__(self) -> None:
+        """Check the ratio.
+
+        Raises:
+            BlastEnvError: If it is out of bounds.
+        """
+        if not 1.0 <= self.aspect_ratio <= 5.0:
+            raise BlastEnvError(f"aspect ratio is {self.aspect_ratio}, must be from 1 to 5")
+
+    def states(self, loads: FloatArray) -> list[PlateState]:
+        """Return the plate under each load.
+
+        Args:
+            loads: Ascending, each positive, q b^4 / (E h^4) (loads,).
+
+        Raises:
+            BlastEnvError: If Newton's method does not converge.
+        """
+        coefficients = np.zeros(_COSINES * _COSINES)
+        states = []
+        for load in loads.tolist():
+            coefficients = self._solved(coefficients, load)
+            states.append(self._state(coefficients, load))
+        return states
+
+    @cached_property
+    def _half(self) -> tuple[float, float]:
+        return self.aspect_ratio / 2.0, 0.5
+
+    @cached_property
+    def _points(self) -> tuple[FloatArray, FloatArray]:
+        """Gauss points and weights on (0, 1)."""
+        points, weights = leggauss(_POINTS)
+        return 0.5 * (points + 1.0), 0.5 * weights
+
+    @cached_property
+    def _bending(self) -> tuple[FloatArray, ...]:
+        """Basis of w, its xx, yy and xy derivatives (functions, points of a quarter)."""
+        along = [_cosines(self._points[0], half) for half in self._half]
+        return _products(along)
+
+    @cached_property
+    def _membrane(self) -> tuple[FloatArray, ...]:
+        """Basis of F, its xx, yy and xy derivatives (functions, points of a quarter)."""
+        along = [_clamped(self._points[0], half) for half in self._half]
+        return _products(along)
+
+    @cached_property
+    def _weights(self) -> FloatArray:
+        """Quadrature weights of a quarter (points,), the area of a quarter in all."""
+        weights = np.outer(self._points[1], self._points[1]).ravel()
+        return weights * self._half[0] * self._half[1]
+
+    @cached_property
+    def _stiffness(self) -> FloatArray:
+        """Bending stiffness with D / (E h^3) (functions, functions)."""
+        _, w_xx, w_yy, _ = self._bending
+        laplacian = w_xx + w_yy  # edges neither deflect nor carry a moment: the rest vanishes
+        return (laplacian * self._weights) @ laplacian.T / (12.0 * (1.0 - POISSON_RATIO**2))
+
+    @cached_property
+    def _compliance(self) -> FloatArray:
+        """Inverse of the membrane's matrix (functions, functions)."""
+        _, f_xx, f_yy, _ = self._membrane
+        laplacian = f_xx + f_yy
+        return np.asarray(np.linalg.inv((laplacian * self._weights) @ laplacian.T), np.float64)
+
+    def _solved(self, coefficients: FloatArray, load: float) -> FloatArray:
+        """Return the coefficients of w under a load, beginning with those under a smaller one."""
+        pushed = load * (self._bending[0] @ self._weights)
+        for _ in range(_MOST_ITERATIONS):
+            residual, tangent = self._residual(coefficients, pushed)
+            step = np.asarray(np.linalg.solve(tangent, -residual), np.float64)
+            coefficients = coefficients + step
+            if np.abs(step).max() <= _TOLERANCE * max(1.0, float(np.abs(coefficients).max())):
+                return coefficients
+        raise BlastEnvError(
+            f"plate of aspect ratio {self.aspect_ratio:g} under a load of {load:g}: no convergence "
+            f"in {_MOST_ITERATIONS} iterations, must be given in smaller steps of load"
+        )
+
+    def _residual(
+        self, coefficients: FloatArray, pushed: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the residual of the equation of w, and its derivative."""
+        w = [coefficients @ each for each in self._bending[1:]]
+        stress_function = self._stress_function(coefficients)
+        f = [stress_function @ each for each in self._membrane[1:]]
+        basis = self._bending[0]
+        residual = self._stiffness @ coefficients - pushed
+        residual -= basis @ (self._weights * _bracket(w, f))
+        changed = _bracket(self._bending[1:], f)  # of w alone, F as it is
+        with_w = _bracket(self._bending[1:], w)
+        moved = -self._compliance @ ((self._membrane[0] * self._weights) @ with_w.T)
+        by_membrane = moved.T @ _bracket(self._membrane[1:], w)
+        tangent = self._stiffness - (basis * self._weights) @ (changed + by_membrane).T
+        return residual, tangent
+
+    def _stress_function(self, coefficients: FloatArray) -> FloatArray:
+        w = [coefficients @ each for each in self._bending[1:]]
+        source: FloatArray = self._membrane[0] @ (self._weights * _bracket(w, w))
+        return -0.5 * self._compliance @ source
+
+    def _state(self, coefficients: FloatArray, load: float) -> PlateState:
+        w, w_xx, w_yy, w_xy = (coefficients @ each for each in self._bending)
+        stress_function = self._stress_function(coefficients)
+        _, f_xx, f_yy, f_xy = (stress_function @ each for each in self._membrane)
+        factor = -0.5 / (1.0 - POISSON_RATIO**2)
+        bent = np.array(
+            [
+                factor * (w_xx + POISSON_RATIO * w_yy),
+                factor * (w_yy + POISSON_RATIO * w_xx),
+                factor * (1.0 - POISSON_RATIO) * w_xy,
+            ]
+        )
+        stretched = np.array([f_yy, f_xx, -f_xy])
+        faces = np.array([stretched + bent, stretched - bent])
+        shares = self._weights / self._weights.sum()
+        centre = float(coefficients.sum())  # every cosine is 1 there
+        shape = (_POINTS, _POINTS)
+        return PlateState(
+            load=load,
+            deflection=centre,
+            volume=float(shares @ w),
+            shape_square=float(shares @ (w / centre) ** 2),
+            principal=_principal(faces).reshape(2, *shape, 2),
+            weights=shares.reshape(shape),
+        )
+
+
+def _cosines(points: FloatArray, half: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return cos((2 i - 1) pi s / 2) at s = x / half, and its first and second derivative in x."""
+    waves = np.arange(1.0, 2.0 * _COSINES, 2.0)[:, None] * np.pi / 2.0
+    angle = waves * points
+    return np.cos(angle), -waves / half * np.sin(angle), -((waves / half) ** 2) * np.cos(angle)
+
+
+def _clamped(points: FloatArray, half: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return (1 - s^2)^2 T_2i(s) at s = x / half, and its first and second derivative in x."""
+    edge = chebyshev.poly2cheb([1.0, 0.0, -2.0, 0.0, 1.0])
+    found: tuple[list[FloatArray], ...] = ([], [], [])
+    for index in range(_POLYNOMIALS):
+        own = chebyshev.chebmul(edge, [0.0] * (2 * index) + [1.0])
+        for order, rows in enumerate(found):
+            derived = chebyshev.chebval(points, chebyshev.chebder(own, order))
+            rows.append(np.asarray(derived, np.float64) / half**order)
+    value, first, second = (np.array(rows) for rows in found)
+    return value, first, second
+
+
+def _products(along: list[tuple[FloatArray, FloatArray, FloatArray]]) -> tuple[FloatArray, ...]:
+    """Return the products of functions of x and y: value, xx, yy, xy (functions, points)."""
+    x, y = along
+    pairs = ((0, 0), (2, 0), (0, 2), (1, 1))
+    return tuple(
+        np.einsum("ip,jq->ijpq", x[i], y[j]).reshape(len(x[0]) * len(y[0]), -1) for i, j in pairs
+    )
+
+
+def _bracket(u: "tuple[FloatArray, ...] | list[FloatArray]", v: list[FloatArray]) -> FloatArray:
+    """Return L(u, v) = u_xx v_yy - 2 u_xy v_xy + u_yy v_xx."""
+    result: FloatArray = u[0] * v[1] - 2.0 * u[2] * v[2] + u[1] * v[0]
+    return result
+
+
+def _principal(stress: FloatArray) -> FloatArray:
+    """Return the principal values of (faces, 3, points) in plane stress (faces, points, 2)."""
+    mean = 0.5 * (stress[:, 0] + stress[:, 1])
+    radius = np.hypot(0.5 * (stress[:, 0] - stress[:, 1]), stress[:, 2])
+    return np.stack([mean + radius, mean - radius], axis=-1)

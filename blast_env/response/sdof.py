@@ -1,0 +1,278 @@
+"""Single-degree-of-freedom systems under a pressure history.
+
+A component of mass per area m deflects by x, measured where it deflects most, in a shape phi:
+
+    K_LM m x'' + r(x) = p(t)        K_LM = mean(phi^2) / mean(phi)
+
+(Biggs, Introduction to Structural Dynamics, chapter 5; UFC 3-340-02, section 3-13). The resistance
+follows a polyline up to a cap, where the component yields; it unloads parallel to the beginning of
+the polyline. Beyond the deflection at which it cracks it follows a second polyline instead.
+
+The equation is integrated by the leapfrog method with steps of a hundredth of the shortest period:
+the peak of an elastic system is then right to a thousandth. Pressure runs straight between the
+points of its history, and each step gets its impulse exactly, however short the load is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numba import njit
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+
+STEPS_PER_PERIOD: Final = 100
+"""Least number of steps in the shortest natural period of a system."""
+
+_PERIODS_AFTER_LOAD: Final = 1.0
+_NO_CRACK: Final = np.inf
+_MOST_TIMES: Final = 50
+"""A panel that falls is followed for so many times the load and a period."""
+
+
+@dataclass(frozen=True, eq=False)
+class Resistance:
+    """Resistance of a component over its deflection, per loaded area.
+
+    Attributes:
+        deflection_m: From 0, ascending (points,).
+        pressure_pa: From 0 (points,); beyond the last point the last slope goes on.
+        cap_pa: Where it yields; infinite for what does not.
+        rebound_cap_pa: The same against rebound.
+        crack_m: Deflection at which it cracks; infinite for what does not.
+        cracked_deflection_m: Deflections of what is left after cracking, ascending (points,).
+        cracked_pressure_pa: Its resistance (points,).
+
+    Raises:
+        BlastEnvError: If deflections do not ascend from 0, or a first slope is not positive.
+    """
+
+    deflection_m: FloatArray
+    pressure_pa: FloatArray
+    cap_pa: float = np.inf
+    rebound_cap_pa: float = np.inf
+    crack_m: float = _NO_CRACK
+    cracked_deflection_m: FloatArray = field(default_factory=lambda: np.array([0.0, 1.0]))
+    cracked_pressure_pa: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0]))
+
+    def __post_init__(self) -> None:
+        """Check the polylines."""
+        for name, deflection in (
+            ("deflection_m", self.deflection_m),
+            ("cracked_deflection_m", self.cracked_deflection_m),
+        ):
+            if len(deflection) < 2 or deflection[0] != 0.0 or not (np.diff(deflection) > 0.0).all():
+                raise BlastEnvError(f"{name} is {deflection}, must ascend from 0")
+        if not self.stiffness_pa_m > 0.0:
+            raise BlastEnvError(f"first slope is {self.stiffness_pa_m} Pa/m, must be above 0")
+
+    @property
+    def stiffness_pa_m(self) -> float:
+        """Slope at no deflection, Pa/m."""
+        return float(self.pressure_pa[1] / self.deflection_m[1])
+
+    @property
+    def yield_m(self) -> float:
+        """Deflection at which it yields or cracks, m; infinite for what does neither."""
+        if np.isinf(self.cap_pa):
+            return self.crack_m
+        return float(np.interp(self.cap_pa, self.pressure_pa, self.deflection_m))
+
+    @classmethod
+    def elastic_plastic(
+        cls, stiffness_pa_m: float, cap_pa: float, rebound_cap_pa: float | None = None
+    ) -> "Resistance":
+        """Return a bilinear resistance: elastic, then perfectly plastic."""
+        yield_m = cap_pa / stiffness_pa_m
+        return cls(
+            np.array([0.0, yield_m]),
+            np.array([0.0, cap_pa]),
+            cap_pa,
+            cap_pa if rebound_cap_pa is None else rebound_cap_pa,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """A single-degree-of-freedom system, per loaded area.
+
+    Attributes:
+        mass_kg_m2: Mass per area.
+        load_mass_factor: K_LM.
+        resistance: Resistance per area.
+    """
+
+    mass_kg_m2: float
+    load_mass_factor: float
+    resistance: Resistance
+
+    @property
+    def period_s(self) -> float:
+        """Natural period at no deflection, s."""
+        return 2.0 * np.pi * self._time_scale_s(self.resistance.stiffness_pa_m)
+
+    @property
+    def shortest_period_s(self) -> float:
+        """Natural period where it is stiffest, s."""
+        slopes = np.diff(self.resistance.pressure_pa) / np.diff(self.resistance.deflection_m)
+        return 2.0 * np.pi * self._time_scale_s(float(slopes.max()))
+
+    def _time_scale_s(self, stiffness_pa_m: float) -> float:
+        return float(np.sqrt(self.load_mass_factor * self.mass_kg_m2 / stiffness_pa_m))
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """What systems did under their histories.
+
+    Attributes:
+        peak_m: Largest deflection inwards, m (systems,).
+        rebound_m: Largest deflection outwards, m, 0 or below (systems,).
+        peak_time_s: When the largest deflection was reached, s (systems,).
+        largest_resistance_pa: Largest resistance inwards, Pa (systems,).
+        permanent_m: Deflection that stays, m (systems,).
+        cracked: Whether it cracked (systems,).
+    """
+
+    peak_m: FloatArray
+    rebound_m: FloatArray
+    peak_time_s: FloatArray
+    largest_resistance_pa: FloatArray
+    permanent_m: FloatArray
+    cracked: FloatArray
+
+
+def responses(
+    systems: Sequence[System],
+    time_s: FloatArray,
+    pressure_pa: FloatArray,
+    steps_per_period: int = STEPS_PER_PERIOD,
+) -> Responses:
+    """Return what each system does under its own history.
+
+    Args:
+        systems: The systems.
+        time_s: Times of the histories, ascending (times,).
+        pressure_pa: A history a system; inwards is positive (systems, times).
+        steps_per_period: Least number of steps in the shortest period of a system.
+
+    Raises:
+        BlastEnvError: If the histories are not one a system, or times do not ascend.
+    """
+    if pressure_pa.shape != (len(systems), len(time_s)):
+        raise BlastEnvError(
+            f"pressure_pa has shape {pressure_pa.shape}, must be ({len(systems)}, {len(time_s)})"
+        )
+    if len(time_s) < 2 or not (np.diff(time_s) > 0.0).all():
+        raise BlastEnvError("time_s must ascend, and have at least two times")
+    rows = np.zeros((len(systems), 6))
+    for index, system in enumerate(systems):
+        resistance = system.resistance
+        step_s = system.shortest_period_s / steps_per_period
+        lasts_s = float(time_s[-1] - time_s[0]) + _PERIODS_AFTER_LOAD * system.period_s
+        _integrate(
+            system.load_mass_factor * system.mass_kg_m2,
+            resistance.deflection_m,
+            resistance.pressure_pa,
+            resistance.cap_pa,
+            resistance.rebound_cap_pa,
+            resistance.crack_m,
+            resistance.cracked_deflection_m,
+            resistance.cracked_pressure_pa,
+            time_s,
+            pressure_pa[index],
+            impulses(time_s, pressure_pa[index]),
+            step_s,
+            int(np.ceil(lasts_s / step_s)),
+            rows[index],
+        )
+    return Responses(*rows.T)
+
+
+@njit(cache=True)
+def polyline(points: FloatArray, values: FloatArray, at: float) -> float:
+    """Return a polyline's value; odd below 0, straight on beyond its end."""
+    size = abs(at)
+    upper = 1
+    while upper < len(points) - 1 and points[upper] < size:
+        upper += 1
+    slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
+    value: float = values[upper - 1] + slope * (size - points[upper - 1])
+    return value if at >= 0.0 else -value
+
+
+@njit(cache=True)
+def impulse_until(
+    time_s: FloatArray, pressure_pa: FloatArray, impulse_pa_s: FloatArray, begin: int, at_s: float
+) -> tuple[float, int]:
+    """Return the impulse of a history until a time, and where in the history that is.
+
+    The impulse at the points of the history is given: a load shorter than a step keeps its own.
+    """
+    if at_s <= time_s[0]:
+        return 0.0, begin
+    if at_s >= time_s[-1]:
+        return impulse_pa_s[-1], begin
+    place = begin
+    while time_s[place + 1] < at_s:
+        place += 1
+    gone_s = at_s - time_s[place]
+    slope = (pressure_pa[place + 1] - pressure_pa[place]) / (time_s[place + 1] - time_s[place])
+    return impulse_pa_s[place] + gone_s * (pressure_pa[place] + 0.5 * slope * gone_s), place
+
+
+def impulses(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
+    """Return the impulse of a history until each of its points, Pa s (times,)."""
+    steps = 0.5 * (pressure_pa[1:] + pressure_pa[:-1]) * np.diff(time_s)
+    return np.append(0.0, np.cumsum(steps))
+
+
+@njit(cache=True)
+def _integrate(
+    mass: float,
+    points: FloatArray,
+    values: FloatArray,
+    cap: float,
+    rebound_cap: float,
+    crack: float,
+    cracked_points: FloatArray,
+    cracked_values: FloatArray,
+    time_s: FloatArray,
+    pressure_pa: FloatArray,
+    impulse_pa_s: FloatArray,
+    step_s: float,
+    least_steps: int,
+    out: FloatArray,
+) -> None:
+    """Integrate one system until it comes back; `out` gets the fields of `Responses`."""
+    x, offset, is_cracked = 0.0, 0.0, 0.0
+    largest, resistance = 0.0, 0.0
+    pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
+    v = pushed / mass
+    for step in range(1, _MOST_TIMES * least_steps):
+        x += step_s * v
+        if abs(x) > crack:
+            is_cracked = 1.0
+        if is_cracked:
+            resistance = polyline(cracked_points, cracked_values, x)
+        else:
+            resistance = polyline(points, values, x - offset)
+            if resistance > cap:
+                offset += (resistance - cap) / (values[1] / points[1])
+                resistance = cap
+            elif resistance < -rebound_cap:
+                offset += (resistance + rebound_cap) / (values[1] / points[1])
+                resistance = -rebound_cap
+        now_s = time_s[0] + step * step_s
+        until, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, now_s + 0.5 * step_s)
+        v += (until - pushed - step_s * resistance) / mass
+        pushed = until
+        largest = max(largest, resistance)
+        if x > out[0]:
+            out[0], out[2] = x, now_s
+        out[1] = min(out[1], x)
+        if step >= least_steps and v * x <= 0.0:
+            break
+    out[3], out[4], out[5] = largest, offset, is_cracked

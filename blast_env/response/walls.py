@@ -1,0 +1,396 @@
+"""Wall panels and slabs: resistance from the section, damage from ductility and support rotation.
+
+Panels span one way between two supports, per metre of width. Their resistance to a uniform pressure
+follows from virtual work, their load-mass factor from the deflected shape, integrated here; a panel
+fixed at both ends passes through an elastic-plastic range, which a single slope of equal work
+stands for (UFC 3-340-02, section 3-13).
+
+Damage levels are those of PDC-TR 06-08 (Single degree of freedom structural response limits for
+antiterrorism design, US Army Corps of Engineers, 2008). Each limit says where it was read.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+from functools import cached_property
+from typing import Annotated, Final, Literal, Protocol
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from blast_env.arrays import FloatArray
+from blast_env.response.sdof import Resistance, Responses, System, responses
+
+_GRAVITY_M_S2: Final = 9.81
+
+
+class DamageLevel(IntEnum):
+    """Damage of a component in the terms of PDC-TR 06-08, the better the smaller."""
+
+    SUPERFICIAL = 0
+    MODERATE = 1
+    HEAVY = 2
+    HAZARDOUS = 3
+    BLOWOUT = 4
+
+
+class Supports(StrEnum):
+    """How a panel is held along its two supports."""
+
+    SIMPLE = "simple"
+    FIXED = "fixed"
+    CANTILEVER = "cantilever"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Where the damage of a component passes from one level into the next.
+
+    Attributes:
+        ductility: Ductility at the end of superficial, moderate, heavy and hazardous damage; `None`
+            where it does not count.
+        rotation_deg: Support rotation there, degrees.
+        source: Where the limits were read; what is an assumption says so.
+    """
+
+    ductility: tuple[float | None, float | None, float | None, float | None]
+    rotation_deg: tuple[float | None, float | None, float | None, float | None]
+    source: str
+
+    def measure(self, ductility: FloatArray, rotation_deg: FloatArray) -> FloatArray:
+        """Return the damage as a number: below 1 superficial, from 1 moderate, to 4 blowout.
+
+        Between two limits it goes up evenly, so that a search has something to climb. Where both
+        ductility and rotation have a limit, the one that is passed first decides.
+
+        Args:
+            ductility: Largest deflection over that at yield (components,).
+            rotation_deg: Largest support rotation (components,).
+        """
+        both = [
+            _measure(values, limits)
+            for values, limits in ((ductility, self.ductility), (rotation_deg, self.rotation_deg))
+            if any(limit is not None for limit in limits)
+        ]
+        result: FloatArray = np.max(both, axis=0)
+        return result
+
+
+def _measure(values: FloatArray, limits: Sequence[float | None]) -> FloatArray:
+    at = [(0.0, 0.0)]
+    at += [(limit, level) for level, limit in enumerate(limits, start=1) if limit is not None]
+    known, levels = (np.array(each) for each in zip(*at, strict=True))
+    return np.interp(values, known, levels)
+
+
+def damage_level(measure: FloatArray) -> list[DamageLevel]:
+    """Return the levels of damage measures."""
+    return [DamageLevel(int(min(each, 4.0))) for each in measure.tolist()]
+
+
+_PDC_TABLES: Final = "PDC-TR 06-08, tables 3-1 and 3-3"
+_BETWEEN: Final = "the limit of heavy damage is an assumption between those of the tables"
+
+CONCRETE_LIMITS: Final = Limits(
+    (1.0, None, None, None),
+    (None, 2.0, 5.0, 10.0),
+    f"{_PDC_TABLES}: 1, 2 and 10 degrees; {_BETWEEN}",
+)
+"""Reinforced concrete in bending, single reinforcement."""
+
+MASONRY_LIMITS: Final = Limits(
+    (1.0, None, None, None),
+    (None, 1.5, 4.0, 8.0),
+    f"{_PDC_TABLES}: 1, 1.5 and 8 degrees; {_BETWEEN}",
+)
+"""Unreinforced masonry in bending."""
+
+_ASSUMED: Final = (
+    "assumption of this project: no public table was found; give own limits to change it"
+)
+
+REINFORCED_MASONRY_LIMITS: Final = Limits((1.0, None, None, None), (None, 2.0, 8.0, 15.0), _ASSUMED)
+STEEL_LIMITS: Final = Limits((1.0, 3.0, 6.0, 10.0), (None, None, None, None), _ASSUMED)
+TIMBER_LIMITS: Final = Limits((1.0, 2.0, 3.0, 4.0), (None, None, None, None), _ASSUMED)
+
+
+class Section(Protocol):
+    """What a panel is made of, per metre of width."""
+
+    @property
+    def mass_kg_m2(self) -> float:
+        """Mass per area."""
+
+    @property
+    def moment_n(self) -> float:
+        """Moment at which it yields or cracks, N m per m."""
+
+    @property
+    def bending_stiffness_n_m(self) -> float:
+        """E I, N m2 per m."""
+
+    @property
+    def limits(self) -> Limits:
+        """Where its damage passes from level to level."""
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class ReinforcedConcrete(_Section):
+    """Reinforced concrete, as much steel on both faces.
+
+    Moment by equilibrium of steel and a rectangular block of concrete, stiffness from the mean of
+    whole and cracked section (UFC 3-340-02, sections 4-9 and 4-11), with dynamic strengths.
+
+    Attributes:
+        thickness_m: Thickness.
+        steel_share: Area of tension steel over that of the section above its middle.
+        cover_m: Depth of the middle of the steel under the face.
+        concrete_pa: Compressive strength.
+        steel_pa: Yield strength.
+        dynamic_increase: Factor on both strengths at the speed of a blast.
+    """
+
+    kind: Literal["reinforced_concrete"] = "reinforced_concrete"
+    thickness_m: Annotated[float, Field(gt=0.0, le=3.0)]
+    steel_share: Annotated[float, Field(gt=0.0, le=0.04)] = 0.003
+    cover_m: Annotated[float, Field(gt=0.0)] = 0.035
+    concrete_pa: Annotated[float, Field(gt=0.0)] = 30e6
+    steel_pa: Annotated[float, Field(gt=0.0)] = 500e6
+    dynamic_increase: Annotated[float, Field(ge=1.0, le=2.0)] = 1.17
+
+    @property
+    def mass_kg_m2(self) -> float:
+        """Mass per area, at 2,500 kg/m3."""
+        return 2500.0 * self.thickness_m
+
+    @property
+    def _depth_m(self) -> float:
+        return max(self.thickness_m - self.cover_m, 0.5 * self.thickness_m)
+
+    @property
+    def moment_n(self) -> float:
+        """Yield moment per metre of width."""
+        force = self.steel_share * self._depth_m * self.steel_pa * self.dynamic_increase
+        block_m = force / (0.85 * self.concrete_pa * self.dynamic_increase)
+        return force * (self._depth_m - 0.5 * block_m)
+
+    @property
+    def bending_stiffness_n_m(self) -> float:
+        """E I, the mean of whole and cracked section."""
+        concrete_e = 4700e6 * np.sqrt(self.concrete_pa / 1e6)
+        ratio = 200e9 / concrete_e
+        share = ratio * self.steel_share
+        neutral_m = self._depth_m * (np.sqrt(2.0 * share + share**2) - share)
+        steel_m = self.steel_share * self._depth_m
+        cracked = neutral_m**3 / 3.0 + ratio * steel_m * (self._depth_m - neutral_m) ** 2
+        return float(0.5 * concrete_e * (self.thickness_m**3 / 12.0 + cracked))
+
+    @property
+    def limits(self) -> Limits:
+        """PDC-TR 06-08, single reinforcement."""
+        return CONCRETE_LIMITS
+
+
+class Masonry(_Section):
+    """Unreinforced brick or block: it cracks, then rocks on its own weight until it falls.
+
+    Attributes:
+        thickness_m: Thickness of the wall.
+        density_kg_m3: Of the wall as built.
+        flexural_pa: Flexural strength at which it cracks.
+        young_pa: Young's modulus.
+    """
+
+    kind: Literal["masonry"] = "masonry"
+    thickness_m: Annotated[float, Field(gt=0.0, le=2.0)]
+    density_kg_m3: Annotated[float, Field(gt=0.0)] = 1900.0
+    flexural_pa: Annotated[float, Field(gt=0.0)] = 0.7e6
+    young_pa: Annotated[float, Field(gt=0.0)] = 6e9
+
+    @property
+    def mass_kg_m2(self) -> float:
+        """Mass per area."""
+        return self.density_kg_m3 * self.thickness_m
+
+    @property
+    def moment_n(self) -> float:
+        """Cracking moment per metre of width."""
+        return self.flexural_pa * self.thickness_m**2 / 6.0
+
+    @property
+    def bending_stiffness_n_m(self) -> float:
+        """E I of the whole section."""
+        return self.young_pa * self.thickness_m**3 / 12.0
+
+    @property
+    def limits(self) -> Limits:
+        """PDC-TR 06-08, unreinforced masonry."""
+        return MASONRY_LIMITS
+
+
+class Sheeting(_Section):
+    """Anything else that bends elastically and then yields: studs, timber, reinforced block.
+
+    Attributes:
+        moment_n: Yield moment per metre of width, N m per m.
+        bending_stiffness_n_m: E I per metre of width.
+        mass_kg_m2: Mass per area.
+        material: Decides the limits of damage.
+    """
+
+    kind: Literal["sheeting"] = "sheeting"
+    moment_n: Annotated[float, Field(gt=0.0)]
+    bending_stiffness_n_m: Annotated[float, Field(gt=0.0)]
+    mass_kg_m2: Annotated[float, Field(gt=0.0)]
+    material: Literal["steel", "timber", "reinforced_masonry"]
+
+    @property
+    def limits(self) -> Limits:
+        """Of the material."""
+        known = {
+            "steel": STEEL_LIMITS,
+            "timber": TIMBER_LIMITS,
+            "reinforced_masonry": REINFORCED_MASONRY_LIMITS,
+        }
+        return known[self.material]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A wall panel or slab that spans one way.
+
+    Attributes:
+        section: What it is made of.
+        span_m: Distance between its supports; of a cantilever its length.
+        supports: How it is held.
+    """
+
+    section: ReinforcedConcrete | Masonry | Sheeting
+    span_m: float
+    supports: Supports = Supports.SIMPLE
+
+    @cached_property
+    def system(self) -> System:
+        """The panel as a single-degree-of-freedom system, per area."""
+        stiffness_pa_m, cap_pa = self._strength()
+        if isinstance(self.section, Masonry):
+            resistance = self._rocking(stiffness_pa_m, cap_pa)
+        else:
+            resistance = Resistance.elastic_plastic(stiffness_pa_m, cap_pa)
+        elastic, plastic = load_mass_factors(self.supports)
+        return System(self.section.mass_kg_m2, 0.5 * (elastic + plastic), resistance)
+
+    def _strength(self) -> tuple[float, float]:
+        """Return stiffness and ultimate resistance per area, Pa/m and Pa.
+
+        Ultimate resistance by virtual work of the hinges: 8, 16 and 2 M / L^2. Elastic stiffness:
+        384 E I / (5 L^4), E I 384 / L^4 and 8 E I / L^4. Fixed at both ends, yield begins at 12
+        M / L^2, and goes on with the stiffness of a simple span; one slope of equal work stands for
+        both.
+        """
+        moment, bending = self.section.moment_n, self.section.bending_stiffness_n_m
+        length = self.span_m
+        simple = 384.0 * bending / (5.0 * length**4)
+        if self.supports is Supports.SIMPLE:
+            return simple, 8.0 * moment / length**2
+        if self.supports is Supports.CANTILEVER:
+            return 8.0 * bending / length**4, 2.0 * moment / length**2
+        cap = 16.0 * moment / length**2
+        first_m = (12.0 * moment / length**2) / (5.0 * simple)
+        last_m = first_m + (4.0 * moment / length**2) / simple
+        work = 0.5 * 0.75 * cap * first_m + 0.5 * (0.75 + 1.0) * cap * (last_m - first_m)
+        yield_m = 2.0 * (last_m - work / cap)
+        return cap / yield_m, cap
+
+    def _rocking(self, stiffness_pa_m: float, cap_pa: float) -> Resistance:
+        """Return a resistance that is lost with the crack, but for the panel's own weight.
+
+        Cracked at mid-height, its halves rock: at no deflection they resist with what lifts them,
+        4 m g h / L ... at a deflection of their thickness with nothing (Paulay & Priestley 1992).
+        """
+        section = self.section
+        thickness = section.thickness_m  # type: ignore[union-attr]
+        weight = 4.0 * section.mass_kg_m2 * _GRAVITY_M_S2 * thickness / self.span_m
+        first_m = 0.01 * thickness
+        return Resistance(
+            np.array([0.0, cap_pa / stiffness_pa_m]),
+            np.array([0.0, cap_pa]),
+            crack_m=cap_pa / stiffness_pa_m,
+            cracked_deflection_m=np.array([0.0, first_m, thickness, 100.0 * self.span_m]),
+            cracked_pressure_pa=np.array([0.0, 0.99 * weight, 0.0, 0.0]),
+        )
+
+    def rotation_deg(self, deflection_m: FloatArray) -> FloatArray:
+        """Return the support rotation at a deflection, degrees."""
+        arm = self.span_m if self.supports is Supports.CANTILEVER else 0.5 * self.span_m
+        return np.degrees(np.arctan(np.asarray(deflection_m) / arm))
+
+
+def load_mass_factors(supports: Supports) -> tuple[float, float]:
+    """Return K_LM = mean(phi^2) / mean(phi) of the elastic and of the plastic shape.
+
+    Elastic is the static deflection under a uniform load, plastic the straight-sided mechanism.
+    """
+    s = (np.arange(2000) + 0.5) / 2000.0
+    if supports is Supports.SIMPLE:
+        elastic, plastic = s - 2.0 * s**3 + s**4, 1.0 - np.abs(2.0 * s - 1.0)
+    elif supports is Supports.FIXED:
+        elastic, plastic = s**2 * (1.0 - s) ** 2, 1.0 - np.abs(2.0 * s - 1.0)
+    else:
+        elastic, plastic = 6.0 * s**2 - 4.0 * s**3 + s**4, s
+    shapes = (elastic / elastic.max(), plastic / plastic.max())
+    first, second = (float((shape**2).mean() / shape.mean()) for shape in shapes)
+    return first, second
+
+
+@dataclass(frozen=True, eq=False)
+class PanelResponses:
+    """What panels did under their histories.
+
+    Attributes:
+        motion: Their motion.
+        ductility: Largest deflection over that at yield (panels,).
+        rotation_deg: Largest support rotation (panels,).
+        damage: Damage as a number, see `Limits.measure` (panels,).
+    """
+
+    motion: Responses
+    ductility: FloatArray
+    rotation_deg: FloatArray
+    damage: FloatArray
+
+    @property
+    def levels(self) -> list[DamageLevel]:
+        """Levels of damage, one a panel."""
+        return damage_level(self.damage)
+
+
+def panel_responses(
+    panels: Sequence[Panel], time_s: FloatArray, pressure_pa: FloatArray
+) -> PanelResponses:
+    """Return what each panel does under its own history.
+
+    Args:
+        panels: The panels.
+        time_s: Times of the histories, ascending (times,).
+        pressure_pa: A history a panel, inwards positive (panels, times).
+
+    Raises:
+        BlastEnvError: If the histories are not one a panel.
+    """
+    motion = responses([panel.system for panel in panels], time_s, pressure_pa)
+    most = np.maximum(motion.peak_m, -motion.rebound_m)
+    ductility = most / np.array([panel.system.resistance.yield_m for panel in panels])
+    rotation = np.array(
+        [panel.rotation_deg(each).item() for panel, each in zip(panels, most, strict=True)]
+    )
+    damage = np.array(
+        [
+            panel.section.limits.measure(ductility[[index]], rotation[[index]]).item()
+            for index, panel in enumerate(panels)
+        ]
+    )
+    return PanelResponses(motion, ductility, rotation, damage)
