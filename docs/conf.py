@@ -100,7 +100,8 @@ def _commands(package: str) -> str:
     """Return what every command of a Typer application does and takes, as it says itself."""
     commands = typer.main.get_command(import_module(package).app).commands
     lines: list[str] = []
-    for name, command in commands.items():
+    for name, lazy in commands.items():
+        command = lazy.loaded
         lines += [f"## {name}", "", inspect.cleandoc(command.help), ""]
         lines += ["| option | what |", "|---|---|"]
         for option in command.params:

@@ -75,6 +75,7 @@ def parse(application: Typer, words: tuple[str, ...], in_sentence: bool) -> None
             return
         assert words[0] in command.commands, f"there is no command {words[0]!r}"
         command, words = command.commands[words[0]], words[1:]
+        command = getattr(command, "loaded", command)  # ours are imported when they are called
     if in_sentence:
         options = {name for option in command.params for name in option.opts}
         options |= {name for option in command.params for name in option.secondary_opts}

@@ -1,55 +1,92 @@
-"""The command line, `blast-env`: one module a command."""
+"""The command line, `blast-env`: one module a command, imported when it is called."""
 
 from typing import Annotated
 
 import typer
 
-from blast_env.cli.bench import bench
-from blast_env.cli.calibrate import calibrate
-from blast_env.cli.draw import draw
-from blast_env.cli.evaluate import evaluate
-from blast_env.cli.import_map import import_map
-from blast_env.cli.league import league
-from blast_env.cli.output import print_line
-from blast_env.cli.page import app as page
-from blast_env.cli.play import play
-from blast_env.cli.propose import propose
-from blast_env.cli.report import report
-from blast_env.cli.search import search
-from blast_env.cli.simulate import simulate
-from blast_env.cli.train import train
-from blast_env.cli.validate import validate
-from blast_env.provenance import package_version
+from blast_env.cli.command import MARKUP, LazyGroup
+
+
+class _Commands(LazyGroup):
+    """All commands, in the order in which help lists them."""
+
+    places = {  # noqa: RUF012  # annotated in the base class
+        "simulate": (
+            "blast_env.cli.simulate:simulate",
+            "Run one blast and print what each structure took.",
+        ),
+        "validate": (
+            "blast_env.cli.validate:ValidateCommand",
+            "Check scenario files: what is wrong with each, or what it is (not) good for.",
+        ),
+        "draw": (
+            "blast_env.cli.draw:DrawCommand",
+            "Draw the plan and the oblique view of a site, with a layout if one is given.",
+        ),
+        "calibrate": (
+            "blast_env.cli.calibrate:calibrate",
+            "Run blasts at many distances, fit the three laws, and store one as a calibration.",
+        ),
+        "evaluate": (
+            "blast_env.cli.evaluate:EvaluateCommand",
+            "Compare layouts with no barrier, both exposed to the same threats.",
+        ),
+        "search": (
+            "blast_env.cli.search:search",
+            "Search for the layout with the least impulse on the protected structures.",
+        ),
+        "bench": (
+            "blast_env.cli.bench:bench",
+            "Time blasts on all engines and against other codes, and measure the memory.",
+        ),
+        "train": (
+            "blast_env.cli.train:TrainCommand",
+            "Train an agent that proposes layouts, or go on with a training that was interrupted.",
+        ),
+        "league": (
+            "blast_env.cli.league:league",
+            "Compare searches, rules and trained agents on the same held-out cases and seeds.",
+        ),
+        "propose": (
+            "blast_env.cli.propose:propose",
+            "Propose a layout for any site in a second or a few; no blast is run for it.",
+        ),
+        "report": (
+            "blast_env.cli.report:ReportCommand",
+            "Report on a layout by gas dynamics: HTML that needs nothing else, and PDF.",
+        ),
+        "play": (
+            "blast_env.cli.play:PlayCommand",
+            "Place barriers by hand, with mouse and keyboard, and see what the blast makes of "
+            "them.",
+        ),
+        "import": (
+            "blast_env.cli.import_map:ImportCommand",
+            "Make a scenario of a map or drawing: GeoJSON, OpenStreetMap, DXF.",
+        ),
+        "app": (
+            "blast_env.cli.page:AppCommand",
+            "Open a local web page to design on: draw a site, place barriers, blast, compare, "
+            "search.",
+        ),
+    }
+
 
 app = typer.Typer(
     name="blast-env",
+    cls=_Commands,
     no_args_is_help=True,
-    rich_markup_mode="markdown",  # its own markup takes [row, column] for a style
+    rich_markup_mode=MARKUP,
     pretty_exceptions_enable=False,
 )
-_COMMANDS = (
-    simulate,
-    validate,
-    draw,
-    calibrate,
-    evaluate,
-    search,
-    bench,
-    train,
-    league,
-    propose,
-    report,
-    play,
-)
-for _command in _COMMANDS:
-    app.command()(_command)
-app.command("import")(import_map)  # a word that Python keeps for itself
-app.command("app")(page)
 
 
 def _show_version(asked: bool) -> None:
     if asked:
-        print_line(f"blast-env {package_version()}")
+        # Here, because help is shown without it.
+        from blast_env.provenance import package_version
+
+        typer.echo(f"blast-env {package_version()}")
         raise typer.Exit
 
 

@@ -3,21 +3,19 @@
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from blast_env.cli.output import message_console, printable
 from blast_env.cluster import on_cluster
 
-ClusterAddress = Annotated[
-    str | None,
-    typer.Option(
-        "--cluster",
-        help="Address or scheduler file of a Dask cluster, which then runs the blasts in the "
-        "place of worker processes (docs/howto/cluster.md).",
-    ),
-]
+CLUSTER_HELP: Final = (
+    "Address or scheduler file of a Dask cluster, which then runs the blasts in the place of "
+    "worker processes (docs/howto/cluster.md)."
+)
+
+ClusterAddress = Annotated[str | None, typer.Option("--cluster", help=CLUSTER_HELP)]
 
 
 @contextmanager

@@ -6,7 +6,16 @@ from math import isnan
 from pathlib import Path
 from typing import Final
 
-from blast_env.cli.options import fixed_charge
+from blast_env.cli.command import FOLDER, Target, option
+from blast_env.cli.options import (
+    CELL_HELP,
+    CVAR_HELP,
+    CacheOptions,
+    ChargeOptions,
+    ClusterOptions,
+    JsonOptions,
+    ProcessOptions,
+)
 from blast_env.cli.output import (
     engine_text,
     make_table,
@@ -18,7 +27,6 @@ from blast_env.cli.output import (
     without,
 )
 from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
-from blast_env.cli.targets import FileTarget
 from blast_env.evaluation import (
     BlastEvaluator,
     Evaluators,
@@ -34,53 +42,49 @@ from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.physics.engine import Engine
 from blast_env.physics.engines import is_gas
-from blast_env.scenario import AnyCharge, ObjectiveSection, Scenario
-from blast_env.statistics import Estimate
+from blast_env.scenario import ObjectiveSection, Scenario
+from blast_env.statistics import CVAR_LEVEL, Estimate
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
 
 _PERCENT = 100.0
 
 
-@dataclass(frozen=True)
-class EvaluateOptions:
+@dataclass(frozen=True, kw_only=True)
+class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions, JsonOptions):
     """The options that a layout's file and a run have in common; see `evaluate`."""
 
-    seeds: int
-    first_seed: int | None
-    processes: int
-    engine: str | None
-    cell_m: float | None
-    charge_m: tuple[float, float] | None
-    tnt_kg: float | None
-    cvar_level: float
-    cache: Path | None
-    export: Path | None
-    out: Path | None
-    as_json: bool
-    json_all: bool
+    seeds: int = option(32, "Number of threats.", min=1)
+    first_seed: int | None = option(
+        None,
+        "The seeds count from here.",
+        min=0,
+        show_default="the first one that no training and no search meets",
+    )
+    engine: str | None = option(
+        None, "Engine that runs the blasts.", show_default="event; with --run that of the run"
+    )
+    cell_m: float | None = option(None, CELL_HELP)
+    cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
+    export: Path | None = option(
+        None,
+        "Folder for the layouts as JSON, CSV, GeoJSON and DXF; or, for one layout, a file with one "
+        "of these suffixes.",
+    )
+    out: Path | None = option(
+        None, "Folder for the JSON file, the tables and the figure.", writes=FOLDER
+    )
 
-    @property
-    def files(self) -> dict[str, FileTarget]:
-        """The file of `--export`, if it is one; its suffix is looked at by `check_target`."""
-        if self.export is None or not is_file(self.export):
-            return {}
-        return {"--export": FileTarget(self.export, (self.export.suffix.lower(),))}
-
-    @property
-    def folders(self) -> dict[str, Path | None]:
-        """The folder of `--export`, if it is one."""
-        is_folder = self.export is not None and not self.export.suffix
-        return {"--export": self.export if is_folder else None}
-
-    @property
-    def any_json(self) -> bool:
-        """Whether the result is printed as JSON."""
-        return self.as_json or self.json_all
-
-    def fixed(self, scenario: Scenario, charge: AnyCharge) -> AnyCharge:
-        """Return a charge with what the user has fixed of it; see `fixed_charge`."""
-        return fixed_charge(scenario, charge, self.charge_m, self.tnt_kg)
+    def targets(self) -> list[Target]:
+        """Return where the command is to write; `check_target` looks at the suffix of `export`."""
+        targets = super().targets()
+        if self.export is None:
+            return targets
+        if is_file(self.export):
+            targets.append(Target("--export", self.export, (self.export.suffix.lower(),)))
+        elif not self.export.suffix:
+            targets.append(Target("--export", self.export, FOLDER))
+        return targets
 
     def threats(self, scenario: Scenario, engine: Engine) -> tuple[Threat, ...]:
         """Return the threats that the seeds draw, with what the user has fixed of their charges.

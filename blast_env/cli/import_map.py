@@ -1,19 +1,18 @@
 """`blast-env import`: a site from a map or drawing."""
 
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
+from blast_env.cli.command import Command, argument, option
 from blast_env.cli.output import (
     make_table,
     print_json,
     print_line,
     result_console,
     save_pictures,
-    user_errors,
 )
-from blast_env.cli.targets import PICTURES, FileTarget, checked_targets
+from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import save_scenario
 
@@ -32,156 +31,96 @@ _HEADERS = (
 Place = tuple[float, float]
 
 
-def import_map(
-    file: Annotated[Path, typer.Argument(help=".geojson, .osm, .osm.pbf or .dxf.")],
-    out: Annotated[Path, typer.Option(help="Scenario file to write: .toml.")],
-    name: Annotated[str | None, typer.Option(help="Name of the scenario.")] = None,
-    origin: Annotated[
-        Place | None,
-        typer.Option(metavar="X Y", help=f"The site's lower left corner. {_PLACE}"),
-    ] = None,
-    centre: Annotated[
-        Place | None, typer.Option(metavar="X Y", help="The site's middle, instead of --origin.")
-    ] = None,
-    size: Annotated[
-        Place | None,
-        typer.Option(
-            metavar="WIDTH HEIGHT",
-            help="The site's extents, m.",
-            show_default="as much as everything in the file needs",
-        ),
-    ] = None,
-    margin: Annotated[float, typer.Option(help="Ground around everything without --size, m.")] = 10,
-    rotation: Annotated[
-        float | None,
-        typer.Option(
-            help="Direction of the site's x axis, degrees from east, counterclockwise.",
-            show_default="that of most walls",
-        ),
-    ] = None,
-    crs: Annotated[
-        str | None,
-        typer.Option(
-            help="Reference system of the coordinates: EPSG:25832, or local for plain metres.",
-            show_default="what GeoJSON says, else EPSG:4326; none for DXF",
-        ),
-    ] = None,
-    units: Annotated[
-        str | None, typer.Option(help="Unit of a drawing: m, mm, cm, dm, km, in, ft.")
-    ] = None,
-    buildings_from: Annotated[
-        list[str] | None,
-        typer.Option(help="What is a building: KEY, KEY=VALUE, or a layer of a drawing."),
-    ] = None,
-    charges_from: Annotated[
-        list[str] | None,
-        typer.Option(help="Where charges may be, likewise.", show_default="streets, car parks"),
-    ] = None,
-    zone_from: Annotated[
-        list[str] | None, typer.Option(help="Where barriers may stand, likewise.")
-    ] = None,
-    keep_outs_from: Annotated[
-        list[str] | None, typer.Option(help="What must stay empty, likewise.")
-    ] = None,
-    protect: Annotated[
-        list[str] | None, typer.Option(help="Name of a building whose load counts.")
-    ] = None,
-    protect_near: Annotated[
-        Place | None, typer.Option(metavar="X Y", help="Protect the building nearest to this.")
-    ] = None,
-    tnt_kg: Annotated[
-        float, typer.Option("--tnt-kg", metavar="KG", help="Mass of the charges, kg TNT.")
-    ] = 100.0,
-    charge_at: Annotated[
-        list[str] | None,
-        typer.Option(metavar="X,Y", help="A further place of a charge."),
-    ] = None,
-    zone: Annotated[
-        tuple[float, float, float, float] | None,
-        typer.Option(metavar="LEFT BOTTOM WIDTH HEIGHT", help="The build zone, site metres."),
-    ] = None,
-    zone_around: Annotated[
-        float | None, typer.Option(help="Zone around what is protected, so many metres wide.")
-    ] = None,
-    stock: Annotated[int, typer.Option(min=1, help="Modules that there are to place.")] = 20,
-    wall_height: Annotated[float, typer.Option(help="Height of the modules, m.")] = 3.0,
-    clearance: Annotated[
-        float, typer.Option(min=0.0, help="Least distance of modules from structures, m.")
-    ] = 1.0,
-    preset: Annotated[str, typer.Option(help="Parameters of the particle model.")] = "collisional",
-    height_from: Annotated[str | None, typer.Option(help="Property with the height.")] = None,
-    default_height: Annotated[
-        float | None,
-        typer.Option(help="Height of buildings without one, m.", show_default="as high as the air"),
-    ] = None,
-    level_height: Annotated[float, typer.Option(help="Height of a storey, m.")] = 3.0,
-    least_area: Annotated[float, typer.Option(help="Leave out smaller buildings, m2.")] = 4.0,
-    most_area_deviation: Annotated[
-        float, typer.Option(help="Refuse a building of which modules miss more, share of area.")
-    ] = 0.2,
-    most_outline_deviation: Annotated[
-        float, typer.Option(help="Refuse a building whose outline is farther off, m.")
-    ] = 1.0,
-    most_rectangles: Annotated[
-        int, typer.Option(help="Rectangles that a building may take; coarser blocks beyond.")
-    ] = 16,
-    repair: Annotated[
-        bool, typer.Option("--repair", help="Put outlines right that cross themselves.")
-    ] = False,
-    picture: Annotated[
-        Path | None, typer.Option(help="Write a plan, outlines over modules: .png, .svg, .pdf.")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class ImportCommand(Command):
     """Make a scenario of a map or drawing: GeoJSON, OpenStreetMap, DXF.
 
     The site is turned to the direction of most walls and buildings are cut into modules of 0.5 m;
     the table says how far each is from its outline.
     """
-    files = {"--out": FileTarget(out, (".toml",)), "--picture": FileTarget(picture, PICTURES)}
-    with user_errors(), checked_targets(files):
+
+    file: Path = argument(".geojson, .osm, .osm.pbf or .dxf.")
+    out: Path = option(..., "Scenario file to write: .toml.", writes=(".toml",))
+    name: str | None = option(None, "Name of the scenario.")
+    origin: Place | None = option(None, f"The site's lower left corner. {_PLACE}", metavar="X Y")
+    centre: Place | None = option(None, "The site's middle, instead of --origin.", metavar="X Y")
+    size_m: Place | None = option(
+        None,
+        "The site's extents, m.",
+        metavar="WIDTH HEIGHT",
+        show_default="as much as everything in the file needs",
+    )
+    margin_m: float = option(10, "Ground around everything without --size, m.")
+    rotation_deg: float | None = option(
+        None,
+        "Direction of the site's x axis, degrees from east, counterclockwise.",
+        show_default="that of most walls",
+    )
+    crs: str | None = option(
+        None,
+        "Reference system of the coordinates: EPSG:25832, or local for plain metres.",
+        show_default="what GeoJSON says, else EPSG:4326; none for DXF",
+    )
+    units: str | None = option(None, "Unit of a drawing: m, mm, cm, dm, km, in, ft.")
+    buildings_from: tuple[str, ...] = option(
+        (), "What is a building: KEY, KEY=VALUE, or a layer of a drawing."
+    )
+    charges_from: tuple[str, ...] = option(
+        (), "Where charges may be, named in the same way.", show_default="streets, car parks"
+    )
+    zone_from: tuple[str, ...] = option((), "Where barriers may stand, named in the same way.")
+    keep_outs_from: tuple[str, ...] = option((), "What must stay empty, named in the same way.")
+    protect: tuple[str, ...] = option((), "Name of a building whose load counts.")
+    protect_near: Place | None = option(
+        None, "Protect the building nearest to this.", metavar="X Y"
+    )
+    tnt_kg: float = option(100.0, "Mass of the charges, kg TNT.", metavar="KG")
+    charge_at: tuple[str, ...] = option((), "A further place of a charge.", metavar="X,Y")
+    zone_m: tuple[float, float, float, float] | None = option(
+        None, "The build zone, site metres.", metavar="LEFT BOTTOM WIDTH HEIGHT"
+    )
+    zone_around_m: float | None = option(
+        None, "Zone around what is protected, so many metres wide."
+    )
+    stock: int = option(20, "Modules that there are to place.", min=1)
+    wall_height_m: float = option(3.0, "Height of the modules, m.")
+    clearance_m: float = option(1.0, "Least distance of modules from structures, m.", min=0.0)
+    preset: str = option("collisional", "Parameters of the particle model.")
+    height_from: str | None = option(None, "Property with the height.")
+    default_height_m: float | None = option(
+        None, "Height of buildings without one, m.", show_default="as high as the air"
+    )
+    level_height_m: float = option(3.0, "Height of a storey, m.")
+    least_area_m2: float = option(4.0, "Leave out smaller buildings, m2.")
+    most_area_deviation: float = option(
+        0.2, "Refuse a building of which modules miss more, share of area."
+    )
+    most_outline_deviation_m: float = option(
+        1.0, "Refuse a building whose outline is farther off, m."
+    )
+    most_rectangles: int = option(16, "Rectangles that a building may take; coarser blocks beyond.")
+    repair: bool = option(False, "Put outlines right that cross themselves.")
+    picture: Path | None = option(
+        None, "Write a plan, outlines over modules: .png, .svg, .pdf.", writes=PICTURES
+    )
+    as_json: bool = option(False, "Print the report as JSON.", flag="--json")
+
+    def __call__(self) -> None:
+        """Convert the file, write the scenario and say how far it is from the file."""
         # Here, because maps need the extra `maps`.
         from blast_env.importing import ImportOptions, import_site
 
-        options = ImportOptions(
-            name=name,
-            crs=crs,
-            units=units,
-            origin=origin,
-            centre=centre,
-            size_m=size,
-            margin_m=margin,
-            rotation_deg=rotation,
-            buildings_from=tuple(buildings_from or ()),
-            charges_from=tuple(charges_from or ()),
-            zone_from=tuple(zone_from or ()),
-            keep_outs_from=tuple(keep_outs_from or ()),
-            protect=tuple(protect or ()),
-            protect_near=protect_near,
-            tnt_kg=tnt_kg,
-            charge_at=tuple(_place(text) for text in charge_at or ()),
-            zone_m=zone,
-            zone_around_m=zone_around,
-            stock=stock,
-            wall_height_m=wall_height,
-            clearance_m=clearance,
-            preset=preset,
-            height_from=height_from,
-            default_height_m=default_height,
-            level_height_m=level_height,
-            least_area_m2=least_area,
-            most_area_deviation=most_area_deviation,
-            most_outline_deviation_m=most_outline_deviation,
-            most_rectangles=most_rectangles,
-            repair=repair,
-        )
-        imported = import_site(file, options)
-        save_scenario(imported.scenario, out)
-        written = [out, *save_pictures(lambda: _pictures(imported, picture))]
-    if as_json:
-        print_json(_record(imported, written))
-    else:
-        _print(imported, written)
+        given: dict[str, Any] = {
+            each.name: getattr(self, each.name) for each in fields(ImportOptions)
+        }
+        given["charge_at"] = tuple(_place(text) for text in self.charge_at)
+        imported = import_site(self.file, ImportOptions(**given))
+        save_scenario(imported.scenario, self.out)
+        written = [self.out, *save_pictures(lambda: _pictures(imported, self.picture))]
+        if self.as_json:
+            print_json(_record(imported, written))
+        else:
+            _print(imported, written)
 
 
 def _place(text: str) -> Place:

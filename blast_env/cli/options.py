@@ -1,42 +1,84 @@
 """Options that several commands have in common, with one name and one meaning in all of them."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
+from blast_env.cli.cluster import CLUSTER_HELP
+from blast_env.cli.command import FOLDER, Command, option
+from blast_env.cli.output import check_json, resume_with_cache
 from blast_env.envs.arguments import ResetOptions
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 
-ChargePlace = Annotated[
-    tuple[float, float] | None,
-    typer.Option("--charge", metavar="X Y", help="Where the charge is, m, instead of drawing it."),
-]
+SCENARIO_HELP: Final = "Bundled name, or a scenario file."
+CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.5."
+CVAR_HELP: Final = "0.8: the mean of the worst 20 %, beside or instead of that of all."
 
-TntMass = Annotated[
-    float | None,
-    typer.Option("--tnt-kg", metavar="KG", help="Its mass, kg TNT, instead of the scenario's."),
-]
 
-CellSide = Annotated[
-    float | None, typer.Option("--cell", help="Side of the cells of gas dynamics, m; else 0.5.")
-]
+@dataclass(frozen=True, kw_only=True)
+class ChargeOptions(Command):
+    """The charge, where the user says where it is and how large."""
 
-Processes = Annotated[int, typer.Option(min=1, help="Worker processes.")]
+    charge_m: tuple[float, float] | None = option(
+        None, "Where the charge is, m, instead of drawing it.", metavar="X Y"
+    )
+    tnt_kg: float | None = option(
+        None, "Its mass, kg TNT, instead of the scenario's.", metavar="KG"
+    )
 
-CacheFolder = Annotated[
-    Path | None, typer.Option(help="Folder in which blasts are kept for the next run.")
-]
+    def fixed(self, scenario: Scenario, drawn: AnyCharge) -> AnyCharge:
+        """Return a charge with the place and the mass that the user gives; see `fixed_charge`."""
+        return fixed_charge(scenario, drawn, self.charge_m, self.tnt_kg)
 
-CvarLevel = Annotated[
-    float, typer.Option(help="0.8: the mean of the worst 20 %, beside or instead of that of all.")
-]
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, in short.")]
+@dataclass(frozen=True, kw_only=True)
+class ProcessOptions(Command):
+    """Worker processes on this machine."""
 
-JsonAll = Annotated[
-    bool, typer.Option("--json-all", help="Print as JSON all that there is to know of it.")
-]
+    processes: int = option(1, "Worker processes.", min=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClusterOptions(Command):
+    """A cluster in the place of this machine's processes."""
+
+    cluster: str | None = option(None, CLUSTER_HELP)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CacheOptions(Command):
+    """Blasts that are kept."""
+
+    cache: Path | None = option(
+        None, "Folder in which blasts are kept for the next run.", writes=FOLDER
+    )
+
+    def how_to_resume(self) -> str:
+        """Return how to go on after Ctrl-C: with the blasts that are kept, if they are."""
+        return resume_with_cache(self.cache)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JsonOptions(Command):
+    """The result as JSON, in short or all of it."""
+
+    as_json: bool = option(False, "Print the result as JSON, in short.", flag="--json")
+    json_all: bool = option(False, "Print as JSON all that there is to know of it.")
+
+    def __post_init__(self) -> None:
+        """Refuse both at once.
+
+        Raises:
+            BlastEnvError: If both are asked for.
+        """
+        check_json(self.as_json, self.json_all)
+
+    @property
+    def any_json(self) -> bool:
+        """Whether the result is printed as JSON."""
+        return self.as_json or self.json_all
 
 
 def fixed_charge(
@@ -62,3 +104,30 @@ def fixed_charge(
     if not isinstance(charge, VehicleCharge):
         scenario.with_charge(charge)  # refuses a place that is not clear
     return charge
+
+
+ChargePlace = Annotated[
+    tuple[float, float] | None,
+    typer.Option("--charge", metavar="X Y", help="Where the charge is, m, instead of drawing it."),
+]
+
+TntMass = Annotated[
+    float | None,
+    typer.Option("--tnt-kg", metavar="KG", help="Its mass, kg TNT, instead of the scenario's."),
+]
+
+CellSide = Annotated[float | None, typer.Option("--cell", help=CELL_HELP)]
+
+Processes = Annotated[int, typer.Option(min=1, help="Worker processes.")]
+
+CacheFolder = Annotated[
+    Path | None, typer.Option(help="Folder in which blasts are kept for the next run.")
+]
+
+CvarLevel = Annotated[float, typer.Option(help=CVAR_HELP)]
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, in short.")]
+
+JsonAll = Annotated[
+    bool, typer.Option("--json-all", help="Print as JSON all that there is to know of it.")
+]

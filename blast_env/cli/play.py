@@ -1,44 +1,43 @@
 """`blast-env play`: place barriers by hand."""
 
-from typing import Annotated
+from dataclasses import dataclass
 
-import gymnasium as gym
-import typer
-
-from blast_env.cli.output import engine_text, print_line, user_errors
-from blast_env.envs.play import KEYS
-from blast_env.envs.play import play as play_in_window
+from blast_env.cli.command import Command, argument, option
+from blast_env.cli.options import SCENARIO_HELP
+from blast_env.cli.output import engine_text, print_line
 from blast_env.geometry import layout_counts
 from blast_env.physics.engines import find_engine
 from blast_env.scenario import find_scenario
 
 
-def play(
-    scenario: Annotated[str, typer.Argument(help="Bundled name, or a scenario file.")] = (
-        "courtyard"
-    ),
-    seed: Annotated[int, typer.Option(min=0, help="Of the first episode.")] = 0,
-    threat: Annotated[
-        str, typer.Option(help="visible or hidden: whether you see the charge.")
-    ] = "visible",
-    engine: Annotated[
-        str, typer.Option(help="event or pymunk (particles), or gas (gas dynamics).")
-    ] = "event",
-    film: Annotated[bool, typer.Option(help="Show the blast.")] = True,
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class PlayCommand(Command):
     """Place barriers by hand, with mouse and keyboard, and see what the blast makes of them."""
-    with user_errors():
+
+    scenario: str = argument(SCENARIO_HELP, default="courtyard")
+    seed: int = option(0, "Of the first episode.", min=0)
+    threat: str = option("visible", "visible or hidden: whether you see the charge.")
+    engine: str = option("event", "event or pymunk (particles), or gas (gas dynamics).")
+    film: bool = option(True, "Show the blast.")
+
+    def __call__(self) -> None:
+        """Open the window, and print each blast."""
+        # Here, because they take half a second to import.
+        import gymnasium as gym
+
+        from blast_env.envs.play import KEYS, play
+
         env = gym.make(
             "blast_env:BlastBarrier-v0",
-            scenario=scenario,
-            threat=threat,
-            engine=engine,
+            scenario=self.scenario,
+            threat=self.threat,
+            engine=self.engine,
             render_mode="rgb_array",
-            show_blast=film,
+            show_blast=self.film,
         )
-        print_line(engine_text(find_engine(engine), [find_scenario(scenario)]))
+        print_line(engine_text(find_engine(self.engine), [find_scenario(self.scenario)]))
         print_line(KEYS)
-        for played in play_in_window(env, seed):
+        for played in play(env, self.seed):
             print_line(
                 f"seed {played.seed}, {layout_counts(played.layout, 'barrier')}: "
                 f"{played.impulse_pa_s:,.0f} Pa s, reduction {played.reduction:.1%}"

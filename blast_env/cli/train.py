@@ -1,17 +1,16 @@
 """`blast-env train`: an agent that proposes layouts."""
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import typer
 
-from blast_env.cli.cluster import ClusterAddress, running_on
-from blast_env.cli.options import CellSide
-from blast_env.cli.output import engine_text, print_line, progress_bar, user_errors
+from blast_env.cli.cluster import running_on
+from blast_env.cli.command import FOLDER, option, options_of
+from blast_env.cli.options import CELL_HELP, ClusterOptions
+from blast_env.cli.output import engine_text, print_line, progress_bar
 from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
-from blast_env.cli.targets import checked_targets
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
@@ -22,158 +21,119 @@ if TYPE_CHECKING:
 
 _DEFAULT_ALGORITHM: Final = "maskable_ppo"
 _DEFAULT_SCENARIO: Final = "courtyard"
+_WITH_RESUME: Final = ("resume", "scenario", "cluster")
+"""Options that go with `--resume`; the run folder says the others."""
 
 
-def train(
-    algo: Annotated[
-        str | None,
-        typer.Option(help="ppo, maskable_ppo or self_labelling.", show_default=_DEFAULT_ALGORITHM),
-    ] = None,
-    scenario: Annotated[
-        str | None,
-        typer.Option(
-            help="Bundled name, a scenario file, or 'sites' for generated ones.",
-            show_default=_DEFAULT_SCENARIO,
-        ),
-    ] = None,
-    steps: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Steps, a module each (of self_labelling, a layout that meets a threat each); "
-            "else as the YAML file says.",
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Decides everything.", show_default="0")
-    ] = None,
-    envs: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Parallel environments (of self_labelling, worker processes); "
-            "else as the YAML file says.",
-        ),
-    ] = None,
-    run: Annotated[Path | None, typer.Option(help="Folder for the run; new or empty.")] = None,
-    threat: Annotated[
-        str | None,
-        typer.Option(
-            help="visible or hidden: whether the agent sees the charge.", show_default="visible"
-        ),
-    ] = None,
-    engine: Annotated[
-        str | None,
-        typer.Option(
-            help="Engine that runs the blasts; surrogate: guesses instead.", show_default="event"
-        ),
-    ] = None,
-    cell: CellSide = None,
-    observation: Annotated[
-        str | None,
-        typer.Option(
-            help="What the agent sees: grid, grid_with_load, image (with a CnnPolicy), or features"
-            " (with an MlpPolicy).",
-            show_default="grid",
-        ),
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="key=value, e.g. ent_coef=0.01; may be given again."),
-    ] = None,
-    start_from: Annotated[
-        Path | None,
-        typer.Option(
-            help="Run folder whose best weights to begin with, of a scenario of this size."
-        ),
-    ] = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(help="Go on with the run of this folder; no other option but --cluster."),
-    ] = None,
-    cluster: ClusterAddress = None,
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class TrainCommand(ClusterOptions):
     """Train an agent that proposes layouts, or go on with a training that was interrupted."""
-    fresh = {
-        "algo": algo,
-        "steps": steps,
-        "seed": seed,
-        "envs": envs,
-        "run": run,
-        "threat": threat,
-        "engine": engine,
-        "cell": cell,
-        "observation": observation,
-        "set": set_ or None,
-        "start-from": None if start_from is None else str(start_from),
-    }
-    given = {name: value for name, value in fresh.items() if value is not None}
-    with (
-        user_errors(lambda: _how_to_resume(resume or run)),
-        checked_targets(folders={"--run": run}),
-        running_on(cluster),
-    ):
-        if resume is not None:
-            result = _resume(resume, scenario, given)
-        elif run is None:
-            raise BlastEnvError("--run is missing: the folder for the run (or --resume)")
-        else:
-            result = _train(run, scenario or _DEFAULT_SCENARIO, given, set_ or [], envs)
-    _print_result(result)
 
-
-def _how_to_resume(folder: Path | None) -> str:
-    """Return how an interrupted training goes on."""
-    if folder is None:
-        return ""
-    # Here, because torch takes seconds to start, and is an extra.
-    from blast_agents.training.run_folder import RunFolder
-
-    if RunFolder(folder).is_run:
-        return f"blast-env train --resume {folder} goes on"
-    return "the run had not begun: the same command begins anew"
-
-
-def _resume(folder: Path, scenario: str | None, given: Mapping[str, object]) -> "TrainingResult":
-    # Here, because torch takes seconds to start, and is an extra.
-    with import_extra("agents,render", "training"):
-        from blast_agents.training import resume
-
-    if given:
-        raise BlastEnvError(
-            f"--{next(iter(given))} cannot be changed with --resume: the run folder says it"
-        )
-    with progress_bar(f"training {folder}") as progress:
-        return resume(folder, scenario, progress)
-
-
-def _train(
-    run: Path, scenario: str, given: Mapping[str, object], options: list[str], envs: int | None
-) -> "TrainingResult":
-    # Here, because torch takes seconds to start, and is an extra.
-    with import_extra("agents,render", "training"):
-        from blast_agents.training import load_hyperparameters, train
-        from blast_agents.training.environments import environment_id
-        from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
-        from blast_agents.training.run_folder import SETTING_KEYS, settings_from
-
-    algorithm = str(given.get("algo", _DEFAULT_ALGORITHM))
-    changes = parse_options(options, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
-    names = ("steps", "seed", "threat", "engine", "observation")
-    values = {name: given[name] for name in names if name in given}
-    if "cell" in given:
-        values["cell_m"] = given["cell"]
-    values["start_from"] = given.get("start-from")
-    if given.get("observation") == "features":  # no planes, which the YAML file's policy looks at
-        changes.setdefault("policy", "MlpPolicy")
-    values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
-    hyperparameters = load_hyperparameters(algorithm, environment_id(scenario), changes, envs)
-    settings = settings_from(
-        {"steps": hyperparameters.n_timesteps, "algorithm": algorithm, "scenario": scenario}
-        | values
+    algo: str | None = option(
+        None, "ppo, maskable_ppo or self_labelling.", show_default=_DEFAULT_ALGORITHM
     )
-    with progress_bar(f"training {run}") as progress:
-        return train(settings, hyperparameters, run, progress)
+    scenario: str | None = option(
+        None,
+        "Bundled name, a scenario file, or 'sites' for generated ones.",
+        show_default=_DEFAULT_SCENARIO,
+    )
+    steps: int | None = option(
+        None,
+        "Steps, a module each (of self_labelling, a layout that meets a threat each); else as the "
+        "YAML file says.",
+        min=1,
+    )
+    seed: int | None = option(None, "Decides everything.", min=0, show_default="0")
+    envs: int | None = option(
+        None,
+        "Parallel environments (of self_labelling, worker processes); else as the YAML file says.",
+        min=1,
+    )
+    run: Path | None = option(None, "Folder for the run; new or empty.", writes=FOLDER)
+    threat: str | None = option(
+        None, "visible or hidden: whether the agent sees the charge.", show_default="visible"
+    )
+    engine: str | None = option(
+        None, "Engine that runs the blasts; surrogate: guesses instead.", show_default="event"
+    )
+    cell_m: float | None = option(None, CELL_HELP)
+    observation: str | None = option(
+        None,
+        "What the agent sees: grid, grid_with_load, image (with a CnnPolicy), or features (with an "
+        "MlpPolicy).",
+        show_default="grid",
+    )
+    changes: tuple[str, ...] = option(
+        (), "key=value, e.g. ent_coef=0.01; may be given again.", flag="--set"
+    )
+    start_from: Path | None = option(
+        None, "Run folder whose best weights to begin with, of a scenario of this size."
+    )
+    resume: Path | None = option(
+        None, "Go on with the run of this folder; no other option but --cluster."
+    )
+
+    def how_to_resume(self) -> str:
+        """Return how an interrupted training goes on."""
+        folder = self.resume or self.run
+        if folder is None:
+            return ""
+        # Here, because torch takes seconds to start, and is an extra.
+        from blast_agents.training.run_folder import RunFolder
+
+        if RunFolder(folder).is_run:
+            return f"blast-env train --resume {folder} goes on"
+        return "the run had not begun: the same command begins anew"
+
+    def __call__(self) -> None:
+        """Train, and print what came of it."""
+        with running_on(self.cluster):
+            if self.resume is not None:
+                result = self._go_on(self.resume)
+            elif self.run is None:
+                raise BlastEnvError("--run is missing: the folder for the run (or --resume)")
+            else:
+                result = self._train(self.run)
+        _print_result(result)
+
+    def _go_on(self, folder: Path) -> "TrainingResult":
+        # Here, because torch takes seconds to start, and is an extra.
+        with import_extra("agents,render", "training"):
+            from blast_agents.training import resume
+
+        for each in options_of(type(self)):
+            if each.name not in _WITH_RESUME and getattr(self, each.name) != each.default:
+                raise BlastEnvError(
+                    f"{each.flag} cannot be changed with --resume: the run folder says it"
+                )
+        with progress_bar(f"training {folder}") as progress:
+            return resume(folder, self.scenario, progress)
+
+    def _train(self, run: Path) -> "TrainingResult":
+        # Here, because torch takes seconds to start, and is an extra.
+        with import_extra("agents,render", "training"):
+            from blast_agents.training import load_hyperparameters, train
+            from blast_agents.training.environments import environment_id
+            from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
+            from blast_agents.training.run_folder import SETTING_KEYS, settings_from
+
+        algorithm = self.algo or _DEFAULT_ALGORITHM
+        scenario = self.scenario or _DEFAULT_SCENARIO
+        changes = parse_options(self.changes, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
+        if self.observation == "features":  # no planes, which the YAML file's policy looks at
+            changes.setdefault("policy", "MlpPolicy")
+        names = ("steps", "seed", "threat", "engine", "observation", "cell_m")
+        given = {name: getattr(self, name) for name in names}
+        values = {name: value for name, value in given.items() if value is not None}
+        values["start_from"] = None if self.start_from is None else str(self.start_from)
+        values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
+        hyperparameters = load_hyperparameters(
+            algorithm, environment_id(scenario), changes, self.envs
+        )
+        fixed = {"steps": hyperparameters.n_timesteps, "algorithm": algorithm, "scenario": scenario}
+        settings = settings_from(fixed | values)
+        with progress_bar(f"training {run}") as progress:
+            return train(settings, hyperparameters, run, progress)
 
 
 def _print_result(result: "TrainingResult") -> None:

@@ -1,32 +1,36 @@
 """`blast-env validate`: check scenario files."""
 
-from typing import Annotated
+from dataclasses import dataclass
 
 import typer
 
-from blast_env.cli.output import print_line, user_errors
+from blast_env.cli.command import Command, argument
+from blast_env.cli.output import print_line
 from blast_env.evaluation.suitability import suitability
 from blast_env.scenario import find_problems
 
 
-def validate(
-    files: Annotated[list[str], typer.Argument(help="Scenario files, or bundled names.")],
-) -> None:
-    """Check scenario files: everything that is wrong with each, or what it is (not) good for.
+@dataclass(frozen=True, kw_only=True)
+class ValidateCommand(Command):
+    """Check scenario files: what is wrong with each, or what it is (not) good for.
 
     The exit code is 0 when all files are good, 1 when one has a problem.
     """
-    bad_files = 0
-    with user_errors():
-        for name in files:
+
+    files: tuple[str, ...] = argument("Scenario files, or bundled names.")
+
+    def __call__(self) -> None:
+        """Print what there is to say of each file."""
+        bad_files = 0
+        for name in self.files:
             problems = find_problems(name)
             bad_files += bool(problems)
             if not problems:
                 _print_suitability(name)
             for problem in problems:
                 print_line(f"{name}: {problem}")
-    if bad_files:
-        raise typer.Exit(1)
+        if bad_files:
+            raise typer.Exit(1)
 
 
 def _print_suitability(name: str) -> None:

@@ -11,11 +11,12 @@ from blast_agents.training.run_folder import RunFolder
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperGroup
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
+from blast_env.cli.command import LazyCommand
 from blast_env.cli.tables import ResultTable
 from blast_env.physics.event.engine import EventRun
 from blast_env.physics.pymunk.engine import PymunkRun
@@ -34,10 +35,10 @@ def run(*arguments: object, columns: int = NARROW) -> Result:
     return CliRunner().invoke(app, words, env={"COLUMNS": str(columns)})
 
 
-def commands() -> dict[str, TyperCommand]:
+def commands() -> dict[str, LazyCommand]:
     group = typer.main.get_command(app)
     assert isinstance(group, TyperGroup)
-    return {name: each for name, each in group.commands.items() if isinstance(each, TyperCommand)}
+    return {name: each for name, each in group.commands.items() if isinstance(each, LazyCommand)}
 
 
 def words_of(text: str) -> set[str]:
@@ -51,10 +52,17 @@ def words_of(text: str) -> set[str]:
 @pytest.mark.parametrize("name", sorted(commands()))
 def test_every_word_of_the_help_is_shown(name: str) -> None:
     """Rich takes `[row, column]` for a style of its own, and leaves it out."""
-    shown, command = words_of(run(name, "--help").stdout), commands()[name]
+    shown, command = words_of(run(name, "--help").stdout), commands()[name].loaded
     helps = [str(getattr(each, "help", None) or "") for each in command.params]
     for text in [command.help or "", *helps]:
         assert words_of(text) <= shown
+
+
+@pytest.mark.parametrize("name", sorted(commands()))
+def test_the_list_of_commands_says_what_each_says_first_of_itself(name: str) -> None:
+    """The list is shown without importing the commands, and so keeps their first sentences."""
+    command = commands()[name]
+    assert (command.loaded.help or "").partition("\n\n")[0].replace("\n", " ") == command.help
 
 
 # Tables.

@@ -266,7 +266,7 @@ def test_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
         assert env.render_mode == "rgb_array"
         yield Played(seed, ((1, 2),), 0.25, 1234.5)
 
-    monkeypatch.setattr(import_module("blast_env.cli.play"), "play_in_window", played)
+    monkeypatch.setattr(import_module("blast_env.envs.play"), "play", played)
     result = CliRunner().invoke(app, ["play", "courtyard", "--seed", "3"])
     assert result.exit_code == 0, result.output
     assert "seed 3, 1 barrier module: 1,234 Pa s, reduction 25.0%" in result.output
