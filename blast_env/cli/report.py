@@ -59,14 +59,14 @@ class ReportCommand(ProcessOptions, CacheOptions):
 
     def __call__(self) -> None:
         """Run the blasts and write the report."""
+        scenario = load_scenario(self.scenario)
+        layout = load_layout(self.layout, scenario)
         # Here, because reports need extras, and Numba half a second.
         from blast_env.reporting import run_study, write_report
         from blast_env.reporting.page import check_targets
 
         check_targets(self.out, self.pdf)
         options = self._study_options()
-        scenario = load_scenario(self.scenario)
-        layout = load_layout(self.layout, scenario)
         columns = (TextColumn("{task.description}"), BarColumn())
         with Progress(*columns, console=message_console(), transient=True) as progress:
             task = progress.add_task("report", total=1.0)

@@ -3,17 +3,17 @@
 from collections.abc import Iterator, Sequence
 from math import fsum
 from pathlib import Path
-from typing import Final, NamedTuple
-
-import pandas as pd
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from blast_env.export.plan import LayoutPlan, rounded_m
 from blast_env.geometry import Element, Piece
 from blast_env.provenance import package_version
-from blast_env.recording.excel import SheetTable, write_tables
 from blast_env.scenario import Placement
 from blast_env.tables import Column, as_types, table_of
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
 
 MODULE_COLUMNS: Final = (
     Column("module_id", "", "name of the module, made from its centre in metres"),
@@ -71,7 +71,7 @@ def element_columns(plan: LayoutPlan) -> tuple[Column, ...]:
     return PIECE_COLUMNS if zone is not None and zone.items else MODULE_COLUMNS
 
 
-def element_table(plan: LayoutPlan) -> pd.DataFrame:
+def element_table(plan: LayoutPlan) -> "pd.DataFrame":
     """Return one row a module or a piece in the order of the layout; see `element_columns`."""
     columns = element_columns(plan)
     rows = _piece_rows(plan) if columns is PIECE_COLUMNS else _module_rows(plan)
@@ -139,7 +139,7 @@ class _Line(NamedTuple):
     unit_cost: float
 
 
-def bill_of_quantities(plan: LayoutPlan) -> pd.DataFrame:
+def bill_of_quantities(plan: LayoutPlan) -> "pd.DataFrame":
     """Return what a layout takes, one row an item that it has, and the total; `BILL_COLUMNS`."""
     lines = _lines(plan)
     of_items: dict[str, list[float]] = {line.item: [] for line in lines}
@@ -206,6 +206,9 @@ def write_excel(plan: LayoutPlan, path: Path) -> None:
             "charge TNT equivalent (kg)": plan.charge.tnt_kg,
         }
     record |= {f"made by: {key}": str(value) for key, value in plan.provenance.items()}
+    # Here, because pandas takes a third of a second to import.
+    from blast_env.recording.excel import SheetTable, write_tables
+
     tables = (
         SheetTable("Bill", bill_of_quantities(plan), BILL_COLUMNS),
         SheetTable(name, element_table(plan), columns),

@@ -1,6 +1,5 @@
 """What a blast costs: cell updates per CPU second, memory. `python -m` runs it."""
 
-import resource
 import time
 from dataclasses import dataclass
 from math import ceil
@@ -149,8 +148,15 @@ def measure(
         least_step_s=float(least_s),
         cells=solid.size,
         arrays_bytes=solver.state.nbytes,
-        process_bytes=1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
+        process_bytes=_process_bytes(),
     )
+
+
+def _process_bytes() -> int:
+    """Return the most memory that this process has had."""
+    import resource  # here, because Windows has none
+
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 if __name__ == "__main__":

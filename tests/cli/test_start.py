@@ -1,0 +1,83 @@
+"""The command line starts at once, and everywhere: what it imports, and what it does not need."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from blast_env import save_scenario
+from tests.agents.search_cases import small_scenario
+
+SLOW = ("matplotlib", "numba", "pandas", "pyarrow", "pymunk", "scipy", "torch", "xlsxwriter")
+"""What takes a tenth of a second or more to import."""
+
+LATER = ("simulate", "calibrate", "search", "bench", "league", "propose")
+"""Commands that still import what they work with at once."""
+
+NOT_ON_WINDOWS = ("fcntl", "grp", "pwd", "resource", "syslog", "termios")
+
+
+def python(code: str, *arguments: str | Path) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+IMPORTED = f"""
+import sys
+from blast_env.cli import app
+app(sys.argv[1:], standalone_mode=False)
+print("imported:", *(name for name in {SLOW} if name in sys.modules))
+"""
+
+
+def imported(*arguments: str | Path) -> set[str]:
+    """Return which slow packages a command line has imported when it has ended."""
+    return set(python(IMPORTED, *arguments).rpartition("imported:")[2].split())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("--help",), ("validate", "courtyard"), ("evaluate", "--layout", "nowhere")],
+    ids=" ".join,
+)
+def test_nothing_slow_is_imported_before_a_blast(arguments: tuple[str, ...]) -> None:
+    assert imported(*arguments) == set()
+
+
+LISTED = f"""
+import sys, typer
+from blast_env.cli import app
+for name, command in typer.main.get_command(app).commands.items():
+    if name in {LATER}:
+        continue
+    assert "blast_env.cli." + name not in sys.modules, name
+    command.loaded
+    found = [each for each in {SLOW} if each in sys.modules]
+    if found:
+        print(name, *found)
+"""
+
+
+def test_options_of_all_commands_are_known_without_anything_slow() -> None:
+    """Each command is imported when it is asked for, and what it works with, when it works."""
+    assert python(LISTED).splitlines() == []
+
+
+ON_WINDOWS = f"""
+import sys
+for name in {NOT_ON_WINDOWS}:
+    sys.modules[name] = None
+from blast_env.cli import app
+app(sys.argv[1:], standalone_mode=False)
+"""
+
+
+@pytest.mark.parametrize("engine", ["gas", "event"])
+def test_it_starts_and_runs_a_blast_without_what_windows_lacks(engine: str, tmp_path: Path) -> None:
+    site = tmp_path / "site.toml"
+    save_scenario(small_scenario(), site)
+    assert f"engine {engine} " in python(ON_WINDOWS, "simulate", site, "--engine", engine)
