@@ -1,0 +1,126 @@
+"""What facades are made of: a catalogue of ordinary components, and own ones.
+
+A component fills a bay: windows, wall panels, or both side by side. The catalogue is
+`data/components.toml`; every entry says where its properties come from. A scenario may define
+components of its own with the same keys, by section properties where none of the kinds fits.
+"""
+
+import tomllib
+from functools import cache
+from importlib.resources import files
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.response.glass import GlassKind, Interlayer, Pane
+from blast_env.response.walls import Masonry, Panel, ReinforcedConcrete, Sheeting, Supports
+
+_MM: Final = 1e-3
+_Positive = Annotated[float, Field(gt=0.0, le=100.0)]
+_Text = Annotated[str, Field(min_length=1, max_length=300)]
+
+
+class _Component(BaseModel):
+    """Base of components.
+
+    Attributes:
+        title: For people.
+        source: Where its properties come from.
+        cost_m2: What it costs to put it in place of another one, per area; `None` if it is not
+            for sale.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    title: _Text
+    source: _Text
+    cost_m2: Annotated[float, Field(ge=0.0)] | None = None
+
+
+class Glazing(_Component):
+    """Windows: as many equal panes as the bay has room for, one at least.
+
+    Attributes:
+        width_m: Width of a pane.
+        height_m: Height of a pane.
+        thickness_mm: Least thickness of the glass by its norm; of laminated glass that of all
+            plies together.
+        glass: Heat treatment.
+        interlayer: Whether an interlayer or a film holds the fragments, and how well.
+        outer_thickness_mm: Of double glazing, the outer pane; 0 for single.
+        sill_m: Height of the lower edge above the floor.
+    """
+
+    kind: Literal["glazing"] = "glazing"
+    width_m: _Positive
+    height_m: _Positive
+    thickness_mm: _Positive
+    glass: GlassKind = GlassKind.ANNEALED
+    interlayer: Interlayer | None = None
+    outer_thickness_mm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    sill_m: Annotated[float, Field(ge=0.0, le=10.0)] = 0.9
+
+    @property
+    def pane(self) -> Pane:
+        """One pane of it."""
+        return Pane(
+            self.width_m,
+            self.height_m,
+            self.thickness_mm * _MM,
+            self.glass,
+            self.interlayer,
+            self.outer_thickness_mm * _MM,
+            self.sill_m,
+        )
+
+
+class Wall(_Component):
+    """A wall panel that spans from floor to floor.
+
+    Attributes:
+        section: What it is made of.
+        supports: How it is held by the floors.
+        span_m: Its span; the height of the storey unless given.
+    """
+
+    kind: Literal["wall"] = "wall"
+    section: Annotated[ReinforcedConcrete | Masonry | Sheeting, Field(discriminator="kind")]
+    supports: Supports = Supports.SIMPLE
+    span_m: _Positive | None = None
+
+    def panel(self, storey_m: float) -> Panel:
+        """Return a panel of it in a storey of such a height."""
+        return Panel(self.section, storey_m if self.span_m is None else self.span_m, self.supports)
+
+
+Component = Annotated[Glazing | Wall, Field(discriminator="kind")]
+"""A component of a facade."""
+
+_READ: Final[TypeAdapter[dict[str, Glazing | Wall]]] = TypeAdapter(dict[str, Component])
+
+
+@cache
+def catalogue() -> dict[str, Glazing | Wall]:
+    """Return the components that come with the package, by name.
+
+    Raises:
+        BlastEnvError: If the file is not what it ought to be.
+    """
+    text = files("blast_env.response").joinpath("data", "components.toml").read_text("utf-8")
+    try:
+        return _READ.validate_python(tomllib.loads(text))
+    except ValidationError as error:
+        raise BlastEnvError(f"components.toml: {error}") from None
+
+
+def find_component(name: str, own: dict[str, Glazing | Wall] | None = None) -> Glazing | Wall:
+    """Return a component by name: an own one, or one of the catalogue.
+
+    Raises:
+        UnknownNameError: If there is none; the message has the nearest one.
+    """
+    known = {**catalogue(), **(own or {})}
+    if name not in known:
+        raise UnknownNameError("component", name, known)
+    return known[name]

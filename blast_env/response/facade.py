@@ -1,0 +1,264 @@
+"""Bays: the walls of a building divided by storeys and axes, and what becomes of each.
+
+A bay is a storey high and about a module of the facade wide. It holds components: windows, wall
+panels, or both side by side. Its load is the mean overpressure over the bay, so that one history
+serves all that stands in it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import floor
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Rectangle
+from blast_env.response.buildings import LevelOfProtection, level_of_protection
+from blast_env.response.components import Glazing, Wall
+from blast_env.response.glass import GlazingCondition, GlazingResponses, glazing_responses
+from blast_env.response.walls import DamageLevel, PanelResponses, panel_responses
+
+STOREY_M = 3.5
+"""Height of a storey unless a facade says otherwise."""
+
+BAY_M = 3.0
+"""Width of a bay unless a facade says otherwise."""
+
+
+@dataclass(frozen=True)
+class Bay:
+    """A part of a wall.
+
+    Attributes:
+        structure: Name of the structure.
+        wall: The side that it looks to: west, east, south or north.
+        storey: Counted from 1 at the ground.
+        number: Counted from 1 along the wall, from west to east or from south to north.
+        left_m: Where it begins along the wall: x or y on the site.
+        right_m: Where it ends.
+        floor_m: Height of its floor above the ground.
+        top_m: Height of its upper edge.
+    """
+
+    structure: str
+    wall: str
+    storey: int
+    number: int
+    left_m: float
+    right_m: float
+    floor_m: float
+    top_m: float
+
+    @property
+    def name(self) -> str:
+        """`office/west/2/5`: structure, wall, storey, number."""
+        return f"{self.structure}/{self.wall}/{self.storey}/{self.number}"
+
+    @property
+    def width_m(self) -> float:
+        """Its width."""
+        return self.right_m - self.left_m
+
+    @property
+    def height_m(self) -> float:
+        """Its height."""
+        return self.top_m - self.floor_m
+
+    @property
+    def area_m2(self) -> float:
+        """Its area."""
+        return self.width_m * self.height_m
+
+
+def divide(
+    structure: str,
+    ground_m: Rectangle,
+    height_m: float,
+    walls: Sequence[str],
+    storey_m: float = STOREY_M,
+    bay_m: float = BAY_M,
+) -> tuple[Bay, ...]:
+    """Return the bays of a block, wall by wall, storey by storey.
+
+    The uppermost storey takes what is left, if that is at least half of one, else it goes to the
+    storey below. Bays of a wall are equally wide, as near to the width asked for as they can be.
+
+    Args:
+        structure: Name of the structure.
+        ground_m: Where it stands.
+        height_m: Its height.
+        walls: Which walls: west, east, south, north.
+        storey_m: Height of a storey.
+        bay_m: Width of a bay.
+
+    Raises:
+        BlastEnvError: If a size is not positive.
+    """
+    for name, value in (("height_m", height_m), ("storey_m", storey_m), ("bay_m", bay_m)):
+        if not value > 0.0:
+            raise BlastEnvError(f"facade of {structure!r}: {name} is {value}, must be above 0")
+    storeys = max(1, floor(height_m / storey_m + 0.5))
+    floors = [storey_m * storey for storey in range(storeys)] + [height_m]
+    bays: list[Bay] = []
+    for wall in walls:
+        low, high = (
+            (ground_m.bottom, ground_m.top)
+            if wall in ("west", "east")
+            else (ground_m.left, ground_m.right)
+        )
+        count = max(1, round((high - low) / bay_m))
+        ends = np.linspace(low, high, count + 1).tolist()
+        bays += [
+            Bay(
+                structure,
+                wall,
+                storey + 1,
+                number + 1,
+                ends[number],
+                ends[number + 1],
+                floors[storey],
+                floors[storey + 1],
+            )
+            for storey in range(storeys)
+            for number in range(count)
+        ]
+    return tuple(bays)
+
+
+@dataclass(frozen=True)
+class FilledBay:
+    """A bay with what stands in it.
+
+    Attributes:
+        bay: The bay.
+        glazing: Its windows, if it has some.
+        wall: Its wall panel, if it has one.
+    """
+
+    bay: Bay
+    glazing: Glazing | None = None
+    wall: Wall | None = None
+
+    def __post_init__(self) -> None:
+        """Check that the window fits.
+
+        Raises:
+            BlastEnvError: If the bay is empty, or a pane is larger than its bay.
+        """
+        if self.glazing is None and self.wall is None:
+            raise BlastEnvError(f"bay {self.bay.name}: it has neither windows nor a wall")
+        if self.glazing is None:
+            return
+        top_m = self.glazing.sill_m + self.glazing.height_m
+        if self.glazing.width_m > self.bay.width_m + 1e-9 or top_m > self.bay.height_m + 1e-9:
+            raise BlastEnvError(
+                f"bay {self.bay.name}: a pane of {self.glazing.width_m:g} x"
+                f" {self.glazing.height_m:g} m over a sill of {self.glazing.sill_m:g} m must fit"
+                f" into {self.bay.width_m:g} x {self.bay.height_m:g} m"
+            )
+
+    @property
+    def panes(self) -> int:
+        """How many panes it has: as many as fit side by side."""
+        if self.glazing is None:
+            return 0
+        return max(1, int(self.bay.width_m / self.glazing.width_m + 1e-9))
+
+    @property
+    def glazed_m2(self) -> float:
+        """Area of its panes."""
+        return 0.0 if self.glazing is None else self.panes * self.glazing.pane.area_m2
+
+
+@dataclass(frozen=True, eq=False)
+class FacadeResponse:
+    """What became of the bays of a facade under one blast.
+
+    Attributes:
+        bays: The bays.
+        time_s: Times of the histories (times,).
+        pressure_pa: Mean overpressure on each bay (bays, times).
+        glazed: Which bays have windows, indices (glazed,).
+        glazing: What their panes did.
+        walled: Which bays have wall panels, indices (walled,).
+        walls: What those did.
+    """
+
+    bays: tuple[FilledBay, ...]
+    time_s: FloatArray
+    pressure_pa: FloatArray
+    glazed: FloatArray
+    glazing: GlazingResponses
+    walled: FloatArray
+    walls: PanelResponses
+
+    @property
+    def broken_panes(self) -> float:
+        """How many panes are expected to break."""
+        counts = np.array([self.bays[index].panes for index in self.glazed.tolist()])
+        return float(counts @ self.glazing.break_probability) if len(counts) else 0.0
+
+    @property
+    def panes(self) -> int:
+        """How many panes there are."""
+        return sum(bay.panes for bay in self.bays)
+
+    @property
+    def worst_condition(self) -> GlazingCondition:
+        """Performance condition of the worst pane."""
+        return GlazingCondition(int(self.glazing.condition.max(initial=1.0)))
+
+    @property
+    def worst_damage(self) -> DamageLevel:
+        """Damage of the worst wall panel; superficial where there are none."""
+        return max(self.walls.levels, default=DamageLevel.SUPERFICIAL)
+
+    @property
+    def level_of_protection(self) -> LevelOfProtection:
+        """Level of protection of the building: what its worst component allows.
+
+        A condition of glazing counts as the level that GSA gives it: no fragments high, fragments
+        within 3 m on the floor medium, low on the panel low, high on the panel very low.
+        """
+        by_glass = {
+            GlazingCondition.NO_BREAK: LevelOfProtection.HIGH,
+            GlazingCondition.RETAINED: LevelOfProtection.HIGH,
+            GlazingCondition.WITHIN_1_M: LevelOfProtection.HIGH,
+            GlazingCondition.WITHIN_3_M: LevelOfProtection.MEDIUM,
+            GlazingCondition.LOW_ON_PANEL: LevelOfProtection.LOW,
+            GlazingCondition.HIGH_ON_PANEL: LevelOfProtection.VERY_LOW,
+        }
+        return min(by_glass[self.worst_condition], level_of_protection(self.worst_damage))
+
+
+def respond(
+    bays: Sequence[FilledBay], time_s: FloatArray, pressure_pa: FloatArray
+) -> FacadeResponse:
+    """Return what becomes of bays under their histories; no blast is run.
+
+    Args:
+        bays: The bays.
+        time_s: Times of the histories, ascending (times,).
+        pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
+
+    Raises:
+        BlastEnvError: If the histories are not one a bay.
+    """
+    if pressure_pa.shape != (len(bays), len(time_s)):
+        raise BlastEnvError(
+            f"pressure_pa has shape {pressure_pa.shape}, must be ({len(bays)}, {len(time_s)})"
+        )
+    glazed = [index for index, each in enumerate(bays) if each.glazing is not None]
+    walled = [index for index, each in enumerate(bays) if each.wall is not None]
+    panes = [each.glazing.pane for each in bays if each.glazing is not None]
+    panels = [each.wall.panel(each.bay.height_m) for each in bays if each.wall is not None]
+    return FacadeResponse(
+        bays=tuple(bays),
+        time_s=time_s,
+        pressure_pa=pressure_pa,
+        glazed=np.array(glazed, dtype=np.int64),
+        glazing=glazing_responses(panes, time_s, pressure_pa[glazed]),
+        walled=np.array(walled, dtype=np.int64),
+        walls=panel_responses(panels, time_s, pressure_pa[walled]),
+    )

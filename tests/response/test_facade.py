@@ -1,0 +1,95 @@
+"""Bays of a block, what fills them, and what a building's components say of it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.geometry import Rectangle
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.components import Glazing, Wall, catalogue, find_component
+from blast_env.response.facade import Bay, FilledBay, divide, respond
+from blast_env.response.glass import GlazingCondition
+
+GROUND = Rectangle(10.0, 20.0, 22.0, 27.0)
+
+
+@given(st.floats(2.0, 60.0), st.floats(2.5, 6.0), st.floats(1.0, 9.0))
+def test_bays_cover_the_walls_once(height_m: float, storey_m: float, bay_m: float) -> None:
+    bays = divide("office", GROUND, height_m, ("west", "south"), storey_m, bay_m)
+    area = sum(bay.area_m2 for bay in bays)
+    assert area == pytest.approx((7.0 + 12.0) * height_m)
+    assert len({bay.name for bay in bays}) == len(bays)
+
+
+def test_storeys_and_numbers_of_a_wall() -> None:
+    bays = divide("office", GROUND, 13.0, ("south",), 3.5, 3.0)
+    assert [bay.storey for bay in bays if bay.number == 1] == [1, 2, 3, 4]
+    assert bays[-1].top_m == 13.0
+    assert [bay.left_m for bay in bays[:4]] == [10.0, 13.0, 16.0, 19.0]
+
+
+def test_every_component_of_the_catalogue_says_its_source_and_makes_a_system() -> None:
+    for component in catalogue().values():
+        assert len(component.source) > 10
+        if isinstance(component, Glazing):
+            assert component.pane.load_resistance_pa() > 0.0
+        else:
+            assert 0.005 < component.panel(3.0).system.period_s < 0.5
+
+
+def test_unknown_components_name_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="window_annealed_6"):
+        find_component("window_anealed_6")
+
+
+def bay(width_m: float = 3.0) -> Bay:
+    return Bay("office", "west", 1, 1, 0.0, width_m, 0.0, 3.5)
+
+
+def glazing(name: str) -> Glazing:
+    found = find_component(name)
+    assert isinstance(found, Glazing)
+    return found
+
+
+def wall(name: str) -> Wall:
+    found = find_component(name)
+    assert isinstance(found, Wall)
+    return found
+
+
+def test_as_many_panes_as_there_is_room_for() -> None:
+    assert FilledBay(bay(), glazing("window_annealed_6")).panes == 2
+    assert FilledBay(bay(), wall=wall("brick_215")).panes == 0
+
+
+def test_a_pane_that_is_too_large_for_its_bay() -> None:
+    with pytest.raises(BlastEnvError, match=r"office/west/1/1: a pane of 1.2 x 1.5 m .* must fit"):
+        FilledBay(bay(1.0), glazing("window_annealed_6"))
+
+
+def test_a_bay_with_nothing_in_it() -> None:
+    with pytest.raises(BlastEnvError, match="neither windows nor a wall"):
+        FilledBay(bay())
+
+
+def test_windows_and_walls_of_a_building_decide_together() -> None:
+    end_s = 2.0 * 200.0 / 28e3  # some 50 kg at 40 m
+    time_s, history = np.array([0.0, end_s]), np.array([28e3, 0.0])
+    bays = [
+        FilledBay(bay(), glazing("window_annealed_6"), wall("concrete_200")),
+        FilledBay(bay(), glazing("window_laminated_12")),
+        FilledBay(bay(), wall=wall("concrete_200")),
+    ]
+    found = respond(bays, time_s, np.tile(history, (3, 1)))
+    assert found.panes == 4
+    assert 2.0 < found.broken_panes <= 4.0
+    assert found.worst_condition is GlazingCondition.HIGH_ON_PANEL
+    assert found.level_of_protection is LevelOfProtection.VERY_LOW
+    held = respond(bays[1:], time_s, np.tile(history, (2, 1)))
+    assert held.level_of_protection > LevelOfProtection.VERY_LOW
+    calm = respond(bays, time_s, np.zeros((3, 2)))
+    assert calm.broken_panes == 0.0
+    assert calm.level_of_protection is LevelOfProtection.HIGH
