@@ -161,6 +161,44 @@ class FaceLoads(LoadTable):
         self.add(solver.wall_overpressure_pa(), solver.time_s, step_s)
 
 
+class PatchHistories:
+    """Recorder of the mean overpressure on patches of wall: bays, the sides of barrier pieces.
+
+    Args:
+        patch: Which patch each of the solver's faces belongs to, -1 for none (faces,).
+        count: Number of patches; each has at least one face.
+
+    Raises:
+        BlastEnvError: If a patch has no face.
+    """
+
+    def __init__(self, patch: NDArray[np.int64], count: int) -> None:
+        self._members = np.flatnonzero(patch >= 0)
+        self._patch = patch[self._members]
+        self._faces = np.bincount(self._patch, minlength=count)
+        if len(self._faces) != count or not self._faces.all():
+            raise BlastEnvError(f"{count} patches of wall: each must have a face of a cell")
+        self._times: list[float] = []
+        self._history: list[NDArray[np.float32]] = []
+
+    def record(self, solver: GasSolver, step_s: float) -> None:
+        """Add a step: the mean over its time, in its middle."""
+        over = solver.wall_pressure[self._members] - 1.0
+        sums = np.bincount(self._patch, weights=over, minlength=len(self._faces))
+        self._times.append(solver.time_s - 0.5 * step_s)
+        self._history.append((solver.pressure_pa * sums / self._faces).astype(np.float32))
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Middles of the steps so far (steps,)."""
+        return np.array(self._times)
+
+    @property
+    def history_pa(self) -> NDArray[np.float32]:
+        """Mean overpressures of the steps (patches, steps)."""
+        return np.array(self._history, dtype=np.float32).reshape(-1, len(self._faces)).T
+
+
 class Gauges(LoadTable):
     """Recorder of the overpressure in cells of air, with its whole history.
 

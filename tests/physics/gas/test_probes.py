@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.faces import exposed_faces, ground_faces
@@ -13,6 +14,7 @@ from blast_env.physics.gas.probes import (
     Gauges,
     GroundMap,
     LoadTable,
+    PatchHistories,
     Snapshots,
     group_status,
 )
@@ -96,6 +98,42 @@ def test_faces_are_loaded_from_their_own_side() -> None:
         expected = [10, 10, 10]
         expected[axis] = 11
         assert air.tolist() == expected
+
+
+def test_patches_keep_the_mean_history_of_their_faces() -> None:
+    """Their positive impulse is the mean of the faces', and a patch without a face is refused."""
+    made: list[FaceLoads | PatchHistories] = []
+
+    def setup(grid: GasGrid) -> dict[str, Any]:
+        faces = exposed_faces(grid, grid.solid)
+        patch = np.where(faces.axis == 2, -1, faces.side > 0)
+        made.extend((FaceLoads(len(faces)), PatchHistories(patch, 2)))
+        return {"faces": faces, "recorders": made}
+
+    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver.advance(0.03)
+    loads, patches = made
+    assert isinstance(loads, FaceLoads)
+    assert isinstance(patches, PatchHistories)
+    assert patches.history_pa.shape == (2, solver.steps)
+    assert (np.diff(patches.time_s) > 0.0).all()
+    steps_s = np.diff(np.append(0.0, _ends(patches.time_s)))
+    whole = loads.positive_impulse_pa_s + loads.negative_impulse_pa_s
+    for side, history in enumerate(patches.history_pa):
+        members = (solver.faces.axis != 2) & ((solver.faces.side > 0) == bool(side))
+        assert history @ steps_s == pytest.approx(whole[members].mean(), rel=1e-5)
+    with pytest.raises(BlastEnvError, match="each must have a face"):
+        PatchHistories(np.array([0, 2]), 3)
+
+
+def _ends(middles_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the ends of steps that follow each other, from their middles."""
+    ends = []
+    end = 0.0
+    for middle in middles_s.tolist():
+        end = 2.0 * middle - end
+        ends.append(end)
+    return np.array(ends)
 
 
 def test_gauges_keep_the_history() -> None:
