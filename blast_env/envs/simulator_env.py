@@ -27,8 +27,7 @@ from blast_env.values import real_number
 
 if TYPE_CHECKING:  # drawing is an optional extra, and Numba takes half a second to import
     from blast_env.rendering.window import Window
-    from blast_env.values import real_number
-from blast_env.simulation.gas import GasResult
+    from blast_env.simulation.gas import GasResult
 
 _OPTIONS: Final = ("layout", "charge_position_m")
 
@@ -233,6 +232,10 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         if self._window is not None:
             self._window.close()
             self._window = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the window: a copy opens one of its own."""
+        return {**self.__dict__, "_window": None}
 
     def _lay_out(self, seed: int, options: Mapping[str, Any]) -> Unfolding:
         layout = check_layout(self.scenario, options.get("layout", self.layout))

@@ -89,6 +89,10 @@ class UnfoldingParticles:
         self.run = blast.start()
         self._painter: FramePainter | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what draws: it does not pickle, and is made anew."""
+        return {**self.__dict__, "_painter": None}
+
     @property
     def time_s(self) -> float:
         """Time since the detonation."""
@@ -201,6 +205,10 @@ class UnfoldingGas:
         self._plan = (slice(margin, margin + columns), slice(margin, margin + rows))
         self._layer = min(int(PLAN_HEIGHT_M / grid.cell_m), grid.shape[2] - 1)
         self._painter: PressureNow | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what draws: it does not pickle, and is made anew."""
+        return {**self.__dict__, "_painter": None}
 
     @property
     def time_s(self) -> float:

@@ -1,5 +1,6 @@
 """The event-driven engine: the paper's model with hard discs and without a time step."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, Final
@@ -47,7 +48,7 @@ class EventRun:
     """One blast on its way; see `BlastRun` for the attributes. A step is a collision."""
 
     def __init__(self, scene: Scene, cell_units: float | None = None) -> None:
-        self.scene = scene
+        self.scene, self._cell_units = scene, cell_units
         self.obstacles = scene.obstacles()
         self.log = CollisionLog()
         self.time_s = 0.0
@@ -57,6 +58,13 @@ class EventRun:
         self._world = world_of(scene, self._parts, cell_units)
         self._record = np.empty((_RECORD_ROWS, len(RECORD_COLUMNS)))
         self._recorded = 0
+
+    def __reduce__(
+        self,
+    ) -> tuple[Callable[..., "EventRun"], tuple[Scene, float | None, float]]:
+        """Pickle the scene and the time: parts of the state share memory, which a copy loses."""
+        until_s = self.time_s if self.end_reason is None else np.inf
+        return _run_again, (self.scene, self._cell_units, until_s)
 
     @property
     def crossings(self) -> int:
@@ -130,3 +138,10 @@ class EventRun:
             if hits:
                 part.hits, part.impulse, part.transferred_impulse = hits, impulse, transferred
                 part.first_hit_s = first_hit_s
+
+
+def _run_again(scene: Scene, cell_units: float | None, until_s: float) -> EventRun:
+    """Return a run of a scene up to a time that another run of it has come to."""
+    run = EventRun(scene, cell_units)
+    run.advance(until_s)
+    return run

@@ -1,6 +1,6 @@
 """The reference engine: pymunk, step by step."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from math import hypot
@@ -184,6 +184,10 @@ class PymunkRun:
             self._built.space.on_collision(
                 kind, CollisionType.ModularPart, pre_solve=self._before_module_contact
             )
+
+    def __reduce__(self) -> tuple[Callable[[Scene, float], "PymunkRun"], tuple[Scene, float]]:
+        """Pickle the scene and the time: a space has no form in bytes, but runs again the same."""
+        return _run_again, (self.scene, self.time_s if self.end_reason is None else np.inf)
 
     @property
     def time_step_s(self) -> float:
@@ -399,3 +403,10 @@ class PymunkRun:
                 self._built.space.remove(
                     self._built.ball_bodies[ball], self._built.ball_shapes[ball]
                 )
+
+
+def _run_again(scene: Scene, until_s: float) -> PymunkRun:
+    """Return a run of a scene up to a time that another run of it has come to."""
+    run = PymunkRun(scene)
+    run.advance(until_s)
+    return run
