@@ -6,7 +6,8 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from time import perf_counter
+from typing import Any, Final
 
 import typer
 from rich.console import Console
@@ -20,6 +21,7 @@ from blast_env.scenario import Scenario
 from blast_env.values import STEERING
 
 _PIPE_COLUMNS = 120
+_LINE_EVERY_S: Final = 30.0
 
 
 def result_console() -> Console:
@@ -141,16 +143,36 @@ def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
     """Show a progress bar on standard error; it is gone when the work is done.
 
+    Where standard error is no terminal, as in a log file, a line every half minute instead.
+
     Args:
         label: What is going on.
 
     Yields:
         A function to call with the share that is done.
     """
+    console = message_console()
+    if not console.is_terminal:
+        yield _progress_lines(console, printable(label))
+        return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=message_console(), transient=True) as progress:
+    with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task(printable(label), total=1.0)
         yield lambda share: progress.update(task, completed=share)
+
+
+def _progress_lines(console: Console, label: str) -> Callable[[float], None]:
+    """Return a function that writes the share that is done, but not too often."""
+    began = told = perf_counter()
+
+    def show(share: float) -> None:
+        nonlocal told
+        now = perf_counter()
+        if now - told >= _LINE_EVERY_S:
+            told = now
+            console.print(f"{label}: {share:.0%} after {now - began:,.0f} s")
+
+    return show
 
 
 def make_table(title: str, headers: Sequence[str], text_columns: int = 1) -> ResultTable:
