@@ -22,7 +22,7 @@ from blast_agents.training.run_folder import (
     read_rows,
     settings_from,
 )
-from blast_agents.training.self_labelling import Judge, race
+from blast_agents.training.self_labelling import Judge, SelfLabelling, race
 
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
@@ -179,13 +179,13 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def outcome(run: Path) -> tuple[Any, ...]:
-    """Return all that a run has come to, but for the time it took and where loads came from."""
+    """Return all that a run has come to, but for the time it took."""
     checkpoint = Checkpoint.load(run / "checkpoint.pt")
     rollouts = read_rows(run / "rollouts.csv", RolloutRow)
     evaluations = read_rows(run / "evaluations.csv", EvaluationRow)
     return (
-        [astuple(replace(row, seconds=0.0, blasts=0, cache_hits=0)) for row in rollouts],
-        [astuple(replace(row, seconds=0.0, blasts=0)) for row in evaluations],
+        [astuple(replace(row, seconds=0.0)) for row in rollouts],
+        [astuple(replace(row, seconds=0.0)) for row in evaluations],
         checkpoint.labels,
         {name: values.tolist() for name, values in checkpoint.policy.items()},
     )
@@ -207,6 +207,7 @@ def test_no_label_is_worse_than_a_rule_s_layout(finished: Path) -> None:
     assert reached == sorted(reached)
     assert len(rows) > 2
     assert rows[-1].steps >= STEPS > rows[-2].steps
+    assert all(row.blasts + row.cache_hits == row.steps for row in rows)
 
 
 def test_its_agent_is_one_like_any_other(finished: Path) -> None:
@@ -234,14 +235,27 @@ def test_an_interrupted_run_ends_as_if_it_had_not_been(
     assert outcome(run) == outcome(finished)
 
 
-def test_blasts_of_an_interrupted_round_are_not_repeated(finished: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("rounds", [0, 1])
+def test_blasts_of_an_interrupted_round_are_not_repeated_but_counted(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rounds: int
+) -> None:
     run = tmp_path / "run"
-    train(run_settings(scenario_file(tmp_path)), own(), run)
-    start = Checkpoint.of_start(Checkpoint.load(run / "checkpoint.pt").configuration)
-    start.save(run / "checkpoint.pt")
+    imitate = SelfLabelling._imitate
+
+    def interrupt(training: SelfLabelling, updates: int, rng: np.random.Generator) -> float:
+        if training.progress.counters.rollouts == rounds:
+            raise KeyboardInterrupt
+        return imitate(training, updates, rng)
+
+    monkeypatch.setattr(SelfLabelling, "_imitate", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        train(run_settings(scenario_file(tmp_path)), own(), run)
+    monkeypatch.undo()
+    simulated = len([*(run / "blasts").iterdir()])
+    assert simulated > Checkpoint.load(run / "checkpoint.pt").counters.blasts
     result = resume(run)
-    assert result.progress.counters.blasts == 0
     assert outcome(run) == outcome(finished)
+    assert result.progress.counters.blasts == len([*(run / "blasts").iterdir()])
 
 
 def test_another_training_begins_with_the_weights_of_a_run(finished: Path, tmp_path: Path) -> None:

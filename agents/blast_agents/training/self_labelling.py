@@ -221,6 +221,7 @@ class SelfLabelling:
         selection: What the best weights are chosen by.
         progress: What the run has come to so far.
         logger: Writes for TensorBoard.
+        uncounted: Blasts in the run folder that no round has counted: of one that was interrupted.
     """
 
     folder: RunFolder
@@ -231,6 +232,7 @@ class SelfLabelling:
     selection: Selection
     progress: Progress
     logger: Logger
+    uncounted: int = 0
 
     @classmethod
     def of(
@@ -278,6 +280,7 @@ class SelfLabelling:
             selection=selection,
             progress=progress,
             logger=configure(str(folder.tensorboard), ["tensorboard"]),
+            uncounted=0 if settings.guesses else max(len(cache) - progress.counters.blasts, 0),
         )
 
     @property
@@ -300,17 +303,19 @@ class SelfLabelling:
             updates = hyperparameters.updates
         self.judge.asked = max(self.judge.asked, before.steps + 1)  # every round ends some time
         loss = self._imitate(updates, rng)
+        simulated = self.judge.evaluators.blasts - blasts + self.uncounted
         counters = replace(
             before,
             steps=self.judge.asked,
             rollouts=number + 1,
             updates=before.updates + updates,
             episodes=before.episodes + len(tried),
-            blasts=before.blasts + self.judge.evaluators.blasts - blasts,
-            cache_hits=before.cache_hits + self.judge.evaluators.cache_hits - hits,
+            blasts=before.blasts + simulated,
+            # Each blast is run ahead, and then found.
+            cache_hits=before.cache_hits + self.judge.evaluators.cache_hits - hits - simulated,
             seconds=before.seconds + perf_counter() - began,
         )
-        self.progress.counters = counters
+        self.progress.counters, self.uncounted = counters, 0
         self._write_down(tried, loss)
 
     def _turn(self, number: int) -> list[int]:
