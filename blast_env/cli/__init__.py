@@ -12,7 +12,7 @@ class _Commands(LazyGroup):
 
     places = {  # noqa: RUF012  # annotated in the base class
         "simulate": (
-            "blast_env.cli.simulate:simulate",
+            "blast_env.cli.simulate:SimulateCommand",
             "Run one blast and print what each structure took.",
         ),
         "validate": (

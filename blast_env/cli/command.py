@@ -89,11 +89,13 @@ class _Text(NamedTuple):
         info: Makes Typer's description of it from the names on the command line.
         flag: What one writes on the command line, where the field's name does not say it.
         writes: Suffixes of the file that is written there; `FOLDER`; None if nothing is.
+        panel: Heading under which help shows it; None for the first.
     """
 
     info: partial[Any]
     flag: str | None
     writes: tuple[str, ...] | None
+    panel: str | None
 
 
 _Value = TypeVar("_Value")
@@ -106,6 +108,7 @@ def option(
     *,
     flag: str | None = None,
     writes: tuple[str, ...] | None = None,
+    panel: str | None = None,
     **settings: Any,
 ) -> Any: ...
 @overload
@@ -115,6 +118,7 @@ def option(
     *,
     flag: str | None = None,
     writes: tuple[str, ...] | None = None,
+    panel: str | None = None,
     **settings: Any,
 ) -> _Value: ...
 def option(
@@ -123,6 +127,7 @@ def option(
     *,
     flag: str | None = None,
     writes: tuple[str, ...] | None = None,
+    panel: str | None = None,
     **settings: Any,
 ) -> Any:
     """Return a field of a command that is an option.
@@ -132,14 +137,16 @@ def option(
         help: What it says of itself.
         flag: What one writes on the command line; `--cell` of a field `cell_m` unless given.
         writes: Suffixes of the file that the command writes there; `FOLDER` for a folder.
+        panel: Heading under which help shows it, unless it is the first.
         settings: What else `typer.Option` takes.
     """
-    return _field(default, _Text(partial(typer.Option, help=help, **settings), flag, writes))
+    info = partial(typer.Option, help=help, rich_help_panel=panel, **settings)
+    return _field(default, _Text(info, flag, writes, panel))
 
 
 def argument(help: str, *, default: Any = ..., **settings: Any) -> Any:  # noqa: A002
     """Return a field of a command that stands without a name on the command line; see `option`."""
-    return _field(default, _Text(partial(typer.Argument, help=help, **settings), None, None))
+    return _field(default, _Text(partial(typer.Argument, help=help, **settings), None, None, None))
 
 
 def _field(default: Any, text: _Text) -> Any:

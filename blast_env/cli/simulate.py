@@ -1,209 +1,532 @@
-"""`blast-env simulate`: run one blast."""
+"""`blast-env simulate`: run one blast; print and write what it did."""
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import isfinite, isnan, nan
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
-import typer
-
-from blast_env.cli.options import AsJson, CellSide, ChargePlace, JsonAll, TntMass, fixed_charge
-from blast_env.cli.output import check_json, user_errors
-from blast_env.cli.particle_blast import ParticleOutput, report_particle_blast
-from blast_env.cli.targets import PICTURES, FileTarget, checked_targets
-from blast_env.errors import BlastEnvError
+from blast_env.cli.command import argument, option, options_of
+from blast_env.cli.options import CELL_HELP, SCENARIO_HELP, ChargeOptions, JsonOptions
+from blast_env.cli.output import (
+    engine_text,
+    make_table,
+    print_json,
+    print_line,
+    progress_bar,
+    result_console,
+)
+from blast_env.cli.targets import PICTURES
+from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
+from blast_env.geometry import Layout, layout_counts
+from blast_env.physics.engine import Engine
 from blast_env.physics.engines import find_engine, is_gas
-from blast_env.scenario import Scenario, load_layout, load_scenario
+from blast_env.physics.scene import Charge
+from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario
 from blast_env.scenario.build_scene import draw_threat
-from blast_env.simulation import Blast
+from blast_env.simulation import Blast, BlastResult
+from blast_env.units import MS_PER_S, PA_PER_KPA
 
-_FILMS = (".mp4", ".gif")
-_GAS_PANEL = "Gas dynamics only"
-_PARTICLES_PANEL = "Particles only"
+if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
+    import pandas as pd
 
-Picture = Path | None
+    from blast_env.physics.gas.engine import Recorders
+    from blast_env.rendering.pressure_frames import Section
+    from blast_env.simulation.gas import GasBlast, GasResult
+
+_GAS_PANEL: Final = "Gas dynamics only"
+_PARTICLES_PANEL: Final = "Particles only"
+
+_Progress = Callable[[float], None]
 
 
-def simulate(
-    scenario: Annotated[str, typer.Argument(help="Bundled name, or a scenario file.")],
-    layout: Annotated[
-        Path | None, typer.Option(help="JSON file with the barrier's [row, column] cells.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Decides charge, fan and air.")] = 0,
-    preset: Annotated[
-        str | None, typer.Option(help="Parameters of this name instead of the scenario's.")
-    ] = None,
-    engine: Annotated[
-        str, typer.Option(help="pymunk or event (particles), or gas (gas dynamics).")
-    ] = "pymunk",
-    cell: CellSide = None,
-    charge: ChargePlace = None,
-    tnt_kg: TntMass = None,
-    stand_off: Annotated[
-        float | None, typer.Option(help="Distance from charge to facade, m (free_field).")
-    ] = None,
-    film: Annotated[Path | None, typer.Option(help="Write a film: .mp4 or .gif.")] = None,
-    excel: Annotated[Path | None, typer.Option(help="Write a workbook: .xlsx.")] = None,
-    parquet: Annotated[
-        Path | None, typer.Option(help="Write the collisions, or the loads of all faces: .parquet.")
-    ] = None,
-    heat_map: Annotated[
-        Picture,
-        typer.Option(
-            help="Write a picture of the load on what is protected, by place: .png, .svg, .pdf."
-        ),
-    ] = None,
-    history: Annotated[
-        Picture, typer.Option(help="Write a picture of the load over time (gas: at --gauge).")
-    ] = None,
-    side_by_side: Annotated[
-        bool,
-        typer.Option(
-            "--side-by-side", help="Show in all pictures the site without the barrier as well."
-        ),
-    ] = False,
-    impulse_map: Annotated[
-        Picture,
-        typer.Option(
-            help="Write a map of the impulse over the ground.", rich_help_panel=_GAS_PANEL
-        ),
-    ] = None,
-    peak_map: Annotated[
-        Picture,
-        typer.Option(
-            help="Write a map of the peak overpressure, likewise.", rich_help_panel=_GAS_PANEL
-        ),
-    ] = None,
-    quantity: Annotated[
-        str | None,
-        typer.Option(
-            help="impulse or peak: what --heat-map shows.",
-            show_default="impulse",
-            rich_help_panel=_GAS_PANEL,
-        ),
-    ] = None,
-    gauge: Annotated[
-        str | None,
-        typer.Option(
-            help="Gauge of --history, beside Kingery-Bulmash.",
-            show_default="the scenario's first",
-            rich_help_panel=_GAS_PANEL,
-        ),
-    ] = None,
-    film_height: Annotated[
-        float | None,
-        typer.Option(
-            help="Height of the film's plan, m.", show_default="1.5", rich_help_panel=_GAS_PANEL
-        ),
-    ] = None,
-    film_section: Annotated[
-        str | None,
-        typer.Option(
-            metavar="AXIS=M",
-            help="The film's vertical section: x=12.5 or y=4.",
-            show_default="through the charge",
-            rich_help_panel=_GAS_PANEL,
-        ),
-    ] = None,
-    scheme: Annotated[
-        Picture,
-        typer.Option(
-            help="Write a picture of the initial state.", rich_help_panel=_PARTICLES_PANEL
-        ),
-    ] = None,
-    velocities: Annotated[
-        Picture,
-        typer.Option(
-            help="Write a picture of the fan's velocities.", rich_help_panel=_PARTICLES_PANEL
-        ),
-    ] = None,
-    as_json: AsJson = False,
-    json_all: JsonAll = False,
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class SimulateCommand(ChargeOptions, JsonOptions):
     """Run one blast and print what each structure took.
 
     A picture answers the same question on either engine: --film how the blast spreads, --heat-map
     where the load falls, --history when it comes.
     """
-    pictures = {
-        "--heat-map": heat_map,
-        "--history": history,
-        "--impulse-map": impulse_map,
-        "--peak-map": peak_map,
-        "--scheme": scheme,
-        "--velocities": velocities,
-    }
-    files = {option: FileTarget(path, PICTURES) for option, path in pictures.items()}
-    files |= {
-        "--film": FileTarget(film, _FILMS),
-        "--excel": FileTarget(excel, (".xlsx",)),
-        "--parquet": FileTarget(parquet, (".parquet",)),
-    }
-    for_gas = {
-        "--impulse-map": impulse_map,
-        "--peak-map": peak_map,
-        "--quantity": quantity,
-        "--gauge": gauge,
-        "--film-height": film_height,
-        "--film-section": film_section,
-    }
-    with user_errors(), checked_targets(files):
-        check_json(as_json, json_all)
-        named = load_scenario(scenario)
-        chosen = _changed(named, preset, stand_off)
+
+    scenario: str = argument(SCENARIO_HELP)
+    layout: Path | None = option(None, "JSON file with the barrier's [row, column] cells.")
+    seed: int = option(0, "Decides charge, fan and air.", min=0)
+    engine: str = option("pymunk", "pymunk or event (particles), or gas (gas dynamics).")
+    stand_off_m: float | None = option(None, "Distance from charge to facade, m (free_field).")
+    film: Path | None = option(None, "Write a film: .mp4 or .gif.", writes=(".mp4", ".gif"))
+    excel: Path | None = option(None, "Write a workbook: .xlsx.", writes=(".xlsx",))
+    parquet: Path | None = option(
+        None, "Write the collisions, or the loads of all faces: .parquet.", writes=(".parquet",)
+    )
+    heat_map: Path | None = option(
+        None,
+        "Write a picture of the load on what is protected, by place: .png, .svg, .pdf.",
+        writes=PICTURES,
+    )
+    history: Path | None = option(
+        None, "Write a picture of the load over time (gas: at --gauge).", writes=PICTURES
+    )
+    side_by_side: bool = option(False, "Show in all pictures the site without the barrier as well.")
+    cell_m: float | None = option(None, CELL_HELP, panel=_GAS_PANEL)
+    impulse_map: Path | None = option(
+        None, "Write a map of the impulse over the ground.", writes=PICTURES, panel=_GAS_PANEL
+    )
+    peak_map: Path | None = option(
+        None,
+        "Write a map of the peak overpressure over the ground.",
+        writes=PICTURES,
+        panel=_GAS_PANEL,
+    )
+    quantity: str | None = option(
+        None, "impulse or peak: what --heat-map shows.", show_default="impulse", panel=_GAS_PANEL
+    )
+    gauge: str | None = option(
+        None,
+        "Gauge of --history, beside Kingery-Bulmash.",
+        show_default="the scenario's first",
+        panel=_GAS_PANEL,
+    )
+    film_height_m: float | None = option(
+        None, "Height of the film's plan, m.", show_default="1.5", panel=_GAS_PANEL
+    )
+    film_section: str | None = option(
+        None,
+        "The film's vertical section: x=12.5 or y=4.",
+        metavar="AXIS=M",
+        show_default="through the charge",
+        panel=_GAS_PANEL,
+    )
+    preset: str | None = option(
+        None, "Parameters of this name instead of the scenario's.", panel=_PARTICLES_PANEL
+    )
+    scheme: Path | None = option(
+        None, "Write a picture of the initial state.", writes=PICTURES, panel=_PARTICLES_PANEL
+    )
+    velocities: Path | None = option(
+        None, "Write a picture of the fan's velocities.", writes=PICTURES, panel=_PARTICLES_PANEL
+    )
+
+    def __call__(self) -> None:
+        """Run the blast, write its files and print its loads."""
+        site = load_scenario(self.scenario)
+        scenario = site if self.stand_off_m is None else site.at_stand_off(self.stand_off_m)
+        scenario = scenario.with_simulation(self.preset)
         # A layout is for the site of the file; preset and stand-off are this command's.
-        cells = () if layout is None else load_layout(layout, named)
-        found = find_engine(engine, cell)
-        drawn = fixed_charge(chosen, draw_threat(chosen, seed), charge, tnt_kg)
-        if not is_gas(found):
-            for option, value in for_gas.items():
-                if value is not None:
-                    raise BlastEnvError(f"{option} is for gas dynamics: engine is {found.name!r}")
-            report_particle_blast(
-                Blast(chosen, cells, seed, found, drawn),
-                ParticleOutput(
-                    film=film,
-                    excel=excel,
-                    parquet=parquet,
-                    heat_map=heat_map,
-                    history=history,
-                    scheme=scheme,
-                    velocities=velocities,
-                    side_by_side=side_by_side,
-                    as_json=as_json,
-                    json_all=json_all,
-                ),
-            )
-            return
-        for option, path in (("--scheme", scheme), ("--velocities", velocities)):
-            if path is not None:
-                raise BlastEnvError(f"{option} draws particles: engine 'gas' has none")
-        if preset is not None:
-            raise BlastEnvError("--preset is for particles: engine 'gas' has no parameters")
+        layout: Layout = () if self.layout is None else tuple(load_layout(self.layout, site))
+        engine = find_engine(self.engine, self.cell_m)
+        self._check(engine, layout)
+        charge = self.fixed(scenario, draw_threat(scenario, self.seed))
+        shown = self._shown(scenario, layout, engine, charge)
+        with progress_bar(f"blast in {scenario.name}") as progress:
+            bare, result = shown.run(progress)
+        written = [path for path in (self.film,) if path is not None]
+        if self.excel is not None:
+            written.append(result.to_excel(self.excel))
+        if self.parquet is not None:
+            written.append(result.to_parquet(self.parquet))
+        written += shown.write_pictures(result, bare)
+        if self.any_json:
+            print_json(_record(result, written, all_of_it=self.json_all))
+        else:
+            shown.print_loads(result)
+            for path in written:
+                print_line(f"wrote {path}")
+
+    def _check(self, engine: Engine, layout: Layout) -> None:
+        """Refuse options of no use before anything is run."""
+        other = _PARTICLES_PANEL if is_gas(engine) else _GAS_PANEL
+        for each in options_of(type(self)):
+            if each.text.panel == other and getattr(self, each.name) != each.default:
+                what = other.removesuffix(" only").lower()
+                raise BlastEnvError(f"{each.flag} is for {what}: engine is {engine.name!r}")
+        if self.side_by_side and not layout:
+            raise BlastEnvError("--side-by-side compares with the empty site: --layout is missing")
+
+    def _shown(
+        self, scenario: Scenario, layout: Layout, engine: Engine, charge: AnyCharge
+    ) -> "_Shown[Any, Any]":
+        if not is_gas(engine):
+            return _ShownParticles(self, Blast(scenario, layout, self.seed, engine, charge))
         # Here, because Numba takes half a second to import.
-        from blast_env.cli.gas_blast import GasOutput, parsed_section, report_gas_blast
         from blast_env.simulation.gas import GasBlast
 
-        report_gas_blast(
-            GasBlast(chosen, tuple(cells), seed, found, drawn),
-            GasOutput(
-                film=film,
-                excel=excel,
-                parquet=parquet,
-                heat_map=heat_map,
-                history=history,
-                impulse_map=impulse_map,
-                peak_map=peak_map,
-                quantity=quantity or "impulse",
-                gauge=gauge,
-                film_height_m=film_height,
-                film_section=parsed_section(film_section),
-                side_by_side=side_by_side,
-                as_json=as_json,
-                json_all=json_all,
-            ),
+        return _ShownGas(self, GasBlast(scenario, layout, self.seed, engine, charge))
+
+
+_AnyBlast = TypeVar("_AnyBlast", Blast, "GasBlast")
+_AnyResult = TypeVar("_AnyResult", BlastResult, "GasResult")
+
+
+class _Shown(ABC, Generic[_AnyBlast, _AnyResult]):
+    """A blast, and how its result is shown.
+
+    Args:
+        command: What is wanted of it.
+        blast: The blast.
+
+    Raises:
+        BlastEnvError: If an option is of no use for it.
+    """
+
+    headers: tuple[str, ...]
+
+    def __init__(self, command: SimulateCommand, blast: _AnyBlast) -> None:
+        self.command = command
+        self.blast: _AnyBlast = blast
+        self.check()
+
+    def check(self) -> None:
+        """Refuse options of no use before anything is run."""
+
+    def run(self, progress: _Progress) -> tuple[_AnyResult | None, _AnyResult]:
+        """Run the blast, and the one without a barrier where it is to stand beside it."""
+        bare = replace(self.blast, layout=()) if self.command.side_by_side else None
+        if self.command.film is not None:
+            return self.write_film(self.command.film, bare, progress)
+        if bare is None:
+            return None, self.run_one(self.blast, progress)
+        first = self.run_one(bare, lambda share: progress(0.5 * share))
+        return first, self.run_one(self.blast, lambda share: progress(0.5 + 0.5 * share))
+
+    @abstractmethod
+    def run_one(self, blast: _AnyBlast, progress: _Progress) -> _AnyResult:
+        """Run one blast to its end."""
+
+    @abstractmethod
+    def write_film(
+        self, path: Path, bare: _AnyBlast | None, progress: _Progress
+    ) -> tuple[_AnyResult | None, _AnyResult]:
+        """Write the film of the blast, and of the other beside it; return their results."""
+
+    @abstractmethod
+    def write_pictures(self, result: _AnyResult, bare: _AnyResult | None) -> list[Path]:
+        """Write the pictures that are wanted; return their files."""
+
+    @abstractmethod
+    def print_loads(self, result: _AnyResult) -> None:
+        """Print a table of the structures' loads, and how the run went."""
+
+    def print_table(self, charge: Charge, more: str, rows: Sequence[Sequence[str]]) -> None:
+        """Print the table of the structures' loads.
+
+        Args:
+            charge: The charge of the blast.
+            more: What else decides the result.
+            rows: The rows.
+        """
+        x_m, y_m = charge.position_m
+        table = make_table(
+            f"{self.blast.scenario.name}: {charge.tnt_kg:g} kg TNT at ({x_m:.2f}, {y_m:.2f}) m, "
+            f"{more}, {layout_counts(self.blast.layout, 'barrier')}",
+            self.headers,
+            text_columns=2,
         )
+        for row in rows:
+            table.add_row(*row)
+        result_console().print(table)
+
+    def print_end(self, result: _AnyResult, what: str, steps: str, notes: Sequence[str]) -> None:
+        """Print which engine ran what, how it ended, and what there is to say of it."""
+        print_line(
+            f"{what}, {result.steps:,} {steps}, {MS_PER_S * result.time_s:.0f} ms simulated; ended "
+            f"because {result.end_reason}"
+        )
+        for note in notes:
+            print_line(note)
+        print_line(f"digest {result.digest}")
 
 
-def _changed(scenario: Scenario, preset: str | None, stand_off: float | None) -> Scenario:
-    if stand_off is not None:
-        scenario = scenario.at_stand_off(stand_off)
-    return scenario.with_simulation(preset)
+class _ShownParticles(_Shown[Blast, BlastResult]):
+    """A blast of particles."""
+
+    headers = (
+        *("structure", "protected", "modules", "hits", "impulse m|v| (sim)"),
+        *("transferred (sim)", "impulse (Pa s)", "first hit (ms)"),
+    )
+
+    def check(self) -> None:
+        """Refuse a film that cannot be written."""
+        film = self.command.film
+        if self.command.side_by_side and film is not None and film.suffix.lower() != ".mp4":
+            raise BlastEnvError(f"--film {film}: of two blasts of particles it must be .mp4")
+
+    def run_one(self, blast: Blast, progress: _Progress) -> BlastResult:
+        """Run one blast to its end."""
+        return blast.run(progress)
+
+    def write_film(
+        self, path: Path, bare: Blast | None, progress: _Progress
+    ) -> tuple[BlastResult | None, BlastResult]:
+        """Write the film of the blast, and of the other beside it; return their results."""
+        # Here, because films need the extra `render`.
+        from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
+
+        if bare is None:
+            return None, write_film(self.blast, path, progress=progress)
+        words = f"barrier of {layout_counts(self.blast.layout)}"
+        panels = [FilmPanel(bare, "no barrier"), FilmPanel(self.blast, words)]
+        first, second = write_side_by_side(panels, path, progress=progress)
+        return first, second
+
+    def write_pictures(self, result: BlastResult, bare: BlastResult | None) -> list[Path]:
+        """Write the pictures; those of the empty site have files of their own."""
+        asked = self.command
+        if not any((asked.heat_map, asked.history, asked.scheme, asked.velocities)):
+            return []
+        # Here, because pictures need the extra `render`.
+        from blast_env.rendering import figures
+
+        results = [result] if bare is None else [result, bare]
+        heat_map = partial(figures.heat_map, scale=figures.common_scale(results))
+        scheme = partial(figures.model_scheme, result.blast.scene)
+        fan = partial(figures.initial_velocities, result.blast.scenario.parameters)
+        pictures: list[tuple[Path | None, Callable[[], figures.Figure]]] = [
+            *((_named(asked.heat_map, each is bare), partial(heat_map, each)) for each in results),
+            *(
+                (_named(asked.history, each is bare), partial(figures.impulse_over_time, each))
+                for each in results
+            ),
+            (asked.scheme, scheme),
+            (asked.velocities, fan),
+        ]
+        return [figures.save_figure(draw(), path) for path, draw in pictures if path is not None]
+
+    def print_loads(self, result: BlastResult) -> None:
+        """Print a table of the structures' loads, and how the run went."""
+        blast, scene = result.blast, result.blast.scene
+        scaled = {
+            each.name: _scaled(result, each.name) for each in result.obstacles if each.cells is None
+        }
+        rows = [
+            (
+                each.name,
+                "yes" if each.protected else "no",
+                f"{len(each.parts):,}",
+                f"{each.hits:,}",
+                f"{each.impulse:,.0f}",
+                f"{each.transferred_impulse:,.0f}",
+                _pa_s_text(scaled.get(each.name, {})),
+                "never" if each.first_hit_s is None else f"{MS_PER_S * each.first_hit_s:.1f}",
+            )
+            for each in result.obstacles
+        ]
+        self.print_table(scene.charge, f"seed {blast.seed}", rows)
+        notes = {str(each["error"]) for each in scaled.values() if "error" in each}
+        for name, each in scaled.items():
+            notes |= {f"outside the calibration (~): {name}, {text}" for text in _notes(each)}
+        what = f"{engine_text(blast.particle_engine, [blast.scenario])}: {len(scene.balls):,} balls"
+        texts = [f"impulse (Pa s): {note}" for note in sorted(notes)]
+        self.print_end(result, what, result.step_name, texts)
+
+
+def _named(path: Path | None, is_bare: bool) -> Path | None:
+    """Return the path of a picture, that of the empty site beside it."""
+    if path is None or not is_bare:
+        return path
+    return path.with_name(f"{path.stem}_without{path.suffix}")
+
+
+class _ShownGas(_Shown["GasBlast", "GasResult"]):
+    """A blast of gas dynamics."""
+
+    headers = (
+        *("structure", "protected", "impulse (Pa s)", "first phase (Pa s)", "peak (kPa)"),
+        *("arrival (ms)", "most loaded wall", "roof (Pa s)"),
+    )
+
+    def check(self) -> None:
+        """Refuse options of no use before anything is run."""
+        asked = self.command
+        for flag, value in (
+            ("--film-height", asked.film_height_m),
+            ("--film-section", asked.film_section),
+        ):
+            if value is not None and asked.film is None:
+                raise BlastEnvError(f"{flag} is for --film: no film is to be written")
+        if asked.heat_map is not None:
+            with import_extra("render", "pictures and films"):
+                from blast_env.rendering.gas import kind_of
+            kind_of(asked.quantity or "impulse")
+        _section(asked.film_section)
+        self._check_gauge([each.name for each in self.blast.site.gauges])
+
+    def _check_gauge(self, names: Sequence[str]) -> None:
+        gauge = self.command.gauge
+        if self.command.history is None:
+            if gauge is not None:
+                raise BlastEnvError("--gauge is for --history: no history is to be drawn")
+            return
+        if not names:
+            raise BlastEnvError(
+                f"--history: {self.blast.scenario.name} has no gauges ([[gauges]]), and gas "
+                "dynamics keeps the load over time at gauges only"
+            )
+        if gauge is not None and gauge not in names:
+            raise UnknownNameError("gauge", gauge, names)
+
+    def run_one(self, blast: "GasBlast", progress: _Progress) -> "GasResult":
+        """Run one blast to its end."""
+        return blast.run(progress, self._recorders)
+
+    @property
+    def _recorders(self) -> "Recorders":
+        """What records the ground, where a map of it is wanted."""
+        if self.command.impulse_map is None and self.command.peak_map is None:
+            return lambda _: ()
+        from blast_env.rendering.ground_map import ground_recorders
+
+        return ground_recorders
+
+    def write_film(
+        self, path: Path, bare: "GasBlast | None", progress: _Progress
+    ) -> "tuple[GasResult | None, GasResult]":
+        """Write the film of the blast, and of the other beside it; return their results."""
+        # Here, because films need the extra `render`.
+        from blast_env.rendering.pressure_film import PLAN_HEIGHT_M, write_pressure_film
+
+        height_m = self.command.film_height_m
+        results = write_pressure_film(
+            self.blast,
+            path,
+            beside=bare,
+            height_m=PLAN_HEIGHT_M if height_m is None else height_m,
+            section=_section(self.command.film_section),
+            further=self._recorders,
+            progress=progress,
+        )
+        return (None if bare is None else results[0]), results[-1]
+
+    def write_pictures(self, result: "GasResult", bare: "GasResult | None") -> list[Path]:
+        """Write the pictures; the empty site is in each beside the other."""
+        asked = self.command
+        if not any((asked.heat_map, asked.history, asked.impulse_map, asked.peak_map)):
+            return []
+        # Here, because pictures need the extra `render`.
+        from blast_env.rendering import gas
+        from blast_env.rendering.figures import save_figure
+        from blast_env.rendering.ground_map import ground_map
+
+        kind = gas.kind_of(asked.quantity or "impulse")
+        gauge = asked.gauge or next((each.name for each in self.blast.site.gauges), "")
+        pictures: tuple[tuple[Path | None, Callable[[], Any]], ...] = (
+            (asked.heat_map, lambda: gas.facades(result, quantity=kind, beside=bare)),
+            (asked.history, lambda: gas.gauge_history(result, gauge, free_field=True, beside=bare)),
+            (asked.impulse_map, lambda: ground_map(result, "impulse", bare)),
+            (asked.peak_map, lambda: ground_map(result, "peak", bare)),
+        )
+        return [save_figure(draw(), path) for path, draw in pictures if path is not None]
+
+    def print_loads(self, result: "GasResult") -> None:
+        """Print tables of the structures' loads and of the gauges, and how the run went."""
+        structures = result.structures.to_dict("records")
+        scaled = {each["structure"]: _scaled(result, each["structure"]) for each in structures}
+        rows = [
+            (
+                each["structure"],
+                "yes" if each["protected"] else "no",
+                _pa_s_text(scaled[each["structure"]]),
+                f"{each['first_impulse_pa_s']:,.0f}",
+                f"{each['peak_pa'] / PA_PER_KPA:,.1f}",
+                _number(MS_PER_S * each["arrival_s"], ".1f"),
+                f"{each['most_loaded_face']} {each['most_loaded_pa_s']:,.0f}",
+                _number(each["roof_impulse_pa_s"], ",.0f"),
+            )
+            for each in structures
+        ]
+        charge = result.run.site.charge
+        self.print_table(charge, f"{charge.height_m:g} m high", rows)
+        _print_gauges(result.gauges)
+        cells = " x ".join(str(count) for count in result.run.grid.shape)
+        notes = dict.fromkeys(note for each in scaled.values() for note in _notes(each))
+        texts = [f"outside what was checked (~): {note}" for note in notes]
+        what = f"{engine_text(result.blast.engine)}: {cells} cells"
+        self.print_end(result, what, "steps", texts)
+
+
+def _section(text: str | None) -> "Section | None":
+    """Return the section of `--film-section`.
+
+    Raises:
+        BlastEnvError: If it is none.
+        MissingExtraError: If the extra `render` is not installed.
+    """
+    if text is None:
+        return None
+    with import_extra("render", "pictures and films"):
+        from blast_env.rendering.pressure_frames import Section
+
+    axis, _, number = text.partition("=")
+    try:
+        at_m = float(number)
+    except ValueError:
+        at_m = nan
+    if axis in ("x", "y") and isfinite(at_m):
+        return Section("x" if axis == "x" else "y", at_m)
+    raise BlastEnvError(f"--film-section is {text!r}, must be x=M or y=M, e.g. x=12.5")
+
+
+def _print_gauges(gauges: "pd.DataFrame") -> None:
+    if not len(gauges):
+        return
+    table = make_table(
+        "gauges", ("gauge", "x (m)", "y (m)", "z (m)", "peak (kPa)", "impulse (Pa s)"), 1
+    )
+    for row in gauges.to_dict("records"):
+        places = (f"{row[axis]:.2f}" for axis in ("x_m", "y_m", "z_m"))
+        peak, impulse = row["peak_pa"] / PA_PER_KPA, row["positive_impulse_pa_s"]
+        table.add_row(row["name"], *places, f"{peak:,.1f}", f"{impulse:,.0f}")
+    result_console().print(table)
+
+
+def _number(value: float, form: str) -> str:
+    return "-" if isnan(value) else format(value, form)
+
+
+def _scaled(result: "BlastResult | GasResult", name: str) -> dict[str, Any]:
+    """Return the impulse on a structure in Pa s, or the error where there is none."""
+    try:
+        impulse = result.impulse(name)
+    except BlastEnvError as error:
+        return {"error": str(error)}
+    return {**impulse._asdict(), "pa_s": impulse.pa_s}
+
+
+def _pa_s_text(scaled: Mapping[str, Any]) -> str:
+    if "pa_s" not in scaled:
+        return "-"
+    return f"{'' if scaled['in_range'] else '~'}{scaled['pa_s']:,.0f}"
+
+
+def _notes(scaled: Mapping[str, Any]) -> tuple[str, ...]:
+    notes: tuple[str, ...] = scaled.get("notes", ())
+    return notes
+
+
+def _record(
+    result: "BlastResult | GasResult", written: Sequence[Path], *, all_of_it: bool
+) -> dict[str, object]:
+    """Return the result as plain data; numbers that do not exist are null.
+
+    In short it has neither the modules nor every parameter, which the preset stands for.
+    """
+    content: dict[str, object] = {
+        "run": {
+            name: value
+            for name, value in result.run_record.items()
+            if all_of_it or not name.startswith("parameter ")
+        },
+        "structures": _rows(result.structures),
+        "impulse": {name: _scaled(result, name) for name in result.structures["structure"]},
+    }
+    if not isinstance(result, BlastResult):
+        content["gauges"] = _rows(result.gauges)
+    if all_of_it:
+        content["modules"] = _rows(result.modules)
+    return content | {"files": [str(path) for path in written]}
+
+
+def _rows(table: "pd.DataFrame") -> list[dict[str, object]]:
+    plain = table.astype(object).where(table.notna(), None)
+    return [{str(key): value for key, value in row.items()} for row in plain.to_dict("records")]

@@ -68,8 +68,8 @@ def test_a_layout_is_evaluated_by_gas(site: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--scheme", "a.png"), "--scheme draws particles: engine 'gas' has none"),
-        (("--velocities", "a.png"), "--velocities draws particles: engine 'gas' has none"),
+        (("--scheme", "a.png"), "--scheme is for particles: engine is 'gas'"),
+        (("--velocities", "a.png"), "--velocities is for particles: engine is 'gas'"),
         (("--preset", "ballistic"), "--preset is for particles"),
         (("--gauge", "front"), "--gauge is for --history: no history is to be drawn"),
         (("--gauge", "frnt", "--history", "a.png"), "did you mean 'front'"),

@@ -12,7 +12,7 @@ from tests.agents.search_cases import small_scenario
 SLOW = ("matplotlib", "numba", "pandas", "pyarrow", "pymunk", "scipy", "torch", "xlsxwriter")
 """What takes a tenth of a second or more to import."""
 
-LATER = ("simulate", "calibrate", "search", "bench", "league", "propose")
+LATER = ("calibrate", "search", "bench", "league", "propose")
 """Commands that still import what they work with at once."""
 
 NOT_ON_WINDOWS = ("fcntl", "grp", "pwd", "resource", "syslog", "termios")
@@ -41,7 +41,7 @@ def imported(*arguments: str | Path) -> set[str]:
 
 @pytest.mark.parametrize(
     "arguments",
-    [("--help",), ("validate", "courtyard"), ("evaluate", "--layout", "nowhere")],
+    [("--help",), ("validate", "courtyard"), ("simulate", "nowhere")],
     ids=" ".join,
 )
 def test_nothing_slow_is_imported_before_a_blast(arguments: tuple[str, ...]) -> None:
