@@ -21,6 +21,9 @@ MAX_DEPTH: Final = 50
 """Brackets within each other, and parts of a dotted key. Parsers take time that grows with the
 square of it, or fail in ways of their own."""
 
+MOST_DEEP_PARTS: Final = 10_000
+"""Third and further parts of all dotted keys together: each may make a table of its own."""
+
 MAX_DIGITS: Final = 1000
 """Digits of an integer."""
 
@@ -87,12 +90,13 @@ def read_text(path: Path, most_bytes: int = MAX_BYTES) -> str:
 
 _TOML_TOKEN: Final = re.compile(
     r"""(?P<comment>\#[^\n]*+)
-      | (?P<text>\"{3}(?:[^"\\]|\\.|"(?!""))*+\"{3} | '{3}.*?'{3})
-      | (?P<key>"(?:[^"\\\n]|\\.)*+" | '[^'\n]*+' | [A-Za-z0-9_-]++)
+      | (?P<text>\"{3}(?:[^"\\]|\\.|"(?!""))*+(?:\"{3})? | '{3}.*?(?:'{3}|\Z))
+      | (?P<key>"(?:[^"\\\n]|\\.)*+"? | '[^'\n]*+'? | [A-Za-z0-9_-]++)
       | (?P<dot>\.) | (?P<space>[ \t]++) | (?P<open>[\[{]) | (?P<close>[\]}])
       | (?P<other>[^\#"'A-Za-z0-9_.\[\]{}\ \t-]++ | .)""",
     re.VERBOSE | re.DOTALL,
 )
+"""A text without its end is a token, too: to look for its end again and again takes for ever."""
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -110,7 +114,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 def _check_toml_depth(text: str) -> None:
     """Refuse what takes the parser for ever: deep brackets, and keys of many parts."""
-    depth, parts, after_dot = 0, 0, False
+    depth, parts, deep_parts, after_dot = 0, 0, 0, False
     for token in _TOML_TOKEN.finditer(text):
         kind = token.lastgroup
         if kind == "space":
@@ -121,6 +125,7 @@ def _check_toml_depth(text: str) -> None:
             depth = max(depth - 1, 0)
         if kind == "key":
             parts = parts + 1 if after_dot else 1
+            deep_parts += parts > 2
         after_dot = kind == "dot" and parts > 0
         if kind not in ("key", "dot"):
             parts = 0
@@ -129,6 +134,9 @@ def _check_toml_depth(text: str) -> None:
             raise DocumentError(
                 f"line {line}", f"is nested too deeply: more than {MAX_DEPTH} levels"
             )
+    if deep_parts > MOST_DEEP_PARTS:
+        message = f"dotted keys have {deep_parts} parts after their second ones, must have at most"
+        raise DocumentError("", f"{message} {MOST_DEEP_PARTS}")
 
 
 def _toml_error(message: str, text: str) -> DocumentError:
@@ -148,7 +156,7 @@ def _toml_error(message: str, text: str) -> DocumentError:
     return DocumentError(f"line {line}, column {column}", f"is not TOML: {shortened(what, 200)}")
 
 
-_JSON_TOKEN: Final = re.compile(r'"(?:[^"\\]|\\.)*+"|([\[{])|([\]}])', re.DOTALL)
+_JSON_TOKEN: Final = re.compile(r'"(?:[^"\\]|\\.)*+"?|([\[{])|([\]}])', re.DOTALL)
 
 
 def parse_json(text: str) -> Any:

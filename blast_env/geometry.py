@@ -4,6 +4,10 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
+from blast_env.arrays import BoolArray, IntArray
+
 Cell = tuple[int, int]
 """(row, column) of a build-zone cell, from 0; rows count upwards, columns to the right."""
 
@@ -93,6 +97,32 @@ class Rectangle(NamedTuple):
             first, last = sorted(((low - begin) / step, (high - begin) / step))
             enter, leave = max(enter, first), min(leave, last)
         return enter < leave or (start == end and enter <= leave)
+
+
+def stacked_runs(cells: BoolArray) -> IntArray:
+    """Return rectangles that together are cells, none over another.
+
+    Rows are cut into runs, and equal runs above each other are one rectangle.
+
+    Args:
+        cells: The cells (rows, columns).
+
+    Returns:
+        Lowest row, leftmost column, rows and columns of each (rectangles, 4), by row and column.
+    """
+    framed = np.zeros((cells.shape[0], cells.shape[1] + 2), dtype=np.int8)
+    framed[:, 1:-1] = cells
+    steps = np.diff(framed, axis=1)
+    row, first = np.nonzero(steps > 0)
+    _, after = np.nonzero(steps < 0)
+    order = np.lexsort((row, after, first))
+    row, first, after = row[order], first[order], after[order]
+    goes_on = (np.diff(row) == 1) & (np.diff(first) == 0) & (np.diff(after) == 0)
+    lowest = np.flatnonzero(np.concatenate((np.ones(len(row[:1]), dtype=bool), ~goes_on)))
+    heights = np.diff(np.append(lowest, len(row)))
+    row, first, after = row[lowest], first[lowest], after[lowest]
+    found: IntArray = np.column_stack((row, first, heights, after - first))
+    return found[np.lexsort((first, row))]
 
 
 Layout = tuple[Element, ...]

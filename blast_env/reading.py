@@ -32,7 +32,7 @@ class ReadingLimits:
     """
 
     processor_s: int = 8
-    memory_bytes: int = 300_000_000
+    memory_bytes: int = 350_000_000
     wall_s: float = 60.0
 
 

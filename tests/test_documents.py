@@ -34,7 +34,6 @@ DEEP = MAX_DEPTH + 1
         ("x = { " + ".".join(["1"] * DEEP) + " = 2 }", 1),
         ("x = 'y'\n\nx = " + "[" * 2000, 3),
         ("x = " + "{ x = " * 400 + "1" + "}" * 400, 1),
-        ('"""' + ".".join(["a"] * DEEP) + " = 1", 1),  # a text without an end is no text
     ],
 )
 def test_what_is_nested_too_deeply_is_refused_at_once(text: str, line: int) -> None:

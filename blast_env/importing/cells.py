@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.arrays import BoolArray, FloatArray
-from blast_env.errors import import_extra
-from blast_env.geometry import Rectangle
+from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.geometry import Rectangle, stacked_runs
 from blast_env.units import MODULE_SIDE_M
 
 with import_extra("maps", "maps and drawings"):
@@ -22,8 +22,23 @@ LEAST_SHARE: Final = 0.5
 COARSER: Final = (1, 2, 3, 4, 6, 8)
 """Sides of the blocks that an outline is cut into, in modules; the first that will do is taken."""
 
+MOST_CROSSED: Final = 2_000_000
+"""Cells that outlines together may run through: 1,000 km of walls."""
+
+MOST_COVERED: Final = 64_000_000
+"""Cells that the rectangles around outlines may have together: four sites of the largest size."""
+
+MOST_CROSSINGS: Final = 1000
+"""How often an outline that is to be put right may cross itself."""
+
+_SHARE_STEPS: Final = 2.0**20  # so that equal shares are equal, and 32 bits hold them
 _ROUNDING: Final = 1e-9
-_LINE_STEP: Final = 0.02  # of an outline: how densely its distances are measured
+_BAND_CELLS: Final = 2**20
+_PAIRS: Final = 2**21
+_LINE_STEP_M: Final = 0.1  # of outlines: how densely their distances are measured
+_LINE_POINTS: Final = 50_000
+
+Shares = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -42,6 +57,11 @@ class CellRectangle:
     rows: int
     columns: int
 
+    @classmethod
+    def each(cls, table: IntArray) -> "tuple[CellRectangle, ...]":
+        """Return the rectangles of a table (n, 4), whose columns are the attributes."""
+        return tuple(cls(*row) for row in table.tolist())
+
     @property
     def cells(self) -> tuple[slice, slice]:
         """What of a grid it covers."""
@@ -58,29 +78,160 @@ class CellRectangle:
         ).scaled(MODULE_SIDE_M)
 
 
-def covered_shares(
-    outline: BaseGeometry, shape: tuple[int, int]
-) -> tuple[tuple[slice, slice], FloatArray]:
-    """Return which part of each cell an outline covers.
+def check_outlines(outlines: Sequence[BaseGeometry], what: str) -> None:
+    """Refuse outlines that take too long to be cut into cells, before anything is cut.
 
     Args:
-        outline: In metres from the grid's lower left corner.
+        outlines: In metres, sound, on the site.
+        what: What they are, for the error.
+
+    Raises:
+        BlastEnvError: If they are too long, or lie over each other too often.
+    """
+    starts, ends = _edges(outlines)
+    crossed = float(np.abs(ends - starts).sum()) / MODULE_SIDE_M
+    if crossed > MOST_CROSSED:
+        raise BlastEnvError(
+            f"{what} run through {crossed:,.0f} cells of {MODULE_SIDE_M:g} m together, must run "
+            f"through at most {MOST_CROSSED:,}: their outlines are too long"
+        )
+    left, bottom, right, top = shapely.bounds(list(outlines)).reshape(-1, 4).T
+    covered = float(np.nansum((right - left) * (top - bottom))) / MODULE_SIDE_M**2
+    if covered > MOST_COVERED:
+        raise BlastEnvError(
+            f"{what} take {covered:,.0f} cells of {MODULE_SIDE_M:g} m together, each with the "
+            f"rectangle around it, must take at most {MOST_COVERED:,}: do they lie over each other?"
+        )
+
+
+def mended(outline: BaseGeometry, what: str) -> BaseGeometry:
+    """Return an outline, or several, that does not cross itself.
+
+    Args:
+        outline: Any outline.
+        what: What it is, for the error.
+
+    Raises:
+        BlastEnvError: If it crosses itself too often.
+    """
+    if shapely.is_valid(outline):
+        return outline
+    if _crosses_often(outline):
+        raise BlastEnvError(
+            f"{what} crosses itself more than {MOST_CROSSINGS:,} times, must cross itself at most "
+            "that often to be put right"
+        )
+    return shapely.buffer(shapely.make_valid(outline), 0.0)
+
+
+def _crosses_often(outline: BaseGeometry) -> bool:
+    """Whether an outline crosses itself too often, found without all of its crossings."""
+    walls = _walls(outline)
+    tree = shapely.STRtree(walls)
+    step = max(_PAIRS // max(len(walls), 1), 1)
+    pairs = 0
+    for first in range(0, len(walls), step):
+        some = walls[first : first + step]
+        # Each wall meets itself, and its neighbours at both ends.
+        pairs += tree.query(some, "intersects").shape[1] - 3 * len(some)
+        if pairs > 2 * MOST_CROSSINGS:
+            return True
+    return False
+
+
+def _walls(outline: BaseGeometry) -> NDArray[np.object_]:
+    """Return the edges of an outline as lines."""
+    return np.asarray(shapely.linestrings(np.stack(_edges([outline]), axis=1)))
+
+
+def _edges(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
+    """Return both ends of all edges of outlines (n, 2)."""
+    rings = shapely.get_rings(shapely.get_parts(list(outlines)))
+    places, ring = shapely.get_coordinates(rings, return_index=True)
+    same = ring[1:] == ring[:-1]
+    return places[:-1][same], places[1:][same]
+
+
+def covered_shares(
+    outline: BaseGeometry, shape: tuple[int, int]
+) -> tuple[tuple[slice, slice], Shares]:
+    """Return which part of each cell an outline covers.
+
+    Every edge adds to each row the height that it climbs there, from its place to the right; what
+    both sides of an outline add up to is the area between them.
+
+    Args:
+        outline: In metres from the grid's lower left corner; it does not cross itself.
         shape: Rows and columns of the grid.
 
     Returns:
         The window of rows and columns around the outline, and the shares in it.
     """
     left, bottom, right, top = outline.bounds
-    columns = _window(left, right, shape[1])
     rows = _window(bottom, top, shape[0])
-    x = np.arange(columns.start, columns.stop) * MODULE_SIDE_M
-    y = np.arange(rows.start, rows.stop)[:, np.newaxis] * MODULE_SIDE_M
-    cells = shapely.box(x, y, x + MODULE_SIDE_M, y + MODULE_SIDE_M)
-    shapely.prepare(outline)
-    shares = shapely.contains_properly(outline, cells).astype(np.float64)
-    partly = shapely.intersects(outline, cells) & (shares == 0.0)
-    shares[partly] = shapely.area(shapely.intersection(outline, cells[partly])) / MODULE_SIDE_M**2
+    columns = _window(left, right, shape[1])
+    count, width = rows.stop - rows.start, columns.stop - columns.start
+    shares = np.zeros((count, width), dtype=np.float32)
+    if count == 0 or width == 0:
+        return (rows, columns), shares
+    row, column, climb, aside = _pieces(outline, rows, columns)
+    order = np.argsort(row, kind="stable")
+    row, column, climb, aside = row[order], column[order], climb[order], aside[order]
+    step = max(_BAND_CELLS // width, 1)
+    for first in range(0, count, step):
+        band = slice(first, min(first + step, count))
+        own = slice(*np.searchsorted(row, [band.start, band.stop]))
+        place = (row[own] - first) * (width + 2) + column[own]
+        size = (band.stop - first) * (width + 2)
+        added = np.bincount(place, climb[own] * (1.0 - aside[own]), size)
+        added += np.bincount(place + 1, climb[own] * aside[own], size)
+        covered = np.abs(added.reshape(-1, width + 2).cumsum(axis=1)[:, :width])
+        shares[band] = np.round(np.minimum(covered, 1.0) * _SHARE_STEPS) / _SHARE_STEPS
     return (rows, columns), shares
+
+
+def _pieces(
+    outline: BaseGeometry, rows: slice, columns: slice
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Return the edges of an outline in pieces, each in one cell of a window.
+
+    Returns:
+        The row and the column of each piece in the window, how far it climbs and how far its
+        middle is from the left side of its cell, in cells. What lies to the left of the window
+        climbs at its left side, what lies to the right beside it.
+    """
+    parts = shapely.get_parts(outline)
+    turned = shapely.normalize(parts[shapely.get_type_id(parts) == 3])  # holes the other way
+    corner = np.array([columns.start, rows.start])
+    starts, ends = (each / MODULE_SIDE_M - corner for each in _edges(turned))
+    steps = ends - starts
+    height, width = rows.stop - rows.start, columns.stop - columns.start
+    edges, shares = [np.arange(len(steps))] * 2, [np.zeros(len(steps)), np.ones(len(steps))]
+    for axis, most in ((0, width), (1, height)):
+        edge, line = _lines_between(starts[:, axis], ends[:, axis], most)
+        edges.append(edge)
+        shares.append((line - starts[edge, axis]) / steps[edge, axis])
+    edge, share = np.concatenate(edges), np.concatenate(shares)
+    order = np.lexsort((share, edge))
+    edge, share = edge[order], share[order]
+    same = edge[1:] == edge[:-1]
+    own, middle = edge[:-1][same], 0.5 * (share[:-1] + share[1:])[same]
+    climb = (share[1:] - share[:-1])[same] * steps[own, 1]
+    x, y = (starts[own, axis] + middle * steps[own, axis] for axis in (0, 1))
+    inside = (y > 0.0) & (y < height) & (climb != 0.0)
+    x, y, climb = np.clip(x[inside], 0.0, width), y[inside], climb[inside]
+    column = np.floor(x).astype(np.int64)
+    return np.floor(y).astype(np.int64), column, climb, x - column
+
+
+def _lines_between(starts: FloatArray, ends: FloatArray, most: int) -> tuple[IntArray, FloatArray]:
+    """Return which edges cross which lines of the grid, from 0 to `most`, along an axis."""
+    low = np.clip(np.floor(np.minimum(starts, ends)) + 1.0, 0, most + 1).astype(np.int64)
+    high = np.clip(np.ceil(np.maximum(starts, ends)), 0, most + 1).astype(np.int64)
+    counts = np.maximum(high - low, 0)
+    edge = np.repeat(np.arange(len(starts)), counts)
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    return edge, (low[edge] + np.arange(len(edge)) - first).astype(np.float64)
 
 
 def owners(outlines: Sequence[BaseGeometry], shape: tuple[int, int]) -> NDArray[np.int32]:
@@ -94,38 +245,37 @@ def owners(outlines: Sequence[BaseGeometry], shape: tuple[int, int]) -> NDArray[
     together = np.zeros(shape, dtype=np.float32)
     for index, outline in enumerate(outlines):
         window, shares = covered_shares(outline, shape)
-        more = shares > most[window] + _ROUNDING
+        more = shares > most[window]
         owner[window][more] = index
         most[window] = np.maximum(most[window], shares)
         together[window] += shares
-    owner[together < LEAST_SHARE - _ROUNDING] = -1
+    owner[together < LEAST_SHARE - len(outlines) / _SHARE_STEPS] = -1
     return owner
 
 
-def in_blocks(cells: BoolArray, side: int) -> BoolArray:
-    """Return cells cut into blocks of side x side cells: whole ones, where half is covered."""
+def in_blocks(cells: BoolArray, side: int, least: float = LEAST_SHARE) -> BoolArray:
+    """Return cells cut into blocks of side x side cells: whole ones, where this share is there."""
     if side == 1:
         return cells
     rows, columns = (-(-count // side) * side for count in cells.shape)
     padded = np.zeros((rows, columns), dtype=bool)
     padded[: cells.shape[0], : cells.shape[1]] = cells
     blocks = padded.reshape(rows // side, side, columns // side, side).mean(axis=(1, 3))
-    whole = np.repeat(np.repeat(blocks >= LEAST_SHARE, side, axis=0), side, axis=1)
+    whole = np.repeat(np.repeat(blocks >= least, side, axis=0), side, axis=1)
     return whole[: cells.shape[0], : cells.shape[1]]
 
 
-def rectangles_of(cells: BoolArray) -> tuple[CellRectangle, ...]:
+def rectangles_of(cells: BoolArray) -> IntArray:
     """Return few rectangles that together are the cells, none over another.
 
     Rows are cut into runs, and equal runs above each other are one rectangle; or columns, where
     that gives fewer. So every rectangle has two walls that no other one hides.
+
+    Returns:
+        A table (rectangles, 4), see `CellRectangle.each`: there may be very many.
     """
-    by_rows = _stacked_runs(cells)
-    by_columns = [
-        CellRectangle(each.column, each.row, each.columns, each.rows)
-        for each in _stacked_runs(cells.T)
-    ]
-    return tuple(by_rows if len(by_rows) <= len(by_columns) else by_columns)
+    by_rows, by_columns = stacked_runs(cells), stacked_runs(cells.T)
+    return by_rows if len(by_rows) <= len(by_columns) else by_columns[:, [1, 0, 3, 2]]
 
 
 def outline_of(rectangles: Sequence[CellRectangle]) -> BaseGeometry:
@@ -150,33 +300,22 @@ class Deviation:
     def between(cls, outline: BaseGeometry, modules: BaseGeometry) -> "Deviation":
         """Return how far modules are from an outline."""
         area = shapely.area(shapely.symmetric_difference(outline, modules))
-        return cls(
-            float(area / outline.area),
-            float(shapely.hausdorff_distance(outline.boundary, modules.boundary, _LINE_STEP)),
-        )
+        outline_m = max(_farthest_m(outline, modules), _farthest_m(modules, outline))
+        return cls(float(area / outline.area), outline_m)
+
+
+def _farthest_m(outline: BaseGeometry, other: BaseGeometry) -> float:
+    """Return the largest distance of a point of an outline from another outline."""
+    step_m = max(_LINE_STEP_M, outline.length / _LINE_POINTS)
+    line = shapely.segmentize(outline.boundary, step_m)
+    tree = shapely.STRtree(_walls(other))
+    points = shapely.points(shapely.get_coordinates(line))
+    _, distances_m = tree.query_nearest(points, return_distance=True, all_matches=False)
+    return float(distances_m.max())
 
 
 def _window(low_m: float, high_m: float, count: int) -> slice:
     first = int(np.floor(low_m / MODULE_SIDE_M + _ROUNDING))
     last = int(np.ceil(high_m / MODULE_SIDE_M - _ROUNDING))
-    return slice(min(max(first, 0), count), min(max(last, 0), count))
-
-
-def _stacked_runs(cells: BoolArray) -> list[CellRectangle]:
-    """Return the runs of rows, equal ones above each other made one."""
-    finished: list[CellRectangle] = []
-    growing: dict[tuple[int, int], int] = {}  # first and last column to the first row
-    for row in range(cells.shape[0] + 1):
-        runs = _runs(cells[row]) if row < cells.shape[0] else []
-        for run in [each for each in growing if each not in runs]:
-            first = growing.pop(run)
-            finished.append(CellRectangle(first, run[0], row - first, run[1] - run[0]))
-        for run in runs:
-            growing.setdefault(run, row)
-    return sorted(finished, key=lambda each: (each.row, each.column))
-
-
-def _runs(line: BoolArray) -> list[tuple[int, int]]:
-    """Return the runs of true values as first and last index, the last one not included."""
-    steps = np.flatnonzero(np.diff(np.concatenate(([0], line.astype(np.int8), [0]))))
-    return [(int(first), int(last)) for first, last in steps.reshape(-1, 2)]
+    first = min(max(first, 0), count)
+    return slice(first, min(max(last, first), count))

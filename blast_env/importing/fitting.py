@@ -9,13 +9,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, shortened
 from blast_env.importing.cells import (
     COARSER,
     CellRectangle,
     Deviation,
+    check_outlines,
     in_blocks,
+    mended,
     outline_of,
     owners,
     rectangles_of,
@@ -106,12 +107,7 @@ def fit_buildings(
     cut = [_cut(site, index, thing, owner, options) for index, thing in enumerate(kept)]
     count = sum(len(rectangles) for rectangles, _ in cut)
     if count > MOST_STRUCTURES:
-        raise BlastEnvError(
-            f"{site.path}: the buildings take {count} rectangles, must take at most "
-            f"{MOST_STRUCTURES}, as many structures as a scenario has: make the site smaller "
-            "(--size), leave out small buildings (--least-area), or take fewer rectangles for each "
-            "(--most-rectangles)"
-        )
+        raise _too_many(site, f"the buildings take {count} rectangles, must take")
     heights = _heights(kept, options)
     titles = [each.name for each in kept]
     walls = _wall_areas([rectangles for rectangles, _ in cut], heights, site.shape)
@@ -167,55 +163,78 @@ def protected_as_asked(
 
 
 def _kept(site: PlacedSite, options: ImportOptions) -> tuple[list[Thing], list[str]]:
-    """Return the buildings on the site, cut at its border and large enough, and notes."""
-    kept, small, invalid = [], 0, 0
-    for thing in site.of_role(Role.BUILDING):
-        outline, mended = _sound(site, thing, options)
-        invalid += mended
-        inside = shapely.intersection(outline, site.box)
-        parts = [part for part in shapely.get_parts(inside) if part.geom_type == "Polygon"]
-        if sum(part.area for part in parts) < options.least_area_m2:
-            small += not inside.is_empty
-            continue
-        geometry = parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
-        kept.append(
-            replace(thing, geometry=geometry, name=thing.name or _written_in(site, outline))
+    """Return the buildings on the site, cut at its border and large enough, and notes.
+
+    Raises:
+        BlastEnvError: If an outline is not sound, or there are too many buildings, or too long.
+    """
+    things = site.of_role(Role.BUILDING)
+    outlines = np.array([each.geometry for each in things], dtype=object)
+    unsound = np.flatnonzero(~shapely.is_valid(outlines))
+    for index in unsound:
+        outlines[index] = _put_right(site, things[index], options)
+    inside = shapely.intersection(outlines, site.box)
+    parts, owner = shapely.get_parts(inside, return_index=True)
+    is_area = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
+    areas_m2 = np.bincount(owner[is_area], shapely.area(parts[is_area]), len(things))
+    chosen = np.flatnonzero(areas_m2 >= options.least_area_m2)
+    if len(chosen) > MOST_STRUCTURES:
+        raise _too_many(site, f"there are {len(chosen)} buildings on the site, must be")
+    geometries = [_together(parts[is_area & (owner == index)]) for index in chosen]
+    check_outlines(geometries, f"{site.path}: the buildings")
+    kept = [
+        replace(
+            things[index],
+            geometry=geometry,
+            name=things[index].name or _written_in(site, outlines[index]),
         )
+        for index, geometry in zip(chosen, geometries, strict=True)
+    ]
+    small = int((~shapely.is_empty(inside)).sum()) - len(chosen)
     notes = []
     if small:
         notes.append(
             f"buildings of less than {options.least_area_m2:g} m2 on the site, which were left "
             f"out (--least-area): {small}"
         )
-    if invalid:
-        notes.append(f"outlines that cross themselves, which were put right: {invalid}")
+    if len(unsound):
+        notes.append(f"outlines that cross themselves, which were put right: {len(unsound)}")
     return kept, notes
 
 
-def _sound(site: PlacedSite, thing: Thing, options: ImportOptions) -> tuple[BaseGeometry, bool]:
-    """Return an outline that does not cross itself, and whether it was put right.
+def _together(parts: NDArray[np.object_]) -> BaseGeometry:
+    geometry: BaseGeometry = parts[0] if len(parts) == 1 else shapely.MultiPolygon(list(parts))
+    return geometry
+
+
+def _too_many(site: PlacedSite, what: str) -> BlastEnvError:
+    return BlastEnvError(
+        f"{site.path}: {what} at most {MOST_STRUCTURES}, as many structures as a scenario has: "
+        "make the site smaller (--size), leave out small buildings (--least-area), or take fewer "
+        "rectangles for each (--most-rectangles)"
+    )
+
+
+def _put_right(site: PlacedSite, thing: Thing, options: ImportOptions) -> BaseGeometry:
+    """Return an outline that crosses itself as one that does not.
 
     Raises:
-        BlastEnvError: If it does, and is not to be put right.
+        BlastEnvError: If it is not to be put right, or crosses itself too often.
     """
-    outline = thing.geometry
-    if shapely.is_valid(outline):
-        return outline, False
+    words = f" ({shortened(thing.name)})" if thing.name else ""
+    what = f"{site.path}: {thing.place}{words}: the outline"
     if not options.repair:
-        reason = str(shapely.is_valid_reason(outline)).split("[")[0].strip().lower()
-        words = f" ({thing.name})" if thing.name else ""
-        raise BlastEnvError(
-            f"{site.path}: {thing.place}{words}: the outline is not sound: {reason}; --repair puts "
-            "such outlines right"
-        )
-    return shapely.buffer(shapely.make_valid(outline), 0.0), True
+        reason = str(shapely.is_valid_reason(thing.geometry)).split("[")[0].strip().lower()
+        raise BlastEnvError(f"{what} is not sound: {reason}; --repair puts such outlines right")
+    return mended(thing.geometry, what)
 
 
 def _written_in(site: PlacedSite, outline: BaseGeometry) -> str:
     """Return the only text that stands in an outline of a drawing, or an empty string."""
-    words = {
-        each.name for each in site.of_role(Role.NAME) if shapely.covers(outline, each.geometry)
-    }
+    texts = site.of_role(Role.NAME)
+    shapely.prepare(outline)
+    inside = shapely.covers(outline, [each.geometry for each in texts])
+    words = {texts[index].name for index in np.flatnonzero(inside)}
     return words.pop() if len(words) == 1 else ""
 
 
@@ -243,13 +262,13 @@ def _cut(
     least = 0
     for side in COARSER:
         cells = in_blocks(own, side) & (own | (owner == -1))
-        rectangles = rectangles_of(cells)
-        if 0 < len(rectangles) <= options.most_rectangles:
+        table = rectangles_of(cells)
+        if 0 < len(table) <= options.most_rectangles:
             owner[own & ~cells] = -1
             owner[cells] = index
-            return rectangles, side
-        least = min(least, len(rectangles)) or len(rectangles)
-    words = f" ({thing.name})" if thing.name else ""
+            return CellRectangle.each(table), side
+        least = min(least, len(table)) or len(table)
+    words = f" ({shortened(thing.name)})" if thing.name else ""
     raise BlastEnvError(
         f"{site.path}: {thing.place}{words}: takes {least} rectangles even in blocks of "
         f"{COARSER[-1] * MODULE_SIDE_M:g} m, must take at most {options.most_rectangles} "
@@ -264,7 +283,7 @@ def _check_deviation(site: PlacedSite, building: FittedBuilding, options: Import
         BlastEnvError: If area or outline are too far off.
     """
     deviation = building.deviation
-    words = f"{site.path}: {building.place}: {building.title or building.name}"
+    words = f"{site.path}: {building.place}: {shortened(building.title) or building.name}"
     if deviation.area_share > options.most_area_deviation:
         raise BlastEnvError(
             f"{words}: modules miss {deviation.area_share:.1%} of its area, must miss at most "
@@ -298,19 +317,34 @@ def _wall_areas(
     """
     # Nothing is higher than what is as high as the air.
     known = [height_m for height_m in heights if height_m is not None]
-    highest_m = max(known, default=0.0) + 1.0
-    height = np.zeros((shape[0] + 2, shape[1] + 2))
-    for rectangles, height_m in zip(parts, heights, strict=True):
+    tops_m = [max(known, default=0.0) + 1.0 if each is None else each for each in heights]
+    height = np.zeros((shape[0] + 2, shape[1] + 2), dtype=np.float32)
+    for rectangles, top_m in zip(parts, tops_m, strict=True):
         for each in rectangles:
-            height[1:-1, 1:-1][each.cells] = highest_m if height_m is None else height_m
-    middle = height[1:-1, 1:-1]
-    sides = (height[1:-1, :-2], height[1:-1, 2:], height[:-2, 1:-1], height[2:, 1:-1])
-    open_m: FloatArray = np.sum([np.maximum(middle - side, 0.0) for side in sides], axis=0)
+            height[1:-1, 1:-1][each.cells] = top_m
     shares = []
-    for rectangles in parts:
-        areas = np.array([open_m[each.cells].sum() for each in rectangles])
+    for rectangles, top_m in zip(parts, tops_m, strict=True):
+        areas = np.array([_open_m2(each, top_m, height) for each in rectangles])
         shares.append(tuple(float(area) for area in areas / (areas.sum() or 1.0)))
     return shares
+
+
+def _open_m2(each: CellRectangle, top_m: float, height: NDArray[np.float32]) -> float:
+    """Return how much of a rectangle's walls looks at air, in modules' sides times metres.
+
+    Args:
+        each: The rectangle.
+        top_m: Its height.
+        height: Of what stands on each cell, and on a frame of cells around all (rows, columns).
+    """
+    rows, columns = (slice(each.start + 1, each.stop + 1) for each in each.cells)
+    beside = (
+        height[rows, columns.start - 1],
+        height[rows, columns.stop],
+        height[rows.start - 1, columns],
+        height[rows.stop, columns],
+    )
+    return float(sum(np.maximum(top_m - side, 0.0).sum(dtype=np.float64) for side in beside))
 
 
 def _touches_border(outline: BaseGeometry, site: PlacedSite) -> bool:

@@ -6,7 +6,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
-from blast_env.errors import BlastEnvError, import_extra, value_text
+from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
 from blast_env.importing.site_map import (
     MOST_COORDINATE,
     MOST_FEATURES,
@@ -25,6 +25,9 @@ with import_extra("maps", "maps and drawings"):
     from shapely.errors import ShapelyError
     from shapely.geometry import shape
     from shapely.geometry.base import BaseGeometry
+
+MOST_VALUES: Final = 3_000_000
+"""Numbers, arrays and tables of a file: each takes some hundred bytes once it is read."""
 
 LOCAL: Final = "local"
 """Instead of a reference system: the coordinates are metres of a plane of their own."""
@@ -53,7 +56,8 @@ def read_geojson(path: Path, crs: str | None = None) -> SiteMap:
     if len(listed) > MOST_FEATURES:
         raise too_many(path)
     features, empty = [], 0
-    for index, item in enumerate(listed):
+    for index in range(len(listed)):
+        item, listed[index] = listed[index], None  # which takes more than what is made of it
         feature = _feature(path, f"features[{index}]", item)
         if feature is None:
             empty += 1
@@ -65,11 +69,20 @@ def read_geojson(path: Path, crs: str | None = None) -> SiteMap:
 
 def _parsed(path: Path) -> Mapping[str, Any]:
     try:
-        document = json.loads(path.read_bytes())
+        content = path.read_bytes()
+        values = sum(content.count(sign) for sign in (b",", b"[", b"{"))
+        if values > MOST_VALUES:
+            raise BlastEnvError(
+                f"{path}: has {values:,} commas and opening brackets, must have at most "
+                f"{MOST_VALUES:,}: cut a smaller extract"
+            )
+        document = json.loads(content)
     except RecursionError as error:
         raise BlastEnvError(f"{path}: is nested too deeply") from error
+    except BlastEnvError:
+        raise
     except (ValueError, OSError) as error:
-        raise BlastEnvError(f"{path}: is not JSON: {error}") from error
+        raise BlastEnvError(f"{path}: is not JSON: {shortened(str(error), 300)}") from error
     if not isinstance(document, dict):
         raise BlastEnvError(f"{path}: is {type(document).__name__}, must be a GeoJSON object")
     return document
@@ -88,7 +101,8 @@ def _listed_features(path: Path, document: Mapping[str, Any]) -> list[Any]:
     if kind in _KINDS:
         return [{"type": "Feature", "geometry": document, "properties": {}}]
     raise BlastEnvError(
-        f"{path}: type is {kind!r}, must be 'FeatureCollection', 'Feature' or that of a geometry: "
+        f"{path}: type is {value_text(kind)}, must be 'FeatureCollection', 'Feature' or that of a "
+        f"geometry: "
         "is it GeoJSON?"
     )
 
@@ -107,13 +121,16 @@ def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:
     if not isinstance(document, dict) or document.get("type") not in _KINDS:
         kind = document.get("type") if isinstance(document, dict) else document
         raise BlastEnvError(
-            f"{path}: {place}.geometry: type is {kind!r}, must be one of {', '.join(_KINDS)}"
+            f"{path}: {place}.geometry: type is {value_text(kind)}, must be one of "
+            f"{', '.join(_KINDS)}"
         )
     _check_numbers(path, place, document)
     try:
         geometry = shapely.force_2d(shape(document))
     except (ShapelyError, TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
-        raise BlastEnvError(f"{path}: {place}.geometry: is not usable: {error}") from error
+        raise BlastEnvError(
+            f"{path}: {place}.geometry: is not usable: {shortened(str(error), 300)}"
+        ) from error
     except RecursionError as error:
         raise BlastEnvError(f"{path}: {place}.geometry: is nested too deeply") from error
     return geometry

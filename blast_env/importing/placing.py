@@ -89,7 +89,7 @@ def place_site(site_map: SiteMap, things: Sequence[Thing], options: ImportOption
     plane = plane_around(site_map.coordinates, _reference(things, options))
     near = _near(site_map, things, plane, options)
     rotation_deg = _rotation_deg(near, options)
-    turned = [_moved(each, lambda places: rotated(places, -rotation_deg)) for each in near]
+    turned = _moved(near, lambda places: rotated(places, -rotation_deg))
     left, bottom, right, top = _bounds_m(site_map, turned, plane, rotation_deg, options)
     size_m = np.array([right - left, top - bottom])
     if size_m.max() > MOST_SITE_M:
@@ -109,7 +109,7 @@ def place_site(site_map: SiteMap, things: Sequence[Thing], options: ImportOption
         int(np.ceil((high - low) / MODULE_SIDE_M - _ROUNDING))
         for low, high in zip(corner, far, strict=True)
     ]
-    moved = [_moved(each, lambda places: places - np.array(corner)) for each in turned]
+    moved = _moved(turned, lambda places: places - np.array(corner))
     layers = sorted({str(each.tags["layer"]) for each in site_map.features if "layer" in each.tags})
     return PlacedSite(
         path=site_map.path,
@@ -153,9 +153,10 @@ def _near(
     site_map: SiteMap, things: Sequence[Thing], plane: Plane, options: ImportOptions
 ) -> list[Thing]:
     """Return what may be on the site, in metres of the plane."""
-    measured = [_moved(each, plane.to_metres) for each in things]
+    measured = _moved(things, plane.to_metres)
+    geometries = [each.geometry for each in measured]
     if options.size_m is None:
-        bounds = [shapely.bounds(each.geometry) for each in measured]
+        bounds = shapely.bounds(geometries)
         if not np.isfinite(bounds).all():
             raise BlastEnvError(
                 f"{site_map.path}: reaches too far for one site: say --centre or --origin, and "
@@ -166,8 +167,8 @@ def _near(
     reference = options.origin or options.centre
     middle = plane.to_metres(np.array([reference]))[0]
     around = shapely.Point(middle).buffer(2.0 * float(np.hypot(*options.size_m)))
-    near = [each for each in measured if shapely.intersects(each.geometry, around)]
-    return list(_joined(near))
+    near = np.flatnonzero(shapely.intersects(geometries, around))
+    return list(_joined(measured[index] for index in near))
 
 
 def _joined(things: Iterable[Thing]) -> Iterator[Thing]:
@@ -185,8 +186,10 @@ def _joined(things: Iterable[Thing]) -> Iterator[Thing]:
         yield replace(parts[0], geometry=outline, name=name, protected=protected)
 
 
-def _moved(thing: Thing, move: Callable[[FloatArray], FloatArray]) -> Thing:
-    return replace(thing, geometry=shapely.transform(thing.geometry, move))
+def _moved(things: Sequence[Thing], move: Callable[[FloatArray], FloatArray]) -> list[Thing]:
+    """Return things whose coordinates were all moved at once."""
+    geometries = shapely.transform([each.geometry for each in things], move)
+    return [replace(each, geometry=new) for each, new in zip(things, geometries, strict=True)]
 
 
 def _rotation_deg(things: Sequence[Thing], options: ImportOptions) -> float:
@@ -230,11 +233,9 @@ def _outlines(things: Sequence[Thing], bounds_m: tuple[float, float, float, floa
     """Return the buildings that the grid's lines are to suit."""
     box = shapely.box(*bounds_m)
     own = [each for each in things if each.role is Role.SITE]
-    return own or [
-        each
-        for each in things
-        if each.role is Role.BUILDING and shapely.intersects(each.geometry, box)
-    ]
+    buildings = [each for each in things if each.role is Role.BUILDING]
+    on_site = shapely.intersects([each.geometry for each in buildings], box)
+    return own or [buildings[index] for index in np.flatnonzero(on_site)]
 
 
 def _on_grid(low_m: float, offset_m: float, nearest: bool) -> float:

@@ -9,7 +9,9 @@ from math import isfinite
 from types import MappingProxyType
 from typing import Final
 
-from blast_env.errors import BlastEnvError, import_extra
+import numpy as np
+
+from blast_env.errors import MAX_TEXT, BlastEnvError, import_extra, value_text
 from blast_env.importing.site_map import DrawingCoordinates, MapFeature, SiteMap, Tags
 
 with import_extra("maps", "maps and drawings"):
@@ -118,7 +120,7 @@ _ROADS: Final = frozenset(
 _HEIGHT_KEYS: Final = ("height", "height_m", "building:height", "building_height")
 _LEVEL_KEYS: Final = ("building:levels", "levels", "storeys", "num_floors")
 _NAME_KEYS: Final = ("name", "addr:housename", "text")
-_LENGTH: Final = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?)\s*(m|ft|')?\s*")
+_LENGTH: Final = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*(m|ft|')?")
 _FOOT_M: Final = 0.3048
 
 
@@ -201,7 +203,7 @@ def _height_m(
         height_m = _length_m(given)
         if height_m is not None:
             return height_m, None
-        return None, f"{feature.place}: the height {given!r} is no length in m or ft"
+        return None, f"{feature.place}: the height {value_text(given)} is no length in m or ft"
     levels = next((lower[name] for name in _LEVEL_KEYS if name in lower), None)
     number = None if levels is None or key is not None else _length_m(levels)
     return (None if number is None else number * level_height_m), None
@@ -210,7 +212,7 @@ def _height_m(
 def _length_m(value: str | float | bool) -> float | None:
     """Return a length above 0 in metres, or `None` if the value is none."""
     if isinstance(value, str):
-        match = _LENGTH.fullmatch(value.replace(",", "."))
+        match = _LENGTH.fullmatch(value[:MAX_TEXT].strip().replace(",", "."))
         if match is None:
             return None
         value = float(match[1]) * (1.0 if match[2] in (None, "m") else _FOOT_M)
@@ -242,6 +244,11 @@ def _closed(things: Iterable[Thing]) -> Iterator[Thing]:
         else:
             yield thing
     for role, lines in loose.items():
-        for outline in shapely.get_parts(shapely.polygonize([each.geometry for each in lines])):
-            near = next(each for each in lines if each.geometry.intersects(outline))
+        geometries = [each.geometry for each in lines]
+        outlines = shapely.get_parts(shapely.polygonize(geometries))
+        pairs = shapely.STRtree(geometries).query(outlines, "intersects")
+        first = np.full(len(outlines), len(lines))
+        np.minimum.at(first, *pairs)
+        for outline, index in zip(outlines, first, strict=True):
+            near = lines[index]
             yield Thing(role, outline, near.name, near.place, near.height_m, near.protected)

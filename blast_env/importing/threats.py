@@ -1,13 +1,20 @@
 """Where charges may be on an imported site."""
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.importing.cells import covered_shares, in_blocks, rectangles_of
+from blast_env.importing.cells import (
+    CellRectangle,
+    check_outlines,
+    covered_shares,
+    in_blocks,
+    mended,
+    rectangles_of,
+)
 from blast_env.importing.fitting import FittedBuilding
 from blast_env.importing.options import ImportOptions
 from blast_env.importing.placing import PlacedSite
@@ -50,7 +57,7 @@ def charge_sources(
         BlastEnvError: If there is no place for a charge, or there are too many.
     """
     free = _free(site, buildings, radius_m)
-    things = site.of_role(Role.CHARGE)
+    things = _without_crossings(site)
     for tolerance_m in _SIMPLER_M:
         sources = [
             *_asked(site, free, options),
@@ -70,6 +77,23 @@ def charge_sources(
             "--charge-at X Y, or with --charges-from where one may be"
         )
     return sources
+
+
+def _without_crossings(site: PlacedSite) -> list[Thing]:
+    """Return the places of charges, the outlines of areas put right.
+
+    Raises:
+        BlastEnvError: If they are too long, or one crosses itself too often.
+    """
+    things, areas = [], []
+    for thing in site.of_role(Role.CHARGE):
+        if shapely.get_dimensions(thing.geometry) == 2:
+            outline = mended(thing.geometry, f"{site.path}: {thing.place}: the outline")
+            areas.append(shapely.intersection(outline, site.box))
+            thing = replace(thing, geometry=areas[-1])
+        things.append(thing)
+    check_outlines(areas, f"{site.path}: areas of charges")
+    return things
 
 
 def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float) -> BaseGeometry:
@@ -107,7 +131,7 @@ def _sources(
     tnt_kg = thing.tnt_kg or options.tnt_kg
     for part in shapely.get_parts(thing.geometry):
         if part.geom_type == "Polygon":
-            yield from _areas(shapely.make_valid(part), free, tolerance_m, tnt_kg)
+            yield from _areas(part, free, tolerance_m, tnt_kg)
         elif part.geom_type == "Point":
             if shapely.intersects(free, part):
                 yield _point(part.x, part.y, tnt_kg)
@@ -118,20 +142,18 @@ def _sources(
 def _segments(
     line: BaseGeometry, free: BaseGeometry, tolerance_m: float, tnt_kg: float
 ) -> Iterator[dict[str, Any]]:
-    straight = shapely.simplify(line, tolerance_m)
-    for start, end in pairwise(shapely.get_coordinates(straight)):
-        inside = shapely.intersection(shapely.LineString([start, end]), free)
-        for part in shapely.get_parts(inside):
-            if part.length < _LEAST_LENGTH_M:
-                continue
-            ends = shapely.get_coordinates(part)[[0, -1]].round(_DIGITS).tolist()
-            yield {
-                "kind": "segment",
-                "start_m": ends[0],
-                "end_m": ends[1],
-                "tnt_kg": tnt_kg,
-                "weight": round(float(part.length), _DIGITS),
-            }
+    places = shapely.get_coordinates(shapely.simplify(line, tolerance_m))
+    pieces = shapely.linestrings(np.stack((places[:-1], places[1:]), axis=1))
+    parts = shapely.get_parts(shapely.intersection(pieces, free))
+    for part in parts[shapely.length(parts) >= _LEAST_LENGTH_M]:
+        ends = shapely.get_coordinates(part)[[0, -1]].round(_DIGITS).tolist()
+        yield {
+            "kind": "segment",
+            "start_m": ends[0],
+            "end_m": ends[1],
+            "tnt_kg": tnt_kg,
+            "weight": round(float(part.length), _DIGITS),
+        }
 
 
 def _areas(
@@ -148,7 +170,7 @@ def _areas(
     # Whole cells only: their edges keep as clear as the area does.
     cells[rows, columns] = shares > 1.0 - 1e-6
     blocks = in_blocks(cells, 1 + int(_AREA_BLOCK * tolerance_m)) & cells
-    for each in rectangles_of(blocks):
+    for each in CellRectangle.each(rectangles_of(blocks)):
         left, bottom, far, high = each.rectangle_m
         size = [far - left, high - bottom]
         yield {

@@ -1,6 +1,8 @@
 """Where barriers may be built on an imported site."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import lcm
 from typing import Any, Final
 
 import numpy as np
@@ -12,22 +14,30 @@ from blast_env.importing.cells import (
     COARSER,
     LEAST_SHARE,
     CellRectangle,
+    check_outlines,
     covered_shares,
+    in_blocks,
+    mended,
     rectangles_of,
 )
 from blast_env.importing.fitting import FittedBuilding
 from blast_env.importing.options import ImportOptions
 from blast_env.importing.placing import PlacedSite
-from blast_env.importing.roles import Role
+from blast_env.importing.roles import Role, Thing
 from blast_env.units import MODULE_SIDE_M
 
 with import_extra("maps", "maps and drawings"):
     import shapely
+    from shapely.geometry.base import BaseGeometry
 
 MOST_KEEP_OUTS: Final = 100
 """As many as a scenario may have."""
 
+MOST_AREAS: Final = 1000
+"""Outlines of a zone, or of what must stay empty."""
+
 _MOST_REASON: Final = 200
+_ANY: Final = 1e-3  # of a block: a single cell of it is enough
 _TOUCHED: Final = 0.05  # of a cell: less is a map's rounding
 _OUTSIDE: Final = "outside the build zone of the map"
 
@@ -78,53 +88,118 @@ def _keep_outs(
     site: PlacedSite, inside: BoolArray, window: tuple[slice, slice]
 ) -> list[dict[str, Any]]:
     """Return what must stay empty, in as fine pieces as a scenario can have."""
-    low, left = window[0].start, window[1].start
-    areas = [(~inside, _OUTSIDE)]
-    for thing in site.of_role(Role.KEEP_OUT):
-        cells = np.zeros(site.shape, dtype=bool)
-        touched, shares = covered_shares(thing.geometry, site.shape)
-        cells[touched] = shares > _TOUCHED
-        areas.append((cells, (thing.name or "keep-out of the map")[:_MOST_REASON]))
+    corner = (window[0].start, window[1].start)
+    empty = [_Empty(corner, ~inside[window], _OUTSIDE)]
+    for thing, outline in _on_site(site, Role.KEEP_OUT):
+        touched, shares = covered_shares(outline, site.shape)
+        reason = (thing.name or "keep-out of the map")[:_MOST_REASON]
+        empty += _Empty.within(window, touched, shares > _TOUCHED, reason)
     for side in COARSER:
-        found = [
-            _area(each, low, left, reason)
-            for cells, reason in areas
-            for each in rectangles_of(_whole_blocks(cells[window], side))
-        ]
-        if len(found) <= MOST_KEEP_OUTS:
-            return found
+        tables = [rectangles_of(in_blocks(each.cells, side, _ANY)) for each in empty]
+        count = sum(map(len, tables))
+        if count <= MOST_KEEP_OUTS:
+            return [
+                _area(rectangle, each)
+                for each, table in zip(empty, tables, strict=True)
+                for rectangle in CellRectangle.each(table)
+            ]
     raise BlastEnvError(
-        f"{site.path}: what must stay empty takes {len(found)} rectangles even in blocks of "
+        f"{site.path}: what must stay empty takes {count} rectangles even in blocks of "
         f"{COARSER[-1] * MODULE_SIDE_M:g} m, must take at most {MOST_KEEP_OUTS}: make the zone "
         "smaller or simpler"
     )
 
 
-def _whole_blocks(cells: BoolArray, side: int) -> BoolArray:
-    """Return cells in blocks, each whole where any of its cells is there."""
-    rows, columns = (-(-count // side) * side for count in cells.shape)
-    padded = np.zeros((rows, columns), dtype=bool)
-    padded[: cells.shape[0], : cells.shape[1]] = cells
-    blocks = padded.reshape(rows // side, side, columns // side, side).any(axis=(1, 3))
-    whole = np.repeat(np.repeat(blocks, side, axis=0), side, axis=1)
-    return whole[: cells.shape[0], : cells.shape[1]]
+@dataclass(frozen=True)
+class _Empty:
+    """Cells of a zone that must stay empty, cut out of the site.
+
+    Attributes:
+        corner: Row and column of the lower left one on the site.
+        cells: Which of them (rows, columns).
+        reason: Why.
+    """
+
+    corner: tuple[int, int]
+    cells: BoolArray
+    reason: str
+
+    @classmethod
+    def within(
+        cls,
+        window: tuple[slice, slice],
+        touched: tuple[slice, slice],
+        cells: BoolArray,
+        reason: str,
+    ) -> "Iterator[_Empty]":
+        """Yield what of some cells of a site is in the window of the zone, if anything is.
+
+        It is cut out where blocks of any size begin and end.
+        """
+        cut = tuple(map(_in_whole_blocks, window, touched))
+        if any(each.start >= each.stop for each in cut):
+            return
+        found = np.zeros([each.stop - each.start for each in cut], dtype=bool)
+        both = [
+            slice(max(own.start, other.start), min(own.stop, other.stop))
+            for own, other in zip(cut, touched, strict=True)
+        ]
+        into, out_of = (
+            tuple(
+                slice(own.start - base.start, own.stop - base.start)
+                for own, base in zip(both, bases, strict=True)
+            )
+            for bases in (cut, touched)
+        )
+        found[into] = cells[out_of]
+        yield cls((cut[0].start, cut[1].start), found, reason)
 
 
-def _area(each: CellRectangle, low: int, left: int, reason: str) -> dict[str, Any]:
+def _in_whole_blocks(window: slice, touched: slice) -> slice:
+    """Return what is touched of a window, in whole blocks of any of the sizes from its start."""
+    block = lcm(*COARSER)
+    first = max(touched.start - window.start, 0) // block * block
+    after = -(-(touched.stop - window.start) // block) * block
+    return slice(window.start + first, min(window.start + after, window.stop))
+
+
+def _area(each: CellRectangle, empty: _Empty) -> dict[str, Any]:
+    row, column = empty.corner[0] + each.row, empty.corner[1] + each.column
     return {
-        "corner_m": [(left + each.column) * MODULE_SIDE_M, (low + each.row) * MODULE_SIDE_M],
+        "corner_m": [column * MODULE_SIDE_M, row * MODULE_SIDE_M],
         "size_m": [each.columns * MODULE_SIDE_M, each.rows * MODULE_SIDE_M],
-        "reason": reason,
+        "reason": empty.reason,
     }
 
 
 def _covered(site: PlacedSite, role: Role, least: float) -> BoolArray:
     """Return the cells of which outlines of a role cover a share."""
     cells = np.zeros(site.shape, dtype=bool)
-    for thing in site.of_role(role):
-        window, shares = covered_shares(shapely.make_valid(thing.geometry), site.shape)
+    for _, outline in _on_site(site, role):
+        window, shares = covered_shares(outline, site.shape)
         cells[window] |= shares >= least
     return cells
+
+
+def _on_site(site: PlacedSite, role: Role) -> list[tuple[Thing, BaseGeometry]]:
+    """Return the areas of a role, each with what of its outline is on the site.
+
+    Raises:
+        BlastEnvError: If they are too many or too long, or one crosses itself too often.
+    """
+    found = []
+    for thing in site.of_role(role):
+        what = f"{site.path}: {thing.place}: the outline"
+        inside = shapely.intersection(mended(thing.geometry, what), site.box)
+        if inside.area > 0.0:
+            found.append((thing, inside))
+    if len(found) > MOST_AREAS:
+        raise BlastEnvError(
+            f"{site.path}: there are {len(found)} outlines of a {role} on the site, must be at "
+            f"most {MOST_AREAS}"
+        )
+    check_outlines([outline for _, outline in found], f"{site.path}: outlines of a {role}")
+    return found
 
 
 def _window(site: PlacedSite, area_m: Rectangle, option: str) -> tuple[slice, slice]:

@@ -191,7 +191,7 @@ class Scenario(Section):
         """
         problems = self.particle_problems
         if problems:
-            raise ScenarioError(self.name, dict.fromkeys(problems))
+            raise ScenarioError(self.name, problems)
 
     @property
     def content_hash(self) -> str:
@@ -233,7 +233,7 @@ class Scenario(Section):
             problems = problems_from(error, cls)
         # Pydantic skips the checks between sections if any section is unsound.
         problems += (*version_problems(document), *check_parts(sound_parts(document)))
-        raise ScenarioError(source, dict.fromkeys(problems))
+        raise ScenarioError(source, problems)
 
     def at_stand_off(self, distance_m: float) -> "Scenario":
         """Return the scenario with the structure at another distance from the charge.
@@ -308,7 +308,7 @@ class Scenario(Section):
             )
         problems = check_sources(self._parts(together))
         if problems:
-            raise ScenarioError(self.name, dict.fromkeys(problems))
+            raise ScenarioError(self.name, problems)
         copy = self.model_copy(update={"charge": together})
         return copy.model_copy(update={"schema_version": lowest_version(copy)})
 

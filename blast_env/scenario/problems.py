@@ -27,7 +27,7 @@ def extent(rectangle: Rectangle) -> str:
     return f"x {left:g} to {right:g} m, y {bottom:g} to {top:g} m"
 
 
-MAX_PROBLEMS: Final = 1000
+MAX_PROBLEMS: Final = 20
 """More problems than this are counted only: no person reads them, and naming them takes long."""
 
 
@@ -59,16 +59,19 @@ class ScenarioError(BlastEnvError):
 
     Args:
         source: The file, or a name for where the scenario came from.
-        problems: All that is wrong.
+        problems: All that is wrong; each counts once.
 
     Attributes:
         source: As given.
-        problems: As given.
+        problems: The first `MAX_PROBLEMS` of them, and how many more there are.
     """
 
     def __init__(self, source: str, problems: Iterable[Problem]) -> None:
         self.source = source
-        self.problems = tuple(problems)
+        found = tuple(dict.fromkeys(problems))
+        more = len(found) - MAX_PROBLEMS
+        rest = (Problem("", f"{more} more problem{'s' if more > 1 else ''}"),) if more > 0 else ()
+        self.problems = found[:MAX_PROBLEMS] + rest
         super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
 
     def __reduce__(self) -> tuple[type["ScenarioError"], tuple[str, tuple[Problem, ...]]]:
@@ -100,12 +103,10 @@ def problems_from(
         prefix: Where the validated value lies in the file.
     """
     details = error.errors(include_url=False)
-    problems: list[Problem] = []
-    for detail in details[:MAX_PROBLEMS]:
-        problems += (problem.below(prefix) for problem in _translated(detail, model))
-    if len(details) > MAX_PROBLEMS:
-        problems.append(Problem("", f"{len(details) - MAX_PROBLEMS} more problems"))
-    return tuple(problems)
+    told = [each for detail in details[:MAX_PROBLEMS] for each in _translated(detail, model)]
+    # The others are only counted, which needs no words.
+    counted = [Problem(key_path(detail["loc"]), detail["msg"]) for detail in details[MAX_PROBLEMS:]]
+    return tuple(problem.below(prefix) for problem in (*told, *counted))
 
 
 def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Problem]:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from blast_env.importing.cells import (
+    CellRectangle,
     Deviation,
     covered_shares,
     in_blocks,
@@ -24,7 +25,7 @@ MASKS = arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9)))
 @settings(max_examples=100, deadline=None, derandomize=True)
 def test_rectangles_are_the_cells_and_none_lies_over_another(cells: np.ndarray) -> None:
     count = np.zeros(cells.shape, dtype=int)
-    for each in rectangles_of(cells):
+    for each in CellRectangle.each(rectangles_of(cells)):
         count[each.cells] += 1
     assert (count == cells).all()
 
@@ -34,7 +35,7 @@ def test_rectangles_are_the_cells_and_none_lies_over_another(cells: np.ndarray) 
 def test_every_rectangle_has_a_wall_that_no_other_one_hides(cells: np.ndarray) -> None:
     """So that no part of a building alone is without a load."""
     framed = np.pad(cells, 1)
-    for each in rectangles_of(cells):
+    for each in CellRectangle.each(rectangles_of(cells)):
         rows, columns = each.cells
         beside = [
             framed[rows.start + 1 : rows.stop + 1, columns.start],
@@ -74,7 +75,7 @@ def test_shares_add_up_to_the_area(angle: float, width: float, height: float) ->
 def test_outline_on_grid_lines_becomes_exactly_its_cells() -> None:
     outline = shapely.box(1.0, 0.5, 3.5, 2.0)
     owner = owners([outline], (6, 10))
-    (only,) = rectangles_of(owner == 0)
+    (only,) = CellRectangle.each(rectangles_of(owner == 0))
     assert only.rectangle_m == (1.0, 0.5, 3.5, 2.0)
     deviation = Deviation.between(outline, outline_of([only]))
     assert (deviation.area_share, deviation.outline_m) == pytest.approx((0.0, 0.0), abs=1e-12)
