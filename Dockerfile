@@ -1,4 +1,4 @@
-# The page to design on, at http://localhost:8080:
+# The page to design on, at the address that it prints:
 #   docker build -t blast-env .
 #   mkdir -p designs
 #   docker run --rm --user "$(id -u)" -p 127.0.0.1:8080:8080 -v "$PWD/designs:/designs" blast-env
@@ -22,5 +22,5 @@ WORKDIR /designs
 # Whoever --user says can write what Numba and matplotlib keep.
 ENV HOME=/tmp SDL_VIDEODRIVER=dummy PYGAME_HIDE_SUPPORT_PROMPT=1
 EXPOSE 8080
-# There is no password: publish the port at 127.0.0.1, as above, or behind something that has one.
+# Nothing is encrypted: publish the port at 127.0.0.1, as above, or behind something that does it.
 CMD ["blast-env", "app", "--host", "0.0.0.0", "--port", "8080", "--folder", "/designs"]

@@ -38,6 +38,9 @@ class ReadingLimits:
 
 LIMITS: Final = ReadingLimits()
 
+_WITHIN: Final = "BLAST_ENV_READING"
+"""Set in processes that read: what they read in turn counts to their own limits."""
+
 
 class ReadingError(BlastEnvError):
     """Reading something took more than it may, or ended its process."""
@@ -72,6 +75,7 @@ class Reading(Generic[Found]):
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
+            env={**os.environ, _WITHIN: "1"},
         )
 
     def result(self) -> Found:
@@ -140,10 +144,14 @@ def read_apart(
 ) -> Found:
     """Return what a function returns, called in a process of its own; see `Reading`.
 
+    In such a process it is called there: it is limited already, and ends with it.
+
     Raises:
         ReadingError: If it took more than it may, or its process was ended.
         BaseException: What the function raised.
     """
+    if _WITHIN in os.environ:
+        return function(*arguments)
     with Reading(what, function, *arguments, limits=limits) as reading:
         return reading.result()
 

@@ -3,19 +3,23 @@
 import socket
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from blast_env.app.folder import WorkFolder
+from blast_env.app.guard import Entrance, Guard
 from blast_env.app.jobs import Workers
 from blast_env.app.records import check_key
 from blast_env.app.session import Sessions
 from blast_env.errors import BlastEnvError, import_extra
 
 with import_extra("app", "page to design on"):
-    from fastapi import HTTPException
-    from fastapi.responses import FileResponse
-    from nicegui import app, ui
+    import uvicorn
+    from fastapi import Depends, FastAPI, HTTPException, Request
+    from fastapi.responses import FileResponse, PlainTextResponse
+    from nicegui import Client, app, ui
+    from starlette.exceptions import HTTPException as StarletteHTTPException
 
     from blast_env.app.page.design_page import DesignPage
     from blast_env.app.page.start_page import StartPage
@@ -28,6 +32,15 @@ _TICK_S: Final = 0.05
 _RECONNECT_S: Final = 30.0
 """How long a browser may be silent, as while gas keeps all cores busy, before it loads anew."""
 
+MOST_PAGES: Final = 24
+"""How many pages may be open at the same time; each takes about a megabyte."""
+
+_UNUSED_S: Final = 30.0
+"""How long a page is kept that no browser has connected to; a busy browser takes a while."""
+
+_MOST_CONNECTIONS: Final = 400
+_MOST_MESSAGE_BYTES: Final = 2_000_000
+
 _KEPT_BY_BROWSER: Final = {"Cache-Control": "private, max-age=31536000, immutable"}
 
 
@@ -38,13 +51,14 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
         sessions: The designs.
         runs: Run folders of trained agents that may be asked for layouts.
     """
+    room = [Depends(_check_room)]
 
-    @ui.page("/", title="blast-env")
+    @ui.page("/", title="blast-env", dependencies=room)
     def start() -> None:
         _style()
         StartPage(sessions)
 
-    @ui.page("/design/{design_id}", title="blast-env")
+    @ui.page("/design/{design_id}", title="blast-env", dependencies=room)
     def design(design_id: str) -> None:
         _style()
         try:
@@ -53,6 +67,7 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
             StartPage(sessions, str(error))
             return
         DesignPage(session, runs)
+        ui.context.client.on_delete(partial(sessions.leave, design_id))
 
     @app.get("/blasts/{design_id}/{key}/{name}")
     def blast_file(design_id: str, key: str, name: str) -> FileResponse:
@@ -66,7 +81,29 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
         return FileResponse(folder / name, headers=_KEPT_BY_BROWSER)
 
     app.add_static_file(local_file=_PAGE_FILES / "player.js", url_path="/player.js")
+    app.add_exception_handler(503, _say)
+    app.add_exception_handler(404, _say)  # NiceGUI's would open a page
     app.timer(_TICK_S, sessions.workers.tick)
+    app.timer(_UNUSED_S / 4.0, partial(Client.prune_instances, client_age_threshold=_UNUSED_S))
+
+
+def _check_room() -> None:
+    """Refuse a page more than may be open.
+
+    Raises:
+        HTTPException: If there are too many.
+    """
+    if len(Client.instances) >= MOST_PAGES:
+        raise HTTPException(
+            503,
+            f"{len(Client.instances)} pages are open, the most that may be is {MOST_PAGES}: close"
+            f" some and try again in {_RECONNECT_S:.0f} s",
+        )
+
+
+def _say(_: Request, error: Exception) -> PlainTextResponse:
+    assert isinstance(error, StarletteHTTPException)
+    return PlainTextResponse(f"{error.detail}\n", error.status_code)
 
 
 def _style() -> None:
@@ -93,27 +130,32 @@ def check_port(host: str, port: int) -> None:
             ) from error
 
 
-def serve(host: str, port: int, folder: Path, runs: Sequence[Path] = ()) -> None:
+def serve(entrance: Entrance, folder: Path, runs: Sequence[Path] = ()) -> None:
     """Serve the page until the process is told to end.
 
     Args:
-        host: Address to listen at.
-        port: Port to listen at.
+        entrance: Where to listen, and who may come in.
         folder: Where everything is kept.
         runs: Run folders of trained agents.
 
     Raises:
         BlastEnvError: If the port cannot be used, or another server has the folder open.
     """
-    check_port(host, port)
+    check_port(entrance.host, entrance.port)
     work, workers = WorkFolder(folder), Workers()
     with ExitStack() as held:
-        held.enter_context(work.held(f"http://{host}:{port}"))
+        held.enter_context(work.held(entrance.url))
         held.callback(workers.close)
         add_pages(Sessions(work, workers), runs)
         app.on_startup(workers.prepare)
         app.on_shutdown(held.close)  # after SIGTERM nothing else is run any more
-        ui.run(
-            host=host, port=port, title="blast-env", reload=False, show=False,
-            show_welcome_message=False, reconnect_timeout=_RECONNECT_S,
+        outside = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+        ui.run_with(
+            outside, title="blast-env", show_welcome_message=False, reconnect_timeout=_RECONNECT_S
+        )
+        # Not ui.run: what it puts around the pages would be outside of the guard.
+        uvicorn.run(
+            Guard(outside, entrance), host=entrance.host, port=entrance.port, log_level="warning",
+            ws="wsproto", ws_max_size=_MOST_MESSAGE_BYTES, limit_concurrency=_MOST_CONNECTIONS,
+            server_header=False,
         )  # fmt: skip

@@ -102,6 +102,11 @@ class Session:
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener)
 
+    @property
+    def is_watched(self) -> bool:
+        """Whether a tab looks at the design."""
+        return bool(self._listeners)
+
     def put(self, label: str, design: Design) -> None:
         """Make a step, and keep it.
 
@@ -339,6 +344,12 @@ class Sessions:
             folder = self.work.open(design_id)
             self._open[design_id] = Session.opened(folder, self.work, self.workers)
         return self._open[design_id]
+
+    def leave(self, design_id: str) -> None:
+        """Let go of the session of a design, unless a tab still looks at it."""
+        session = self._open.get(design_id)
+        if session is not None and not session.is_watched:
+            del self._open[design_id]
 
     def new(self, scenario: Scenario, label: str) -> Session:
         """Return the session of a new design.

@@ -11,7 +11,8 @@ from blast_env.cli.output import message_console, print_line
 class AppCommand(Command):
     """Open a local web page to design on: draw a site, place barriers, blast, compare, search.
 
-    Everything is kept in the folder at every step. Ctrl-C ends the page.
+    Open the address that is printed: without its token the page lets nobody in. Everything is kept
+    in the folder at every step. Ctrl-C ends the page.
     """
 
     port: int = option(8080, "Port of the page.", min=1, max=65535)
@@ -19,6 +20,12 @@ class AppCommand(Command):
         "127.0.0.1", "Address to listen at; others than 127.0.0.1 are open to others."
     )
     folder: Path = option(Path("blast-env-designs"), "Where designs, blasts and layouts are kept.")
+    more_names: tuple[str, ...] = option(
+        (),
+        "Another name under which browsers reach the page, with a port or without; more than one"
+        " will do.",
+        flag="--allow-host",
+    )
     runs: tuple[Path, ...] = option(
         (), "Run folder of a trained agent to ask; more than one will do.", flag="--run"
     )
@@ -26,18 +33,21 @@ class AppCommand(Command):
     def __call__(self) -> None:
         """Serve the page until Ctrl-C."""
         # Here, because the page needs the extra `app`.
+        from blast_env.app.guard import Entrance
         from blast_env.app.server import LOOPBACK, serve
 
         for each in self.runs:
             check_run(each)
+        entrance = Entrance(self.host, self.port, self.more_names)
         if self.host not in LOOPBACK:
             message_console().print(
-                f"warning: whoever reaches {self.host} can use this page, read and change the "
-                "designs in the folder and start work on this computer; there is no password",
+                "warning: whoever has the address below, or listens on the way to"
+                f" {self.host}, can use this page, read and change the designs in the folder and"
+                " start work on this computer; nothing is encrypted",
                 style="yellow",
             )
-        print_line(f"blast-env app: http://{self.host}:{self.port}  (designs in {self.folder})")
-        serve(self.host, self.port, self.folder, self.runs)
+        print_line(f"blast-env app: {entrance.printed}  (designs in {self.folder})")
+        serve(entrance, self.folder, self.runs)
 
 
 def check_run(folder: Path) -> None:

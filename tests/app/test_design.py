@@ -146,14 +146,16 @@ def test_a_folder_that_a_killed_server_held_is_free(tmp_path: Path) -> None:
         assert "here" in (tmp_path / "open.json").read_text()
 
 
-def test_a_build_zone_of_a_map_comes_before_one_around_what_is_protected() -> None:
+def test_a_build_zone_of_a_map_comes_before_one_around_what_is_protected(tmp_path: Path) -> None:
     path = Path(__file__).parents[2] / "docs" / "data" / "pump_house.geojson"
     options = ImportOptions(protect=("Pump House",), zone_around_m=10.0, stock=8, wall_height_m=3.0)
-    zone = imported_site(path.name, path.read_bytes(), options).scenario.zone
+    zone = imported_site(path, options).scenario.zone
     assert (zone.corner_m, zone.rows, zone.columns) == ((8.0, 4.0), 20, 8)
     document = json.loads(path.read_text())
     document["features"] = [
         each for each in document["features"] if each["properties"].get("kind") != "build_zone"
     ]
-    around = imported_site(path.name, json.dumps(document).encode(), options).scenario.zone
+    without = tmp_path / path.name
+    without.write_text(json.dumps(document))
+    around = imported_site(without, options).scenario.zone
     assert around.rows > 20

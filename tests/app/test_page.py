@@ -1,6 +1,8 @@
 """The page as a user without a browser meets it."""
 
 import asyncio
+import logging
+import signal
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -8,17 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from nicegui import events, ui
+from nicegui import Client, events, ui
 from nicegui.elements.upload_files import SmallFileUpload
 from nicegui.testing import User
 from nicegui.testing.user_simulation import user_simulation
 
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
+from blast_env.app.page import uploads
 from blast_env.app.records import Engine
-from blast_env.app.server import add_pages
+from blast_env.app.server import MOST_PAGES, add_pages
 from blast_env.app.session import Sessions
 from blast_env.app.work import read_status, write_status
+from blast_env.reading import Reading
 from blast_env.scenario import Scenario, load_scenario
 from tests.app.here import Here
 from tests.app.test_work import CELLS
@@ -236,7 +240,7 @@ def test_a_broken_file_is_a_message_and_the_design_stays(tmp_path: Path) -> None
             await element.handle_uploads(
                 [SmallFileUpload(name="bad.toml", content_type="", _data=b"schema_version = ")]
             )
-        await user.should_see("line 1, column 18")
+        await user.should_see("line 1, column 18", retries=50)
         await user.should_see("Nothing was changed")
         assert session.design == before
 
@@ -267,6 +271,42 @@ def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
     play(tmp_path, story)
 
 
+def test_a_page_that_is_closed_while_a_file_is_read_leaves_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither a traceback, nor a process that reads on, nor the open design."""
+
+    started: list[Reading[Any]] = []
+
+    class Noted(Reading[Any]):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments)
+            started.append(self)
+
+    monkeypatch.setattr(uploads, "Reading", Noted)
+
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        choose(user, "site from a file, into this design")
+        (element,) = user.find(kind=ui.upload).elements
+        file = SmallFileUpload(name=BLOCK.name, content_type="", _data=BLOCK.read_bytes())
+        with user:
+            await element.handle_uploads([file])
+        await user.should_see("protected buildings (names, by commas)")
+        user.find("protected buildings (names, by commas)").type("Library")
+        user.find(marker="import").click()
+        await asyncio.sleep(0.1)
+        (reading,) = started
+        assert user.client is not None
+        user.client.delete()
+        assert reading._process.wait(5.0) == -signal.SIGKILL
+        await asyncio.sleep(0.1)
+        assert sessions.of(session.folder.design_id) is not session  # it is opened anew
+
+    play(tmp_path, story)
+    assert not [each for each in caplog.records if each.levelno >= logging.WARNING]
+
+
 def test_two_tabs_do_not_mix(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         one = await opened(user, sessions, hut())
@@ -275,6 +315,34 @@ def test_two_tabs_do_not_mix(tmp_path: Path) -> None:
         await user.should_see("0 of 6 modules")
         other.put("wall", other.design.with_layout(WALL[:2]))
         await user.should_see("2 of 6 modules")
+
+    play(tmp_path, story)
+
+
+def test_so_many_pages_and_no_more(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = sessions.new(hut(), "begin")
+        address = f"/design/{session.folder.design_id}"
+        answers = [await user.http_client.get(address) for _ in range(MOST_PAGES + 2)]
+        assert [each.status_code for each in answers[-3:]] == [200, 503, 503]
+        assert f"{MOST_PAGES} pages are open, the most that may be is" in answers[-1].text
+        assert len(Client.instances) == MOST_PAGES
+        next(iter(Client.instances.values())).delete()
+        assert (await user.http_client.get(address)).status_code == 200
+
+    play(tmp_path, story)
+
+
+def test_a_design_is_open_as_long_as_a_page_shows_it(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        address = f"/design/{session.folder.design_id}"
+        await user.http_client.get(address)
+        first, second = Client.instances.values()
+        first.delete()
+        assert sessions.of(session.folder.design_id) is session
+        second.delete()
+        assert sessions.of(session.folder.design_id) is not session
 
     play(tmp_path, story)
 

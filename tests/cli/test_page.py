@@ -1,5 +1,6 @@
 """`blast-env app` before it serves anything."""
 
+import re
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,7 +38,25 @@ def test_a_port_in_use_is_a_message(taken: int, tmp_path: Path) -> None:
 def test_an_address_that_others_reach_is_warned_of(taken: int, tmp_path: Path) -> None:
     code, text = run("--host", "0.0.0.0", "--port", str(taken), "--folder", str(tmp_path))
     assert code == 2
-    assert "whoever reaches 0.0.0.0 can use this page" in text
+    assert "whoever has the address below, or listens on the way to 0.0.0.0" in text
+
+
+def test_the_address_that_is_printed_has_a_token_that_is_new_each_time(
+    taken: int, tmp_path: Path
+) -> None:
+    asked = ("--port", str(taken), "--folder", str(tmp_path), "--host", "0.0.0.0")
+    found = [
+        re.search(rf"http://localhost:{taken}/\?token=(\S{{43}}) ", run(*asked)[1]) for _ in "ab"
+    ]
+    tokens = {each[1] for each in found if each is not None}
+    assert len(tokens) == 2
+
+
+def test_a_name_to_allow_that_is_none_is_a_message(tmp_path: Path) -> None:
+    code, text = run("--allow-host", "http://desk/", "--folder", str(tmp_path / "designs"))
+    assert code == 2
+    assert "--allow-host is 'http://desk/', must be a name" in text
+    assert not (tmp_path / "designs").exists()
 
 
 def test_a_folder_that_is_open_elsewhere_is_a_message(tmp_path: Path) -> None:

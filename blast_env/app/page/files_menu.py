@@ -7,55 +7,14 @@ import tomli_w
 from nicegui import events, ui
 
 from blast_env.app.design import SLOTS
-from blast_env.app.page.import_dialog import ImportDialog, complain
+from blast_env.app.page.uploads import complain, file_upload, read_upload, site_upload
 from blast_env.app.session import Session
-from blast_env.app.sources import (
-    IMPORTERS,
-    MAPS,
-    MOST_BYTES,
-    is_map,
-    layout_of_file,
-    site_of_file,
-)
+from blast_env.app.sources import layout_of_file
 from blast_env.errors import BlastEnvError
 from blast_env.export import SUFFIXES, LayoutPlan, export_layout
 from blast_env.files import scratch_folder
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario
-
-
-async def read_site(event: events.UploadEventArguments) -> Scenario | None:
-    """Return the site of a file that was handed over, or say what is wrong with it."""
-    try:
-        return site_of_file(event.file.name, await event.file.read())
-    except BlastEnvError as error:
-        complain(error)
-        return None
-
-
-def site_upload(label: str, use: Callable[[Scenario, str], None]) -> ui.upload:
-    """Return a place to hand over the file of a site."""
-
-    async def take(event: events.UploadEventArguments) -> None:
-        upload.reset()
-        if is_map(event.file.name):
-            ImportDialog(event.file.name, await event.file.read(), use)
-            return
-        scenario = await read_site(event)
-        if scenario is not None:
-            use(scenario, event.file.name)
-
-    upload = ui.upload(
-        label=label,
-        auto_upload=True,
-        max_file_size=MOST_BYTES,
-        on_upload=take,
-        on_rejected=lambda: ui.notify(
-            f"the file is too large: at most {MOST_BYTES // 1_000_000} MB", type="negative"
-        ),
-    )
-    upload.props(f'accept="{",".join((*IMPORTERS, *MAPS))}" flat bordered').classes("w-full")
-    return upload
 
 
 def _menu(words: str, icon: str) -> ui.menu:
@@ -108,9 +67,11 @@ class FilesMenu:
             ui.label(f"A layout file (.json) into layout {SLOTS[active]}")
 
             async def take(event: events.UploadEventArguments) -> None:
+                file = await read_upload(event.file, layout_of_file)
+                if file is None:
+                    return
                 dialog.close()
                 try:
-                    file = layout_of_file(event.file.name, await event.file.read())
                     layout = file.layout_for(self._session.scenario)
                     design = self._session.design.with_layout(layout)
                     self._session.put(f"layout of {event.file.name}", design)
@@ -118,10 +79,7 @@ class FilesMenu:
                     complain(error)
                 self._after()
 
-            upload = ui.upload(
-                label="drop a file here, or press +", auto_upload=True, on_upload=take
-            )
-            upload.props('accept=".json" flat bordered').classes("w-full")
+            file_upload("drop a file here, or press +", (".json",), take)
             ui.button("cancel", on_click=dialog.close).props("flat no-caps")
 
     def _save_site(self) -> None:

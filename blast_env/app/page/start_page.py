@@ -4,12 +4,11 @@ from datetime import datetime
 
 from nicegui import ui
 
-from blast_env.app.page.files_menu import site_upload
-from blast_env.app.page.import_dialog import complain
+from blast_env.app.page.uploads import complain, site_upload
 from blast_env.app.session import Sessions
-from blast_env.app.sources import generated_site
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
+from blast_env.sites import generate_site
 
 _MOST_SHOWN = 30
 
@@ -78,7 +77,7 @@ class StartPage:
 
     def _generated(self) -> None:
         try:
-            self._create(generated_site(int(self._seed.value or 0)), "generated")
+            self._create(generate_site(int(self._seed.value or 0)), "generated")
         except BlastEnvError as error:
             complain(error)
 

@@ -55,6 +55,7 @@ class Server:
     folder: Path
     port: int = 0
     process: "subprocess.Popen[str] | None" = field(default=None, init=False)
+    token: str = field(default="", init=False)
 
     def start(self) -> None:
         if not self.port:
@@ -65,7 +66,9 @@ class Server:
         # NiceGUI would take the server for one of its own tests.
         own = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
         command += ["--folder", str(self.folder)]
-        self.process = subprocess.Popen(command, text=True, env=own)
+        self.process = subprocess.Popen(command, text=True, env=own, stdout=subprocess.PIPE)
+        assert self.process.stdout is not None
+        self.token = self.process.stdout.readline().split("token=")[1].split()[0]
         until_s = monotonic() + 180.0
         while monotonic() < until_s:
             with socket.socket() as probe:
@@ -79,6 +82,8 @@ class Server:
         if self.process is not None:
             self.process.send_signal(kind)
             self.process.wait(20)
+            if self.process.stdout is not None:
+                self.process.stdout.close()
             self.process = None
 
     @property
@@ -94,7 +99,8 @@ class Page:
     server: Server
 
     def open(self, path: str = "/") -> None:
-        self.driver.get(f"{self.server.url}{path}")
+        self.driver.get(f"{self.server.url}{path}?token={self.server.token}")
+        self.until(lambda: "token" not in self.driver.current_url)
         sleep(1.0)
 
     def begin(self, name: str) -> None:

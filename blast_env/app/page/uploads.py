@@ -1,15 +1,25 @@
-"""The questions that a map or a drawing leaves open, and what came of it."""
+"""Files that are handed over: read apart, what a map leaves open asked, and what is wrong said."""
 
-from collections.abc import Callable
-from typing import Any
+import re
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any, Final, TypeVar
 
-from nicegui import run, ui
+from nicegui import events, run, ui
+from nicegui.elements.upload_files import FileUpload
 
-from blast_env.app.sources import imported_site
+from blast_env.app.guard import MOST_BYTES
+from blast_env.app.sources import MAPS, SITES, imported_site, is_map, site_of_file
 from blast_env.errors import BlastEnvError
+from blast_env.files import scratch_folder
 from blast_env.importing.convert import ImportedSite
 from blast_env.importing.options import ImportOptions
+from blast_env.reading import Reading
 from blast_env.scenario import Scenario
+
+Read = TypeVar("Read")
+
+_MOST_LETTERS: Final = 100
 
 
 def complain(error: BlastEnvError) -> None:
@@ -21,21 +31,100 @@ def complain(error: BlastEnvError) -> None:
         ui.button("close", on_click=dialog.close).props("autofocus no-caps")
 
 
+async def read_upload(file: FileUpload, read: Callable[..., Read], *arguments: Any) -> Read | None:
+    """Return what a file holds, read in a process of its own, which ends with the page.
+
+    Args:
+        file: The file.
+        read: Reads it, from a path; it, its arguments and what it returns pickle.
+        arguments: Further arguments.
+
+    Returns:
+        What was read; nothing if the page was closed meanwhile, or something is wrong, which was
+        said.
+    """
+    client = ui.context.client
+    # The name stands in messages and names the site; nothing of it leads anywhere.
+    name = re.sub(r"[^\w.() +-]", "_", file.name)[-_MOST_LETTERS:].lstrip(".") or "file"
+    try:
+        with scratch_folder() as folder:
+            path = Path(folder, name)
+            await file.save(path)
+            try:
+                with Reading(name, read, path, *arguments) as reading:
+                    client.on_delete(reading.end)
+                    found = await run.io_bound(reading.result)
+            except BlastEnvError as error:
+                raise BlastEnvError(str(error).replace(f"{folder}/", "")) from error
+    except BlastEnvError as error:
+        if not client.is_deleted:
+            complain(error)
+        return None
+    return None if client.is_deleted else found
+
+
+def site_upload(label: str, use: Callable[[Scenario, str], None]) -> None:
+    """Make a place to hand over the file of a site.
+
+    Args:
+        label: What stands on it.
+        use: Takes the site, and the name of the file.
+    """
+
+    async def take(event: events.UploadEventArguments) -> None:
+        if is_map(event.file.name):
+            ImportDialog(event.file, use)
+            return
+        scenario = await read_upload(event.file, site_of_file)
+        if scenario is not None:
+            use(scenario, event.file.name)
+
+    file_upload(label, (*SITES, *MAPS), take)
+
+
+def file_upload(
+    label: str,
+    endings: tuple[str, ...],
+    take: Callable[[events.UploadEventArguments], Awaitable[None]],
+) -> None:
+    """Make a place to hand over a file.
+
+    Args:
+        label: What stands on it.
+        endings: Endings of what is offered to choose from.
+        take: Takes the file.
+    """
+
+    async def received(event: events.UploadEventArguments) -> None:
+        upload.reset()
+        await take(event)
+
+    upload: ui.upload = ui.upload(
+        label=label,
+        auto_upload=True,
+        max_file_size=MOST_BYTES,
+        max_files=1,
+        on_upload=received,
+        on_rejected=lambda: ui.notify(
+            f"one file, and at most {MOST_BYTES // 1_000_000} MB", type="negative"
+        ),
+    )
+    upload.props(f'accept="{",".join(endings)}" flat bordered').classes("w-full")
+
+
 class ImportDialog:
     """Asks what a file does not say, imports it, and says by how much the site deviates.
 
     Args:
-        name: Name of the file.
-        content: What is in it.
+        file: The file.
         use: Takes the site, and the name of the file.
     """
 
-    def __init__(self, name: str, content: bytes, use: Callable[[Scenario, str], None]) -> None:
-        self._name = name
-        self._content = content
+    def __init__(self, file: FileUpload, use: Callable[[Scenario, str], None]) -> None:
+        self._file = file
         self._use = use
         with ui.dialog(value=True) as self._dialog, ui.card().classes("w-[560px] max-w-full gap-2"):
-            ui.label(f"Import {name}").style("font-weight: 600; font-size: 16px")
+            ui.label(f"Import {file.name}").style("font-weight: 600; font-size: 16px")
             with ui.grid(columns=2).classes("w-full gap-2"):
                 self._protect = _text("protected buildings (names, by commas)")
                 self._near = _text("or the building nearest to x, y of the file")
@@ -77,16 +166,17 @@ class ImportDialog:
         )
 
     async def _import(self) -> None:
-        self._wait.visible = True
         try:
             options = self._options()
-            found = await run.io_bound(imported_site, self._name, self._content, options)
         except BlastEnvError as error:
             complain(error)
             return
-        finally:
-            self._wait.visible = False
-        if found is not None:  # None: the server is being stopped
+        self._wait.visible = True
+        found = await read_upload(self._file, imported_site, options)
+        if self._wait.is_deleted:  # the page was closed meanwhile
+            return
+        self._wait.visible = False
+        if found is not None:
             self._dialog.close()
             self._report(found)
 
@@ -94,7 +184,9 @@ class ImportDialog:
         """Say by how much the site deviates from the map before it is taken."""
         with ui.dialog(value=True) as dialog, ui.card().classes("w-[560px] max-w-full gap-1"):
             site = found.scenario.site
-            ui.label(f"{self._name}: {site.width_m:g} x {site.height_m:g} m").classes("be-head")
+            ui.label(f"{self._file.name}: {site.width_m:g} x {site.height_m:g} m").classes(
+                "be-head"
+            )
             for building in found.buildings:
                 area, apart = building.deviation.area_share, building.deviation.outline_m
                 name = f"{building.name}, protected" if building.protected else building.name
@@ -106,7 +198,7 @@ class ImportDialog:
 
             def take() -> None:
                 dialog.close()
-                self._use(found.scenario, self._name)
+                self._use(found.scenario, self._file.name)
 
             with ui.row():
                 ui.button("take this site", on_click=take).props("no-caps autofocus").mark(

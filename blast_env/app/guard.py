@@ -1,0 +1,306 @@
+"""Who may use the page: the person who has the address that was printed, and nobody's other pages.
+
+A server at this computer's own address is within reach of every page that is open in a browser
+here. So it answers only to its own names (a name that is made to lead here is refused), only to
+requests of its own pages, and only to those who have the token of the printed address.
+"""
+
+import asyncio
+import html
+import re
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final
+from urllib.parse import quote, urlencode
+
+from blast_env.errors import BlastEnvError, import_extra
+
+with import_extra("app", "page to design on"):
+    from starlette.datastructures import URL, MutableHeaders
+    from starlette.requests import HTTPConnection
+    from starlette.responses import HTMLResponse, PlainTextResponse, Response
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
+    from starlette.websockets import WebSocketClose
+
+MOST_BYTES: Final = 100_000_000
+"""Larger requests are refused before they are read."""
+
+MOST_SECONDS: Final = 120.0
+"""So long may a file take to arrive."""
+
+TOKEN: Final = "token"
+"""Name of the token in the printed address."""
+
+_TOKEN_BYTES: Final = 32
+_EVERYWHERE: Final = ("0.0.0.0", "::", "")
+_OWN_NAMES: Final = ("localhost", "127.0.0.1", "[::1]")
+_NAME: Final = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9_-]+(\.[a-z0-9_-]+)*)(:[0-9]{1,5})?")
+_METHODS: Final = ("GET", "HEAD", "POST")
+
+_POLICY: Final = MappingProxyType(
+    {
+        "default-src": "'none'",
+        # NiceGUI's pages carry their program inline, and compile what they show in the browser.
+        "script-src": "'self' 'unsafe-inline' 'unsafe-eval'",
+        "style-src": "'self' 'unsafe-inline'",
+        "img-src": "'self' data: blob:",
+        "media-src": "'self' blob:",
+        "font-src": "'self' data:",
+        "connect-src": "'self'",
+        "base-uri": "'none'",
+        "form-action": "'self'",
+        "frame-ancestors": "'none'",
+    }
+)
+
+HEADERS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "Content-Security-Policy": "; ".join(f"{key} {value}" for key, value in _POLICY.items()),
+        "X-Frame-Options": "DENY",
+        "X-Content-Type-Options": "nosniff",
+        # Not "no-referrer": with it, browsers say of no form where it comes from.
+        "Referrer-Policy": "same-origin",
+        "Cross-Origin-Opener-Policy": "same-origin",
+        "Cross-Origin-Resource-Policy": "same-origin",
+    }
+)
+"""What every answer says to browsers."""
+
+
+@dataclass(frozen=True)
+class Entrance:
+    """Where the page is, and what one needs to use it.
+
+    Attributes:
+        host: Address to listen at.
+        port: Port to listen at.
+        more_names: Names under which the server may be asked as well, with a port or without.
+        token: The secret of the printed address.
+
+    Raises:
+        BlastEnvError: If a name is none.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8080
+    more_names: tuple[str, ...] = ()
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(_TOKEN_BYTES), repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse names that are none."""
+        for name in self.more_names:
+            if _NAME.fullmatch(name.lower()) is None:
+                raise BlastEnvError(
+                    f"--allow-host is {name!r}, must be a name or a name and a port, such as"
+                    " desk.example:8080"
+                )
+
+    @property
+    def url(self) -> str:
+        """The address, without its secret."""
+        name = "localhost" if self.host in _EVERYWHERE else _bracketed(self.host)
+        return f"http://{name}:{self.port}"
+
+    @property
+    def printed(self) -> str:
+        """The address to open."""
+        return f"{self.url}/?{urlencode({TOKEN: self.token})}"
+
+    @property
+    def cookie(self) -> str:
+        """Name of the cookie; browsers keep one set of cookies for all ports of a host."""
+        return f"blast-env-{self.port}"
+
+    @property
+    def authorities(self) -> frozenset[str]:
+        """What may stand in the header `Host`, and behind the scheme in `Origin`."""
+        own = _OWN_NAMES if self.host in _EVERYWHERE else (*_OWN_NAMES, _bracketed(self.host))
+        named = [each.lower() for each in self.more_names]
+        with_port = {each for each in named if _has_port(each)}
+        without = {*own, *named} - with_port
+        found = with_port | {f"{name}:{self.port}" for name in without}
+        # Behind a server of another kind, which has the port that is not named.
+        found |= {name for name in named if not _has_port(name)}
+        return frozenset(found | (without if self.port == 80 else set()))
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host.lower()
+
+
+def _has_port(name: str) -> bool:
+    return re.search(r":[0-9]+$", name.rpartition("]")[2]) is not None
+
+
+class Guard:
+    """Stands before an application, and lets only those in who may be; as ASGI, websockets too.
+
+    Args:
+        app: The application.
+        entrance: Where it is, and what one needs.
+        most_bytes: Largest request.
+        most_s: Longest time that a request with content may take.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        entrance: Entrance,
+        most_bytes: int = MOST_BYTES,
+        most_s: float = MOST_SECONDS,
+    ) -> None:
+        self.app = app
+        self._entrance = entrance
+        self._authorities = entrance.authorities
+        self._most_bytes = most_bytes
+        self._most_s = most_s
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):  # start and end of the server
+            await self.app(scope, receive, send)
+            return
+        asked = HTTPConnection(scope)
+        reason = self._foreign(asked)
+        if scope["type"] == "websocket":
+            if reason or not self._is_known(asked):
+                await WebSocketClose(code=1008, reason=reason or _WITHOUT_TOKEN)(
+                    scope, receive, send
+                )
+            else:
+                await self.app(scope, receive, send)
+            return
+        answered = _with_headers(send)
+        refusal = self._refusal(asked, reason)
+        if refusal is not None:
+            await refusal(scope, receive, answered)
+        else:
+            await self._pass_on(scope, receive, answered)
+
+    def _refusal(self, asked: HTTPConnection, reason: str) -> Response | None:
+        """Return the answer to what does not reach the application."""
+        method = asked.scope["method"]
+        if reason:
+            return _refused(403, reason)
+        if method not in _METHODS:
+            return _refused(405, f"method {method} is none of {', '.join(_METHODS)}")
+        given = asked.query_params.get(TOKEN)
+        if method == "GET" and given is not None and self._is_token(given):
+            return self._welcome(asked)
+        if not self._is_known(asked):
+            return _refused(403, _WITHOUT_TOKEN)
+        if method == "POST":
+            return self._too_large(asked)
+        return None
+
+    def _foreign(self, asked: HTTPConnection) -> str:
+        """Return why a request is none of the page's own; empty if it may be."""
+        hosts = asked.headers.getlist("host")
+        if len(hosts) != 1 or hosts[0].lower() not in self._authorities:
+            return (
+                f"host {', '.join(hosts)!r} is none that this page was started for; another name"
+                " is allowed with --allow-host"
+            )
+        origins = asked.headers.getlist("origin")
+        is_websocket = asked.scope["type"] == "websocket"
+        if is_websocket and len(origins) != 1:
+            return "a websocket without one origin is refused"
+        for origin in origins:
+            scheme, _, authority = origin.lower().partition("://")
+            if scheme not in ("http", "https") or authority not in self._authorities:
+                return f"origin {origin!r} is not this page: other pages may not use it"
+        site, place = (asked.headers.get(f"sec-fetch-{each}", "") for each in ("site", "dest"))
+        # Following a link to here is all that others may ask for; a frame has another place.
+        if site not in ("", "none", "same-origin") and place != "document":
+            return "other pages may not use this page, nor show it in a frame"
+        return ""
+
+    def _is_known(self, asked: HTTPConnection) -> bool:
+        return self._is_token(asked.cookies.get(self._entrance.cookie, ""))
+
+    def _is_token(self, given: str) -> bool:
+        return secrets.compare_digest(given.encode(), self._entrance.token.encode())
+
+    def _welcome(self, asked: HTTPConnection) -> Response:
+        """Return a page that keeps the token as a cookie, and goes on to the address without it.
+
+        Not a redirection: a browser that came from another page would send no cookie there.
+        """
+        path = quote("/" + asked.scope["path"].lstrip("/\\"))
+        rest = urlencode([each for each in asked.query_params.multi_items() if each[0] != TOKEN])
+        where = html.escape(f"{path}?{rest}" if rest else path)
+        answer = HTMLResponse(
+            f'<!doctype html><meta http-equiv="refresh" content="0; url={where}">'
+            f'<title>blast-env</title><a href="{where}">on to the page</a>',
+            headers={"Cache-Control": "no-store"},
+        )
+        answer.set_cookie(
+            self._entrance.cookie,
+            self._entrance.token,
+            httponly=True,
+            samesite="strict",
+            secure=URL(scope=asked.scope).scheme == "https",
+        )
+        return answer
+
+    def _too_large(self, asked: HTTPConnection) -> Response | None:
+        length = asked.headers.get("content-length", "")
+        if "transfer-encoding" in asked.headers or not length.isdecimal():
+            return _refused(411, "content without its length is refused")
+        if int(length) > self._most_bytes:
+            return _refused(
+                413,
+                f"the content has {int(length):,} bytes, must have at most {self._most_bytes:,}",
+            )
+        return None
+
+    async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let the application answer; content may arrive for a while, but not forever."""
+        begun = gone = False
+
+        async def noted(message: Message) -> None:
+            nonlocal begun
+            begun = True
+            await send(message)
+
+        async def heard() -> Message:
+            nonlocal gone
+            message = await receive()
+            gone = gone or message["type"] == "http.disconnect"
+            return message
+
+        try:
+            async with asyncio.timeout(self._most_s if scope["method"] == "POST" else None):
+                await self.app(scope, heard, noted)
+        except TimeoutError:
+            if not begun:
+                words = f"the content took more than {self._most_s:g} s to arrive"
+                await _refused(408, words)(scope, receive, send)
+        except RuntimeError:
+            # Starlette misses an answer to a browser that was closed before it had one.
+            if begun or not gone:
+                raise
+
+
+_WITHOUT_TOKEN: Final = (
+    "this page is opened by the address that `blast-env app` printed, with its token"
+)
+
+
+def _refused(status: int, reason: str) -> Response:
+    return PlainTextResponse(f"{reason}\n", status, headers={"Cache-Control": "no-store"})
+
+
+def _with_headers(send: Send) -> Send:
+    """Return what sends answers with the headers that all have."""
+
+    async def sent(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for key, value in HEADERS.items():
+                headers[key] = value
+        await send(message)
+
+    return sent
