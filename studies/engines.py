@@ -1,216 +1,132 @@
-"""The tables and figures of docs/studies/engines.md: where the engines agree, what they cost."""
+"""How far the loads of pymunk are from those of the event engine, at ever shorter steps.
 
+The engines share charge and air of a seed. Each difference is the mean of the paired differences
+over the event engine's mean, with its 95 % interval.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Final
 
-import pandas as pd
+import numpy as np
 import typer
 
 from blast_env.arrays import FloatArray
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.errors import BlastEnvError
-from blast_env.files import make_folder
-from blast_env.rendering.figures import save_figure
 from blast_env.runner import run_all
 from blast_env.scenario import Scenario, load_scenario
-from blast_env.scenario.build_scene import build_scene
 from blast_env.simulation import simulate
-from blast_env.studies.benchmark.engines import benchmark_scenes
+from blast_env.statistics import Estimate, mean_estimate
+from blast_env.studies.benchmark.engines import dense_courtyard
 from blast_env.tables import markdown_table
-from studies.particles import blast_front, event_engine
-from studies.particles.agreement import loads, modules
 
 STEPS_RADII: Final = (0.5, 0.25, 0.1, 0.05)
-STEP_SEEDS: Final = 4
-COMPARED: Final = Path("out/compare_engines")
+"""How far the fastest ball goes in a step, in radii of the smallest; 0.5 is the default."""
 
-app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
+CLOSE: Final = 0.05
+"""The engines count as agreeing when the whole interval lies within this share."""
 
-
-@app.command()
-def compare(
-    seeds: Annotated[int, typer.Option(min=20, help="Blasts on pymunk at its default step.")] = 200,
-    event_seeds: Annotated[int, typer.Option(help="Blasts on the event engine.")] = 1000,
-    scene: Annotated[str | None, typer.Option(help="Only this scene.")] = None,
-    processes: int = 2,
-    cluster: ClusterAddress = None,
-    out: Annotated[Path, typer.Option(help="Folder of the finished blasts.")] = COMPARED,
-    figure: Annotated[Path, typer.Option()] = COMPARED / "engine_convergence.png",
-) -> None:
-    """Hold the loads of pymunk, at ever shorter steps, against those of the event engine."""
-
-    def collisions(blasts: loads.BlastSet) -> pd.DataFrame:
-        with progress_bar(blasts.label) as progress:
-            return loads.collisions_of(blasts, processes, out, progress)
-
-    with user_errors(), running_on(cluster):
-        if event_seeds < seeds:
-            raise BlastEnvError(
-                f"--event-seeds is {event_seeds}, must be at least --seeds, {seeds}: the engines "
-                "share charge and air of each seed"
-            )
-        make_folder(out)
-        make_folder(figure.parent)
-        scenes = [each for each in loads.engine_scenes() if scene in (None, each.name)]
-        found = list(loads.compare_scenes(scenes, (seeds, event_seeds), collisions))
-        for headers, rows in (
-            (loads.DIFFERENCE_HEADERS, loads.difference_rows(found)),
-            (loads.DISTANCE_HEADERS, loads.distance_rows(found)),
-            (loads.STEP_HEADERS, loads.step_rows(found)),
-        ):
-            print_line(markdown_table(headers, rows) + "\n")
-        first = {each.name: each.structures[0] for each in scenes}
-        drawn = [each for each in found if each.structure == first[each.scene]]
-        print_line(f"wrote {save_figure(loads.convergence_figure(drawn, event_seeds), figure)}")
+HEADERS: Final = ("load on the building of", "step (radii)", "m|v|", "transferred impulse", "")
 
 
-@app.command("modules")
-def compare_modules(
-    seeds: Annotated[int, typer.Option(min=20, help="Blasts on pymunk.")] = 60,
-    event_seeds: Annotated[int, typer.Option(help="Blasts on the event engine.")] = 400,
-    processes: int = 2,
-    cluster: ClusterAddress = None,
-) -> None:
-    """Hold single modules against those of the event engine, at two steps of pymunk."""
-
-    def impulses(scenario: Scenario, engine: str, count: int) -> FloatArray:
-        with progress_bar(f"{scenario.name}: {engine}") as progress:
-            return modules.module_impulses(scenario, engine, count, processes, progress)
-
-    rows = []
-    with user_errors(), running_on(cluster):
-        for scene in benchmark_scenes():
-            event = impulses(scene.scenario, "event", event_seeds)
-            for step_radii, scenario in modules.stepped(scene):
-                pymunk = impulses(scenario, "pymunk", seeds)
-                compared = (
-                    modules.agreement(distance, pymunk[..., kind], event[..., kind])
-                    for kind in range(2)
-                    for distance in (modules.distribution_distance, modules.profile_distance)
-                )
-                rows.append((scene.name, f"{step_radii:g}", *compared))
-    quantities = ("m|v|", "the transferred impulse")
-    columns = [(f"distribution of {q} (chance)", "its profile (chance)") for q in quantities]
-    print_line(markdown_table(("scene", "step (radii)", *sum(columns, ())), rows))
+def engine_scenes() -> Mapping[str, Scenario]:
+    """Return the scenes by name: two distances in the open, the courtyard, and dense air."""
+    free_field = load_scenario("free_field")
+    return {
+        "free_field, 15 m": free_field.at_stand_off(15.0),
+        "free_field, 60 m": free_field.at_stand_off(60.0),
+        "courtyard": load_scenario("courtyard").with_simulation("ballistic"),
+        "dense courtyard": dense_courtyard(),
+    }
 
 
-@app.command()
-def steps(processes: int = 2, cluster: ClusterAddress = None) -> None:
-    """Print how the load on a building depends on pymunk's step: m |v| (transferred impulse)."""
-    with user_errors(), running_on(cluster):
-        free_field = load_scenario("free_field")
-        scenarios = {
-            "courtyard": load_scenario("courtyard").with_simulation("ballistic"),
-            "free_field, 15 m": free_field.at_stand_off(15.0),
-            "free_field, 60 m": free_field.at_stand_off(60.0),
-        }
-        rows = []
-        for name, scenario in scenarios.items():
-            row = [name]
-            for step_radii in STEPS_RADII:
-                stepped = scenario.with_simulation(
-                    overrides={"stepping": {"step_radii": step_radii}}
-                )
-                with progress_bar(f"{name}, {step_radii:g} radii") as progress:
-                    found = run_all(partial(_load, stepped), range(STEP_SEEDS), processes, progress)
-                impulse, transferred = (sum(each) / STEP_SEEDS for each in zip(*found, strict=True))
-                row.append(f"{impulse:,.0f} ({transferred:,.0f})")
-            rows.append(row)
-        print_line(markdown_table(("scenario", *(f"{step:g} radii" for step in STEPS_RADII)), rows))
+@dataclass(frozen=True)
+class Agreement:
+    """Pymunk at one step against the event engine on one scene.
+
+    Attributes:
+        scene: Name of the scene.
+        step_radii: The step.
+        impulse: Difference of the mean m |v|, as a share of the event engine's.
+        transferred: Likewise of the momentum really transferred.
+    """
+
+    scene: str
+    step_radii: float
+    impulse: Estimate
+    transferred: Estimate
+
+    @property
+    def is_close(self) -> bool:
+        """Whether both intervals lie within `CLOSE`."""
+        both = (self.impulse, self.transferred)
+        return all(max(-each.low, each.high) < CLOSE for each in both)
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the row of the table; see `HEADERS`."""
+        shares = (each.scaled(100.0) for each in (self.impulse, self.transferred))
+        differences = (f"{s.value:+.1f} % ({s.low:+.1f} to {s.high:+.1f})" for s in shares)
+        close = "within 5 %" if self.is_close else ""
+        return self.scene, f"{self.step_radii:g}", *differences, close
 
 
-def _load(scenario: Scenario, seed: int) -> tuple[float, float]:
-    building = simulate(scenario, seed=seed).obstacle("building")
+def relative_difference(pymunk: FloatArray, event: FloatArray) -> Estimate:
+    """Return the mean of the paired differences (n,) over the event engine's mean."""
+    return mean_estimate((pymunk - event) / float(event.mean()))
+
+
+def agreements(
+    scenes: Mapping[str, Scenario], seeds: int, processes: int, steps_radii: Iterable[float]
+) -> Iterator[Agreement]:
+    """Yield the agreement at each step on each scene.
+
+    Args:
+        scenes: The scenes by name.
+        seeds: Blasts of each; the seeds are 0 and up.
+        processes: Worker processes.
+        steps_radii: Steps of pymunk.
+    """
+    for name, scenario in scenes.items():
+        event = _loads(scenario, "event", seeds, processes, f"{name}: event")
+        for step_radii in steps_radii:
+            stepped = scenario.with_simulation(overrides={"stepping": {"step_radii": step_radii}})
+            label = f"{name}: pymunk, {step_radii:g} radii"
+            pymunk = _loads(stepped, "pymunk", seeds, processes, label)
+            columns = (relative_difference(*each) for each in zip(pymunk.T, event.T, strict=True))
+            yield Agreement(name, step_radii, *columns)
+
+
+def _loads(scenario: Scenario, engine: str, seeds: int, processes: int, label: str) -> FloatArray:
+    """Return m |v| and the transferred impulse on the building (seeds, 2)."""
+    with progress_bar(label) as progress:
+        found = run_all(partial(_load, scenario, engine), range(seeds), processes, progress)
+    return np.array(found)
+
+
+def _load(scenario: Scenario, engine: str, seed: int) -> tuple[float, float]:
+    building = simulate(scenario, seed=seed, engine=engine).obstacle("building")
     return building.impulse, building.transferred_impulse
 
 
-@app.command()
-def front(
-    seeds: Annotated[int, typer.Option(min=1)] = 3,
-    out: Path = Path("out/blast_front.png"),
+def main(
+    seeds: Annotated[int, typer.Option(min=3, help="Blasts on each engine, at each step.")] = 40,
+    scene: Annotated[str | None, typer.Option(help="Only this scene.")] = None,
+    processes: Annotated[int, typer.Option(min=1)] = 2,
+    cluster: ClusterAddress = None,
 ) -> None:
-    """Hold the front of a strong blast on the event engine against the laws of gas dynamics."""
-    with user_errors():
-        make_folder(out.parent)
-        found = []
-        with progress_bar("blasts") as progress:
-            for study in blast_front.STUDIES:
-                found.append(study.traces(seeds))
-                progress(len(found) / len(blast_front.STUDIES))
-        print_line(markdown_table(blast_front.HEADERS, blast_front.front_rows(found)))
-        print_line(blast_front.size_note())
-        print_line(f"wrote {save_figure(blast_front.front_figure(found), out)}")
-
-
-@app.command()
-def cost(
-    repeats: Annotated[int, typer.Option(min=1, help="Runs of each size; the least counts.")] = 5,
-    least_balls: Annotated[int, typer.Option(help="The smallest size.")] = event_engine.BALLS[0],
-    most_balls: Annotated[int, typer.Option(help="The largest size.")] = event_engine.BALLS[-1],
-    out: Annotated[Path, typer.Option(help="The figure.")] = Path("out/engine_cost.png"),
-) -> None:
-    """Print and draw what an event costs the event engine, by the number of balls."""
-    with user_errors():
-        make_folder(out.parent)
-        sizes = [count for count in event_engine.BALLS if least_balls <= count <= most_balls]
-        if len(sizes) < 2:
-            raise BlastEnvError(
-                f"least_balls is {least_balls} and most_balls {most_balls}, must leave at least "
-                f"two of {', '.join(map(str, event_engine.BALLS))} for a fit"
-            )
-        with progress_bar("gases") as progress:
-            gases = [event_engine.gas(count) for count in sizes]
-            costs = event_engine.measure(gases, repeats, progress)
-        headers = ("balls", "MB", "events", "ns an event", "collisions", "ns a collision")
-        print_line(
-            markdown_table(
-                headers,
-                [
-                    (
-                        f"{each.balls:,}",
-                        f"{each.megabytes:.1f}",
-                        f"{each.events:,}",
-                        f"{each.event_ns:.0f}",
-                        f"{each.collisions:,}",
-                        f"{each.collision_ns:.0f}",
-                    )
-                    for each in costs
-                ],
-            )
-        )
-        few = [each for each in costs if each.balls <= event_engine.MOST_FITTED]
-        fit = event_engine.log_fit(few or costs)
-        print_line(f"ns an event = {fit.at_one:.0f} + {fit.per_doubling:.1f} log2(balls)")
-        print_line(f"wrote {save_figure(event_engine.cost_figure(costs, fit), out)}")
-
-
-@app.command()
-def profile(
-    repeats: Annotated[int, typer.Option(min=1, help="Blasts of each; the least counts.")] = 30,
-) -> None:
-    """Print where the time of a blast goes on the event engine.
-
-    What happens in a blast, the processor time of its parts, and the time of what the compiled
-    loop does most, finding out what a ball touches next.
-    """
-    events, parts, looks = [], [], []
-    for scene in benchmark_scenes():
-        of = event_engine.profile(scene, repeats)
-        counts = (f"{count:,}" for count in (of.collisions, of.crossings, of.outdated))
-        events.append((scene.name, *counts, f"{of.event_ns:.0f}"))
-        times_s = (of.scene_s, of.start_s, of.loop_s, of.result_s)
-        parts.append((scene.name, *(f"{1e3 * time_s:.2f}" for time_s in times_s)))
-        for look in event_engine.look_aheads(build_scene(scene.scenario), repeats):
-            numbers = (1e3 * look.time_s, look.air, look.air_ns, look.explosive, look.explosive_ns)
-            looks.append((scene.name, *(f"{number:.0f}" for number in numbers)))
-    balls = ("moving air balls", "one takes (ns)", "explosive balls", "one takes (ns)")
-    times = ("scene (ms)", "walls and arrays (ms)", "compiled loop (ms)", "result (ms)")
-    happened = ("collisions", "moves between cells", "foreseen in vain", "ns an event")
-    for headers, rows in ((happened, events), (times, parts), (("after (ms)", *balls), looks)):
-        print_line(markdown_table(("scene", *headers), rows) + "\n")
+    """Hold the loads of pymunk, at ever shorter steps, against those of the event engine."""
+    with user_errors(), running_on(cluster):
+        scenes = engine_scenes()
+        if scene is not None:
+            if scene not in scenes:
+                raise BlastEnvError(f"--scene is {scene!r}, must be one of {', '.join(scenes)}")
+            scenes = {scene: scenes[scene]}
+        found = [each.cells() for each in agreements(scenes, seeds, processes, STEPS_RADII)]
+    print_line(markdown_table(HEADERS, found))
 
 
 if __name__ == "__main__":
-    app()
+    typer.run(main)

@@ -113,7 +113,7 @@ class Calibration(Section):
         simulated: Which sum over the collisions the law converts.
         tnt_kg: TNT-equivalent mass of the simulated charge.
         tnt_range_kg: Masses between which the law was found to hold by Hopkinson-Cranz scaling
-            (`python -m studies.validity scaling`); None: it holds for `tnt_kg` alone.
+            (`python -m studies.hopkinson_cranz`); None: it holds for `tnt_kg` alone.
         distances_m: Distances, ascending; the first and last are the range of validity.
         seeds: Seeds at every distance.
         i_sim: Mean simulated impulse at each distance.

@@ -254,16 +254,6 @@ _SERIES: Final = tuple((-1.0) ** order / factorial(order + 2) for order in range
 _BISECTIONS: Final = 64
 
 
-_LARGEST_DECAY: Final = 50.0  # of a fit
-
-
-_LONGEST_SHARE: Final = 4.0  # duration of a fit, in times that the bins cover
-
-
-# Durations in multiples of impulse / peak, and decays, from which a fit starts.
-_FIT_STARTS: Final = ((2.0, 0.1), (3.0, 1.5), (10.0, 8.0))
-
-
 @dataclass(frozen=True)
 class Friedlander:
     """p(t) = p_2 (1 - t / t_2) exp(-b t / t_2), with t from the arrival (equation 1).
@@ -378,53 +368,6 @@ class Friedlander:
         share = impulse_share_until(np.clip(x, 0.0, 1.0), self.decay)
         value = self.peak * self.positive_duration_s * share
         return float(value) if value.ndim == 0 else value
-
-
-def fit_friedlander(edges_s: FloatArray, pressure: FloatArray) -> Friedlander:
-    """Fit a waveform that arrives at the first edge to mean pressures in bins of time.
-
-    Least squares over peak, duration and decay, where all bins count alike and the mean of the
-    waveform over a bin is exact. The duration is at most four times the time that the bins cover,
-    the decay at most 50.
-
-    Args:
-        edges_s: Edges of the bins, from the arrival on (n + 1,).
-        pressure: Mean pressure in each bin, at least 0, some above (n,).
-    """
-    from scipy.optimize import least_squares
-
-    since_s, widths_s = edges_s - edges_s[0], np.diff(edges_s)
-    span_s, largest = float(since_s[-1]), float(pressure.max())
-
-    def residual(point: FloatArray) -> FloatArray:
-        wave = Friedlander(*_wave_at(point, largest))
-        means: FloatArray = np.diff(wave.impulse_until(since_s)) / widths_s
-        return (means - pressure) / largest
-
-    shortest_s, longest_s = float(widths_s.min()) / _LARGEST_DECAY, _LONGEST_SHARE * span_s
-    low = np.array([np.log(1e-3), np.log(shortest_s), 0.0])
-    high = np.array([np.log(1e3), np.log(longest_s), np.log1p(_LARGEST_DECAY)])
-    mean_s = float((pressure * widths_s).sum()) / largest
-    fits = [
-        least_squares(
-            residual,
-            np.clip([0.0, np.log(stretch * mean_s), np.log1p(decay)], low, high),
-            bounds=(low, high),
-            x_scale=0.1,
-            xtol=1e-12,
-            ftol=1e-12,
-            gtol=1e-12,
-        )
-        for stretch, decay in _FIT_STARTS
-    ]
-    best = min(fits, key=lambda fit: float(fit.cost))
-    return Friedlander(*_wave_at(best.x, largest), arrival_s=float(edges_s[0]))
-
-
-def _wave_at(point: FloatArray, largest: float) -> tuple[float, float, float]:
-    """Return peak, duration and decay at a point of the search."""
-    peak, duration_s = (float(value) for value in np.exp(point[:2]))
-    return largest * peak, duration_s, max(float(np.expm1(point[2])), 0.0)
 
 
 def impulse_share_until(x: FloatArray, decay: float | FloatArray) -> FloatArray:

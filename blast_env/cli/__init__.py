@@ -24,7 +24,7 @@ class _Commands(LazyGroup):
             "Draw the plan and the oblique view of a site, with a layout if one is given.",
         ),
         "calibrate": (
-            "blast_env.cli.calibrate:calibrate",
+            "blast_env.cli.calibrate:CalibrateCommand",
             "Run blasts at many distances, fit the three laws, and store one as a calibration.",
         ),
         "evaluate": (
@@ -59,6 +59,10 @@ class _Commands(LazyGroup):
             "blast_env.cli.play:PlayCommand",
             "Place barriers by hand, with mouse and keyboard, and see what the blast makes of "
             "them.",
+        ),
+        "paper": (
+            "blast_env.cli.paper:PaperCommand",
+            "Work out the paper's Tables 1 to 4 and Figure 5 again, from its own columns.",
         ),
         "import": (
             "blast_env.cli.import_map:ImportCommand",

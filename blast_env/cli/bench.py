@@ -114,7 +114,7 @@ def bench(
         result_console().print(_engine_table(scenes, repeats))
         print_line(
             "5 % step: the longest at which pymunk's loads are within 5 % of those of the event "
-            "engine, as `python -m studies.engines compare` finds.\nRatio: time of pymunk over "
+            "engine, as `python -m studies.engines` finds.\nRatio: time of pymunk over "
             "time of the event engine.\n"
         )
         if threads > 1:

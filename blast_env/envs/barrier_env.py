@@ -201,13 +201,13 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     | perimeter_gate, hidden | 0.8 (1.1) | 1.2 (1.6) | 1.7 (2.2) | 2.4 (3.1) | 3.3 (4.4) |
     | street_junction, hidden | 0.7 (0.6) | 1.0 (0.9) | 1.4 (1.2) | 1.9 (1.8) | 2.8 (2.5) |
 
-    (`python -m studies.layouts noise --layouts 12 --charges 12 --seeds 4`.) Hence 2 realisations
+    (`python -m studies.noise reward --layouts 12 --charges 12 --seeds 4`.) Hence 2 realisations
     of a visible charge and 16 hidden charges: the spread is then twice the scatter or more.
 
     An episode costs `threats * realisations` blasts, and as many without a barrier.
 
     The largest impulse with any of 144 random layouts, whole and unfinished, was 1.37 times that
-    without a barrier, blast by blast (`python -m studies.layouts deposit`): hence the deposit.
+    without a barrier, blast by blast (`python -m studies.noise deposit`): hence the deposit.
 
     Two-dimensional: nothing flies over a wall. The calibration holds for the distances and the
     charge mass that it was made for (`calibration_in_range`) and for a facade in the open; how far

@@ -206,7 +206,7 @@ def total(terms: Mapping[str, float]) -> float:
 
 
 VISIBLE_REALISATIONS: Final = 2
-"""Blasts for a visible charge unless an argument says otherwise (`studies.layouts noise`)."""
+"""Blasts for a visible charge unless an argument says otherwise (`studies.noise reward`)."""
 
 
 HIDDEN_THREATS: Final = 16

@@ -212,7 +212,7 @@ class Reward(Protocol):
 
 DEPOSIT: Final = 2.0
 """Times the load without a barrier: more than any layout lets through; measured by
-`python -m studies.layouts deposit`."""
+`python -m studies.noise deposit`."""
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,16 @@
-"""The paper's Tables 1 to 4 and Figure 5, worked out again from its own columns.
+"""The paper's Tables 1 to 4, worked out again from its own columns.
 
 Nothing is simulated: i_sim and i_ufc are the paper's own.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from blast_env.calibration import (
-    PAPER_UFC_LABEL,
     LinearLaw,
     PowerLaw,
     ProportionalLaw,
@@ -23,12 +22,6 @@ from blast_env.calibration import (
     paper_table,
 )
 from blast_env.calibration.laws import Fit
-from blast_env.rendering.style import INK, render_extra, unit_interval
-from blast_env.units import PA_PER_PSI
-
-with render_extra():
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 CELLS: Final = ("scaled", "abs", "pct")
 """The cells of a row of Tables 1 to 3 that are worked out, as `paper_table` names them."""
@@ -80,9 +73,6 @@ POWER: Final = PaperLaw(
 )
 PAPER_LAWS: Final = (PROPORTIONAL, LINEAR, POWER)
 TABLE_4_DECIMALS: Final = (1, 4, 1)
-
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
-_LOOKS: Final = (("#0072B2", "--", "s"), ("#009E73", "-.", "^"), ("#D55E00", "-", "D"))
 
 
 def comparison_table(paper_law: PaperLaw) -> pd.DataFrame:
@@ -145,58 +135,3 @@ Where the paper contradicts itself (more in docs/paper/reading.md):
   neither Table 3 nor the last row of Table 4; unrounded they give both.
 - E_abs of Table 3: differences of rounded cells, up to 0.8 of the last digit beside the difference
   of the numbers themselves. Worked out as the paper did here."""
-
-
-def figure_5() -> Figure:
-    """Return the paper's Figure 5 for all three laws, with their deviations below."""
-    figure = Figure(figsize=(7.0, 7.2), layout="constrained")
-    impulse, deviation = figure.subplots(2, 1, sharex=True, height_ratios=(2.1, 1.0))
-    paper = paper_table()
-    look: dict[str, Any] = {"color": unit_interval(INK), "linewidth": 1.4}
-    deviation.axhline(0.0, **look)
-    look |= {"marker": "o", "markersize": 6.5}
-    impulse.plot(paper["r_m"], paper["i_ufc_psi_s"], label=PAPER_UFC_LABEL, **look)
-    for paper_law, (colour, style, marker) in zip(PAPER_LAWS, _LOOKS, strict=True):
-        law = paper_law.fitted
-        scaled = law(paper["i_sim"])
-        look = {"color": colour, "linestyle": style, "linewidth": 1.6, "marker": marker}
-        look |= {"markersize": 6.0, "markeredgecolor": "white", "markeredgewidth": 0.7}
-        impulse.plot(paper["r_m"], scaled, label=_formula(law), **look)
-        deviation.plot(paper["r_m"], 100.0 * (scaled / paper["i_ufc_psi_s"] - 1.0), **look)
-    _label(impulse, deviation)
-    return figure
-
-
-def _label(impulse: Axes, deviation: Axes) -> None:
-    """Write the title, axes and legend of Figure 5."""
-    impulse.set_title("The paper's simulation, scaled by its three laws", fontweight="bold")
-    impulse.set(ylabel="impulse (psi s)", ylim=(0.0, 1.2))
-    impulse.legend(framealpha=1.0, edgecolor="none", labelspacing=0.7, handlelength=3.2)
-    in_pa = impulse.twinx()
-    in_pa.set(ylabel="impulse (Pa s)", ylim=(0.0, 1.2 * PA_PER_PSI))
-    in_pa.spines["top"].set_visible(False)
-    ticks = paper_table()["r_m"].tolist()
-    deviation.set(
-        xlabel="distance $R$ (m)", ylabel="deviation from the\nUFC column (%)", xticks=ticks
-    )
-    for axes in (impulse, deviation):
-        axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
-
-
-def _formula(law: ScalingLaw) -> str:
-    """Return a law as a legend entry."""
-    numbers = [_number(value) for value in law.coefficients.values()]
-    simulated = r"i_\mathrm{sim}"
-    match law:
-        case ProportionalLaw():
-            return rf"proportional, ${numbers[0]}\,{simulated}$"
-        case LinearLaw():
-            return rf"linear, ${numbers[0]} + {numbers[1]}\,{simulated}$"
-        case _:
-            return rf"power law, ${numbers[0]}\,{simulated}^{{\,{numbers[1]}}}$"
-
-
-def _number(value: float) -> str:
-    digits, _, exponent = f"{value:.3e}".partition("e")
-    return f"{value:.4g}" if abs(value) > 1e-2 else rf"{digits} \times 10^{{{int(exponent)}}}"

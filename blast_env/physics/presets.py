@@ -82,8 +82,8 @@ def softened_air_shrink(contact: ContactParameters, factor: float) -> float:
     return float(contact.air_shrink ** (1.0 / factor))
 
 
-# Dense, slightly dissipative air, in which a blast diffracts round walls. Found by
-# `python -m studies.presets collisional` for balls of radius 1; the presets have finer ones.
+# Dense, slightly dissipative air, in which a blast diffracts round walls. Found by a
+# search over distance law, shielding and cost, for balls of radius 1; the presets have finer ones.
 _COLLISIONAL_AIR: Final = with_overrides(
     SimulationParameters(),
     {
@@ -105,7 +105,7 @@ PRESETS: Final[Mapping[str, SimulationParameters]] = MappingProxyType(
     {
         # Sparse air, as the paper's figures suggest: balls fly almost free between collisions.
         # v0, N, the radii, C_e and the 10 % and 30 % rules are the paper's or set beforehand;
-        # air spacing, air mass and elasticity come from `python -m studies.presets ballistic`, and
+        # air spacing, air mass and elasticity come from `python -m studies.ballistic search`, and
         # match the paper's UFC column and the shape of its own impulse-distance curve.
         "ballistic": SimulationParameters(),
         # Balls of 0.2 m radius: coarse, and affordable in training.

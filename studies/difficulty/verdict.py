@@ -7,7 +7,7 @@ from typing import Final
 from blast_env.statistics import Estimate
 from studies.difficulty.items import ItemResult
 from studies.difficulty.outcomes import Outcome, TaskResult
-from studies.particles.agreement.layouts import Noise
+from studies.noise import Noise
 
 LEAST_REDUCTION, MOST_REDUCTION = 0.15, 0.85
 """Between these the best layout does something and leaves something to do."""

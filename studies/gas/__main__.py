@@ -24,11 +24,10 @@ from blast_env.runner import run_all
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.simulation.gas import GasBlast
-from blast_env.studies.shielding.ratios import EXPERIMENT, REGIONS, ExperimentalBand
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.gas.cells import CellLoads, cell_loads, difference
-from studies.gas.corners import corner_waves
+from studies.gas.corners import EXPERIMENT, REGIONS, ExperimentalBand, corner_waves
 from studies.gas.ending import Ending, ending
 from studies.gas.handover import load_from_radius
 from studies.gas.judgement import Judgement

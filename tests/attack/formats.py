@@ -40,7 +40,6 @@ from blast_env.reporting.study import front_layouts
 from blast_env.scenario import LayoutFile, Scenario, load_scenario, save_scenario, write_layout
 from blast_env.simulation import simulate
 from studies.pack_agent import league_result
-from studies.particles.candidates import HIGH, LOW, Candidate, Score, ScoredCandidate
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
 from tests.importing.maps import Places, charge, outline, rectangle, written
 from tests.scenario.documents import full_document
@@ -184,15 +183,6 @@ def _runs(folder: Path) -> Format:
     journal = Journal(folder / "runs.jsonl", FreeFieldRun)
     for seed in range(5):
         journal.add(FreeFieldRun(f"{'0' * 64} {seed} event 1", 8.0, seed, 12.5, 3.25, 0.004))
-    sample = journal.path.read_bytes()
-    return Format((sample,), _from_file(journal.path, lambda _: journal.read()))
-
-
-def _candidates(folder: Path) -> Format:
-    journal = Journal(folder / "candidates.jsonl", ScoredCandidate)
-    for share in (0.1, 0.4, 0.7):
-        candidate = Candidate.from_point(LOW + share * (HIGH - LOW))
-        journal.add(ScoredCandidate(candidate, Score(3.0, 0.5, 1.0, 0.57, 0.49, 1e5)))
     sample = journal.path.read_bytes()
     return Format((sample,), _from_file(journal.path, lambda _: journal.read()))
 
@@ -357,7 +347,6 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "packaged weights' record": _packaged,
         "--set": _setting,
         "runs of a study": _runs,
-        "candidates of a search": _candidates,
         "front.csv": _front,
         "league summary": _summary,
         "cache entry": _loads,

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from blast_env.calibration import Friedlander, kingery_bulmash
-from blast_env.calibration.references import fit_friedlander
 from blast_env.errors import BlastEnvError
 
 peaks = st.floats(1e2, 1e8)
@@ -125,16 +124,3 @@ def test_bad_waves_are_refused(arguments: tuple[float, ...], message: str) -> No
 def test_bad_fields_are_refused(arguments: tuple[float, float, float], message: str) -> None:
     with pytest.raises(BlastEnvError, match=message):
         Friedlander(*arguments)
-
-
-@pytest.mark.parametrize("duration_s", [0.02, 0.3, 3.0])
-@pytest.mark.parametrize("decay", [0.0, 0.5, 2.0, 8.0, 20.0])
-def test_a_fit_finds_the_waveform_that_made_the_bins(duration_s: float, decay: float) -> None:
-    """Bins of 4 ms over 0.9 s: the wave is shorter than a few bins, or longer than all."""
-    wave = Friedlander(5e4, duration_s, decay, arrival_s=0.1)
-    edges_s = 0.1 + 0.004 * np.arange(226.0)
-    found = fit_friedlander(edges_s, np.diff(wave.impulse_until(edges_s)) / 0.004)
-    assert found.arrival_s == 0.1
-    assert found.peak == pytest.approx(5e4, rel=1e-4)
-    assert found.positive_duration_s == pytest.approx(duration_s, rel=1e-3)
-    assert found.decay == pytest.approx(decay, rel=1e-3, abs=1e-4)

@@ -230,7 +230,7 @@ SMALLER: Final[dict[str, str]] = {
         "--charges 1 --changes 1"
     ),
     # docs/paper
-    "python -m studies.presets ballistic": (
+    "python -m studies.ballistic search": (
         "--candidates 1 --refinements 1 --seeds 1 --finalists 1 --finalist-seeds 1"
     ),
     # docs/researchers
@@ -383,13 +383,7 @@ SMALLER: Final[dict[str, str]] = {
         "--seeds 4"
     ),
     # docs/studies
-    "python -m studies.engines compare": "--seeds 20 --event-seeds 20",
-    "python -m studies.engines modules": "--seeds 20 --event-seeds 2",
-    "python -m studies.engines front": "--seeds 1",
-    "python -m studies.engines profile": "--repeats 1",
-    "python -m studies.engines cost --repeats 10": "--repeats 1 --most-balls 5000",
-    "python -m studies.layouts engines --charges 8": "--layouts 10 --charges 1",
-    "python -m studies.layouts resolutions --seeds 4": "--layouts 3 --seeds 2",
+    "python -m studies.engines": "--seeds 3 --scene courtyard",
     "blast-env bench --repeats 7 --no-environment --no-gas": "--repeats 1 --no-memory",
     "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
     "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,
@@ -429,20 +423,12 @@ SMALLER: Final[dict[str, str]] = {
     " --seeds 16 --engine event --simulated transferred_impulse": (
         "--seeds 2 --distances 4.68,9.36,18.71"
     ),
-    "blast-env calibrate --shielding --preset collisional --seeds 16 --first-seed 1000"
-    " --calibration collisional_kb": "--seeds 2",
     "blast-env calibrate --name mine --reference reflected_impulse --distances 8,12,20,40"
     " --seeds 16 --out out/mine": "--seeds 2",
-    "python -m studies.presets front": "--seeds 2",
-    "python -m studies.presets collisional": "--population 4 --generations 1 --seeds 2",
     "blast-env league --run runs/courtyard --out out/league": _LEAGUE,
     "blast-env calibrate --name ballistic_ufc --reference paper_ufc --seeds 32": "--seeds 2",
-    "python -m studies.validity scaling": "--seeds 2",
-    "python -m studies.validity facade-width": "--seeds 2",
-    "python -m studies.validity pressure": "--distances 10 --seeds 2",
-    "python -m studies.validity thermal-share --seeds 8": "--resolutions 2 --seeds 2",
-    "python -m studies.validity mach-stem --preset collisional --resolution 2 --seeds 60"
-    " --first-ms 5 --last-ms 13": "--resolution 1 --seeds 2 --times 4",
+    "python -m studies.hopkinson_cranz": "--seeds 2",
+    "python -m studies.ballistic facade-width": "--seeds 2",
     "python -m studies.scale workers --gas-blasts 12 --episodes 4": (
         "--workers 1 --pauses 5 --gas-blasts 1 --episodes 1"
     ),
@@ -480,7 +466,6 @@ NOT_RUN: Final[dict[str, str]] = {
     """ --env-kwargs 'engine:'"'"'event'"'"'' realisations:1""": "needs RL Zoo",
     "python -m rl_zoo3.enjoy --algo ppo --env BlastBarrier-v0 --gym-packages blast_env -f logs"
     " --stochastic": "needs RL Zoo",
-    "python -m studies.engines steps": "minutes, without an option that makes it smaller",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
 }
 """Commands that are parsed only, and why."""

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 from blast_env.calibration import PAPER_UFC_LABEL
+from blast_env.fitting.figures import figure_5
 from blast_env.fitting.paper import (
     LINEAR,
     PAPER_LAWS,
@@ -23,7 +24,6 @@ from blast_env.fitting.paper import (
     comparative_table,
     comparison_table,
     deviations,
-    figure_5,
     metrics_row,
 )
 

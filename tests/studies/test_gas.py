@@ -13,9 +13,8 @@ from blast_env.physics.gas.source import TNT
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.simulation.gas import GasBlast
-from blast_env.studies.shielding.scenes import BlockGeometry
 from studies.gas.cells import CellLoads, cell_loads, difference
-from studies.gas.corners import corner_waves
+from studies.gas.corners import BlockGeometry, corner_waves
 from studies.gas.ending import Ending, ending
 from studies.gas.loads import protected_impulse_pa_s
 from studies.gas.reference import free_field, wide_wall

@@ -128,7 +128,7 @@ class BenchmarkScene:
         name: Name for the table.
         scenario: The scenario.
         close_step_radii: Longest step at which the loads of pymunk are within 5 % of those of the
-            event engine, as `python -m studies.engines compare` finds; None if not known.
+            event engine, as `python -m studies.engines` finds; None if not known.
         least_ratio: How many times faster than that the event engine is to be; None: not said.
     """
 

@@ -1,8 +1,11 @@
-"""Random layouts: how far noise, the engine and the size of the balls hide which is better."""
+"""How much of what an episode of `BlastBarrier-v0` pays is the layout, and how much luck.
+
+The defaults of `realisations`, `threats` and the deposit of its reward rest on it.
+"""
 
 from collections.abc import Callable, Iterator, Mapping
-from itertools import combinations, product
-from pathlib import Path
+from dataclasses import astuple, dataclass
+from itertools import product
 from typing import Annotated, Final
 
 import numpy as np
@@ -15,22 +18,72 @@ from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.envs.strategies import DEPOSIT
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.files import make_folder
 from blast_env.geometry import Cell, Layout
 from blast_env.scenario import Placement, Scenario, load_scenario
-from blast_env.scenario.build_scene import charge_against
-from blast_env.tables import markdown_table, write_csv
-from studies.particles.agreement import layouts as study
-from studies.particles.agreement.layouts import AVERAGED, Noise
+from blast_env.tables import markdown_table
 
 SCENARIOS: Final = ("courtyard", "perimeter_gate", "street_junction")
+AVERAGED: Final = (1, 2, 4, 8, 16)
 _STEPS: Final = ((0, 1), (0, -1), (1, 0), (-1, 0))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Signal and noise of the impulse, as shares of the impulse without a barrier.
+
+    Attributes:
+        signal: Standard deviation between layouts.
+        noise: Standard deviation of one layout's impulse between draws.
+        reduction_noise: Standard deviation of one layout's reduction between draws, each against
+            no barrier on the same draw.
+        paired_noise: That of the impulse after what a draw does to all layouts alike is taken off:
+            the noise of a comparison of layouts on the same draws.
+    """
+
+    signal: float
+    noise: float
+    reduction_noise: float
+    paired_noise: float
+
+    @classmethod
+    def of(cls, impulses: FloatArray, unprotected: FloatArray) -> "Noise":
+        """Return the estimates.
+
+        Args:
+            impulses: Impulses with layouts (layouts, draws).
+            unprotected: Impulses without a barrier (draws,).
+        """
+        reductions = 1.0 - impulses[:, unprotected > 0.0] / unprotected[unprotected > 0.0]
+        impulses = impulses / unprotected.mean()
+        layouts, draws = impulses.shape
+        between = impulses.mean(axis=1, keepdims=True)
+        residual = impulses - between - impulses.mean(axis=0) + impulses.mean()
+        interaction = float((residual**2).sum() / ((layouts - 1) * (draws - 1)))
+        # The means over the draws scatter by chance as well, which is no signal.
+        signal = max(float(between.var(ddof=1)) - interaction / draws, 0.0)
+        noise = float(impulses.var(axis=1, ddof=1).mean())
+        of_reduction = float(reductions.var(axis=1, ddof=1).mean())
+        return cls(signal**0.5, noise**0.5, of_reduction**0.5, interaction**0.5)
+
+    @classmethod
+    def mean_of(cls, noises: list["Noise"]) -> "Noise":
+        """Return the root mean squares."""
+        squares = np.array([astuple(each) for each in noises]) ** 2
+        return cls(*np.sqrt(squares.mean(axis=0)).tolist())
+
+    def cells(self) -> list[str]:
+        """Return the four as shares, and the signal over the noise by the draws averaged."""
+        ratio, paired = self.signal / self.noise, self.signal / self.paired_noise
+        ratios = (f"{n**0.5 * ratio:.2f} ({n**0.5 * paired:.2f})" for n in AVERAGED)
+        shares = (f"{100.0 * each:.1f} %" for each in astuple(self))
+        return [*shares, *ratios]
+
 
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 
 
 @app.command()
-def noise(
+def reward(
     layouts: Annotated[int, typer.Option(min=2, help="Random layouts of each kind.")] = 16,
     charges: Annotated[int, typer.Option(min=2, help="Charges drawn from the scenario.")] = 16,
     seeds: Annotated[int, typer.Option(min=2, help="Seeds of fan and air a charge.")] = 4,
@@ -106,77 +159,6 @@ def deposit(
     columns = ("scenario", "impulse with a layout / without: median", "largest")
     print_line(markdown_table(columns, rows))
     print_line(f"the deposit is {DEPOSIT:g} times the impulse without a barrier")
-
-
-@app.command()
-def engines(
-    layouts: Annotated[int, typer.Option(min=10)] = 200,
-    charges: Annotated[int, typer.Option(min=1, help="Charges drawn from the scenario.")] = 8,
-    processes: int = 2,
-    cluster: ClusterAddress = None,
-    out: Annotated[Path, typer.Option(help="File for the mean loads.")] = Path(
-        "out/rank_layouts.csv"
-    ),
-) -> None:
-    """Print whether both engines put layouts of the courtyard into the same order.
-
-    Each layout gets the same charges on both. Two lots of seeds of fan and air on each engine say
-    how well an engine agrees with itself, which bounds how well it can agree with the other one.
-    """
-    with user_errors(), running_on(cluster):
-        make_folder(out.parent)
-        scenario = load_scenario("courtyard").with_simulation("ballistic")
-        rng = np.random.default_rng(0)
-        whole = layouts_in_turn(scenario, ("scattered", "walls"), layouts, rng)
-        drawn = [layout[: rng.integers(1, len(layout) + 1)] for layout in whole]
-        drawn_charges = [scenario.sample_charge(rng) for _ in range(charges)]
-        threats = [charge_against(scenario, (), charge) for charge in drawn_charges]
-        with progress_bar("blasts") as progress:
-            loads = study.measured_loads(scenario, drawn, threats, processes, progress)
-        write_csv(study.mean_loads(drawn, loads), out)
-    averaged = loads.mean(axis=-1, keepdims=True)
-    rows = [
-        (name, *(study.correlation(each, statistic, rng) for each in (loads, averaged)))
-        for name, statistic in study.STATISTICS.items()
-    ]
-    print_line(markdown_table(("compared", "1 seed a layout", f"{charges} seeds a layout"), rows))
-    print_line(f"wrote {out}")
-
-
-@app.command()
-def resolutions(
-    scenario: str = "courtyard",
-    layouts: Annotated[int, typer.Option(min=3)] = 30,
-    seeds: Annotated[int, typer.Option(min=2)] = 4,
-    first_seed: int = 2000,
-    processes: Annotated[int, typer.Option(min=1)] = 2,
-    cluster: ClusterAddress = None,
-    out: Path = Path("out/resolution_convergence"),
-) -> None:
-    """Print whether finer balls would rank layouts differently, on the same seeds.
-
-    With `collisional`, `collisional_fine` and still finer balls: what each layout leaves of the
-    impulse, the rank correlations, the mean differences, and the time of a blast.
-    """
-    with user_errors(), running_on(cluster):
-        make_folder(out)
-        loaded = load_scenario(scenario)
-        rng = np.random.default_rng(0)
-        tried = [(), *layouts_in_turn(loaded, ("walls", "scattered"), layouts, rng)]
-        numbers = range(first_seed, first_seed + seeds)
-        found = []
-        for name, parameters in study.resolutions().items():
-            changed = study.with_parameters(loaded, parameters)
-            with progress_bar(name) as progress:
-                found.append(study.blasts_of(name, changed, tried, numbers, processes, progress))
-        write_csv(study.share_table(tried[1:], found), out / f"{scenario}.csv")
-        for each in found:
-            print_line(
-                f"{each.name}: {each.blast_s:.3f} s a blast, leaves {each.shares.mean():.3f}; "
-                f"rank correlation between halves of the seeds {study.own_correlation(each):.2f}"
-            )
-        for one, other in combinations(found, 2):
-            print_line(study.compared(one, other))
 
 
 def layouts_in_turn(

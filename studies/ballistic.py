@@ -1,45 +1,36 @@
-"""How the parameters of the presets were chosen: searches for `ballistic` and `collisional`.
+"""The preset `ballistic`: how its parameters were chosen, and other widths of the facade.
 
-The seeds here are 0 and up; `blast-env calibrate` and `blast-env calibrate --shielding` check the
-choices on seeds from 1000 up.
+The search has the seeds 0 and up; `blast-env calibrate` checks its choice on seeds from 1000 up.
 """
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from statistics import fmean, stdev
 from time import perf_counter
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import numpy as np
-import pandas as pd
 import typer
-from numpy.typing import NDArray
-from pymoo.algorithms.moo.nsga2 import NSGA2
-from pymoo.core.problem import Problem
-from pymoo.optimize import minimize
 from scipy.stats import qmc
 
 from blast_env.calibration import fit_metrics, fit_power_law, paper_table, shape_rms_percent
 from blast_env.cli.cluster import ClusterAddress, running_on
-from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.errors import BlastEnvError
+from blast_env.cli.output import print_line, user_errors
 from blast_env.files import make_folder, write_atomically
 from blast_env.fitting.free_field import FreeFieldStudy, free_field, impulse_by_seed
-from blast_env.rendering.figures import save_figure
+from blast_env.runner import run_all
 from blast_env.scenario import Scenario
-from blast_env.tables import write_csv
-from studies.particles import candidates as dense_air
-
-SEARCH: Final = Path("out/search_collisional")
-SHOWN_COLUMNS: Final = [
-    *("events", "mape_percent", "integral_error_percent", "exponent"),
-    *("one_corner", "two_corners", "distance_error", "shielding_error"),
-]
+from blast_env.simulation import simulate
+from blast_env.units import MODULE_SIDE_M
 
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 
 MOST_MAPE_PERCENT, MOST_INTEGRAL_PERCENT, MOST_RMS_PERCENT = 8.0, 1.5, 20.0
-FACADES_MODULES = (10, 20)
+FACADES_MODULES: Final = (10, 20)
+WIDTHS_MODULES: Final = (20, 40, 80)
+"""The calibrations' reference facade, twice and four times it."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +120,7 @@ def measure(candidate: Candidate, seeds: int, processes: int) -> Score:
 
 
 @app.command()
-def ballistic(
+def search(
     candidates: Annotated[int, typer.Option(help="Points of the first pass (a power of 2).")] = 32,
     refinements: Annotated[int, typer.Option(help="Points around the best.")] = 16,
     seeds: Annotated[int, typer.Option(help="Blasts per distance and candidate.")] = 4,
@@ -171,82 +162,24 @@ def ballistic(
     print_line(f"{len(tried)} candidates, {blasts} blasts, {perf_counter() - start:.0f} s; {out}")
 
 
-class DenseAir(Problem):
-    """The three objectives of `dense_air` as pymoo wants them."""
-
-    def __init__(self, store: dense_air.Store) -> None:
-        super().__init__(n_var=len(dense_air.LOW), n_obj=3, xl=dense_air.LOW, xu=dense_air.HIGH)
-        self._store = store
-
-    def _evaluate(self, x: NDArray[np.float64], out: dict[str, Any], *_: Any, **__: Any) -> None:
-        scores = self._store.score_all(map(dense_air.Candidate.from_point, x))
-        out["F"] = np.array([(s.distance_error, s.shielding_error, s.events) for s in scores])
-
-
 @app.command()
-def collisional(
-    population: Annotated[int, typer.Option(min=4)] = 20,
-    generations: Annotated[int, typer.Option(min=1)] = 9,
-    seeds: Annotated[int, typer.Option(min=2)] = 3,
-    processes: Annotated[int, typer.Option(min=1)] = 2,
+def facade_width(
+    distance_m: float = 40.0,
+    seeds: Annotated[int, typer.Option(min=2)] = 16,
+    processes: int = 2,
     cluster: ClusterAddress = None,
-    out: Path = SEARCH,
 ) -> None:
-    """Search `collisional` with NSGA-II; write all candidates and the front.
-
-    Searches packing fraction, ball radius, elasticity, masses, number of balls, shrinking, C_e,
-    thermal share and facade width. An interrupted search goes on where it was.
-    """
+    """Print the scaled impulse on the reference facade, on twice and on four times it."""
     with user_errors(), running_on(cluster):
-        make_folder(out)
-        store = dense_air.Store(out / "candidates.jsonl", tuple(range(seeds)), processes)
-        with progress_bar(f"{generations} generations of {population}") as progress:
-            minimize(
-                DenseAir(store),
-                NSGA2(pop_size=population),
-                ("n_gen", generations),
-                seed=0,
-                callback=lambda algorithm: progress(algorithm.n_gen / generations),
-            )
-        table = dense_air.front(dense_air.candidate_table(store.scores))
-        write_csv(table, out / "front.csv")
-        met = table[(table.distance_error <= 1.0) & (table.shielding_error <= 1.0)]
-        parts = (dense_air.Candidate, dense_air.Score)
-        columns = [field.name for part in parts for field in fields(part)]
-        print_line(f"{len(store.scores)} candidates; front of {len(table)}, both bounds met:")
-        print_line(met[columns].to_string(index=False))
+        for side_modules in WIDTHS_MODULES:
+            scenario = free_field(side_modules=side_modules).at_stand_off(distance_m)
+            scaled = run_all(partial(_psi_s, scenario), range(seeds), processes)
+            width_m, error = side_modules * MODULE_SIDE_M, stdev(scaled) / seeds**0.5
+            print_line(f"{width_m:3g} m: {fmean(scaled):.4f} +- {error:.4f} psi s")
 
 
-@app.command()
-def front(
-    search: Annotated[Path, typer.Option(help="Folder of the search.")] = SEARCH,
-    seeds: Annotated[int, typer.Option(min=2, help="Seeds of the search.")] = 3,
-    table: Path = Path("docs/data/collisional_candidates.csv"),
-    figure: Path = Path("docs/pictures/collisional_front.png"),
-) -> None:
-    """Print the front of `collisional`, write the table of all candidates and the figure.
-
-    The presets are run on the same seeds.
-    """
-    with user_errors():
-        store = dense_air.Store(search / "candidates.jsonl", tuple(range(seeds)), processes=1)
-        if not store.scores:
-            raise BlastEnvError(f"{search}: has no candidates: run studies.presets collisional")
-        make_folder(table.parent)
-        make_folder(figure.parent)
-        candidates = dense_air.candidate_table(store.scores)
-        unbeaten = dense_air.front(candidates)
-        candidates["on_front"] = candidates.index.isin(unbeaten.index)
-        presets = dense_air.preset_table(tuple(dense_air.SHOWN), tuple(range(seeds)))
-        write_csv(pd.concat([presets, candidates]), table, "%.6g")
-        highest = dense_air.HIGHEST_DRAWN
-        subtitle = (
-            f"{len(candidates)} candidates, {len(unbeaten)} on the front; event engine, {seeds} "
-            f"seeds; errors above {highest:g} are drawn at {highest:g}"
-        )
-        save_figure(dense_air.front_figure(candidates, presets, subtitle), figure)
-    print_line(presets[["preset", *SHOWN_COLUMNS]].round(3).to_string(index=False))
-    print_line(unbeaten[SHOWN_COLUMNS].round(3).to_string(index=False))
+def _psi_s(scenario: Scenario, seed: int) -> float:
+    return simulate(scenario, seed=seed).impulse("building").psi_s
 
 
 if __name__ == "__main__":

@@ -1,19 +1,16 @@
-"""The figures of a calibration and of a pressure history say what the numbers say."""
+"""The figure of a calibration says what the numbers say."""
 
 import numpy as np
 import pytest
 
-from blast_env import load_scenario, simulate
-from blast_env.calibration import Friedlander
-from blast_env.fitting.figure import calibration_figure
+from blast_env import load_scenario
+from blast_env.fitting.figures import calibration_figure
 from blast_env.fitting.free_field import (
     CalibrationReport,
     FreeFieldStudy,
     calibrate,
     kingery_bulmash_reference,
 )
-from studies.particles.pressure.figure import PressureCase, pressure_figure
-from studies.particles.pressure.pulses import facade_history
 
 SMALL = load_scenario("free_field").with_simulation(
     overrides={"explosive": {"ball_count": 180}, "stepping": {"time_limit_s": 0.12}}
@@ -41,17 +38,3 @@ def test_a_calibration_figure_draws_means_laws_and_residuals(report: Calibration
     assert f"power: MAPE {report.metrics['power'].mape_percent:.1f} %" in texts
     power = np.asarray(residuals.lines[2].get_ydata())
     assert power == pytest.approx(report.table().power_error_percent.to_numpy())
-
-
-def test_a_pressure_figure_has_a_panel_a_distance_and_one_legend() -> None:
-    results = [simulate(SMALL.at_stand_off(8.0), seed=seed, engine="event") for seed in (1, 2)]
-    history = facade_history(results, "building", "left", 5e-4)
-    wave = Friedlander.from_impulse(1e5, 0.01, 300.0, 0.01)
-    case = PressureCase(8.0, history, wave, wave)
-    figure = pressure_figure([case, case], "two panels")
-    assert [axes.get_title() for axes in figure.axes] == ["8 m", "8 m"]
-    assert {axes.get_xlabel() for axes in figure.axes} == {"time since the detonation (ms)"}
-    (legend,) = figure.legends
-    assert len(legend.get_texts()) == 3
-    drawn = np.asarray(figure.axes[0].lines[1].get_ydata(), dtype=float)
-    assert np.nanmax(drawn) == pytest.approx(100.0, rel=0.01)  # kPa

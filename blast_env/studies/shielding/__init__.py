@@ -1,1 +1,0 @@
-"""How much of a blast goes round the corners of a block."""

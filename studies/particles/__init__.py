@@ -1,1 +1,0 @@
-"""What was studied about the particle model."""

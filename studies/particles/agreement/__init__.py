@@ -1,1 +1,0 @@
-"""Whether the engines, and finer balls, say the same: loads, single modules, layouts."""

@@ -1,1 +1,0 @@
-"""Pressure over time, held against Kingery & Bulmash."""
