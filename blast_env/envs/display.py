@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.envs.episode import Episode
-from blast_env.envs.vehicle_observations import VehicleView
+from blast_env.envs.observations import VehicleView
 from blast_env.evaluation.cases import Threat
 from blast_env.geometry import Cell, Layout, Rectangle
 from blast_env.physics.engines import has_particles, is_gas

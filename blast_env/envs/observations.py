@@ -1,7 +1,8 @@
-"""What an agent sees: the observations and what they are made of."""
+"""What an agent sees: the observations, and what they are made of."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import ceil, hypot, inf
 from types import MappingProxyType
 from typing import Any, ClassVar, Final, Protocol
 
@@ -9,64 +10,55 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from blast_env.envs.item_observations import (
-    CHANGING_SITE,
-    STRUCTURE_HEIGHT,
-    ItemChannels,
-    PlacedItems,
-    height_share,
-    item_costs,
-    item_heights,
-    items_left,
-)
-from blast_env.envs.site_grid import Lattice, Plane, SiteGrid
-from blast_env.envs.vehicle_observations import (
-    EMPTY_REACH,
-    REACH,
-    VehicleView,
-    vehicle_channels,
-)
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import draw_threats
 from blast_env.evaluation.evaluator import Evaluators
-from blast_env.geometry import Rectangle
-from blast_env.scenario import AnySource, Placement, Scenario
-from blast_env.scenario.models import AnyStructure
+from blast_env.geometry import Layout, Rectangle
+from blast_env.scenario import (
+    AnySource,
+    BuildZone,
+    Catalogue,
+    Placement,
+    RectangleSource,
+    Scenario,
+    Site,
+    VehicleSource,
+)
+from blast_env.scenario.build_scene import vehicle_reach, worst_places
+from blast_env.scenario.sections import PointM
+from blast_env.scenario.vehicles import squares_of
 from blast_env.scenario.zone import source_bounds_m
+from blast_env.units import MODULE_SIDE_M
 
 Array = NDArray[Any]
 """An observation; its data type is that of the space."""
 
+Plane = NDArray[np.float32]
+"""Values of the squares of a site (rows, columns), or several planes of them."""
 
 FULL_CHARGE_KG: Final = 1000.0
 """TNT-equivalent mass that is shown as 1; larger ones as well."""
 
-
 FULL_STOCK: Final = 100
 """Number of modules in stock that is shown as 1; larger ones as well."""
 
+FULL_HEIGHT_M: Final = 12.0
+"""Height that is shown as 1; what is higher, or as high as the air, as well."""
 
-class ModuleLoads(Protocol):
-    """Gives the loads on the structures without a barrier, at the cost of blasts."""
+# ---- What may be seen.
 
-    def __call__(
-        self, scenario: Scenario, sources: tuple[AnySource, ...], blasts: int
-    ) -> NDArray[np.float64]:
-        """Return the load on each module of the structures without a barrier.
+ModuleLoads = Callable[[Scenario, tuple[AnySource, ...], int], FloatArray]
+"""Gives the load on each module of the structures without a barrier, simulation units (modules,).
 
-        Args:
-            scenario: The scenario.
-            sources: Where the charge is, or may be.
-            blasts: How many blasts the loads are the mean of.
-
-        Returns:
-            Simulation units (modules,), in the order of the scenario's structures, row by row.
-        """
+In the order of the scenario's structures, row by row; called with the scenario, with where the
+charge is or may be, and with how many blasts the loads are to be the mean of.
+"""
 
 
 @dataclass(frozen=True)
 class SimulatedModuleLoads:
-    """Loads of blasts of charges from the sources, with seeds from 0 on.
+    """Mean loads of blasts of charges from the sources, with seeds from 0 on: a `ModuleLoads`.
 
     Those are not the blasts that the layout is assessed with.
 
@@ -78,12 +70,11 @@ class SimulatedModuleLoads:
 
     def __call__(
         self, scenario: Scenario, sources: tuple[AnySource, ...], blasts: int
-    ) -> NDArray[np.float64]:
+    ) -> FloatArray:
         """Return the mean load on each module, simulation units (modules,)."""
         threats = draw_threats(scenario.model_copy(update={"charge": sources}), range(blasts))
         loads = self.evaluators.of(scenario).loads_of_many([((), threat) for threat in threats])
-        mean: NDArray[np.float64] = np.mean([each.module_impulse_sim for each in loads], axis=0)
-        return mean
+        return np.asarray(np.mean([each.module_impulse_sim for each in loads], axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +103,7 @@ class Observable:
         """Whether observations have values for vehicles."""
         return self.among_vehicles or bool(self.scenario.vehicles)
 
-    def unprotected_loads(self, blasts: int) -> NDArray[np.float64]:
+    def unprotected_loads(self, blasts: int) -> FloatArray:
         """Return the load on each module of the structures without a barrier.
 
         Args:
@@ -124,6 +115,37 @@ class Observable:
         if self.module_loads is None:
             raise BlastEnvError("module_loads is None, must be given for what shows the loads")
         return self.module_loads(self.scenario, self.sources, blasts)
+
+
+@dataclass(frozen=True)
+class VehicleView:
+    """The vehicles that may be seen.
+
+    Attributes:
+        scenario: The scenario.
+        vehicles: Those of them that may bring the charge.
+    """
+
+    scenario: Scenario
+    vehicles: tuple[VehicleSource, ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario, sources: tuple[AnySource, ...]) -> "VehicleView":
+        """Return the vehicles among the sources of a charge."""
+        return cls(scenario, tuple(each for each in sources if isinstance(each, VehicleSource)))
+
+    def reached(self, layout: Layout) -> BoolArray:
+        """Return which squares of the site a vehicle gets to with a layout, (rows, columns)."""
+        rows, columns = squares_of(self.scenario.site)
+        ground = np.zeros((rows, columns), dtype=bool)
+        for source in self.vehicles:
+            ground |= vehicle_reach(self.scenario, source, layout).ground(rows, columns)
+        return ground
+
+    def stand_off_m(self, layout: Layout) -> float:
+        """Return how near a vehicle comes to a protected structure; infinite without any."""
+        places = (worst_places(self.scenario, source, layout) for source in self.vehicles)
+        return min((each.stand_off_m for each in places), default=inf)
 
 
 class EpisodeObservation(Protocol):
@@ -146,6 +168,9 @@ class Observation(Protocol):
         """Prepare the observations of an episode; what does not change is worked out here."""
 
 
+# ---- Values from 0 to 1, which planes and vectors show alike.
+
+
 def charge_share(tnt_kg: float) -> float:
     """Return a charge's mass as it is shown: (mass / 1000 kg)^(1/3), at most 1.
 
@@ -153,6 +178,11 @@ def charge_share(tnt_kg: float) -> float:
     the mass acts as one of the same mass at half the distance.
     """
     return float(min((tnt_kg / FULL_CHARGE_KG) ** (1.0 / 3.0), 1.0))
+
+
+def height_share(height_m: float | None) -> float:
+    """Return a height as it is shown: as a share of 12 m, at most 1."""
+    return 1.0 if height_m is None else min(height_m / FULL_HEIGHT_M, 1.0)
 
 
 def stock_shares(placement: Placement) -> tuple[float, float, float]:
@@ -168,7 +198,13 @@ def stock_shares(placement: Placement) -> tuple[float, float, float]:
     return left / zone.stock, min(left / FULL_STOCK, 1.0), of_budget
 
 
-def occupied_cells(placement: Placement) -> NDArray[np.bool_]:
+def cost_shares(scenario: Scenario) -> FloatArray:
+    """Return the cost of building on each cell as a share of the highest, (rows, columns)."""
+    costs = Placement.empty(scenario).module_costs
+    return np.asarray(costs / costs.max())
+
+
+def occupied_cells(placement: Placement) -> BoolArray:
     """Return which cells of the build zone hold a module, shape (rows, columns)."""
     occupied = np.zeros(placement.usable.shape, dtype=bool)
     if placement.cells:
@@ -176,11 +212,173 @@ def occupied_cells(placement: Placement) -> NDArray[np.bool_]:
     return occupied
 
 
-def cost_shares(scenario: Scenario) -> NDArray[np.float64]:
-    """Return the cost of building on each cell as a share of the highest, (rows, columns)."""
-    costs = Placement.empty(scenario).module_costs
-    shares: NDArray[np.float64] = costs / costs.max()
-    return shares
+def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
+    """Return what does not change of the items of a catalogue.
+
+    Returns:
+        Their heights (items,), and what a piece of each costs (items,): as a share of the budget,
+        or of the dearest item's cost where there is no budget, at most 1.
+    """
+    costs = np.array([item.cost for item in zone.items])
+    shares = np.minimum(costs / (zone.budget or costs.max(initial=1.0)), 1.0)
+    return np.array([height_share(item.height_m) for item in zone.items]), np.asarray(shares)
+
+
+def items_placed(placement: Placement) -> tuple[FloatArray, FloatArray]:
+    """Return what changes of a catalogue.
+
+    Returns:
+        Which share of the pieces of each item may still be placed (items,); and of each cell the
+        height of the module that stands there, whether it stops vehicles, and whether a piece of
+        each variant may have its lower left cell there (2 + variants, rows, columns).
+    """
+    stocks = np.array(placement.catalogue.stocks)
+    left = np.array(placement.stocks_left, dtype=np.float64) / np.maximum(stocks, 1)
+    standing = np.zeros((2, *placement.usable.shape))
+    for module in placement.modules:
+        row, column = module.cell
+        standing[:, row, column] = height_share(module.height_m), module.stops_vehicles
+    return left, np.concatenate((standing, placement.legal))
+
+
+# ---- The squares of 0.5 m that a site is drawn on.
+
+_POINTS_PER_MODULE: Final = 8  # along a segment where a charge may be
+
+
+@dataclass(frozen=True)
+class SiteGrid:
+    """Planes of (rows, columns) squares of 0.5 m; row 0 is the lower edge of the site.
+
+    Attributes:
+        rows: Squares upwards.
+        columns: Squares to the right.
+    """
+
+    rows: int
+    columns: int
+
+    @classmethod
+    def of(cls, site: Site) -> "SiteGrid":
+        """Return the grid of a site; the last squares jut out of one that is no whole number."""
+        return cls(*squares_of(site))
+
+    def lattice(self, corner_m: tuple[float, float], rows: int, columns: int) -> "Lattice":
+        """Return where a lattice of modules lies on the grid.
+
+        Args:
+            corner_m: Its lower left corner.
+            rows: Modules upwards.
+            columns: Modules to the right.
+        """
+        return Lattice(
+            _shares(self.rows, corner_m[1], rows), _shares(self.columns, corner_m[0], columns)
+        )
+
+    def rectangle(self, rectangle_m: Rectangle) -> Plane:
+        """Return the share of each square that a rectangle covers, (rows, columns)."""
+        left, bottom, right, top = rectangle_m
+        along_y = _covered(self.rows, np.array([bottom]), np.array([top]))
+        along_x = _covered(self.columns, np.array([left]), np.array([right]))
+        return (along_y @ along_x.T).astype(np.float32)
+
+    def source(self, source: AnySource) -> Plane:
+        """Return how likely the charge of a source is in each square, (rows, columns).
+
+        The plane adds up to 1. A point is shared between the four squares around it such that
+        their mean place is the point's. That of a vehicle is where it enters.
+        """
+        if isinstance(source, RectangleSource):
+            plane = self.rectangle(source.rectangle_m)
+        else:
+            plane = np.sum([self._line(*ends_m) for ends_m in source.lines_m], axis=0)
+        # A narrow rectangle covers next to nothing of its squares, which rounding must not lose.
+        return plane / np.float32(plane.sum(dtype=np.float64))
+
+    def _line(self, start_m: PointM, end_m: PointM) -> Plane:
+        """Return points close to each other along a line."""
+        start, end = np.array(start_m), np.array(end_m)
+        length_m = float(np.hypot(*(end - start)))
+        count = 1 + _POINTS_PER_MODULE * ceil(length_m / MODULE_SIDE_M)
+        share = (np.arange(count) + 0.5) / count
+        return self._points(start + share[:, np.newaxis] * (end - start))
+
+    def _points(self, points_m: NDArray[np.float64]) -> Plane:
+        """Return points (n, 2), each shared between the four squares around it."""
+        plane = np.zeros((self.rows, self.columns), dtype=np.float32)
+        places = points_m[:, ::-1] / MODULE_SIDE_M - 0.5
+        low = np.floor(places).astype(int)
+        beyond = places - low
+        for up in (0, 1):
+            for right in (0, 1):
+                row = np.clip(low[:, 0] + up, 0, self.rows - 1)
+                column = np.clip(low[:, 1] + right, 0, self.columns - 1)
+                along_y = beyond[:, 0] if up else 1.0 - beyond[:, 0]
+                along_x = beyond[:, 1] if right else 1.0 - beyond[:, 1]
+                np.add.at(plane, (row, column), along_y * along_x)
+        return plane
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Where a lattice of modules lies on the grid; modules on the 0.5 m grid fill one square each.
+
+    Attributes:
+        along_y: Share of each row of squares that each row of modules covers (grid rows, rows).
+        along_x: The same for columns (grid columns, columns).
+    """
+
+    along_y: Plane
+    along_x: Plane
+
+    def plane(self, values: NDArray[np.generic]) -> Plane:
+        """Return values of the modules (..., rows, columns) on the grid, by the area covered."""
+        plane: Plane = self.along_y @ values.astype(np.float32) @ self.along_x.T
+        return plane
+
+
+def _shares(squares: int, start_m: float, modules: int) -> Plane:
+    low_m = np.asarray(start_m + MODULE_SIDE_M * np.arange(modules), dtype=np.float64)
+    return _covered(squares, low_m, low_m + MODULE_SIDE_M).astype(np.float32)
+
+
+def _covered(
+    squares: int, low_m: NDArray[np.float64], high_m: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the share of each square that each interval covers (squares, intervals)."""
+    first = np.arange(squares)[:, np.newaxis]
+    low, high = low_m / MODULE_SIDE_M, high_m / MODULE_SIDE_M
+    common = np.minimum(first + 1, high) - np.maximum(first, low)
+    # Rounded, so that what lies on the grid but for the last bit fills whole squares.
+    covered: NDArray[np.float64] = np.round(np.clip(common, 0.0, 1.0), 9)
+    return covered
+
+
+# ---- Planes.
+
+STRUCTURE_HEIGHT: Final = "structure_height"
+EMPTY_REACH: Final = "reach_without_barrier"
+REACH: Final = "reach"
+
+
+def item_channels(catalogue: Catalogue) -> tuple[str, ...]:
+    """Return the names of the planes that a zone with a catalogue has more than others.
+
+    Those of an item begin with its name and a colon, which no name has.
+    """
+    if not catalogue.has_items:
+        return ()
+    heights, costs, left = (
+        tuple(f"{name}:{what}" for name in catalogue.names) for what in ("height", "cost", "left")
+    )
+    variants = [f"{each.name}:turned" if each.turned else each.name for each in catalogue.variants]
+    legal = tuple(f"{name}:legal" for name in variants)
+    return STRUCTURE_HEIGHT, *heights, *costs, "barrier_height", "stops_vehicles", *left, *legal
+
+
+def vehicle_channels(shown: bool) -> tuple[str, ...]:
+    """Return the names of the planes that show vehicles; none where they are not shown."""
+    return (EMPTY_REACH, REACH) if shown else ()
 
 
 @dataclass(frozen=True)
@@ -258,43 +456,38 @@ class GridObservation:
             scenario: The scenario.
             shows_vehicles: Whether those of vehicles are there; if it has some, unless given.
         """
-        items = ItemChannels.of(scenario.zone.catalogue).all
         shown = bool(scenario.vehicles) if shows_vehicles is None else shows_vehicles
+        items = item_channels(scenario.zone.catalogue)
         return (*self.channels, *items, *vehicle_channels(shown))
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (channels, rows, columns)."""
-        grid = SiteGrid.of(scenario.site)
-        shape = (len(self.channels_of(scenario)), grid.rows, grid.columns)
+        shape = (len(self.channels_of(scenario)), *squares_of(scenario.site))
         return spaces.Box(0.0, 1.0, shape, np.float32)
 
     def episode(self, observable: Observable) -> "GridEpisode":
         """Draw the planes that do not change."""
-        grid = SiteGrid.of(observable.scenario.site)
         scenario, zone = observable.scenario, observable.scenario.zone
-        lattice = grid.lattice(zone.corner_m, zone.rows, zone.columns)
-        protected, others = _structure_planes(grid, scenario)
-        planes = {
-            "protected": protected,
-            "other_structures": others,
-            "cost": lattice.plane(cost_shares(scenario)),
-            "charge": _charge_plane(grid, observable.sources),
-        }
-        items = ItemChannels.of(zone.catalogue)
-        if zone.items:
-            whole = np.ones((grid.rows, grid.columns), dtype=np.float32)
-            planes[STRUCTURE_HEIGHT] = _height_plane(grid, scenario)
-            names = (*items.heights, *items.costs)
-            values = np.concatenate([item_heights(zone), item_costs(zone)]).astype(np.float32)
-            planes |= {name: value * whole for name, value in zip(names, values, strict=True)}
-        vehicles = VehicleView.of(scenario, observable.sources)
-        if scenario.vehicles:
-            planes[EMPTY_REACH] = vehicles.reached(()).astype(np.float32)
+        grid = SiteGrid.of(scenario.site)
         channels = self.channels_of(scenario, observable.shows_vehicles)
         static = np.zeros((len(channels), grid.rows, grid.columns), dtype=np.float32)
-        for name, plane in planes.items():
-            static[channels.index(name)] = _in_steps(plane)
-        return GridEpisode(static, lattice, channels, items, vehicles)
+        lattice = grid.lattice(zone.corner_m, zone.rows, zone.columns)
+        vehicles = VehicleView.of(scenario, observable.sources)
+        episode = GridEpisode(static, lattice, channels, vehicles)
+        protected, others, heights = _structure_planes(grid, scenario)
+        costs, charge = (
+            lattice.plane(cost_shares(scenario)),
+            _charge_plane(grid, observable.sources),
+        )
+        names = ("protected", "other_structures", "cost", "charge")
+        episode.show(static, names, np.stack((protected, others, costs, charge)))
+        if zone.items:
+            episode.show(static, (STRUCTURE_HEIGHT,), heights[np.newaxis])
+            for ending, values in zip((":height", ":cost"), item_values(zone), strict=True):
+                episode.show(static, episode.ending(ending), values)
+        if scenario.vehicles:
+            episode.show(static, (EMPTY_REACH,), vehicles.reached(())[np.newaxis])
+        return episode
 
 
 @dataclass(frozen=True)
@@ -319,20 +512,94 @@ class GridWithLoadObservation(GridObservation):
         grid = SiteGrid.of(observable.scenario.site)
         impulses = observable.unprotected_loads(self.blasts)
         shares = impulses / max(impulses.max(), np.finfo(float).tiny)
-        plane = np.zeros((grid.rows, grid.columns), dtype=np.float32)
+        plane = np.zeros((1, grid.rows, grid.columns), dtype=np.float32)
         first = 0
         for structure in observable.scenario.structures:
-            modules = structure.rows * structure.columns
-            values = shares[first : first + modules].reshape(structure.rows, structure.columns)
-            plane += grid.lattice(structure.corner_m, structure.rows, structure.columns).plane(
-                values
-            )
-            first += modules
-        episode.static[self.channels.index("unprotected_load")] = _in_steps(plane)
+            rows, columns = structure.rows, structure.columns
+            values = shares[first : first + rows * columns].reshape(rows, columns)
+            plane += grid.lattice(structure.corner_m, rows, columns).plane(values)
+            first += rows * columns
+        episode.show(episode.static, ("unprotected_load",), plane)
         return episode
 
 
+@dataclass(frozen=True, eq=False)
+class GridEpisode:
+    """The planes of one episode.
+
+    Attributes:
+        static: What does not change (channels, rows, columns); the rest is 0.
+        zone: Where the build zone lies on the grid.
+        channels: Names of the planes.
+        vehicles: The vehicles that may be seen.
+    """
+
+    static: Plane
+    zone: Lattice
+    channels: tuple[str, ...]
+    vehicles: VehicleView
+
+    def observe(self, placement: Placement) -> Plane:
+        """Return all planes for the modules placed so far, (channels, rows, columns)."""
+        planes = self.static.copy()
+        cells = np.stack((occupied_cells(placement), placement.free))
+        self.show(planes, ("barrier", "free"), self.zone.plane(cells))
+        shares = np.array(stock_shares(placement))
+        self.show(planes, ("stock_share", "stock", "budget_share"), shares)
+        if placement.catalogue.has_items:
+            left, on_cells = items_placed(placement)
+            names = ("barrier_height", "stops_vehicles", *self.ending(":legal"))
+            self.show(planes, names, self.zone.plane(on_cells))
+            self.show(planes, self.ending(":left"), left)
+        if REACH in self.channels:
+            self.show(planes, (REACH,), self.vehicles.reached(placement.layout)[np.newaxis])
+        return planes
+
+    def ending(self, ending: str) -> tuple[str, ...]:
+        """Return the names of the planes of items or variants that end so, in their order."""
+        return tuple(name for name in self.channels if name.endswith(ending))
+
+    def show(self, planes: Plane, names: Sequence[str], values: NDArray[Any]) -> None:
+        """Set some of the planes to values from 0 to 1, in steps of 1/255; more counts as 1.
+
+        Args:
+            planes: All planes (channels, rows, columns).
+            names: Which of them.
+            values: (names, rows, columns), or (names,) for planes that are the same everywhere.
+        """
+        steps = np.rint(_LEVELS * np.minimum(values.astype(np.float32), np.float32(1.0)))
+        shape = values.shape if values.ndim == 3 else (*values.shape, 1, 1)
+        planes[[self.channels.index(name) for name in names]] = (steps / _LEVELS).reshape(shape)
+
+
 _LEVELS: Final = np.float32(255.0)
+
+
+def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane, Plane]:
+    """Return the protected structures by weight, the others, and the heights of all."""
+    protected, others, heights = np.zeros((3, grid.rows, grid.columns), dtype=np.float32)
+    weights = [structure.weight for structure in scenario.structures if structure.protected]
+    for structure in scenario.structures:
+        covered = grid.rectangle(structure.rectangle_m)
+        heights += np.float32(height_share(structure.height_m)) * covered
+        if structure.protected:
+            protected += np.float32(structure.weight / max(weights)) * covered
+        else:
+            others += covered
+    return protected, others, heights
+
+
+def _charge_plane(grid: SiteGrid, sources: tuple[AnySource, ...]) -> Plane:
+    total_weight = sum(source.weight for source in sources)
+    likely = np.zeros((grid.rows, grid.columns), dtype=np.float32)
+    heavy = np.zeros_like(likely)
+    for source in sources:
+        share = np.float32(source.weight / total_weight) * grid.source(source)
+        likely += share
+        heavy += np.float32(charge_share(source.tnt_kg)) * share
+    mean_share = np.divide(heavy, likely, out=np.zeros_like(heavy), where=likely > 0.0)
+    plane: Plane = np.sqrt(likely / likely.max()) * mean_share
+    return plane
 
 
 LEAST_IMAGE_SIDE: Final = 36
@@ -357,9 +624,8 @@ class ImageObservation:
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
         """Return the space: (height, width, channels)."""
-        shape = self.planes.space(scenario).shape
-        assert shape is not None
-        channels, rows, columns = shape
+        rows, columns = squares_of(scenario.site)
+        channels = len(self.planes.channels_of(scenario))
         least = max(LEAST_IMAGE_SIDE, channels + 1)
         return spaces.Box(0, 255, (max(rows, least), max(columns, least), channels), np.uint8)
 
@@ -379,7 +645,7 @@ class ImageEpisode:
         size: Height and width of the image, pixels.
     """
 
-    planes: "GridEpisode"
+    planes: GridEpisode
     size: tuple[int, ...]
 
     def observe(self, placement: Placement) -> NDArray[np.uint8]:
@@ -391,100 +657,12 @@ class ImageEpisode:
         return image
 
 
-@dataclass(frozen=True, eq=False)
-class GridEpisode:
-    """The planes of one episode.
-
-    Attributes:
-        static: What does not change (channels, rows, columns); the rest is 0.
-        zone: Where the build zone lies on the grid.
-        channels: Names of the planes.
-        items: Names of those of the catalogue.
-        vehicles: The vehicles that may be seen.
-    """
-
-    static: Plane
-    zone: Lattice
-    channels: tuple[str, ...]
-    items: ItemChannels
-    vehicles: VehicleView
-
-    def observe(self, placement: Placement) -> Plane:
-        """Return all planes for the modules placed so far, (channels, rows, columns)."""
-        planes = self.static.copy()
-        cells = np.stack((occupied_cells(placement), placement.free))
-        planes[self._of("barrier", "free")] = _in_steps(self.zone.plane(cells))
-        shares = np.array(stock_shares(placement), dtype=np.float32)
-        same = _in_steps(shares)[:, np.newaxis, np.newaxis]
-        planes[self._of("stock_share", "stock", "budget_share")] = same
-        if self.items.all:
-            self._show_items(planes, placement)
-        if REACH in self.channels:
-            reached = self.vehicles.reached(placement.layout)
-            planes[self.channels.index(REACH)] = _in_steps(reached.astype(np.float32))
-        return planes
-
-    def _show_items(self, planes: Plane, placement: Placement) -> None:
-        """Fill in what changes of the planes of the catalogue."""
-        placed = PlacedItems.of(placement)
-        cells = np.concatenate(([placed.heights, placed.stops_vehicles], placement.legal))
-        planes[self._of(*CHANGING_SITE, *self.items.legal)] = _in_steps(self.zone.plane(cells))
-        left = _in_steps(items_left(placement).astype(np.float32))
-        planes[self._of(*self.items.left)] = left[:, np.newaxis, np.newaxis]
-
-    def _of(self, *names: str) -> list[int]:
-        return [self.channels.index(name) for name in names]
-
-
-def _in_steps(values: Plane) -> Plane:
-    """Return values from 0 to 1 in steps of 1/255; what is larger counts as 1."""
-    steps = np.rint(_LEVELS * np.minimum(values, np.float32(1.0))) / _LEVELS
-    return steps.astype(np.float32, copy=False)
-
-
-def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane]:
-    """Return the planes of the protected structures, by weight, and of the others."""
-    protected, others = np.zeros((2, grid.rows, grid.columns), dtype=np.float32)
-    weights = [structure.weight for structure in scenario.structures if structure.protected]
-    for structure in scenario.structures:
-        covered = grid.rectangle(structure.rectangle_m)
-        if structure.protected:
-            protected += np.float32(structure.weight / max(weights)) * covered
-        else:
-            others += covered
-    return protected, others
-
-
-def _height_plane(grid: SiteGrid, scenario: Scenario) -> Plane:
-    """Return the heights of the structures as shares of 12 m."""
-    heights: Plane = np.zeros((grid.rows, grid.columns), dtype=np.float32)
-    for structure in scenario.structures:
-        share = np.float32(height_share(structure.height_m))
-        heights += share * grid.rectangle(structure.rectangle_m)
-    return heights
-
-
-def _charge_plane(grid: SiteGrid, sources: tuple[AnySource, ...]) -> Plane:
-    total_weight = sum(source.weight for source in sources)
-    likely = np.zeros((grid.rows, grid.columns), dtype=np.float32)
-    heavy = np.zeros_like(likely)
-    for source in sources:
-        share = np.float32(source.weight / total_weight) * grid.source(source)
-        likely += share
-        heavy += np.float32(charge_share(source.tnt_kg)) * share
-    mean_share = np.divide(heavy, likely, out=np.zeros_like(heavy), where=likely > 0.0)
-    plane: Plane = np.sqrt(likely / likely.max()) * mean_share
-    return plane
-
+# ---- A vector.
 
 MOST_STRUCTURES: Final = 8
 """Structures that the vector has room for."""
 
-
-_PER_STRUCTURE: Final = 6
-
-
-_FIXED: Final = 3 + 6 + 2 + MOST_STRUCTURES * _PER_STRUCTURE
+_FIXED: Final = 3 + 6 + 2 + MOST_STRUCTURES * 6
 
 
 @dataclass(frozen=True)
@@ -528,10 +706,9 @@ class FeaturesObservation:
         """Return the space: (features,)."""
         zone, catalogue = scenario.zone, scenario.zone.catalogue
         cells = zone.rows * zone.columns
-        length = _FIXED + 3 * cells
+        length = _FIXED + 3 * cells + bool(scenario.vehicles)
         if catalogue.has_items:
             length += MOST_STRUCTURES + 3 * len(zone.items) + (2 + len(catalogue.variants)) * cells
-        length += bool(scenario.vehicles)
         return spaces.Box(0.0, 1.0, (length,), np.float32)
 
     def episode(self, observable: Observable) -> "FeaturesEpisode":
@@ -544,27 +721,20 @@ class FeaturesObservation:
         size = np.array([scenario.site.width_m, scenario.site.height_m])
         boxes = np.array([source_bounds_m(source) for source in observable.sources])
         charges = [charge_share(source.tnt_kg) for source in observable.sources]
-        fixed = [
-            np.zeros(3),
-            boxes[:, :2].min(axis=0) / size,
-            boxes[:, 2:].max(axis=0) / size,
-            [min(charges), max(charges)],
-            np.array(zone.corner_m) / size,
-            _structures(scenario).ravel(),
-            np.zeros(2 * zone.rows * zone.columns),
-            cost_shares(scenario).ravel(),
-        ]
-        if zone.items:
-            changing = (
-                len(zone.items) + (2 + len(zone.catalogue.variants)) * zone.rows * zone.columns
-            )
-            fixed += [_structure_heights(scenario), item_heights(zone), item_costs(zone)]
-            fixed.append(np.zeros(changing))
-        if observable.shows_vehicles:
-            fixed.append(np.zeros(1))
-        values = np.concatenate(fixed).astype(np.float32)
-        vehicles = VehicleView.of(scenario, observable.sources)
-        return FeaturesEpisode(np.clip(values, 0.0, 1.0), vehicles, observable.shows_vehicles)
+        structures = _structures(scenario)
+        site = (
+            *(boxes[:, :2].min(axis=0) / size, boxes[:, 2:].max(axis=0) / size),
+            *([min(charges), max(charges)], np.array(zone.corner_m) / size),
+            structures[:, :-1].ravel(),
+        )
+        items = (structures[:, -1], *item_values(zone)) if zone.items else ()
+        return FeaturesEpisode(
+            np.concatenate(site),
+            cost_shares(scenario),
+            np.concatenate((*items, [])),
+            VehicleView.of(scenario, observable.sources),
+            observable.shows_vehicles,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -572,68 +742,52 @@ class FeaturesEpisode:
     """The vector of one episode.
 
     Attributes:
-        static: What does not change (features,); the rest is 0.
+        site: Charge, corner of the build zone and structures (56,).
+        costs: Of the cells (rows, columns).
+        items: Heights of structures and items and costs of items; none without a catalogue.
         vehicles: The vehicles that may be seen.
         shows_vehicles: Whether the stand-off is the last value; 1 without a vehicle.
     """
 
-    static: Array
+    site: FloatArray
+    costs: FloatArray
+    items: FloatArray
     vehicles: VehicleView
     shows_vehicles: bool
 
     def observe(self, placement: Placement) -> Array:
         """Return all values for the modules placed so far, (features,)."""
-        values = self.static.copy()
-        values[:3] = stock_shares(placement)
-        cells = placement.free.size
-        values[_FIXED : _FIXED + cells] = occupied_cells(placement).ravel()
-        values[_FIXED + cells : _FIXED + 2 * cells] = placement.free.ravel()
-        ending = []
+        parts = [np.array(stock_shares(placement)), self.site]
+        parts += [occupied_cells(placement), placement.free, self.costs, self.items]
         if placement.catalogue.has_items:
-            placed = PlacedItems.of(placement)
-            ending += [items_left(placement), placed.heights, placed.stops_vehicles]
-            ending.append(placement.legal)
+            parts += items_placed(placement)
         if self.shows_vehicles:
-            ending.append(np.array([self.vehicles.stand_off_share(placement.layout)]))
-        if ending:
-            last = np.concatenate([each.ravel() for each in ending])
-            values[-len(last) :] = last
-        return values
+            site = self.vehicles.scenario.site
+            diagonal_m = hypot(site.width_m, site.height_m)
+            parts.append(np.array(self.vehicles.stand_off_m(placement.layout) / diagonal_m))
+        values = np.concatenate([part.ravel() for part in parts]).astype(np.float32)
+        return np.clip(values, 0.0, 1.0)
 
 
-def _structures(scenario: Scenario) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Return the features of the structures, (MOST_STRUCTURES, 6)."""
-    structures = _protected_first(scenario)
+def _structures(scenario: Scenario) -> FloatArray:
+    """Return left, bottom, right, top, 1, weight and height of each structure, as shares.
+
+    Shape (MOST_STRUCTURES, 7); the protected ones come first.
+    """
+    structures = sorted(scenario.structures, key=lambda structure: not structure.protected)
     if len(structures) > MOST_STRUCTURES:
         raise BlastEnvError(
             f"scenario {scenario.name!r} has {len(structures)} structures, the observation"
             f" 'features' has room for {MOST_STRUCTURES}: use 'grid'"
         )
     largest = max((each.weight for each in structures if each.protected), default=1.0)
-    site = Rectangle(0.0, 0.0, scenario.site.width_m, scenario.site.height_m)
-    rows = np.zeros((MOST_STRUCTURES, _PER_STRUCTURE))
-    for row, structure in zip(rows, structures, strict=False):
-        row[:] = _structure(structure, site, largest)
+    width_m, height_m = scenario.site.width_m, scenario.site.height_m
+    rows = np.zeros((MOST_STRUCTURES, 7))
+    for row, each in zip(rows, structures, strict=False):
+        left, bottom, right, top = each.rectangle_m
+        row[:4] = left / width_m, bottom / height_m, right / width_m, top / height_m
+        row[4:] = 1.0, each.weight / largest if each.protected else 0.0, height_share(each.height_m)
     return rows
-
-
-def _structure_heights(scenario: Scenario) -> NDArray[np.float64]:
-    """Return the heights of the structures, (MOST_STRUCTURES,)."""
-    heights = np.zeros(MOST_STRUCTURES)
-    structures = _protected_first(scenario)
-    heights[: len(structures)] = [height_share(each.height_m) for each in structures]
-    return heights
-
-
-def _protected_first(scenario: Scenario) -> list[AnyStructure]:
-    return sorted(scenario.structures, key=lambda structure: not structure.protected)
-
-
-def _structure(structure: AnyStructure, site: Rectangle, largest_weight: float) -> list[float]:
-    left, bottom, right, top = structure.rectangle_m
-    weight = structure.weight / largest_weight if structure.protected else 0.0
-    sides = [left / site.right, bottom / site.top, right / site.right, top / site.top]
-    return [*sides, 1.0, weight]
 
 
 OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(

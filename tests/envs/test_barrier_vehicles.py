@@ -7,9 +7,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.observations import FeaturesObservation, GridObservation
+from blast_env.envs.observations import EMPTY_REACH, REACH, FeaturesObservation, GridObservation
 from blast_env.envs.strategies import check_size
-from blast_env.envs.vehicle_observations import EMPTY_REACH, REACH
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Piece
 from blast_env.scenario.build_scene import vehicle_reach, worst_places

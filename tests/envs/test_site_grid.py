@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blast_env.envs.site_grid import SiteGrid
+from blast_env.envs.observations import SiteGrid
 from blast_env.geometry import Rectangle
 from blast_env.scenario import AnySource, PointSource, RectangleSource, SegmentSource, Site
 

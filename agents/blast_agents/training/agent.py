@@ -31,16 +31,16 @@ from blast_agents.training.hyperparameters import (
 )
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from blast_env.envs.arguments import check_names
-from blast_env.envs.item_observations import ItemChannels
 from blast_env.envs.observations import (
     OBSERVATIONS,
     Array,
     EpisodeObservation,
     Observable,
     SimulatedModuleLoads,
+    item_channels,
+    vehicle_channels,
 )
 from blast_env.envs.strategies import check_size
-from blast_env.envs.vehicle_observations import vehicle_channels
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout
@@ -97,7 +97,7 @@ def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenari
         "rows": zone.rows,
         "columns": zone.columns,
         "item_channels": (
-            *ItemChannels.of(zone.catalogue).all,
+            *item_channels(zone.catalogue),
             *vehicle_channels(bool(scenario.vehicles)),
         ),
         "places": places,
