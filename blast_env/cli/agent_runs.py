@@ -159,8 +159,9 @@ def _report_cases(
 
 
 def _engine(settings: TrainingSettings, options: EvaluateOptions) -> Engine:
-    """Return the engine that judges: the one asked for, or that of the run."""
-    return find_engine(options.engine or settings.judge, options.cell_m)
+    """Return the engine that judges: with the run's cells, if it judged by that one, too."""
+    own = settings.judge
+    return find_engine(own if own.name == options.engine else options.engine, options.cell_m)
 
 
 def _fixed(case: Case, options: EvaluateOptions) -> Case:

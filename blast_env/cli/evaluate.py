@@ -15,15 +15,15 @@ from blast_env.scenario import LayoutFile, load_layout, load_scenario
 from blast_env.statistics import check_cvar_level
 
 _SCENARIO: Final = "courtyard"
-_ENGINE: Final = "event"
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluateCommand(EvaluateOptions):
     """Compare layouts with no barrier, both exposed to the same threats.
 
-    Each seed draws a charge from the scenario, the fan and the air. With --run an agent that was
-    trained on visible charges proposes a layout for each of them, any other one layout for all.
+    Each seed draws a charge from the scenario; for particles also the fan and the air. With --run
+    an agent that was trained on visible charges proposes a layout for each of them, any other one
+    layout for all.
     """
 
     layout: Path | None = option(None, "JSON file of the (row, column) cells.")
@@ -47,7 +47,7 @@ class EvaluateCommand(EvaluateOptions):
         scenario = load_scenario(self.scenario or _SCENARIO)
         layout = load_layout(path, scenario)
         plan = LayoutPlan(scenario, layout, provenance=LayoutFile.load(path).provenance)
-        engine = find_engine(self.engine or _ENGINE, self.cell_m)
+        engine = find_engine(self.engine, self.cell_m)
         report_layout(plan, BlastEvaluator(scenario, engine, cache=self.cache), self)
 
     def _evaluate_run(self, run: Path) -> None:

@@ -41,7 +41,7 @@ from blast_env.export import LayoutPlan, check_target, export_layouts, is_file
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.physics.engine import Engine
-from blast_env.physics.engines import is_gas
+from blast_env.physics.engines import GAS, is_gas
 from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.statistics import CVAR_LEVEL, Estimate
 from blast_env.tables import write_csv
@@ -61,9 +61,7 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         min=0,
         show_default="the first one that no training and no search meets",
     )
-    engine: str | None = option(
-        None, "Engine that runs the blasts.", show_default="event; with --run that of the run"
-    )
+    engine: str = option(GAS, "Engine that runs the blasts: gas (gas dynamics), event or pymunk.")
     cell_m: float | None = option(None, CELL_HELP)
     cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
     export: Path | None = option(
@@ -89,15 +87,14 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
     def threats(self, scenario: Scenario, engine: Engine) -> tuple[Threat, ...]:
         """Return the threats that the seeds draw, with what the user has fixed of their charges.
 
-        A charge has one realisation by gas dynamics: of threats with the same one, one is left.
+        Without noise, a charge has one realisation: of threats that all have the same, one is left.
         """
         drawn = draw_threats(scenario, self.seed_range)
         threats = tuple(
             Threat(self.fixed(scenario, threat.charge), threat.seed) for threat in drawn
         )
-        if self.charge_m is None or not is_gas(engine):
-            return threats
-        return tuple({threat.charge: threat for threat in reversed(threats)}.values())[::-1]
+        is_one = is_gas(engine) and len({threat.charge for threat in threats}) == 1
+        return threats[:1] if is_one else threats
 
     @property
     def seed_range(self) -> range:

@@ -101,7 +101,7 @@ _WALL: Final = Path(__file__).with_name("wall.json")
 
 def _evaluate(folder: Path) -> None:
     where = ("--cache", folder / "cache", "--out", folder / "out")
-    _command("evaluate", "--layout", _WALL, "--seeds", "2", *where)
+    _command("evaluate", "--layout", _WALL, "--seeds", "2", "--engine", "event", *where)
 
 
 def _files(folder: Path) -> dict[str, bytes]:

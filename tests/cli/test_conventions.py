@@ -136,7 +136,7 @@ def test_the_charge_is_named_alike_everywhere(site: Path, layout: Path, tmp_path
     place = "60 kg TNT at (5.00, 19.00) m"
     shown = run("simulate", site, "--engine", "event", *CHARGE).stdout
     assert place in shown
-    given = ("--scenario", site, "--layout", layout, "--seeds", 2)
+    given = ("--scenario", site, "--layout", layout, "--seeds", 2, "--engine", "event")
     shown = run("evaluate", *given, *CHARGE).stdout
     assert place in shown
     assert "means over 2 threats" in shown
@@ -151,7 +151,7 @@ def test_the_charge_is_named_alike_everywhere(site: Path, layout: Path, tmp_path
 def test_a_fixed_charge_has_one_blast_of_gas_dynamics(hut_file: Path, tmp_path: Path) -> None:
     wall = tmp_path / "wall.json"
     wall.write_text("[[1, 0], [2, 0]]")
-    given = ("--scenario", hut_file, "--layout", wall, "--seeds", 3, "--engine", "gas")
+    given = ("--scenario", hut_file, "--layout", wall, "--seeds", 3)
     shown = run("evaluate", *given, "--charge", 2, 3.5, "--tnt-kg", 4).stdout
     assert "4 kg TNT at (2.00, 3.50) m" in shown
     assert "2 blasts run" in shown
@@ -161,7 +161,7 @@ def test_each_command_says_engine_and_preset(site: Path, layout: Path) -> None:
     given = ("--scenario", site)
     for arguments in (
         ("simulate", site, "--engine", "event"),
-        ("evaluate", *given, "--layout", layout, "--seeds", 1),
+        ("evaluate", *given, "--layout", layout, "--seeds", 1, "--engine", "event"),
         ("search", *given, "--method", "wall_near_charge", "--held-out", 1),
     ):
         assert "engine event 1 (numba" in run(*arguments).stdout
@@ -190,7 +190,7 @@ def test_sight_lines_are_a_method_of_search(site: Path, tmp_path: Path) -> None:
 
 
 def test_json_is_short_unless_all_is_asked_for(site: Path, layout: Path) -> None:
-    evaluate = ("evaluate", "--scenario", site, "--layout", layout, "--seeds", 2)
+    evaluate = ("evaluate", "--scenario", site, "--layout", layout, "--engine", "event")
     for arguments in (("simulate", site, "--engine", "event"), evaluate):
         short, full = (
             json.loads(run(*arguments, each).stdout) for each in ("--json", "--json-all")
@@ -267,14 +267,17 @@ def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(EventRun, "advance", interrupt)
 
 
+EVALUATE = ("evaluate", "--layout", "LAYOUT", "--engine", "event")
+
+
 @pytest.mark.usefixtures("interrupted")
 @pytest.mark.parametrize(
     ("arguments", "resume"),
     [
         (("search", "--out", "a/b"), "with --cache FOLDER the blasts would have been kept"),
         (("search", "--out", "a", "--cache", "c/d"), "the same command goes on with the blasts"),
-        (("evaluate", "--layout", "LAYOUT", "--out", "a/b"), "with --cache FOLDER the blasts"),
-        (("evaluate", "--layout", "LAYOUT", "--cache", "c"), "the same command goes on"),
+        ((*EVALUATE, "--out", "a/b"), "with --cache FOLDER the blasts"),
+        ((*EVALUATE, "--cache", "c"), "the same command goes on"),
         (("league", "--out", "a", "--methods", "random"), "the same command goes on"),
         (
             ("calibrate", "--name", "a", "--reference", "paper_ufc", "--engine", "event"),
@@ -344,7 +347,8 @@ def test_an_interrupted_training_says_how_to_go_on_and_can_be_evaluated(
     assert result.exit_code == 130, result.output
     assert f"blast-env train --resume {folder} goes on" in result.stderr
     monkeypatch.undo()
-    result = run("evaluate", "--run", folder, "--seeds", 2, "--json")
+    evaluate = ("evaluate", "--run", folder, "--engine", "event")
+    result = run(*evaluate, "--seeds", 2, "--json")
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["provenance"]["weights"] == "last"
-    assert "no evaluation yet" in run("evaluate", "--run", folder, "--seeds", 1).stdout
+    assert "no evaluation yet" in run(*evaluate, "--seeds", 1).stdout

@@ -56,9 +56,9 @@ def test_json_has_the_loads_and_the_cell(site: Path) -> None:
     assert "modules" not in content
 
 
-def test_a_layout_is_evaluated_by_gas(site: Path, tmp_path: Path) -> None:
+def test_a_layout_is_evaluated_by_gas_unless_told_otherwise(site: Path, tmp_path: Path) -> None:
     layout = write_layout(tmp_path / "wall.json", hut(), WALL, {"made by": "hand"})
-    options = ("--layout", layout, "--scenario", site, "--engine", "gas", "--seeds", 1, "--json")
+    options = ("--layout", layout, "--scenario", site, "--seeds", 1, "--json")
     content = json.loads(run("evaluate", *options).stdout)
     assert content["engine"] == "gas"
     assert 0.05 < content["result"]["reduction"]["value"] < 0.6

@@ -47,7 +47,9 @@ def test_an_agent_of_the_features_is_trained_and_evaluated(tmp_path: Path) -> No
     options = ("--steps", "16", "--observation", "features", "--run", folder)
     result = run(*options, *small(tmp_path))
     assert result.exit_code == 0, result.output
-    evaluated = CliRunner().invoke(app, ["evaluate", "--run", str(folder), "--seeds", "2"])
+    evaluated = CliRunner().invoke(
+        app, ["evaluate", "--run", str(folder), "--seeds", "2", "--engine", "event"]
+    )
     assert evaluated.exit_code == 0, evaluated.output
     assert "mean reduction" in evaluated.output
 

@@ -382,6 +382,7 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --run runs/courtyard --seeds 64 --processes 2 --export out/layouts": (
         "--seeds 4"
     ),
+    "blast-env evaluate --layout layout.json --export layout.dxf": "--seeds 2",
     # docs/studies
     "python -m studies.engines": "--seeds 3 --scene courtyard",
     "blast-env bench --repeats 7 --no-environment --no-gas": "--repeats 1 --no-memory",
