@@ -14,7 +14,6 @@ from blast_agents.training.agent import TrainedAgent, fitted, policy_for
 from blast_agents.training.cases import Selection, training_cases
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import AnyHyperparameters
-from blast_agents.training.imitation import Demonstration, imitate, imitation_loss
 from blast_agents.training.run_folder import (
     EvaluationRow,
     RolloutRow,
@@ -22,7 +21,14 @@ from blast_agents.training.run_folder import (
     read_rows,
     settings_from,
 )
-from blast_agents.training.self_labelling import Judge, SelfLabelling, race
+from blast_agents.training.self_labelling import (
+    Demonstration,
+    Judge,
+    SelfLabelling,
+    imitate,
+    imitation_loss,
+    race,
+)
 
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError

@@ -14,8 +14,7 @@ import torch
 import yaml
 from blast_agents.training import resume, train
 from blast_agents.training.checkpoint import Checkpoint, Weights
-from blast_agents.training.learning_curve import learning_curve
-from blast_agents.training.recorder import Progress
+from blast_agents.training.recorder import Progress, learning_curve
 from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunFolder, read_rows
 from blast_agents.training.train import TrainingResult
 

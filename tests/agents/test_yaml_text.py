@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from blast_agents.training.yaml_text import parse_yaml
+from blast_agents.training.hyperparameters import parse_yaml
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -20,8 +20,8 @@ from blast_agents.training.hyperparameters import (
     AnyHyperparameters,
     Hyperparameters,
     SelfLabellingHyperparameters,
+    parse_yaml,
 )
-from blast_agents.training.yaml_text import parse_yaml
 from blast_env.documents import (
     DocumentError,
     checked_as,

@@ -15,16 +15,14 @@ from blast_agents.training.cases import Selection
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.environments import make_environments, training_source
 from blast_agents.training.hyperparameters import SELF_LABELLING, AnyHyperparameters
-from blast_agents.training.imitation import check_observation
-from blast_agents.training.learning_curve import save_learning_curve
-from blast_agents.training.recorder import Progress, Recorder
+from blast_agents.training.recorder import Progress, Recorder, save_learning_curve
 from blast_agents.training.run_folder import (
     RunConfiguration,
     RunFolder,
     TrainingSettings,
     check_scenario,
 )
-from blast_agents.training.self_labelling import SelfLabelling
+from blast_agents.training.self_labelling import SelfLabelling, check_observation
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
