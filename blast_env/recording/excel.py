@@ -1,4 +1,4 @@
-"""The workbook of a blast."""
+"""The workbook of a blast, by pandas' writer."""
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,7 +9,6 @@ from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import pandas as pd
-import xlsxwriter
 from pandas.api import types
 from xlsxwriter.exceptions import XlsxFileError
 
@@ -28,19 +27,30 @@ from blast_env.recording.tables import (
 from blast_env.tables import Column
 from blast_env.values import path_of
 
+SUFFIX: Final = ".xlsx"
+
+EXCEL_ROWS: Final = 1_048_576
+"""The most rows that Excel's format allows on a sheet."""
+
 LONGEST_VALUE: Final = 400
 """The most characters of the run record in one cell; the rest goes on in the next row."""
-
 
 MOST_PRINTED_ROWS: Final = 400
 """The most rows of a sheet that are printed, some ten pages; the print area can be lifted."""
 
+CHARTED_MODULES: Final = 30
+"""The most bars of a chart; the labels of more cannot be read."""
 
+_OPTIONS: Final[Mapping[str, bool]] = MappingProxyType(
+    {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
+)
+"""A name of the user's that begins with = is a text, and no formula."""
+
+_CREATED: Final = datetime(2000, 1, 1)
 _EXACT_INTEGER: Final = 10**15  # Excel rounds greater ones
-
-
 _BUTTON: Final = 4  # characters that the button of the filter takes
-
+_RECORD_WIDTH: Final = 44  # characters of a column of the run record
+_ROW_HEIGHT: Final = 15  # points
 
 _NUMBER_FORMATS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -56,9 +66,216 @@ _NUMBER_FORMATS: Final[Mapping[str, str]] = MappingProxyType(
         "m2": "#,##0.00",
     }
 )
-
-
 _LABELS: Final[Mapping[str, str]] = MappingProxyType({"impulse_sim": "impulse, m|v|"})
+_EXPLANATION_COLUMNS: Final = tuple(
+    Column(name, "", "") for name in ("sheet", "column", "unit", "meaning")
+)
+_UNITS: Final = (
+    ("sim", "simulation unit of impulse: sim mass x sim unit / s"),
+    ("sim mass", "simulation unit of mass"),
+    ("sim units/s", "simulation units of length per second; 4 units are 1 m"),
+)
+
+_CHART_SHEET: Final = "Most loaded"
+_CHART_COLUMN: Final = 2  # of the sheet `Run`
+_LABEL_COLUMNS: Final = tuple(
+    column for column in MODULE_COLUMNS if column.name in ("module_id", "structure", "hits")
+)
+_WIDTH: Final = 640  # pixels
+_HEIGHT_WITHOUT_BARS: Final = 150
+_BAR_HEIGHT: Final = 19
+_FEWEST_BARS: Final = 10  # what the height is at least made for; the axis's title needs it
+_COLOURS: Final = ("#7A042E", "#F08030", "#2F6690", "#5B8E7D", "#8E7DBE", "#8A8A8A")
+
+
+class SheetTable(NamedTuple):
+    """A table for a sheet of its own, with what its columns mean."""
+
+    name: str
+    table: pd.DataFrame
+    columns: Sequence[Column]
+
+
+def write_workbook(
+    blast: RecordedBlast, path: str | Path, max_rows_per_sheet: int = EXCEL_ROWS
+) -> Path:
+    """Write a workbook with the run record, the tables and charts of the impulse per module.
+
+    Its sheets are `Run` (with the charts), `Structures`, `Modules`, `Collisions`, `Most loaded`
+    (what the charts show) and `Columns`, which explains every column. A table that is too long
+    for one sheet goes on in `Collisions 2` and so on. The file is written whole or not at all,
+    and two workbooks of the same blast are the same to the last byte.
+
+    Args:
+        blast: The blast.
+        path: The file, with the suffix `.xlsx`; an existing one is replaced.
+        max_rows_per_sheet: The most rows that a table has on one sheet, its header included.
+
+    Returns:
+        The path.
+
+    Raises:
+        BlastEnvError: If the suffix is another one or the file cannot be written there.
+        ValueError: If `max_rows_per_sheet` is less than 2 or more than Excel allows.
+    """
+    if not 2 <= max_rows_per_sheet <= EXCEL_ROWS:
+        raise ValueError(
+            f"max_rows_per_sheet is {max_rows_per_sheet}, must be between 2 and {EXCEL_ROWS}"
+        )
+    record = blast.run_record
+    tables = (
+        SheetTable("Structures", *structures_in_pa_s(blast.structures, blast.load_unit)),
+        SheetTable("Modules", *modules_in_pa_s(blast.modules, blast.load_unit)),
+        SheetTable("Collisions", blast.collisions, COLLISION_COLUMNS),
+    )
+    with _workbook(path, record, f"Blast {record['scenario']}, seed {record['seed']}") as writer:
+        sheets = _Sheets(writer, max_rows_per_sheet)
+        sheets.add_record(record)
+        for each in tables:
+            sheets.add(each)
+        charts = chart_data(blast)
+        sheets.add_whole(_CHART_SHEET, charts.table, charts.columns)
+        add_charts(writer.book, writer.sheets["Run"], charts)
+        sheets.add(_explanations(tables, _UNITS))
+    return path_of(path)
+
+
+def write_tables(
+    record: RunRecord, tables: Sequence[SheetTable], path: str | Path, title: str | None = None
+) -> Path:
+    """Write a workbook with a run record and tables, and a sheet that explains their columns.
+
+    As `write_workbook`: whole or not at all, and the same to the last byte for the same content.
+
+    Args:
+        record: What was run, with the version of the package.
+        tables: The tables.
+        path: The file.
+        title: Of the file; of a blast unless given.
+
+    Returns:
+        The path.
+
+    Raises:
+        BlastEnvError: If the suffix is another one or the file cannot be written there.
+    """
+    title = title or f"Blast {record['scenario']}, engine {record['engine']}"
+    with _workbook(path, record, title) as writer:
+        sheets = _Sheets(writer, EXCEL_ROWS)
+        sheets.add_record(record)
+        for each in (*tables, _explanations(tables, ())):
+            sheets.add(each)
+    return path_of(path)
+
+
+@contextmanager
+def _workbook(path: str | Path, record: RunRecord, title: str) -> Iterator[Any]:
+    """Give a writer of an empty workbook that becomes the file when the block ends well."""
+    path = path_of(path)
+    if path.suffix.lower() != SUFFIX:
+        raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
+    digest = f", digest {record['digest']}" if "digest" in record else ""
+    # XlsxWriter's own scratch files would stay if it failed.
+    with write_atomically(path) as temporary, scratch_folder() as scratch:
+        options = {**_OPTIONS, "tmpdir": str(scratch), "use_zip64": True}
+        try:
+            with (
+                temporary.open("wb") as file,
+                pd.ExcelWriter(
+                    file, engine="xlsxwriter", engine_kwargs={"options": options}
+                ) as writer,
+            ):
+                writer.book.set_properties(
+                    {
+                        "title": title,
+                        "comments": f"blast-env {record['blast-env version']}{digest}",
+                        "created": _CREATED,
+                    }
+                )
+                yield writer
+        except (OSError, XlsxFileError) as error:
+            raise BlastEnvError(f"{path}: cannot be written: {error}") from error
+
+
+class _Sheets:
+    """Adds sheets with frozen headings to a workbook.
+
+    Args:
+        writer: Of an empty workbook.
+        max_rows: The most rows that a table has on one sheet, its header included.
+    """
+
+    def __init__(self, writer: Any, max_rows: int) -> None:
+        self._writer, self._max_rows = writer, max_rows
+        wrapped = {"valign": "top", "align": "left", "indent": 1, "text_wrap": True}
+        heading = wrapped | {"bold": True, "bg_color": "#ECE2C6", "bottom": 1}
+        self._wrapped = writer.book.add_format(wrapped)
+        self._text_heading = writer.book.add_format(heading)
+        self._number_heading = writer.book.add_format(heading | {"align": "right", "indent": 0})
+
+    def add(self, part: SheetTable) -> None:
+        """Add a table, on several sheets where it is too long for one."""
+        per_sheet = self._max_rows - 1
+        for number, start in enumerate(range(0, max(len(part.table), 1), per_sheet), start=1):
+            name = part.name if number == 1 else f"{part.name} {number}"
+            self.add_whole(name, part.table.iloc[start : start + per_sheet], part.columns)
+
+    def add_whole(self, name: str, table: pd.DataFrame, columns: Sequence[Column]) -> None:
+        """Add a table on one sheet: headings with units and notes, formats, widths, a filter."""
+        shown = pd.DataFrame({each.name: readable(table[each.name]) for each in columns})
+        sheet = self._write(name, shown)
+        lines = 1
+        for index, column in enumerate(columns):
+            values, heading = shown[column.name], header(column)
+            number_format = _number_format(values, column.unit)
+            width = max(_heading_width(heading), _values_width(values, number_format))
+            lines = max(lines, len(textwrap.wrap(heading, width)))
+            sheet.set_column(index, index, width + _BUTTON, self._format(number_format))
+            is_text = number_format == "@"
+            sheet.write_string(
+                0, index, heading, self._text_heading if is_text else self._number_heading
+            )
+            if column.meaning:
+                sheet.write_comment(0, index, column.meaning, {"y_scale": 0.6})
+        sheet.set_row(0, _ROW_HEIGHT * (1 + lines))  # the button of the filter covers the last
+        sheet.autofilter(0, 0, len(table), len(columns) - 1)
+        if len(table) > MOST_PRINTED_ROWS:
+            sheet.print_area(0, 0, MOST_PRINTED_ROWS, len(columns) - 1)
+            sheet.set_header(f"&RPrinted: the first {MOST_PRINTED_ROWS} of {len(table):,} rows")
+
+    def add_record(self, record: Mapping[str, str | int | float]) -> None:
+        """Add the run record as pairs on the sheet `Run`."""
+        pairs = [
+            (f"{name}, continued" if number else name, line)
+            for name, value in record.items()
+            for number, line in enumerate(record_cells(value))
+        ]
+        sheet = self._write("Run", pd.DataFrame(pairs, columns=["quantity", "value"]))
+        sheet.set_column(0, 1, _RECORD_WIDTH, self._wrapped)
+        for index, heading in enumerate(("quantity", "value")):
+            sheet.write_string(0, index, heading, self._text_heading)
+        for row, (_, line) in enumerate(pairs, start=1):
+            # Set, not left to the program: the charts beside are placed by it.
+            lines = textwrap.wrap(str(line), _RECORD_WIDTH - 2)
+            sheet.set_row(row, _ROW_HEIGHT * max(1, len(lines)))
+
+    def _write(self, name: str, table: pd.DataFrame) -> Any:
+        """Write the values of a table below the row of headings, and return the sheet."""
+        table.to_excel(self._writer, sheet_name=name, index=False, header=False, startrow=1)
+        sheet = self._writer.sheets[name]
+        sheet.freeze_panes(1, 0)
+        sheet.set_landscape()
+        sheet.set_paper(9)  # A4
+        sheet.fit_to_pages(1, 0)
+        sheet.repeat_rows(0)
+        sheet.set_footer("&L&F&C&A&R&P / &N")
+        return sheet
+
+    def _format(self, number_format: str) -> Any:
+        # The indent keeps a text off the number on its left.
+        indent = {"align": "left", "indent": 1} if number_format == "@" else {}
+        style = {"num_format": number_format, "valign": "top"} | indent
+        return self._writer.book.add_format(style)
 
 
 def header(column: Column) -> str:
@@ -70,70 +287,11 @@ def header(column: Column) -> str:
     return f"{label} ({column.unit})" if column.unit else label
 
 
-class Heading(NamedTuple):
-    """The heading of a column of a sheet.
-
-    Attributes:
-        text: The text.
-        width: Width of the column, characters.
-        lines: Lines that the text takes in that width.
-        of_numbers: Whether there are numbers below.
-    """
-
-    text: str
-    width: int
-    lines: int = 1
-    of_numbers: bool = False
-
-
-class CellStyle(NamedTuple):
-    """How the values of a column are written.
-
-    Attributes:
-        method: Name of the method of XlsxWriter's worksheet.
-        number_format: The number format, in Excel's notation.
-    """
-
-    method: str
-    number_format: str
-
-    @classmethod
-    def of(cls, values: "pd.Series[Any]", unit: str) -> "CellStyle":
-        """Return the style for `readable` values of a unit."""
-        if types.is_float_dtype(values):
-            return cls("write_number", _NUMBER_FORMATS.get(unit, "0.000"))
-        if types.is_integer_dtype(values):
-            return cls("write_number", "0")
-        return cls("write_string", "@")
-
-    def heading(self, text: str, values: "pd.Series[Any]") -> Heading:
-        """Return the heading of a column with these values."""
-        text_width = _heading_width(text)
-        width = max(text_width, self._values_width(values)) + _BUTTON
-        lines = len(textwrap.wrap(text, width - _BUTTON))
-        return Heading(text, width, lines, of_numbers=self.method == "write_number")
-
-    def _values_width(self, values: "pd.Series[Any]") -> int:
-        """Return the characters that the longest value takes."""
-        present = values.dropna()
-        if present.empty:
-            return 0
-        if self.method == "write_string":
-            return int(present.str.len().max())
-        decimals = len(self.number_format.partition(".")[2])
-        return len(f"{present.abs().max():,.0f}") + len("-.") + decimals
-
-
 def readable(values: "pd.Series[Any]") -> "pd.Series[Any]":
     """Return the values with words for booleans; programs differ in how they show those."""
     if types.is_bool_dtype(values):
         return values.map({True: "yes", False: "no"}).astype("str")
     return values
-
-
-def cells(values: "pd.Series[Any]") -> list[Any]:
-    """Return the values as Python objects, None where there is none."""
-    return list(values.astype(object).where(values.notna(), None))
 
 
 def record_cells(value: str | int | float) -> list[str | int | float]:
@@ -150,6 +308,24 @@ def record_cells(value: str | int | float) -> list[str | int | float]:
     return [value]
 
 
+def _number_format(values: "pd.Series[Any]", unit: str) -> str:
+    """Return how values of a unit are shown, in Excel's notation; "@" for texts."""
+    if types.is_float_dtype(values):
+        return _NUMBER_FORMATS.get(unit, "0.000")
+    return "0" if types.is_integer_dtype(values) else "@"
+
+
+def _values_width(values: "pd.Series[Any]", number_format: str) -> int:
+    """Return the characters that the longest value takes."""
+    present = values.dropna()
+    if present.empty:
+        return 0
+    if number_format == "@":
+        return int(present.str.len().max())
+    decimals = len(number_format.partition(".")[2])
+    return len(f"{present.abs().max():,.0f}") + len("-.") + decimals
+
+
 def _heading_width(text: str) -> int:
     """Return the fewest characters in which a heading takes two lines and no unit is broken."""
     unit = text[text.find("(") :] if "(" in text else ""
@@ -161,28 +337,16 @@ def _heading_width(text: str) -> int:
         width += 1
 
 
-CHARTED_MODULES: Final = 30
-"""The most bars of a chart; the labels of more cannot be read."""
-
-
-_LABEL_COLUMNS: Final = tuple(
-    column for column in MODULE_COLUMNS if column.name in ("module_id", "structure", "hits")
-)
-
-
-_WIDTH: Final = 640  # pixels
-
-
-_HEIGHT_WITHOUT_BARS: Final = 150
-
-
-_BAR_HEIGHT: Final = 19
-
-
-_FEWEST_BARS: Final = 10  # what the height is at least made for; the axis's title needs it
-
-
-_COLOURS: Final = ("#7A042E", "#F08030", "#2F6690", "#5B8E7D", "#8E7DBE", "#8A8A8A")
+def _explanations(tables: Sequence[SheetTable], units: Sequence[tuple[str, str]]) -> SheetTable:
+    """Return what every column and every unit means, as a table of its own."""
+    rows = [
+        (each.name, header(column), column.unit, column.meaning)
+        for each in tables
+        for column in each.columns
+    ]
+    rows += [("", "", unit, meaning) for unit, meaning in units]
+    names = [column.name for column in _EXPLANATION_COLUMNS]
+    return SheetTable("Columns", pd.DataFrame(rows, columns=names), _EXPLANATION_COLUMNS)
 
 
 class Ranking(NamedTuple):
@@ -247,25 +411,24 @@ def _names(structures: Sequence[str], unit: LoadUnit) -> tuple[str, ...]:
     )
 
 
-def add_charts(workbook: Any, sheet: Any, column: int, data_sheet: str, data: ChartData) -> None:
-    """Put the charts onto a sheet, side by side, or a note that there is nothing to chart.
+def add_charts(workbook: Any, sheet: Any, data: ChartData) -> None:
+    """Put the charts onto the sheet of the run record, or a note that there is nothing to chart.
 
     Args:
-        workbook: The workbook.
-        sheet: The sheet that the charts are put onto.
-        column: The column of the sheet at which the first chart starts.
-        data_sheet: Name of the sheet that has the table of `data`, under one row of headings.
+        workbook: The workbook, which has the table of `data` on a sheet of its own.
+        sheet: The sheet that the charts are put onto, side by side.
         data: What to show.
     """
     if not data.rankings:
-        sheet.insert_textbox(1, column, "No module was hit.", {"x_offset": 20, "height": 40})
+        options = {"x_offset": 20, "height": 40}
+        sheet.insert_textbox(1, _CHART_COLUMN, "No module was hit.", options)
     first = 0
     for number, ranking in enumerate(data.rankings):
         chart = workbook.add_chart({"type": "bar", "subtype": "stacked"})
-        _add_series(chart, data_sheet, data, slice(first, first + len(ranking.modules)))
+        _add_series(chart, data, slice(first, first + len(ranking.modules)))
         _add_labels(chart, ranking, data.label)
         place = {"object_position": 3, "x_offset": 20 + number * (_WIDTH + 20), "y_offset": 5}
-        sheet.insert_chart(1, column, chart, place)
+        sheet.insert_chart(1, _CHART_COLUMN, chart, place)
         first += len(ranking.modules)
 
 
@@ -296,24 +459,20 @@ def _ranking(name: str, hit: pd.DataFrame, unit: LoadUnit) -> Ranking:
     return Ranking(f"Impulse on the {name}{total}, {which}{len(hit)} {modules} hit", top)
 
 
-def _add_series(chart: Any, sheet: str, data: ChartData, rows: slice) -> None:
+def _add_series(chart: Any, data: ChartData, rows: slice) -> None:
     """Add one series a structure, for some rows of the table."""
     part = data.table.iloc[rows]
     first, last = rows.start + 1, rows.stop  # on the sheet, below the headings
     label = data.columns.index(_LABEL_COLUMNS[0])
     for index, structure in enumerate(data.structures):
         column = len(_LABEL_COLUMNS) + index
-        impulse = part[data.columns[column].name]
-        if impulse.isna().all():
+        if part[data.columns[column].name].isna().all():
             continue
         chart.add_series(
             {
                 "name": structure,
-                "categories": [sheet, first, label, last, label],
-                "values": [sheet, first, column, last, column],
-                # Constant memory keeps no cells from which XlsxWriter could fill its cache.
-                "categories_data": part[_LABEL_COLUMNS[0].name].tolist(),
-                "values_data": impulse.astype(object).where(impulse.notna(), None).tolist(),
+                "categories": [_CHART_SHEET, first, label, last, label],
+                "values": [_CHART_SHEET, first, column, last, column],
                 "fill": {"color": _COLOURS[index % len(_COLOURS)]},
                 "gap": 40,
             }
@@ -346,268 +505,3 @@ def _add_labels(chart: Any, ranking: Ranking, label: str) -> None:
             "height": _HEIGHT_WITHOUT_BARS + _BAR_HEIGHT * max(len(ranking.modules), _FEWEST_BARS),
         }
     )
-
-
-SUFFIX: Final = ".xlsx"
-
-
-EXCEL_ROWS: Final = 1_048_576
-"""The most rows that Excel's format allows on a sheet."""
-
-
-_CREATED: Final = datetime(2000, 1, 1)
-
-
-_RECORD_WIDTH: Final = 44  # characters of a column of the run record
-
-
-_ROW_HEIGHT: Final = 15  # points
-
-
-_CHART_SHEET: Final = "Most loaded"
-
-
-_CHART_COLUMN: Final = 2  # of the sheet `Run`
-
-
-_EXPLANATION_COLUMNS: Final = (
-    Column("sheet", "", ""),
-    Column("column", "", ""),
-    Column("unit", "", ""),
-    Column("meaning", "", ""),
-)
-
-
-_UNITS: Final = (
-    ("sim", "simulation unit of impulse: sim mass x sim unit / s"),
-    ("sim mass", "simulation unit of mass"),
-    ("sim units/s", "simulation units of length per second; 4 units are 1 m"),
-)
-
-
-def write_workbook(
-    blast: RecordedBlast, path: str | Path, max_rows_per_sheet: int = EXCEL_ROWS
-) -> Path:
-    """Write a workbook with the run record, the tables and charts of the impulse per module.
-
-    Its sheets are `Run` (with the charts), `Structures`, `Modules`, `Collisions`, `Most loaded`
-    (what the charts show) and `Columns`, which explains every column. A table that is too long
-    for one sheet goes on in `Collisions 2` and so on. The file is written whole or not at all,
-    and two workbooks of the same blast are the same to the last byte.
-
-    Args:
-        blast: The blast.
-        path: The file, with the suffix `.xlsx`; an existing one is replaced.
-        max_rows_per_sheet: The most rows that a table has on one sheet, its header included.
-
-    Returns:
-        The path.
-
-    Raises:
-        BlastEnvError: If the suffix is another one or the file cannot be written there.
-        ValueError: If `max_rows_per_sheet` is less than 2 or more than Excel allows.
-    """
-    if not 2 <= max_rows_per_sheet <= EXCEL_ROWS:
-        raise ValueError(
-            f"max_rows_per_sheet is {max_rows_per_sheet}, must be between 2 and {EXCEL_ROWS}"
-        )
-    with _workbook(path) as workbook:
-        _WorkbookWriter(workbook, max_rows_per_sheet).write(blast)
-    return path_of(path)
-
-
-class SheetTable(NamedTuple):
-    """A table for a sheet of its own, with what its columns mean."""
-
-    name: str
-    table: pd.DataFrame
-    columns: Sequence[Column]
-
-
-def write_tables(
-    record: RunRecord, tables: Sequence[SheetTable], path: str | Path, title: str | None = None
-) -> Path:
-    """Write a workbook with a run record and tables, and a sheet that explains their columns.
-
-    As `write_workbook`: whole or not at all, and the same to the last byte for the same content.
-
-    Args:
-        record: What was run, with the version of the package.
-        tables: The tables.
-        path: The file.
-        title: Of the file; of a blast unless given.
-
-    Returns:
-        The path.
-
-    Raises:
-        BlastEnvError: If the suffix is another one or the file cannot be written there.
-    """
-    title = title or f"Blast {record['scenario']}, engine {record['engine']}"
-    with _workbook(path) as workbook:
-        _WorkbookWriter(workbook, EXCEL_ROWS).write_tables(record, tables, title)
-    return path_of(path)
-
-
-@contextmanager
-def _workbook(path: str | Path) -> Iterator[Any]:
-    """Give an empty workbook that becomes the file when the block ends well."""
-    path = path_of(path)
-    if path.suffix.lower() != SUFFIX:
-        raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
-    with write_atomically(path) as temporary:
-        try:
-            with (
-                # XlsxWriter's own scratch files would stay if it failed.
-                scratch_folder() as scratch,
-                xlsxwriter.Workbook(
-                    str(temporary), {"constant_memory": True, "tmpdir": str(scratch)}
-                ) as workbook,
-            ):
-                workbook.use_zip64()
-                yield workbook
-        except (OSError, XlsxFileError) as error:
-            raise BlastEnvError(f"{path}: cannot be written: {error}") from error
-
-
-class _WorkbookWriter:
-    """Writes the sheets of one workbook.
-
-    Args:
-        workbook: An empty workbook with constant memory: every sheet is written row by row.
-        max_rows: The most rows that a table has on one sheet, its header included.
-    """
-
-    def __init__(self, workbook: Any, max_rows: int) -> None:
-        self._workbook = workbook
-        self._max_rows = max_rows
-        self._number_formats: dict[str, Any] = {}
-        wrapped = {"valign": "top", "align": "left", "indent": 1, "text_wrap": True}
-        heading = wrapped | {"bold": True, "bg_color": "#ECE2C6", "bottom": 1}
-        self._wrapped = workbook.add_format(wrapped)
-        self._text_heading = workbook.add_format(heading)
-        self._number_heading = workbook.add_format(heading | {"align": "right", "indent": 0})
-
-    def write(self, blast: RecordedBlast) -> None:
-        """Write all sheets of a blast of particles, with charts, and the properties."""
-        record = blast.run_record
-        self._set_properties(record, f"Blast {record['scenario']}, seed {record['seed']}")
-        run = self._write_run(record)
-        tables = (
-            SheetTable("Structures", *structures_in_pa_s(blast.structures, blast.load_unit)),
-            SheetTable("Modules", *modules_in_pa_s(blast.modules, blast.load_unit)),
-            SheetTable("Collisions", blast.collisions, COLLISION_COLUMNS),
-        )
-        for each in tables:
-            self._write_table(*each)
-        data = chart_data(blast)
-        self._write_sheet(_CHART_SHEET, data.table, data.columns)
-        add_charts(self._workbook, run, _CHART_COLUMN, _CHART_SHEET, data)
-        self._write_columns(tables, _UNITS)
-
-    def write_tables(self, record: RunRecord, tables: Sequence[SheetTable], title: str) -> None:
-        """Write a run record and tables, and the properties."""
-        self._set_properties(record, title)
-        self._write_run(record)
-        for each in tables:
-            self._write_table(*each)
-        self._write_columns(tables, ())
-
-    def _set_properties(self, record: RunRecord, title: str) -> None:
-        digest = f", digest {record['digest']}" if "digest" in record else ""
-        self._workbook.set_properties(
-            {
-                "title": title,
-                "comments": f"blast-env {record['blast-env version']}{digest}",
-                "created": _CREATED,
-            }
-        )
-
-    def _add_sheet(self, name: str, headings: Sequence[Heading]) -> Any:
-        """Add a sheet with a frozen row of headings, and return it."""
-        sheet = self._workbook.add_worksheet(name)
-        sheet.freeze_panes(1, 0)
-        sheet.set_landscape()
-        sheet.set_paper(9)  # A4
-        sheet.fit_to_pages(1, 0)
-        sheet.repeat_rows(0)
-        sheet.set_footer("&L&F&C&A&R&P / &N")
-        for index, heading in enumerate(headings):
-            cell_format = self._number_heading if heading.of_numbers else self._text_heading
-            sheet.set_column(index, index, heading.width)
-            sheet.write_string(0, index, heading.text, cell_format)
-        return sheet
-
-    def _write_run(self, record: Mapping[str, str | int | float]) -> Any:
-        """Write the run record as pairs, and return the sheet."""
-        sheet = self._add_sheet(
-            "Run", [Heading(text, _RECORD_WIDTH) for text in ("quantity", "value")]
-        )
-        row = 1
-        for name, value in record.items():
-            for number, line in enumerate(record_cells(value)):
-                # Set, not left to the program: the charts beside are placed by it.
-                lines = textwrap.wrap(str(line), _RECORD_WIDTH - 2)
-                sheet.set_row(row, _ROW_HEIGHT * max(1, len(lines)))
-                sheet.write_string(row, 0, f"{name}, continued" if number else name, self._wrapped)
-                write = sheet.write_string if isinstance(line, str) else sheet.write
-                write(row, 1, line, self._wrapped)
-                row += 1
-        return sheet
-
-    def _write_table(self, name: str, table: pd.DataFrame, columns: Sequence[Column]) -> None:
-        """Write a table, to several sheets where it is too long for one."""
-        per_sheet = self._max_rows - 1
-        for number, start in enumerate(range(0, max(len(table), 1), per_sheet), start=1):
-            sheet_name = name if number == 1 else f"{name} {number}"
-            self._write_sheet(sheet_name, table.iloc[start : start + per_sheet], columns)
-
-    def _write_sheet(self, name: str, table: pd.DataFrame, columns: Sequence[Column]) -> None:
-        """Write a table to one sheet."""
-        values = [readable(table[column.name]) for column in columns]
-        styles = [CellStyle.of(v, c.unit) for v, c in zip(values, columns, strict=True)]
-        headings = [
-            style.heading(header(column), column_values)
-            for style, column, column_values in zip(styles, columns, values, strict=True)
-        ]
-        sheet = self._add_sheet(name, headings)
-        # The button of the filter covers the last line.
-        sheet.set_row(0, _ROW_HEIGHT * (1 + max(heading.lines for heading in headings)))
-        for index, column in enumerate(columns):
-            if column.meaning:
-                sheet.write_comment(0, index, column.meaning, {"y_scale": 0.6})
-        sheet.autofilter(0, 0, len(table), len(columns) - 1)
-        if len(table) > MOST_PRINTED_ROWS:
-            sheet.print_area(0, 0, MOST_PRINTED_ROWS, len(columns) - 1)
-            sheet.set_header(f"&RPrinted: the first {MOST_PRINTED_ROWS} of {len(table):,} rows")
-        writers = [
-            (index, getattr(sheet, style.method), self._format(style.number_format))
-            for index, style in enumerate(styles)
-        ]
-        for row, row_cells in enumerate(zip(*map(cells, values), strict=True), start=1):
-            for (index, write, cell_format), cell in zip(writers, row_cells, strict=True):
-                if cell is not None:
-                    write(row, index, cell, cell_format)
-
-    def _write_columns(
-        self, tables: Sequence[SheetTable], units: Sequence[tuple[str, str]]
-    ) -> None:
-        """Write what every column and every unit means."""
-        rows = [
-            (each.name, header(column), column.unit, column.meaning)
-            for each in tables
-            for column in each.columns
-        ]
-        rows += [("", "", unit, meaning) for unit, meaning in units]
-        names = [column.name for column in _EXPLANATION_COLUMNS]
-        self._write_sheet("Columns", pd.DataFrame(rows, columns=names), _EXPLANATION_COLUMNS)
-
-    def _format(self, number_format: str) -> Any:
-        """Return the cell format with a number format; each is made once."""
-        if number_format not in self._number_formats:
-            # The indent keeps a text off the number on its left.
-            indent = {"align": "left", "indent": 1} if number_format == "@" else {}
-            self._number_formats[number_format] = self._workbook.add_format(
-                {"num_format": number_format, "valign": "top"} | indent
-            )
-        return self._number_formats[number_format]

@@ -51,6 +51,12 @@ _ELSEWHERE: Final = {
     "blast_env/rendering/film.py: Popen": "ffmpeg writes to the temporary file of its caller",
     "blast_env/rendering/film.py: first.save": "to the temporary file of its caller",
     "blast_env/app/jobs.py: subprocess.Popen": "a worker, which is this package",
+    "blast_env/app/page/uploads.py: file.save": "an upload, into a scratch folder",
+    "blast_env/reading.py: subprocess.Popen": "a worker, which is this package",
+    "blast_env/reading.py: os.fdopen": "the worker's standard output",
+    "blast_env/recording/excel.py: table.to_excel": "to the temporary file of `write_atomically`",
+    "blast_env/response/plate_table.py: "
+    "Path(__file__).with_name('data').joinpath(_NAME).write_text": "makes the package's own table",
     "blast_env/cluster.py: connect": "to a cluster",
     "blast_env/studies/gas/pyclaw_worker.py": "runs without this package, in a scratch folder",
     "agents/blast_agents/training/train.py: configure": "TensorBoard's; train tells its errors",

@@ -52,4 +52,4 @@ def _expected_cell(value: Any) -> Any:
     if isinstance(value, float):
         # Excel's files hold 16 digits, a double has up to 17.
         return None if value != value else float(f"{value:.16G}")
-    return value
+    return value if value != "" else None
