@@ -8,7 +8,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Final, Union, overload
+from typing import TYPE_CHECKING, Any, Final, Literal, Union, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,9 @@ from blast_env.errors import BlastEnvError
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
+
+LawName = Literal["proportional", "linear", "power"]
+"""The laws that `blast-env calibrate` fits."""
 
 Numbers = Union[Sequence[float], NDArray[Any], "pd.Series"]
 """Several numbers; a lone one is a float."""

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from blast_env.calibration.laws import LawName
 from blast_env.calibration.metrics import shape_rms_percent
 from blast_env.calibration.model import (
     Calibration,
@@ -24,18 +25,12 @@ from blast_env.cli.output import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder
-from blast_env.fitting.free_field import (
-    CalibrationReport,
-    FreeFieldStudy,
-    LawName,
-    Reference,
-    kingery_bulmash_reference,
-    paper_reference,
-)
-from blast_env.fitting.free_field import calibrate as fit_laws
 from blast_env.physics.engines import find_engine
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.tables import write_csv
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    from blast_env.fitting.free_field import CalibrationReport, FreeFieldStudy, Reference
 
 ReferenceName = Literal["paper_ufc", "reflected_impulse", "incident_impulse"]
 Burst = Literal["hemispherical", "spherical"]
@@ -93,6 +88,10 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
 
     def __call__(self) -> None:
         """Run the study, write its files and print its tables."""
+        # Here, because pandas and SciPy take a third of a second to import.
+        from blast_env.fitting.free_field import FreeFieldStudy
+        from blast_env.fitting.free_field import calibrate as fit_laws
+
         distances_m = _parse_numbers("--distances", self.distances)
         tnt_range_kg = _parse_range(self.tnt_range)
         make_folder(self.out)
@@ -143,21 +142,23 @@ def _parse_range(text: str | None) -> tuple[float, float] | None:
     return numbers[0], numbers[1]
 
 
-def _reference(name: ReferenceName, study: FreeFieldStudy, burst: Burst) -> Reference:
+def _reference(name: ReferenceName, study: "FreeFieldStudy", burst: Burst) -> "Reference":
+    from blast_env.fitting.free_field import kingery_bulmash_reference, paper_reference
+
     if name == "paper_ufc":
         return paper_reference(study.distances_m)
     charge_kg = study.scenario.charge[0].tnt_kg
     return kingery_bulmash_reference(study.distances_m, charge_kg, name, burst)
 
 
-def _write(report: CalibrationReport, stored: Calibration, stem: str) -> list[Path]:
+def _write(report: "CalibrationReport", stored: Calibration, stem: str) -> list[Path]:
     record, picture = Path(f"{stem}.json"), Path(f"{stem}.png")
     save_calibration(stored, record)
     table = write_csv(report.table(), f"{stem}.csv")
     return [record, table, *save_pictures(lambda: _save_figure(report, stored, picture))]
 
 
-def _save_figure(report: CalibrationReport, stored: Calibration, path: Path) -> list[Path]:
+def _save_figure(report: "CalibrationReport", stored: Calibration, path: Path) -> list[Path]:
     # Here, because pictures need the extra `render`.
     from blast_env.fitting.figures import calibration_figure
     from blast_env.rendering.figures import save_figure
@@ -165,7 +166,7 @@ def _save_figure(report: CalibrationReport, stored: Calibration, path: Path) -> 
     return [save_figure(calibration_figure(report, stored.name), path)]
 
 
-def _print(report: CalibrationReport, stored: Calibration) -> None:
+def _print(report: "CalibrationReport", stored: Calibration) -> None:
     table = make_table(
         f"{stored.name}: {len(stored.seeds)} seeds at each distance, reference "
         f"{stored.reference.source}, {stored.reference.quantity.replace('_', ' ')}",

@@ -2,24 +2,17 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-import pandas as pd
 from rich.table import Table
 
 from blast_env.cli.command import FOLDER, Command, option
 from blast_env.cli.output import make_table, result_console, save_pictures
 from blast_env.files import make_folder
-from blast_env.fitting.paper import (
-    CONTRADICTIONS,
-    PAPER_LAWS,
-    TABLE_4_DECIMALS,
-    comparative_table,
-    comparison_table,
-    deviations,
-    metrics_row,
-)
 from blast_env.tables import write_csv
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +27,15 @@ class PaperCommand(Command):
 
     def __call__(self) -> None:
         """Print the tables and what is to be said of them; write them and the figure."""
+        # Here, because pandas takes a third of a second to import.
+        from blast_env.fitting.paper import (
+            CONTRADICTIONS,
+            PAPER_LAWS,
+            TABLE_4_DECIMALS,
+            comparative_table,
+            comparison_table,
+        )
+
         make_folder(self.out)
         console, written = result_console(), []
         headers: tuple[str, ...] = ("R (m)", "i_ufc", "i_sim", "i_scaled", "E_abs", "E%")
@@ -66,7 +68,7 @@ def _save_figure(path: Path) -> Path:
 
 
 def rich_table(
-    title: str, headers: tuple[str, ...], table: pd.DataFrame, formats: tuple[str, ...]
+    title: str, headers: tuple[str, ...], table: "pd.DataFrame", formats: tuple[str, ...]
 ) -> Table:
     """Return the first columns of a table, rounded, one for each format."""
     shown = make_table(title, headers)
@@ -76,9 +78,11 @@ def rich_table(
     return shown
 
 
-def largest_deviation(table: pd.DataFrame, decimals: tuple[int, int, int]) -> str:
+def largest_deviation(table: "pd.DataFrame", decimals: tuple[int, int, int]) -> str:
     """Return a sentence about how far the printed cells are from ours."""
-    largest = np.abs(deviations(table, decimals)).max()
+    from blast_env.fitting.paper import deviations
+
+    largest = abs(deviations(table, decimals)).max()
     return (
         f"largest deviation from a printed cell: {largest:.2f} of its last digit"
         f" ({'within' if largest <= 0.5 else 'BEYOND'} the paper's rounding)\n"
@@ -87,6 +91,8 @@ def largest_deviation(table: pd.DataFrame, decimals: tuple[int, int, int]) -> st
 
 def coefficient_table() -> Table:
     """Return the coefficients of the paper's text and of its columns, and what they give."""
+    from blast_env.fitting.paper import PAPER_LAWS, TABLE_4_DECIMALS, metrics_row
+
     headers = ("law", "from", "coefficients", "MAPE (%)", "RMSE (psi s)", "integral error (%)")
     table = make_table("Coefficients, and the row of Table 4 that they give", headers, 3)
     for law in PAPER_LAWS:

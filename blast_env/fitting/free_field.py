@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 from scipy.special import stdtrit
 
-from blast_env.calibration.laws import Fit, ScalingLaw, fit_linear, fit_power_law, fit_proportional
+from blast_env.calibration.laws import (
+    Fit,
+    LawName,
+    ScalingLaw,
+    fit_linear,
+    fit_power_law,
+    fit_proportional,
+)
 from blast_env.calibration.metrics import (
     FitMetrics,
     bootstrap_coefficients,
@@ -220,9 +227,6 @@ def _run_one(job: tuple[str, Scenario, float, int, str]) -> FreeFieldRun:
 FITS: Final[Mapping[str, Fit]] = MappingProxyType(
     {"proportional": fit_proportional, "linear": fit_linear, "power": fit_power_law}
 )
-
-
-LawName = Literal["proportional", "linear", "power"]
 
 
 ImpulseQuantity = Literal["incident_impulse", "reflected_impulse"]

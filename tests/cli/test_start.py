@@ -12,7 +12,7 @@ from tests.agents.search_cases import small_scenario
 SLOW = ("matplotlib", "numba", "pandas", "pyarrow", "pymunk", "scipy", "torch", "xlsxwriter")
 """What takes a tenth of a second or more to import."""
 
-LATER = ("calibrate", "search", "bench", "league", "propose")
+LATER = ("search", "bench", "league", "propose")
 """Commands that still import what they work with at once."""
 
 NOT_ON_WINDOWS = ("fcntl", "grp", "pwd", "resource", "syslog", "termios")
