@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from blast_agents.training.train import TrainingResult
 
 _DEFAULT_ALGORITHM: Final = "maskable_ppo"
+_POLICIES: Final = {"features": "MlpPolicy", "image": "CnnPolicy"}
+"""Policies for what are no planes, which those of the YAML files look at."""
 _DEFAULT_SCENARIO: Final = "courtyard"
 _WITH_RESUME: Final = ("resume", "scenario", "cluster")
 """Options that go with `--resume`; the run folder says the others."""
@@ -120,8 +122,8 @@ class TrainCommand(ClusterOptions):
         algorithm = self.algo or _DEFAULT_ALGORITHM
         scenario = self.scenario or _DEFAULT_SCENARIO
         changes = parse_options(self.changes, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
-        if self.observation == "features":  # no planes, which the YAML file's policy looks at
-            changes.setdefault("policy", "MlpPolicy")
+        if self.observation in _POLICIES:
+            changes.setdefault("policy", _POLICIES[self.observation])
         names = ("steps", "seed", "threat", "engine", "observation", "cell_m")
         given = {name: getattr(self, name) for name in names}
         values = {name: value for name, value in given.items() if value is not None}

@@ -11,7 +11,7 @@ import torch
 from blast_agents.policies.spatial import SpatialPolicy
 from blast_agents.proposal import LayoutAgent
 from blast_agents.training import TrainedAgent, load_agent, load_archive, train
-from blast_agents.training.agent import logits_of, make_model, make_policy
+from blast_agents.training.agent import logits_of, make_model, policy_for
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.environments import make_environments, training_source
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
@@ -20,7 +20,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from sb3_contrib import MaskablePPO
 
 from blast_env import load_scenario
-from blast_env.envs.observations import GridObservation, GridWithLoadObservation, Observable
+from blast_env.envs.observations import GridWithLoadObservation, Observable
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement, PointSource, Scenario
@@ -52,12 +52,7 @@ def untrained(scenario: Scenario) -> TrainedAgent:
         hyperparameters=chosen,
         scenario_hash=scenario.content_hash,
     )
-    policy = make_policy(
-        configuration,
-        GridObservation().space(scenario),
-        spaces.Discrete(zone.rows * zone.columns + 1),
-    )
-    return TrainedAgent(policy, scenario)
+    return TrainedAgent(policy_for(configuration, scenario), scenario)
 
 
 def test_proposals_are_legal_and_always_the_same(run: Path) -> None:
@@ -214,6 +209,15 @@ def test_weights_of_another_network_are_refused(run: Path, tmp_path: Path) -> No
     (copy / "config.yaml").write_text(text.replace("width: 8", "width: 9"))
     with pytest.raises(BlastEnvError, match="width is 9 in the configuration, must be 8"):
         load_agent(copy)
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "maskable_ppo"])
+def test_an_image_agent_is_trained_loaded_and_proposes(tmp_path: Path, algorithm: str) -> None:
+    chosen = settings(scenario_file(tmp_path), algorithm=algorithm, steps=16, observation="image")
+    train(chosen, hyperparameters({"policy": "CnnPolicy"}, algorithm), tmp_path / "run")
+    agent = load_agent(tmp_path / "run")
+    layout = agent.propose(small_scenario(), CHARGES[0])
+    assert Placement.of(small_scenario(), layout).cells == layout
 
 
 def test_an_archive_needs_trust(run: Path, tmp_path: Path) -> None:

@@ -22,10 +22,9 @@ from stable_baselines3.common.policies import ActorCriticCnnPolicy, ActorCriticP
 from stable_baselines3.common.preprocessing import is_image_space
 from stable_baselines3.common.vec_env import VecEnv, VecTransposeImage
 
-from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
+from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy, ZonePolicy
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import (
-    SELF_LABELLING,
     CommonHyperparameters,
     schedule,
 )
@@ -61,24 +60,6 @@ Model = PPO | MaskablePPO
 Policy = ActorCriticPolicy | MaskableActorCriticPolicy
 
 
-_SPATIAL = {
-    "ppo": SpatialPolicy,
-    "maskable_ppo": SpatialMaskablePolicy,
-    SELF_LABELLING: SpatialMaskablePolicy,
-}
-
-
-_PLAIN = {
-    ("ppo", "CnnPolicy"): ActorCriticCnnPolicy,
-    ("ppo", "MlpPolicy"): ActorCriticPolicy,
-    ("maskable_ppo", "CnnPolicy"): MaskableActorCriticCnnPolicy,
-    ("maskable_ppo", "MlpPolicy"): MaskableActorCriticPolicy,
-    (SELF_LABELLING, "CnnPolicy"): MaskableActorCriticCnnPolicy,
-    (SELF_LABELLING, "MlpPolicy"): MaskableActorCriticPolicy,
-}
-"""The policies of stable-baselines3 and sb3-contrib."""
-
-
 _PLACES: Final = {"visible": 1, "hidden": 9}
 
 
@@ -102,15 +83,10 @@ def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenari
         ),
         "places": places,
     }
-    spatial = _SPATIAL[settings.algorithm]
-    names = ["MlpPolicy"]
-    if channels_of(settings.observation):
-        names = [f"{spatial.__module__}.{spatial.__name__}", *names]
-    if settings.observation == "image":
-        names = ["CnnPolicy", *names]
-    if hyperparameters.policy not in names:
+    policies = _policies(settings)
+    if hyperparameters.policy not in policies:
         raise BlastEnvError(
-            f"policy is {hyperparameters.policy}, must be one of {', '.join(names)} for "
+            f"policy is {hyperparameters.policy}, must be one of {', '.join(policies)} for "
             f"{settings.algorithm} on the observation {settings.observation!r}"
         )
     arguments = hyperparameters.policy_kwargs.model_copy(update=changes)
@@ -156,21 +132,12 @@ def make_model(configuration: RunConfiguration, environments: VecEnv) -> Model:
     return MaskablePPO(policy_class, environments, **arguments, **common)
 
 
-def make_policy(
-    configuration: RunConfiguration,
-    observation_space: spaces.Space[Any],
-    action_space: spaces.Space[Any],
-) -> Policy:
-    """Return the policy of a run without its weights."""
-    policy_class, arguments = _policy_class(configuration)
-    policy: Policy = policy_class(observation_space, action_space, lambda _: 0.0, **arguments)
-    return policy
-
-
 def policy_for(configuration: RunConfiguration, scenario: Scenario) -> Policy:
     """Return the policy of a run on a scenario of its size, with fresh weights."""
-    spaces_of = policy_spaces(configuration.settings.observation, scenario)
-    return make_policy(configuration, *spaces_of)
+    policy_class, arguments = _policy_class(configuration)
+    seen, actions = policy_spaces(configuration.settings.observation, scenario)
+    policy: Policy = policy_class(seen, actions, lambda _: 0.0, **arguments)
+    return policy
 
 
 def policy_spaces(
@@ -214,15 +181,31 @@ def torch_threads(count: int) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
+def _policies(settings: TrainingSettings) -> dict[str, type[Policy]]:
+    """Return the policies for algorithm and observation, by the names that RL Zoo imports."""
+    of_ppo = settings.algorithm == "ppo"
+    plain: dict[str, type[Policy]] = {
+        "MlpPolicy": ActorCriticPolicy if of_ppo else MaskableActorCriticPolicy
+    }
+    if settings.observation == "image":
+        return {
+            "CnnPolicy": ActorCriticCnnPolicy if of_ppo else MaskableActorCriticCnnPolicy
+        } | plain
+    if channels_of(settings.observation):
+        spatial = SpatialPolicy if of_ppo else SpatialMaskablePolicy
+        return {f"{spatial.__module__}.{spatial.__name__}": spatial} | plain
+    return plain
+
+
 def _policy_class(configuration: RunConfiguration) -> tuple[type[Any], dict[str, Any]]:
     """Return the class of the policy, and the arguments beside spaces and schedule."""
     settings, hyperparameters = configuration.settings, configuration.hyperparameters
-    plain = _PLAIN.get((settings.algorithm, hyperparameters.policy))
-    if plain is not None:
-        return plain, {}
+    policy_class = _policies(settings)[hyperparameters.policy]
+    if not issubclass(policy_class, ZonePolicy):
+        return policy_class, {}
     arguments = hyperparameters.policy_kwargs.model_dump()
     channels = (*channels_of(settings.observation), *arguments.pop("item_channels"))
-    return _SPATIAL[settings.algorithm], arguments | {"channels": channels}
+    return policy_class, arguments | {"channels": channels}
 
 
 _ARCHIVE: Final = ".zip"
