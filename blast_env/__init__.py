@@ -3,6 +3,7 @@
 Importing the package registers its environments with Gymnasium.
 """
 
+from blast_env.engines import Blast, BlastResult, simulate, simulate_many
 from blast_env.envs.registration import register_environments as _register_environments
 from blast_env.evaluation import LayoutEvaluation, evaluate_layout
 from blast_env.physics.scene import Charge
@@ -15,7 +16,6 @@ from blast_env.scenario import (
     save_scenario,
     write_layout,
 )
-from blast_env.simulation import Blast, BlastResult, simulate, simulate_many
 
 __version__ = package_version()
 __all__ = [

@@ -24,14 +24,14 @@ from blast_agents.training.train import TrainingResult
 
 from blast_env.cli.evaluation_report import percent
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
+from blast_env.engines import JUDGE
+from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError
 from blast_env.export import LayoutPlan, export_layouts
-from blast_env.physics.engines import GAS
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.gas import facades
 from blast_env.rendering.pressure_film import write_pressure_film
 from blast_env.rendering.site_picture import site_picture
-from blast_env.simulation.gas import GasBlast
 from studies.demo_comparison import HEADERS, Comparison
 
 AGENT: Final = "trained agent"
@@ -124,7 +124,7 @@ def train_agent(settings: DemoSettings) -> TrainingResult:
         scenario=settings.scenario,
         steps=settings.steps,
         seed=settings.seed,
-        engine=GAS,
+        engine=JUDGE,
         evaluation_interval=settings.evaluation_interval,
         evaluation_cases=settings.evaluation_cases,
     )
@@ -135,7 +135,7 @@ def train_agent(settings: DemoSettings) -> TrainingResult:
     counters = result.progress.counters
     print_line(
         f"{counters.episodes:,} layouts tried with {counters.blasts:,} blasts of the engine "
-        f"{GAS} in {counters.seconds:.0f} s\n"
+        f"{JUDGE} in {counters.seconds:.0f} s\n"
     )
     return result
 

@@ -11,10 +11,10 @@ import typer
 from blast_agents.rules import wall_near_building
 
 from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.engines.gas import GasBlast
 from blast_env.rendering.pressure_film import write_pressure_film
 from blast_env.rendering.pressure_frames import Section
 from blast_env.scenario import Charge, load_scenario
-from blast_env.simulation.gas import GasBlast
 
 SITE: Final = Path(__file__).parents[1] / "docs" / "data" / "depot.toml"
 CHARGE: Final = Charge((4.0, 11.0), 100.0)

@@ -25,12 +25,12 @@ from blast_agents.training.run_folder import RunConfiguration
 
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.cluster import on_cluster
+from blast_env.engines import find_engine
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import import_extra
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.files import FolderStore, make_folder
 from blast_env.geometry import Layout
-from blast_env.physics.engines import find_engine
 from blast_env.runner import run_all
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge

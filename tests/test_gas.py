@@ -8,14 +8,13 @@ import openpyxl
 import pytest
 
 import blast_env
+from blast_env.engines.gas import FACE_COLUMNS, GasBlast, GasEngine, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import Threat
 from blast_env.physics.engine import EndReason
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.recording.parquet import read_parquet
-from blast_env.simulation.gas import FACE_COLUMNS, GasBlast, GasResult
 from tests.gas_sites import WALL, hut
 
 HUT = hut()

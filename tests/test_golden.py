@@ -19,9 +19,9 @@ from typing import Final, NamedTuple
 
 import pytest
 
+from blast_env.engines import simulate
 from blast_env.physics.parameters import parameters_digest
 from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
-from blast_env.simulation import simulate
 
 LAYOUT: Final = ((4, 0), (5, 0), (6, 1))
 

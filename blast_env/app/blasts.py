@@ -32,11 +32,11 @@ from blast_env.app.records import (
 from blast_env.app.work import BlastTask, ThreatOf, scenario_of
 from blast_env.calibration.model import CalibrationError
 from blast_env.documents import read_text
+from blast_env.engines import Blast, find_engine
+from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
-from blast_env.physics.engines import find_engine
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.provenance import versions
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.figures import save_figure
@@ -50,8 +50,6 @@ from blast_env.rendering.style import render_extra
 from blast_env.runner import share_of
 from blast_env.scenario import AnyCharge, Scenario, load_scenario
 from blast_env.scenario.build_scene import charge_against
-from blast_env.simulation import Blast
-from blast_env.simulation.gas import GasBlast, GasResult
 from blast_env.statistics import mean_estimate
 from blast_env.units import MS_PER_S, PA_PER_KPA
 

@@ -31,9 +31,9 @@ from blast_env.app.work import (
     scenario_of,
     write_status,
 )
+from blast_env.engines import find_engine
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.geometry import Layout
-from blast_env.physics.engines import find_engine
 from blast_env.scenario import Scenario
 
 _LEAST_PAUSE_S: Final = 0.1
@@ -169,16 +169,16 @@ def _film(task: FilmTask, teller: Teller) -> None:
     layout, path = placing.layout_from(scenario, task.layout), Path(task.path)
     write: Callable[..., object]
     if task.engine.is_gas:
+        from blast_env.engines.gas import GasBlast
         from blast_env.rendering.pressure_film import write_pressure_film
-        from blast_env.simulation.gas import GasBlast
 
         engine = find_engine(task.engine.name, task.engine.cell_m)
         blasts = [GasBlast(scenario, each, 0, engine, charge) for each in ((), layout)]  # type: ignore[arg-type]
         write = partial(write_pressure_film, blasts[-1], path, progress=teller.share)
         write(beside=blasts[0] if layout else None)
     else:
+        from blast_env.engines import Blast
         from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
-        from blast_env.simulation import Blast
 
         bare, own = (Blast(scenario, each, 0, "event", charge) for each in ((), layout))
         if layout:

@@ -28,12 +28,12 @@ from blast_env.cli.evaluation_report import (
     threats_text,
 )
 from blast_env.cli.output import (
-    engine_text,
     make_table,
     print_line,
     progress_bar,
     result_console,
 )
+from blast_env.engines import Engine, find_engine
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -47,8 +47,6 @@ from blast_env.evaluation import (
 from blast_env.evaluation.report import case_table, comparison_record
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine
 from blast_env.provenance import command, versions
 from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.rendering.figures import save_figure
@@ -206,7 +204,7 @@ def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
         print_line(f"note: {outside} threats are outside the range of the calibration (~)")
     print_means(comparison, objective)
     calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)
-    words = engine_text(engine, [case.scenario for case in comparison.cases])
+    words = engine.describe([case.scenario for case in comparison.cases])
     print_line(f"{words}, calibration {', '.join(calibrations)}")
 
 

@@ -16,16 +16,15 @@ from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import ClusterOptions, ProcessOptions
 from blast_env.cli.output import (
-    engine_text,
     make_table,
     print_line,
     progress_bar,
     result_console,
     save_pictures,
 )
+from blast_env.engines import find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder
-from blast_env.physics.engines import find_engine
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.tables import write_csv
 
@@ -108,7 +107,7 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
         stored = stored.model_copy(update={"tnt_range_kg": tnt_range_kg})
         written = _write(report, stored, self.stem)
         _print(report, stored)
-        print_line(engine_text(engine, [study.scenario]))
+        print_line(engine.describe([study.scenario]))
         for path in (*written, kept):
             print_line(f"wrote {path}")
 

@@ -7,10 +7,10 @@ from typing import Final
 from blast_env.cli.cluster import running_on
 from blast_env.cli.command import option
 from blast_env.cli.evaluation_report import EvaluateOptions, report_layout
+from blast_env.engines import find_engine
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator
 from blast_env.export import LayoutPlan
-from blast_env.physics.engines import find_engine
 from blast_env.scenario import LayoutFile, load_layout, load_scenario
 from blast_env.statistics import check_cvar_level
 

@@ -17,7 +17,6 @@ from blast_env.cli.options import (
     ProcessOptions,
 )
 from blast_env.cli.output import (
-    engine_text,
     make_table,
     print_json,
     print_line,
@@ -27,6 +26,7 @@ from blast_env.cli.output import (
     without,
 )
 from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
+from blast_env.engines import JUDGE, Engine
 from blast_env.evaluation import (
     BlastEvaluator,
     Evaluators,
@@ -40,8 +40,6 @@ from blast_env.evaluation.comparison import Comparison
 from blast_env.export import LayoutPlan, check_target, export_layouts, is_file
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import GAS, is_gas
 from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.statistics import CVAR_LEVEL, Estimate
 from blast_env.tables import write_csv
@@ -61,7 +59,7 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         min=0,
         show_default="the first one that no training and no search meets",
     )
-    engine: str = option(GAS, "Engine that runs the blasts: gas (gas dynamics), event or pymunk.")
+    engine: str = option(JUDGE, "Engine that runs the blasts: gas (gas dynamics), event or pymunk.")
     cell_m: float | None = option(None, CELL_HELP)
     cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
     export: Path | None = option(
@@ -93,7 +91,7 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         threats = tuple(
             Threat(self.fixed(scenario, threat.charge), threat.seed) for threat in drawn
         )
-        is_one = is_gas(engine) and len({threat.charge for threat in threats}) == 1
+        is_one = not engine.has_noise and len({threat.charge for threat in threats}) == 1
         return threats[:1] if is_one else threats
 
     @property
@@ -194,7 +192,7 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
         record = {
             **evaluation.to_dict(),
             "scenario_name": plan.scenario.name,
-            "preset": None if is_gas(engine) else plan.scenario.simulation.preset,
+            "preset": engine.preset(plan.scenario),
             "provenance": dict(plan.provenance),
             "cache": cache_record(evaluator),
             "files": [str(path) for path in written],
@@ -273,7 +271,7 @@ def _print_totals(evaluation: LayoutEvaluation, engine: Engine) -> None:
         f"{objective.text(worst.load)}, reduction {percent(worst.reduction)}"
     )
     print_line(
-        f"{engine_text(engine, [evaluation.scenario])}, calibration {evaluation.calibration}, "
+        f"{engine.describe([evaluation.scenario])}, calibration {evaluation.calibration}, "
         f"scenario hash {evaluation.scenario.content_hash[:12]}"
     )
 

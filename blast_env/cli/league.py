@@ -25,7 +25,6 @@ from blast_agents.surrogate.search import SurrogateAgent, SurrogateSearch
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.options import CellSide, Processes
 from blast_env.cli.output import (
-    engine_text,
     make_table,
     print_line,
     progress_bar,
@@ -33,9 +32,8 @@ from blast_env.cli.output import (
     user_errors,
 )
 from blast_env.cli.targets import checked_targets
+from blast_env.engines import Engine, find_engine
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine, is_gas
 from blast_env.provenance import command
 
 if TYPE_CHECKING:
@@ -114,7 +112,7 @@ def league(
         from blast_agents.league.report import write_league
 
         chosen = find_engine(engine, cell)
-        noisy = not is_gas(chosen)
+        noisy = chosen.has_noise
         tracks = find_tracks(track, cases, seeds, seed, scenario or (), noisy=noisy)
         runs = _load_runs(run or (), tracks)
         store = ResultStore(out / "results")
@@ -127,7 +125,7 @@ def league(
         found = None if surrogate is None else load_surrogate(surrogate)
         contests = [_contest(each, runs, searches, found, store, chosen) for each in tracks]
         scenarios = [case.scenario for each in tracks for case in each.cases]
-        print_line(engine_text(chosen, scenarios))
+        print_line(chosen.describe(scenarios))
         _print_outlook(contests)
         all_standings = [_play(contest, processes) for contest in contests]
         written = write_league(all_standings, out, shlex.join(command()))

@@ -3,7 +3,7 @@
 import json
 import os
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
@@ -15,9 +15,6 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.tables import ResultTable
 from blast_env.errors import BlastEnvError, MissingExtraError
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import has_particles, is_gas
-from blast_env.scenario import Scenario
 from blast_env.values import STEERING
 
 _PIPE_COLUMNS = 120
@@ -82,28 +79,6 @@ def resume_with_cache(cache: Path | None) -> str:
     if cache is None:
         return "with --cache FOLDER the blasts would have been kept for the next call"
     return f"the same command goes on with the blasts that are kept in {cache}"
-
-
-def engine_text(engine: Engine, scenarios: Iterable[Scenario] = ()) -> str:
-    """Return in words which engine runs blasts, and with which preset's parameters.
-
-    Args:
-        engine: The engine.
-        scenarios: Those that it runs; only particles have parameters.
-    """
-    known = engine.version.split()[0] == engine.name
-    text = f"engine {engine.version}" if known else f"engine {engine.name}, {engine.version}"
-    if is_gas(engine):
-        return f"{text}, cells of {engine.cell_m:g} m"
-    if not has_particles(engine):
-        return text
-    presets = dict.fromkeys(_preset_text(each) for each in scenarios)
-    return f"{text}, preset {', '.join(presets)}" if presets else text
-
-
-def _preset_text(scenario: Scenario) -> str:
-    section = scenario.simulation
-    return section.preset + (" with overrides" if section.overrides else "")
 
 
 def print_json(content: Mapping[str, object]) -> None:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from blast_env.cli.command import Command, argument, option
 from blast_env.cli.options import SCENARIO_HELP
-from blast_env.cli.output import engine_text, print_line
+from blast_env.cli.output import print_line
+from blast_env.engines import find_engine
 from blast_env.geometry import layout_counts
-from blast_env.physics.engines import find_engine
 from blast_env.scenario import find_scenario
 
 
@@ -35,7 +35,7 @@ class PlayCommand(Command):
             render_mode="rgb_array",
             show_blast=self.film,
         )
-        print_line(engine_text(find_engine(self.engine), [find_scenario(self.scenario)]))
+        print_line(find_engine(self.engine).describe([find_scenario(self.scenario)]))
         print_line(KEYS)
         for played in play(env, self.seed):
             print_line(

@@ -14,7 +14,6 @@ from blast_agents.surrogate import SurrogateAgent, packaged_surrogate
 
 from blast_env.cli.options import ChargePlace, Processes, TntMass
 from blast_env.cli.output import (
-    engine_text,
     make_table,
     print_line,
     progress_bar,
@@ -24,11 +23,11 @@ from blast_env.cli.output import (
 )
 from blast_env.cli.pictures import save_layout_picture
 from blast_env.cli.targets import FileTarget, checked_targets
+from blast_env.engines import JUDGE
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.geometry import Layout, layout_counts
-from blast_env.physics.engines import GAS
 from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
 from blast_env.scenario import (
@@ -76,7 +75,7 @@ def propose(
         chosen.zone  # noqa: B018  # refuses a scenario without one
         told = _charge(chosen, charge, tnt_kg)
         case = _case(chosen, told)
-        evaluator = BlastEvaluator(chosen, GAS)
+        evaluator = BlastEvaluator(chosen, JUDGE)
         proposal = (
             _by_weights(chosen, told)
             or _by_surrogate(chosen, told)
@@ -91,7 +90,7 @@ def propose(
             loads = _loads(evaluator, case, {_NOTHING: (), **rules, _PROPOSAL: layout}, processes)
             _print_verdict(loads, case)
         if verify or evaluator.blasts:
-            print_line(engine_text(evaluator.engine))
+            print_line(evaluator.engine.describe())
         if out is not None:
             provenance = {**proposal.provenance, "command": command(), "versions": versions()}
             written = [LayoutFile.of(chosen, layout, provenance).save(out)]

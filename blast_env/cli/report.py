@@ -9,12 +9,11 @@ from rich.progress import BarColumn, Progress, TextColumn
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import SCENARIO_HELP, CacheOptions, ProcessOptions
 from blast_env.cli.output import (
-    engine_text,
     message_console,
     print_line,
 )
+from blast_env.engines import JUDGE, find_engine
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engines import GAS, find_engine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import load_layout, load_scenario
 
@@ -76,7 +75,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
 
             study = run_study(scenario, layout, options, tell)
         coarse_m, fine_m = self.cells_m
-        print_line(f"{engine_text(find_engine(GAS, coarse_m))} and of {fine_m:g} m")
+        print_line(f"{find_engine(JUDGE, coarse_m).describe()} and of {fine_m:g} m")
         for path in write_report(study, self.out, self.pdf):
             print_line(f"wrote {path}")
 

@@ -34,7 +34,6 @@ from blast_env.cli.options import (
     fixed_charge,
 )
 from blast_env.cli.output import (
-    engine_text,
     make_table,
     message_console,
     print_line,
@@ -47,6 +46,7 @@ from blast_env.cli.output import (
 )
 from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
 from blast_env.cli.targets import checked_targets
+from blast_env.engines import Engine, find_engine
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.envs.strategies import HiddenThreat
 from blast_env.errors import BlastEnvError, UnknownNameError
@@ -62,8 +62,6 @@ from blast_env.evaluation import (
 from blast_env.evaluation.cases import practice_hidden, practice_visible
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine
 from blast_env.provenance import command, versions
 from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario, write_layout
 from blast_env.statistics import CVAR_LEVEL, ConditionalValueAtRisk, WorstRisk, reductions
@@ -145,7 +143,7 @@ def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
         f"blasts spent, {run.cache_hits} of the loads asked for known already; "
         f"{run.seconds:.1f} s"
     )
-    print_line(engine_text(problem.evaluator.engine, [problem.scenario]))
+    print_line(problem.evaluator.engine.describe([problem.scenario]))
 
 
 def write_search(

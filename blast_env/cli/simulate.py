@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 from blast_env.cli.command import argument, option, options_of
 from blast_env.cli.options import CELL_HELP, SCENARIO_HELP, ChargeOptions, JsonOptions
 from blast_env.cli.output import (
-    engine_text,
     make_table,
     print_json,
     print_line,
@@ -19,22 +18,21 @@ from blast_env.cli.output import (
     result_console,
 )
 from blast_env.cli.targets import PICTURES
+from blast_env.engines import Blast, BlastResult, Engine, find_engine
+from blast_env.engines.table import load_plugin
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
 from blast_env.geometry import Layout, layout_counts
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine, is_gas
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario
 from blast_env.scenario.build_scene import draw_threat
-from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
 
+    from blast_env.engines.gas import GasBlast, GasResult
     from blast_env.physics.gas.engine import Recorders
     from blast_env.rendering.pressure_frames import Section
-    from blast_env.simulation.gas import GasBlast, GasResult
 
 _GAS_PANEL: Final = "Gas dynamics only"
 _PARTICLES_PANEL: Final = "Particles only"
@@ -136,30 +134,29 @@ class SimulateCommand(ChargeOptions, JsonOptions):
 
     def _check(self, engine: Engine, layout: Layout) -> None:
         """Refuse options of no use before anything is run."""
-        other = _PARTICLES_PANEL if is_gas(engine) else _GAS_PANEL
+        own = f"{engine.title} only"
         for each in options_of(type(self)):
-            if each.text.panel == other and getattr(self, each.name) != each.default:
-                what = other.removesuffix(" only").lower()
+            panel = each.text.panel or ""
+            is_given = getattr(self, each.name) != each.default
+            if is_given and panel.endswith(" only") and panel != own:
+                what = panel.removesuffix(" only").lower()
                 raise BlastEnvError(f"{each.flag} is for {what}: engine is {engine.name!r}")
         if self.side_by_side and not layout:
             raise BlastEnvError("--side-by-side compares with the empty site: --layout is missing")
 
     def _shown(
         self, scenario: Scenario, layout: Layout, engine: Engine, charge: AnyCharge
-    ) -> "_Shown[Any, Any]":
-        if not is_gas(engine):
-            return _ShownParticles(self, Blast(scenario, layout, self.seed, engine, charge))
-        # Here, because Numba takes half a second to import.
-        from blast_env.simulation.gas import GasBlast
-
-        return _ShownGas(self, GasBlast(scenario, layout, self.seed, engine, charge))
+    ) -> "ShownBlast[Any, Any]":
+        blast = engine.blast(scenario, layout, self.seed, charge)
+        shown: ShownBlast[Any, Any] = load_plugin(engine.shown)(self, blast)
+        return shown
 
 
 _AnyBlast = TypeVar("_AnyBlast", Blast, "GasBlast")
 _AnyResult = TypeVar("_AnyResult", BlastResult, "GasResult")
 
 
-class _Shown(ABC, Generic[_AnyBlast, _AnyResult]):
+class ShownBlast(ABC, Generic[_AnyBlast, _AnyResult]):
     """A blast, and how its result is shown.
 
     Args:
@@ -238,7 +235,7 @@ class _Shown(ABC, Generic[_AnyBlast, _AnyResult]):
         print_line(f"digest {result.digest}")
 
 
-class _ShownParticles(_Shown[Blast, BlastResult]):
+class ShownParticles(ShownBlast[Blast, BlastResult]):
     """A blast of particles."""
 
     headers = (
@@ -316,7 +313,7 @@ class _ShownParticles(_Shown[Blast, BlastResult]):
         notes = {str(each["error"]) for each in scaled.values() if "error" in each}
         for name, each in scaled.items():
             notes |= {f"outside the calibration (~): {name}, {text}" for text in _notes(each)}
-        what = f"{engine_text(blast.particle_engine, [blast.scenario])}: {len(scene.balls):,} balls"
+        what = f"{blast.particle_engine.describe([blast.scenario])}: {len(scene.balls):,} balls"
         texts = [f"impulse (Pa s): {note}" for note in sorted(notes)]
         self.print_end(result, what, result.step_name, texts)
 
@@ -328,7 +325,7 @@ def _named(path: Path | None, is_bare: bool) -> Path | None:
     return path.with_name(f"{path.stem}_without{path.suffix}")
 
 
-class _ShownGas(_Shown["GasBlast", "GasResult"]):
+class ShownGas(ShownBlast["GasBlast", "GasResult"]):
     """A blast of gas dynamics."""
 
     headers = (
@@ -441,7 +438,7 @@ class _ShownGas(_Shown["GasBlast", "GasResult"]):
         cells = " x ".join(str(count) for count in result.run.grid.shape)
         notes = dict.fromkeys(note for each in scaled.values() for note in _notes(each))
         texts = [f"outside what was checked (~): {note}" for note in notes]
-        what = f"{engine_text(result.blast.engine)}: {cells} cells"
+        what = f"{result.blast.engine.describe()}: {cells} cells"
         self.print_end(result, what, "steps", texts)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option, options_of
 from blast_env.cli.options import CELL_HELP, ClusterOptions
-from blast_env.cli.output import engine_text, print_line, progress_bar
+from blast_env.cli.output import print_line, progress_bar
 from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.physics.scene import Charge
@@ -147,9 +147,9 @@ def _print_result(result: "TrainingResult") -> None:
         f"in {counters.seconds:,.0f} s"
     )
     scenario = folder.scenario(result.configuration)
-    print_line(engine_text(settings.blast_engine, [scenario]))
+    print_line(settings.blast_engine.describe([scenario]))
     if settings.judge.name != settings.blast_engine.name:
-        print_line(f"weights chosen by {engine_text(settings.judge, [scenario])}")
+        print_line(f"weights chosen by {settings.judge.describe([scenario])}")
     for row in result.progress.evaluations:
         if row.steps == counters.best_steps:
             print_line(

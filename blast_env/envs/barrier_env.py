@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from blast_env.engines import Engine, find_engine
 from blast_env.envs.arguments import (
     ResetOptions,
     check_names,
@@ -39,8 +40,6 @@ from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.evaluation.store import BlastCache
 from blast_env.geometry import Cell, Element
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine
 from blast_env.scenario import AnyScenario, Placement
 from blast_env.statistics import CVAR_LEVEL, Risk
 from blast_env.values import real_number, whole_number

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.engines.table import load_plugin
 from blast_env.envs.episode import Episode
 from blast_env.envs.observations import VehicleView
 from blast_env.evaluation.cases import Threat
 from blast_env.geometry import Cell, Layout, Rectangle
-from blast_env.physics.engines import has_particles, is_gas
 from blast_env.scenario import AnySource, Placement, PointSource, Scenario
 from blast_env.scenario.catalogue import element_text
 from blast_env.scenario.zone import distances_m
-from blast_env.simulation import Blast
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:
@@ -142,8 +141,6 @@ class Display:
     def blast_frames(self, episode: Episode) -> Iterator[Frame]:
         """Yield the frames of the film of the blast that ended the episode."""
         painter = self._placing_painter(episode)
-        if is_gas(episode.objective.evaluator.engine):
-            return _gas_screening(episode, painter.size_px).frames(self._frames_per_s)
         return _screening(episode, painter.size_px).frames(self._frames_per_s)
 
     def begin_film(self, episode: Episode) -> None:
@@ -193,10 +190,10 @@ class Display:
 
     def _final_frame(self, episode: Episode) -> Frame:
         painter = self._placing_painter(episode)
-        if not has_particles(episode.objective.evaluator.engine):  # no balls to be drawn
-            return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
-        if self._last_frame is None:
+        if self._last_frame is None and episode.objective.evaluator.engine.screening:
             self._last_frame = _screening(episode, painter.size_px).last_frame()
+        if self._last_frame is None:  # there is no state of the blast that could be drawn
+            return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
         return self._last_frame
 
     def _placing_painter(self, episode: Episode) -> "PlacingPainter":
@@ -219,26 +216,19 @@ class Display:
         self._window.show(frame)
 
 
-def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening":
-    """Return the blast of particles that is shown."""
-    from blast_env.rendering.placing import BlastScreening
+def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening | PressureScreening":
+    """Return the film of the blast that is shown.
 
+    Raises:
+        BlastEnvError: If the engine tells loads without a blast.
+    """
     shown, engine = _shown_threat(episode), episode.objective.evaluator.engine
     scenario, layout = episode.objective.evaluator.scenario, _sorted_layout(episode)
-    blast = Blast(scenario, layout, shown.seed, engine, shown.charge)
-    return BlastScreening(blast, _outcome(episode), _remark(episode), size_px)
-
-
-def _gas_screening(episode: Episode, size_px: tuple[int, int]) -> "PressureScreening":
-    """Return the blast of gas dynamics that is shown."""
-    from blast_env.rendering.pressure_film import PressureScreening
-    from blast_env.simulation.gas import GasBlast
-
-    shown, engine = _shown_threat(episode), episode.objective.evaluator.engine
-    assert is_gas(engine)
-    scenario, layout = episode.objective.evaluator.scenario, _sorted_layout(episode)
-    blast = GasBlast(scenario, layout, shown.seed, engine, shown.charge)
-    return PressureScreening(blast, size_px)
+    blast = engine.blast(scenario, layout, shown.seed, shown.charge)
+    made: BlastScreening | PressureScreening = load_plugin(engine.screening)(
+        blast, _outcome(episode), _remark(episode), size_px
+    )
+    return made
 
 
 def _shown_threat(episode: Episode) -> Threat:

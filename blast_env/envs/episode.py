@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.engines import Engine
 from blast_env.envs.arguments import (
     ResetOptions,
     strategy,
@@ -33,8 +34,6 @@ from blast_env.evaluation.cases import Case, SeedRange, Threat
 from blast_env.evaluation.comparison import Assessment, Objective
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.geometry import Layout
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import has_particles
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
@@ -297,10 +296,9 @@ def find_realisations(realisations: int | None, threat: str | ThreatModel, engin
     """Return the number of blasts for each charge for the arguments `realisations` and `threat`.
 
     Raises:
-        BlastEnvError: If the number is out of bounds: engines without particles have no fan and no
-            air to draw, so that a charge has one realisation.
+        BlastEnvError: If the number is out of bounds: without noise a charge has one realisation.
     """
-    if not has_particles(engine):
+    if not engine.has_noise:
         if realisations not in (None, 1):
             raise BlastEnvError(
                 f"realisations is {realisations}, must be 1: {engine.name} has no noise"

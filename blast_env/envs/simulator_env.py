@@ -9,26 +9,27 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from blast_env.engines import Blast, BlastResult, Engine, find_engine
+from blast_env.engines.table import load_plugin
 from blast_env.envs.arguments import ResetOptions, check_names, checked_keywords, checked_options
 from blast_env.envs.spec import PlainSpec
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
-from blast_env.physics.engine import BlastRun, EndReason, Engine
-from blast_env.physics.engines import find_engine, is_gas
+from blast_env.physics.engine import BlastRun, EndReason
 from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import BARRIER_NAME, ModularPart, module_name
 from blast_env.scenario import AnyScenario, Scenario, check_layout, find_scenario
 from blast_env.scenario.build_scene import draw_threat
-from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 from blast_env.values import real_number
 
 if TYPE_CHECKING:  # drawing is an optional extra, and Numba takes half a second to import
+    from blast_env.engines.gas import GasBlast, GasEngine, GasResult
     from blast_env.physics.gas.engine import GasRun
     from blast_env.rendering.frames import FramePainter
     from blast_env.rendering.pressure_film import PressureNow
     from blast_env.rendering.window import Window
-    from blast_env.simulation.gas import GasBlast, GasResult
 
 Observation = dict[str, Any]
 """Arrays by name."""
@@ -185,7 +186,7 @@ class UnfoldingParticles(Unfolding):
         return self._painter.paint(self.run.balls(), self.run.obstacles, self.run.time_s)
 
     @staticmethod
-    def space(scenario: Scenario) -> spaces.Dict:
+    def space(scenario: Scenario, engine: Engine) -> spaces.Dict:  # noqa: ARG004
         """Return the space of the observations."""
         # With the heaviest charge every bound is the highest.
         source = max(scenario.charge, key=lambda source: source.tnt_kg)
@@ -295,12 +296,12 @@ class UnfoldingGas(Unfolding):
 
     def _so_far(self) -> "GasResult":
         """Return what has happened so far, in the form of a result."""
-        from blast_env.simulation.gas import GasResult
+        from blast_env.engines.gas import GasResult
 
         return GasResult(self.blast, self.run)
 
     @staticmethod
-    def space(scenario: Scenario, cell_m: float) -> spaces.Dict:
+    def space(scenario: Scenario, engine: "GasEngine") -> spaces.Dict:
         """Return the space of the observations."""
         low_pa, high_pa = _LEAST_OVERPRESSURE_PA, _MOST_OVERPRESSURE_PA
         modules, structures = _module_count(scenario), len(scenario.structures)
@@ -309,7 +310,7 @@ class UnfoldingGas(Unfolding):
                 "module_impulses": spaces.Box(0.0, _MOST_IMPULSE, (modules,), np.float64),
                 "structure_impulses": spaces.Box(0.0, _MOST_IMPULSE, (structures,), np.float64),
                 "overpressure": spaces.Box(
-                    low_pa, high_pa, _plan_shape(scenario, cell_m), np.float32
+                    low_pa, high_pa, _plan_shape(scenario, engine.cell_m), np.float32
                 ),
                 "gauges": spaces.Box(low_pa, high_pa, (len(scenario.gauges),), np.float64),
                 "time_s": spaces.Box(0.0, _LATEST_S, (1,), np.float64),
@@ -319,9 +320,19 @@ class UnfoldingGas(Unfolding):
 
 def observation_space(scenario: Scenario, engine: Engine) -> spaces.Dict:
     """Return the space of what `Unfolding.observe` gives with an engine."""
-    if is_gas(engine):
-        return UnfoldingGas.space(scenario, engine.cell_m)
-    return UnfoldingParticles.space(scenario)
+    space: spaces.Dict = _unfolding_class(engine).space(scenario, engine)
+    return space
+
+
+def _unfolding_class(engine: Engine) -> Any:
+    """Return what shows the blasts of an engine step by step.
+
+    Raises:
+        BlastEnvError: If it tells loads without a blast.
+    """
+    if not engine.unfolding:
+        raise BlastEnvError(f"engine {engine.name!r} runs no blasts: there is none to show")
+    return load_plugin(engine.unfolding)
 
 
 def _plan_shape(scenario: Scenario, cell_m: float) -> tuple[int, int]:
@@ -558,13 +569,8 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     def _lay_out(self, seed: int, options: Mapping[str, Any]) -> Unfolding:
         layout = check_layout(self.scenario, options.get("layout", self.layout))
         position_m = options.get("charge_position_m")
-        if is_gas(self._engine):
-            from blast_env.simulation.gas import GasBlast
-
-            fixed = ResetOptions.from_mapping({"charge_position_m": position_m})
-            charge = fixed.charge(draw_threat(self.scenario, seed))
-            return UnfoldingGas(GasBlast(self.scenario, layout, seed, self._engine, charge))
-        blast = Blast(self.scenario, layout, seed, self._engine)
-        if position_m is not None:
-            blast = blast.with_charge_at(position_m)
-        return UnfoldingParticles(blast)
+        fixed = ResetOptions.from_mapping({"charge_position_m": position_m})
+        charge = fixed.charge(draw_threat(self.scenario, seed))
+        blast = self._engine.blast(self.scenario, layout, seed, charge)
+        made: Unfolding = _unfolding_class(self._engine)(blast)
+        return made

@@ -1,5 +1,6 @@
 """Evaluating layouts: loads under threats, and reductions with their uncertainty."""
 
+from blast_env.engines.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.cases import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.comparison import (
     Assessment,
@@ -8,7 +9,6 @@ from blast_env.evaluation.comparison import (
     compare,
 )
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
-from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.report import (
     LayoutEvaluation,
     ThreatOutcome,

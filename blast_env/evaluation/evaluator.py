@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from blast_env.calibration.model import Calibration, scenario_calibration
-from blast_env.errors import BlastEnvError
+from blast_env.calibration.model import Calibration
+from blast_env.engines import BlastLoads, Engine, find_engine
 from blast_env.evaluation.cases import Threat
-from blast_env.evaluation.loads import BlastLoads, LoadModel, blast_loads, gas_loads
 from blast_env.evaluation.store import (
     BlastCache,
     BlastKey,
@@ -19,13 +18,10 @@ from blast_env.evaluation.store import (
     find_cache,
 )
 from blast_env.geometry import Element, Layout
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine, has_particles, is_gas
 from blast_env.physics.scene import Charge
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, check_layout, find_scenario
-from blast_env.simulation import Blast
 
 
 class BlastEvaluator:
@@ -70,16 +66,8 @@ class BlastEvaluator:
     ) -> None:
         self.scenario = find_scenario(scenario)
         self.engine = find_engine(engine)
-        self.calibration: Calibration | None = None
-        if self.scenario.objective.needs_peaks and has_particles(self.engine):
-            raise BlastEnvError(
-                f"scenario {self.scenario.name!r}: objective.quantity is"
-                f" {self.scenario.objective.quantity!r}, but engine {self.engine.name!r} knows no"
-                " overpressure: must be 'impulse', or the engine 'gas'"
-            )
-        if has_particles(self.engine):
-            self.scenario.check_for_particles()
-            self.calibration = scenario_calibration(self.scenario, self.engine.name)
+        self.engine.check(self.scenario)
+        self.calibration: Calibration | None = self.engine.calibration(self.scenario)
         self.blasts = 0
         self.cache_hits = 0
         self._remembered = LoadsCache(cache_size)
@@ -157,13 +145,13 @@ class BlastEvaluator:
 
     def _key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
         cells = tuple(sorted(check_layout(self.scenario, layout)))
-        # Without particles there is no fan and no air to draw: a charge has one realisation.
-        seed = threat.seed if has_particles(self.engine) else 0
+        # Without noise there is nothing to draw: a charge has one realisation.
+        seed = threat.seed if self.engine.has_noise else 0
         charge = threat.charge_against(self.scenario, cells)
         return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
 
     def _work(self, key: BlastKey, charge: AnyCharge) -> "_Work":
-        return _Work(self.scenario, self.engine, self.calibration, key, charge)
+        return _Work(self.scenario, self.engine, key, charge)
 
     def _known(self, key: BlastKey) -> BlastLoads | None:
         """Return loads that are remembered here or there."""
@@ -197,23 +185,12 @@ class _Work:
 
     scenario: Scenario
     engine: Engine
-    calibration: Calibration | None
     key: BlastKey
     charge: AnyCharge
 
 
 def _run_one(work: _Work) -> BlastLoads:
-    scenario, engine, key = work.scenario, work.engine, work.key
-    if is_gas(engine):
-        from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
-
-        return gas_loads(GasBlast(scenario, key.layout, key.seed, engine, work.charge).run())
-    if isinstance(engine, LoadModel):
-        return engine.loads(scenario, key.layout, work.charge)
-    if work.calibration is None:
-        raise AssertionError("an evaluator of particles has a calibration")
-    result = Blast(scenario, key.layout, key.seed, engine, work.charge).run()
-    return blast_loads(result, work.calibration)
+    return work.engine.loads(work.scenario, work.key.layout, work.charge, work.key.seed)
 
 
 class BlastAsked(NamedTuple):

@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.engines import Engine, find_engine
+from blast_env.engines.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.cases import Case, Threat, draw_threats
 from blast_env.evaluation.comparison import Comparison, loads_of_both
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastCache
 from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import GAS, find_engine
 from blast_env.physics.scene import Charge
 from blast_env.provenance import versions
 from blast_env.scenario import AnyScenario, Scenario, check_layout
@@ -72,14 +71,6 @@ MODULE_COLUMNS: Final = (
     Column("unprotected_impulse_sim", "sim", "sum of m |v| without it"),
     Column("reduction", "", "of the sum of m |v|"),
 )
-
-
-PARTICLES_OVERRATE: Final = (
-    "The particle model overrates barriers: on 'courtyard' it promised 5.1 times the reduction of"
-    " gas dynamics, with a rank correlation of 0.61 (docs/engineers/validity.md). Judge what"
-    " matters with engine 'gas'."
-)
-"""Said of every evaluation with particles; measured by `python -m studies.gas judge`."""
 
 
 THREAT_COLUMNS: Final = (
@@ -206,9 +197,9 @@ def evaluation_record(evaluation: "LayoutEvaluation") -> dict[str, Any]:
         "scenario": scenario.model_dump(mode="json", exclude_none=True),
         "scenario_hash": scenario.content_hash,
         "layout": [list(cell) for cell in evaluation.layout],
-        "engine": evaluation.engine_name,
+        "engine": evaluation.engine.name,
         "calibration": evaluation.calibration,
-        "versions": versions(evaluation.engine_version),
+        "versions": versions(evaluation.engine.version),
         "result": _result(evaluation),
         "notes": list(evaluation.notes),
         "threats": _rows(evaluation.threat_table),
@@ -379,8 +370,7 @@ class LayoutEvaluation:
         loads: Loads with the layout, one a threat.
         unprotected: Loads without any barrier, one a threat.
         calibration: Name of what converted simulated impulses; `"none"` for gas dynamics.
-        engine_name: Name of the engine.
-        engine_version: Version of the library that did the physics.
+        engine: The engine.
         cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
 
     Raises:
@@ -392,8 +382,7 @@ class LayoutEvaluation:
     loads: tuple[BlastLoads, ...]
     unprotected: tuple[BlastLoads, ...]
     calibration: str
-    engine_name: str
-    engine_version: str
+    engine: Engine
     cvar_level: float
 
     def __post_init__(self) -> None:
@@ -520,13 +509,11 @@ class LayoutEvaluation:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What the particle model cannot say, and what the calibration was not made for."""
-        is_gas = self.engine_name == GAS
-        notes = [] if is_gas else [PARTICLES_OVERRATE, *self.scenario.height_notes]
-        checked = (
-            "what gas dynamics was checked for"
-            if is_gas
-            else (f"the range of calibration {self.calibration!r}")
-        )
+        notes = [self.engine.caveat] if self.engine.caveat else []
+        notes += [] if self.engine.knows_heights else self.scenario.height_notes
+        checked = self.engine.checked_for
+        if self.engine.needs_calibration:
+            checked = f"the range of calibration {self.calibration!r}"
         for of_structure in zip(*(load.structures for load in self.loads), strict=True):
             outside = [load for load in of_structure if not load.in_range]
             if outside:
@@ -646,7 +633,6 @@ def evaluate_against(
         loads=loads,
         unprotected=unprotected,
         calibration=evaluator.calibration_name,
-        engine_name=evaluator.engine.name,
-        engine_version=evaluator.engine.version,
+        engine=evaluator.engine,
         cvar_level=cvar_level,
     )

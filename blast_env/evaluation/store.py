@@ -15,11 +15,10 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from blast_env.calibration.model import Calibration
+from blast_env.engines import BlastLoads, Engine, StructureLoad
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.files import FolderStore
 from blast_env.geometry import Layout
-from blast_env.physics.engine import Engine
 from blast_env.physics.scene import Charge
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from blast_env.calibration.model import scenario_calibration
+from blast_env.engines import CALIBRATED_ENGINES, JUDGE
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engines import GAS, PARTICLE_ENGINES
 from blast_env.scenario import AnyScenario, PointSource, Scenario, find_scenario
 
 _PLACING: Final = "search, train, evaluate, league, play and BlastBarrier-v0"
@@ -39,14 +39,14 @@ def suitability(scenario: AnyScenario) -> Suitability:
         ScenarioError: If it cannot be used at all.
     """
     found = find_scenario(scenario)
-    refusals = {engine: _refusal(found, engine) for engine in PARTICLE_ENGINES}
-    able = [GAS, *(engine for engine, refusal in refusals.items() if not refusal)]
+    refusals = {engine: _refusal(found, engine) for engine in CALIBRATED_ENGINES}
+    able = [JUDGE, *(engine for engine, refusal in refusals.items() if not refusal)]
     uses = ["simulate with every engine"]
     if found.particle_problems:
-        uses = [f"simulate with {GAS}"]
+        uses = [f"simulate with {JUDGE}"]
     if found.build_zone is not None:
         uses.append(f"placing barriers ({_PLACING}) with {', '.join(able)}")
-        uses.append(f"report ({GAS})")
+        uses.append(f"report ({JUDGE})")
     limits = (
         *_placing_limits(found),
         *_particle_limits(found, refusals),
@@ -78,7 +78,7 @@ def _particle_limits(scenario: Scenario, refusals: dict[str, str]) -> Iterator[s
     if scenario.calibration is None:
         yield (
             "no calibration: particles give simulation units alone, and where Pa s are needed "
-            f"({_PLACING}) {' and '.join(PARTICLE_ENGINES)} refuse it; gas needs none"
+            f"({_PLACING}) {' and '.join(CALIBRATED_ENGINES)} refuse it; gas needs none"
         )
     else:
         for reason in dict.fromkeys(refusals.values()):
@@ -89,7 +89,7 @@ def _particle_limits(scenario: Scenario, refusals: dict[str, str]) -> Iterator[s
     if name in _PRESETS_NOT_FOR_DESIGN:
         yield (
             f"preset {name!r} is not meant for design: {_PRESETS_NOT_FOR_DESIGN[name]}; judge "
-            f"layouts with --engine {GAS}"
+            f"layouts with --engine {JUDGE}"
         )
 
 
@@ -101,7 +101,7 @@ def _height_limits(scenario: Scenario) -> Iterator[str]:
     if endless:
         yield (
             f"no height ({', '.join(endless)}): as high as the air, {scenario.air_height_m:g} m, "
-            f"so {GAS} overrates what walls do (height_m)"
+            f"so {JUDGE} overrates what walls do (height_m)"
         )
     for note in scenario.height_notes:
         yield f"particles: {note[0].lower()}{note[1:]}"
@@ -122,4 +122,4 @@ def _charge_limits(scenario: Scenario) -> Iterator[str]:
 
 def _gauge_limits(scenario: Scenario) -> Iterator[str]:
     if not scenario.gauges:
-        yield f"no gauges: simulate --engine {GAS} has no --history to draw ([[gauges]])"
+        yield f"no gauges: simulate --engine {JUDGE} has no --history to draw ([[gauges]])"

@@ -33,14 +33,13 @@ from blast_env.calibration.model import (
     SimulatedQuantity,
 )
 from blast_env.calibration.references import kingery_bulmash, paper_ufc_column
+from blast_env.engines import find_engine, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.journal import Journal
-from blast_env.physics.engines import find_engine
 from blast_env.physics.parameters import parameters_digest
 from blast_env.provenance import package_version
 from blast_env.runner import as_completed
 from blast_env.scenario import Scenario, load_scenario
-from blast_env.simulation import simulate
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
 RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")

@@ -1,4 +1,4 @@
-"""What every engine offers: it takes a scene and returns what happened."""
+"""What a run of the particle model offers: a scene goes in, what happened comes out."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -98,27 +98,3 @@ class BlastRun(Protocol):
 
     def balls(self) -> BallStates:
         """Return the balls that are still there."""
-
-
-class Engine(Protocol):
-    """Something that can run a blast: of particles, or of a gas.
-
-    Attributes:
-        name: Name in records and calibrations.
-        version: Version of the code that does the physics.
-    """
-
-    @property
-    def name(self) -> str:
-        """Name in records and calibrations."""
-
-    @property
-    def version(self) -> str:
-        """Version of the library that does the physics."""
-
-
-class ParticleEngine(Engine, Protocol):
-    """An engine that can run a scene of balls."""
-
-    def start(self, scene: Scene) -> BlastRun:
-        """Return a run of the scene at time 0, independent of every other run."""

@@ -207,7 +207,7 @@ def _subtitle(evaluation: LayoutEvaluation) -> str:
         f"{count_of('threat', len(evaluation.threats))}; worst: {charge.tnt_kg:g} kg TNT at "
         f"({x_m:.1f} m, {y_m:.1f} m), {_load_text(evaluation, evaluation.worst.load)}; "
         f"{stand_off and f'{stand_off}; '}"
-        f"calibration {evaluation.calibration}, engine {evaluation.engine_name}{range_note}"
+        f"calibration {evaluation.calibration}, engine {evaluation.engine.name}{range_note}"
     )
 
 

@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
+from blast_env.engines import BlastResult
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Rectangle
@@ -42,7 +43,6 @@ from blast_env.rendering.style import (
     shown_until_s,
     unit_interval,
 )
-from blast_env.simulation import BlastResult
 from blast_env.units import MS_PER_S, UNITS_PER_M
 from blast_env.values import path_of
 

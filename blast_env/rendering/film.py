@@ -13,6 +13,7 @@ from typing import Final, Protocol, Self
 import numpy as np
 
 from blast_env.calibration import LoadUnit
+from blast_env.engines import Blast, BlastResult
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.engine import BlastRun
@@ -25,7 +26,6 @@ from blast_env.rendering.style import (
     render_extra,
     shown_until_s,
 )
-from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MS_PER_S
 from blast_env.values import path_of
 

@@ -6,6 +6,7 @@ from typing import Final, Self
 import numpy as np
 
 from blast_env.calibration import LoadUnit
+from blast_env.engines import Blast
 from blast_env.physics.engine import BallStates
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.scene import Scene
@@ -34,7 +35,6 @@ from blast_env.rendering.style import (
     render_extra,
 )
 from blast_env.scenario.models import BuildZone
-from blast_env.simulation import Blast
 from blast_env.units import MS_PER_S
 
 with render_extra():

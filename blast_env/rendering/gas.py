@@ -14,6 +14,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.calibration.references import Burst, Friedlander, kingery_bulmash
+from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import layout_counts
 from blast_env.physics.scene import WALLS, StructureOutline, WallName
@@ -30,7 +31,6 @@ from blast_env.rendering.style import (
     render_extra,
     unit_interval,
 )
-from blast_env.simulation.gas import GasBlast, GasResult
 from blast_env.units import MS_PER_S, UNITS_PER_M
 
 with render_extra():

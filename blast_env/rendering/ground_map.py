@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.engines.gas import GasResult
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.opening import Opening, opening_of
@@ -39,7 +40,6 @@ from blast_env.rendering.style import (
     short_number,
     unit_interval,
 )
-from blast_env.simulation.gas import GasResult
 
 with render_extra():
     from matplotlib import patheffects

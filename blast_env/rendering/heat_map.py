@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import isqrt
 
 from blast_env.calibration import LoadUnit
+from blast_env.engines import BlastResult
 from blast_env.errors import BlastEnvError
 from blast_env.physics.structure import ModularObstacle
 from blast_env.rendering.site_plan import (
@@ -31,7 +32,6 @@ from blast_env.rendering.style import (
     short_number,
     unit_interval,
 )
-from blast_env.simulation import BlastResult
 
 with render_extra():
     from matplotlib.axes import Axes

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from blast_env.engines import Blast, BlastResult
 from blast_env.geometry import Cell, Element, Rectangle
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import Colour, load_colour
@@ -46,7 +47,6 @@ from blast_env.scenario import (
 )
 from blast_env.scenario.build_scene import build_scene, build_site, vehicle_reach
 from blast_env.scenario.vehicles import squares_of
-from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
 with render_extra():

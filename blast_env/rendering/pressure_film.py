@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.calibration.references import Burst, kingery_bulmash
+from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.gas.engine import GasRun, Recorders
@@ -34,7 +35,6 @@ from blast_env.rendering.pressure_frames import (
 )
 from blast_env.rendering.site_plan import in_metres
 from blast_env.rendering.style import PAGE, nice_ceiling
-from blast_env.simulation.gas import GasBlast, GasResult
 
 _EVERY_S: Final = 0.0002  # of 100 kg
 _LONGEST_S: Final = 4.0  # of 100 kg
@@ -122,11 +122,19 @@ class PressureScreening:
 
     Attributes:
         blast: The blast.
+        outcome: What came of it, for those who ask; a film of overpressure has no room for it.
+        remark: About which blast is shown, as well.
         size_px: Width and height of the frames, both even.
     """
 
     blast: GasBlast
-    size_px: tuple[int, int]
+    outcome: str = ""
+    remark: str = ""
+    size_px: tuple[int, int] = (960, 720)
+
+    def last_frame(self) -> Frame | None:
+        """Return nothing: when all loads are there, the pressure that made them is gone."""
+        return None
 
     def frames(self, frames_per_s: float) -> Iterator[Frame]:
         """Yield the frames of a film of 8 to 12 s, uint8 (height, width, 3) each.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from blast_env.arrays import FloatArray
+from blast_env.engines.gas import GasResult
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.gas.engine import GasRun
@@ -46,7 +47,6 @@ from blast_env.rendering.style import (
     render_extra,
     unit_interval,
 )
-from blast_env.simulation.gas import GasResult
 from blast_env.units import MS_PER_S
 
 with render_extra():

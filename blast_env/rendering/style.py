@@ -9,12 +9,12 @@ from typing import Final
 import numpy as np
 
 from blast_env.calibration import LoadUnit
+from blast_env.engines import Blast, BlastResult
 from blast_env.errors import import_extra
 from blast_env.geometry import layout_counts
 from blast_env.physics.particles import CollisionType, distance_to_rectangle
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import Colour
-from blast_env.simulation import Blast, BlastResult
 from blast_env.units import MODULE_SIDE_UNITS
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from blast_env.engines.gas import GasBlast
 from blast_env.geometry import Layout
 from blast_env.physics.gas.engine import ROOF
 from blast_env.physics.scene import Charge
@@ -31,7 +32,6 @@ from blast_env.reporting.outcomes import FrontPoint, ItemWorth, Outcome
 from blast_env.reporting.threats import NamedCharge
 from blast_env.reporting.units import UnitSystem
 from blast_env.scenario import RectangleSource, Scenario, SegmentSource
-from blast_env.simulation.gas import GasBlast
 from blast_env.units import MODULE_SIDE_M, MS_PER_S
 
 with render_extra():

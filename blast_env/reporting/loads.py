@@ -10,12 +10,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
+from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.geometry import Rectangle
 from blast_env.physics.gas.probes import ARRIVAL_PA
 from blast_env.physics.gas.solver import GasSolver
 from blast_env.physics.scene import WALLS, WallName
 from blast_env.scenario import AnyStructure, Scenario
-from blast_env.simulation.gas import GasBlast, GasResult
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ import pandas as pd
 
 from blast_env.arrays import FloatArray
 from blast_env.documents import parse_csv, read_text
+from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError, shortened
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.export.bill import bill_of_quantities
 from blast_env.export.plan import LayoutPlan
 from blast_env.geometry import Element, Layout, Piece, layout_text
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.reporting.figures import Picture, blast_pictures, film_stills
 from blast_env.reporting.limits import Limit, check_limits
 from blast_env.reporting.loads import Measured, Target, measure, targets_of
@@ -30,7 +30,6 @@ from blast_env.reporting.threats import (
 )
 from blast_env.reporting.units import UNITS, UnitSystem
 from blast_env.scenario import AnyCharge, Placement, Scenario, check_layout
-from blast_env.simulation.gas import GasBlast
 from blast_env.statistics import reductions
 
 MOST_THREATS: Final = 6

@@ -88,7 +88,7 @@ def difficulty_figure(evaluation: LayoutEvaluation, name: str) -> Figure:
         f"{scenario.name}: a reduction of {value:.0f} % (95 %: {low:.0f} to {high:.0f} %)",
         f"best layout for all threats, means over {len(evaluation.threats)} threats; preset "
         f"{scenario.simulation.preset}, calibration {evaluation.calibration}, engine "
-        f"{evaluation.engine_name}",
+        f"{evaluation.engine.name}",
     )
     for axes, scene in zip(plans, scenes, strict=True):
         # The others have names that say little and would cover much.

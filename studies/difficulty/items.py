@@ -28,11 +28,11 @@ from blast_agents.rules import (
 from blast_agents.search import LayoutProblem, find_search_method
 
 from blast_env.arrays import FloatArray
+from blast_env.engines import Engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Layout, Piece
-from blast_env.physics.engine import Engine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
     AnyCharge,

@@ -15,15 +15,14 @@ from blast_agents.rules import random_layout, wall_near_building, wall_near_char
 from blast_env.arrays import FloatArray
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.rendering.figures import save_figure
 from blast_env.runner import run_all
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
-from blast_env.simulation.gas import GasBlast
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.gas.cells import CellLoads, cell_loads, difference

@@ -15,10 +15,9 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.errors import BlastEnvError
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.scenario import Scenario
-from blast_env.simulation.gas import GasBlast, GasResult
 from blast_env.units import MODULE_SIDE_M
 from studies.gas.reference import free_field_gauges
 from studies.gas.sites import with_heights

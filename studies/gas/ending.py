@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.physics.engine import EndReason
-from blast_env.simulation.gas import GasBlast, GasResult
 from studies.gas.loads import protected_impulse_pa_s
 
 

@@ -1,7 +1,7 @@
 """How loads depend on where the front is when the grid takes a charge over."""
 
+from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.physics.gas.source import set_charge
-from blast_env.simulation.gas import GasBlast, GasResult
 from studies.gas.loads import protected_impulse_pa_s
 
 

@@ -1,6 +1,6 @@
 """What a blast of the gas engine does to the protected structures."""
 
-from blast_env.simulation.gas import GasBlast, GasResult
+from blast_env.engines.gas import GasBlast, GasResult
 
 
 def protected_impulse_pa_s(result: GasResult) -> float:

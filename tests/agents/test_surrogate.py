@@ -40,11 +40,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 import studies.surrogate
+from blast_env.engines.gas import GasEngine
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats
 from blast_env.geometry import Layout, Piece
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, Placement, Scenario, load_scenario
 from blast_env.units import PA_PER_PSI

@@ -19,13 +19,13 @@ from blast_env.app.records import BlastRecord, Engine, Load, blast_key, comparis
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status, ThreatOf, read_status, write_status
+from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.reporting import StudyOptions
 from blast_env.scenario import Scenario, load_scenario
-from blast_env.simulation.gas import GasBlast
 from tests.app.here import Here
 from tests.gas_sites import WALL, hut
 from tests.scenarios import BALLISTIC_COURTYARD

@@ -28,8 +28,9 @@ from blast_env.app.folder import DesignFolder
 from blast_env.app.work import ReportTask, ThreatOf, read_task, write_task
 from blast_env.calibration.model import load_calibration, save_calibration
 from blast_env.cluster import address_of
+from blast_env.engines import simulate
+from blast_env.engines.loads import BlastLoads, StructureLoad
 from blast_env.evaluation import Threat
-from blast_env.evaluation.loads import BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastKey, DiskCache
 from blast_env.fitting.free_field import FreeFieldRun
 from blast_env.importing import ImportOptions, import_site
@@ -38,7 +39,6 @@ from blast_env.physics.scene import Charge
 from blast_env.recording.parquet import read_parquet
 from blast_env.reporting.study import front_layouts
 from blast_env.scenario import LayoutFile, Scenario, load_scenario, save_scenario, write_layout
-from blast_env.simulation import simulate
 from studies.pack_agent import league_result
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
 from tests.importing.maps import Places, charge, outline, rectangle, written

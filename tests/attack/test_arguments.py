@@ -13,10 +13,10 @@ import blast_env
 from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import fit_power_law, kingery_bulmash, load_calibration
 from blast_env.cli import app
+from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import evaluate_layout
 from blast_env.files import write_atomically
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.scenario import Scenario, ScenarioError, save_scenario
 from tests.scenarios import BALLISTIC_COURTYARD
 

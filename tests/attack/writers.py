@@ -14,6 +14,7 @@ from blast_agents.training.run_folder import RunConfiguration
 from matplotlib.figure import Figure
 
 from blast_env.calibration.model import load_calibration, save_calibration
+from blast_env.engines import Blast, BlastResult
 from blast_env.evaluation import LayoutEvaluation, evaluate_layout
 from blast_env.export import LayoutPlan, export_layout
 from blast_env.files import scratch_folder
@@ -21,7 +22,6 @@ from blast_env.rendering.figures import save_figure
 from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
 from blast_env.reporting.page import write_report
 from blast_env.scenario import save_scenario, write_layout
-from blast_env.simulation import Blast, BlastResult
 from blast_env.tables import write_csv
 from tests.agents.training_runs import hyperparameters, settings
 from tests.rendering.scenes import LAYOUT, small_blast

@@ -18,6 +18,7 @@ from blast_env.calibration.model import (
     seen_width_m,
     stored_calibrations,
 )
+from blast_env.engines import CALIBRATED_ENGINES
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.fitting.free_field import (
     FreeFieldStudy,
@@ -27,7 +28,6 @@ from blast_env.fitting.free_field import (
     paper_reference,
 )
 from blast_env.geometry import Rectangle
-from blast_env.physics.engines import PARTICLE_ENGINES
 from blast_env.physics.parameters import with_overrides
 from blast_env.physics.presets import preset
 from blast_env.scenario import Scenario
@@ -36,7 +36,7 @@ from tests.scenarios import BALLISTIC_COURTYARD
 CALIBRATION = load_calibration("ballistic_kb_100kg")
 SLOW = (("collisional", "pymunk"), ("collisional_fine", "event"))
 """Presets and engines with which a blast takes seconds."""
-of_every_engine = pytest.mark.parametrize("engine", PARTICLE_ENGINES)
+of_every_engine = pytest.mark.parametrize("engine", CALIBRATED_ENGINES)
 of_every_calibration = pytest.mark.parametrize(
     ("name", "engine"),
     [(name, engine) for name in stored_calibrations() for engine in calibrated_engines(name)],
@@ -98,7 +98,7 @@ def test_every_engine_has_its_own_calibration(name: str, engine: str) -> None:
 
 def test_the_calibrations_of_the_ballistic_preset_are_there_for_both_engines() -> None:
     for name in ("ballistic_ufc", "ballistic_kb_100kg"):
-        assert calibrated_engines(name) == tuple(sorted(PARTICLE_ENGINES))
+        assert calibrated_engines(name) == tuple(sorted(CALIBRATED_ENGINES))
 
 
 def test_an_engine_without_a_calibration_is_named() -> None:

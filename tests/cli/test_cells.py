@@ -9,7 +9,7 @@ from blast_agents.training.run_folder import RunFolder
 from typer.testing import CliRunner, Result
 
 from blast_env.cli import app
-from blast_env.physics.gas.engine import GasEngine
+from blast_env.engines.gas import GasEngine
 from blast_env.scenario import save_scenario
 from tests.gas_sites import hut
 

@@ -7,10 +7,10 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils.env_checker import data_equivalence
 
+from blast_env.engines.particles import EventEngine, ParticleEngine
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.physics.engine import BlastRun
-from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.particles import Balls, CollisionType
 from blast_env.physics.scene import Scene
 from blast_env.scenario import Scenario, load_scenario
@@ -20,7 +20,7 @@ _MODEL = load_scenario("courtyard")
 
 
 @dataclass(frozen=True)
-class ThinEngine:
+class ThinEngine(ParticleEngine):
     """Runs scenes without air and with every tenth ball of the charge: a blast in some 2 ms."""
 
     name: str = EventEngine().name

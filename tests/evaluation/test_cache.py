@@ -7,6 +7,7 @@ import pytest
 
 from blast_env import Charge
 from blast_env.calibration.model import scenario_calibration
+from blast_env.engines.particles import EventEngine, ParticleEngine, PymunkEngine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastLoads
 from blast_env.evaluation.store import (
@@ -16,8 +17,6 @@ from blast_env.evaluation.store import (
     engine_text,
 )
 from blast_env.physics.engine import BlastRun
-from blast_env.physics.event.engine import EventEngine
-from blast_env.physics.pymunk.engine import PymunkEngine
 from blast_env.physics.scene import Scene
 from tests.evaluation.cases import COURTYARD, FEW, THREATS
 
@@ -78,7 +77,7 @@ def test_a_negative_size_is_refused() -> None:
 
 
 @dataclass(frozen=True)
-class HalfEngine:
+class HalfEngine(ParticleEngine):
     """Calls itself pymunk, as engines of tests and of users may."""
 
     share: float = 0.5

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from blast_env import Charge, load_scenario, simulate
-from blast_env.calibration import Calibration, CalibrationError
+from blast_env.calibration import CalibrationError
 from blast_env.calibration import model as stored_module
+from blast_env.engines.particles import EventEngine, ParticleEngine
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, StructureLoad, Threat
 from blast_env.geometry import Cell
 from blast_env.physics.engine import BlastRun
-from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.scene import Scene
 from blast_env.scenario import Scenario, ScenarioError
 from tests.evaluation.cases import COURTYARD, FEW, THREATS, WALL
@@ -61,7 +61,7 @@ def test_protected_structures_count_by_their_weights_and_others_not_at_all() -> 
     assert not replace(loads, structures=(replace(load, in_range=False),)).in_range
 
 
-class WatchedEngine:
+class WatchedEngine(ParticleEngine):
     """Runs blasts and remembers the barriers' cells in their order."""
 
     name = EventEngine().name
@@ -151,19 +151,12 @@ def test_progress_ends_at_one(evaluator: BlastEvaluator) -> None:
     assert shares == [0.5, 1.0]
 
 
-def test_the_calibration_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_calibration_is_read_once() -> None:
     """Reading and checking the file costs more than converting a load."""
-    calls = []
-    load = stored_module.load_calibration
-
-    def counted(name: str, engine: str) -> Calibration:
-        calls.append((name, engine))
-        return load(name, engine)
-
-    monkeypatch.setattr(stored_module, "load_calibration", counted)
+    stored_module._of_the_package.cache_clear()
     evaluator = BlastEvaluator(COURTYARD)
     evaluator.loads_of_many([((), threat) for threat in THREATS[:2]])
-    assert calls == [("collisional_kb", "event")]
+    assert stored_module._of_the_package.cache_info().misses == 1
 
 
 def test_scenarios_that_no_calibration_fits_are_refused_at_once() -> None:

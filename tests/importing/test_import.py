@@ -11,10 +11,10 @@ import pytest
 import shapely
 from pyproj import Transformer
 
+from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.export import LayoutPlan, export_layout
 from blast_env.importing import ImportedSite, ImportOptions, import_site
 from blast_env.importing.roles import Role
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.scenario import (
     AnySource,
     RectangleSource,
@@ -25,7 +25,6 @@ from blast_env.scenario import (
 )
 from blast_env.scenario.georeference import DrawingGeoreference, MapGeoreference
 from blast_env.scenario.models import PointM
-from blast_env.simulation.gas import GasBlast
 from tests.importing.maps import BLOCK, LAYERS, charge, outline, rectangle, written
 
 HALL = ImportOptions(protect=("Town Hall",))

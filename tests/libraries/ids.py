@@ -7,8 +7,8 @@ from typing import Any, Final
 import gymnasium as gym
 
 import blast_env  # noqa: F401  # registers the environments
+from blast_env.engines.gas import GasEngine
 from blast_env.envs.registration import FOR_GAS, barrier_id
-from blast_env.physics.gas.engine import GasEngine
 from tests.envs.small import ThinEngine
 from tests.gas_sites import hut
 

@@ -20,9 +20,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from blast_env.arrays import FloatArray
+from blast_env.engines.particles import EventEngine
 from blast_env.geometry import Rectangle
 from blast_env.physics.engine import BallStates
-from blast_env.physics.event.engine import EventEngine
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.scene import Charge, Scene, StructureOutline

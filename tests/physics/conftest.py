@@ -2,11 +2,11 @@
 
 import pytest
 
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import PARTICLE_ENGINES, find_particle_engine
+from blast_env.engines import CALIBRATED_ENGINES, Engine
+from blast_env.engines.particles import find_particle_engine
 
 
-@pytest.fixture(params=PARTICLE_ENGINES)
+@pytest.fixture(params=CALIBRATED_ENGINES)
 def engine(request: pytest.FixtureRequest) -> Engine:
     """Every engine that comes with the package, one after the other."""
     return find_particle_engine(str(request.param))

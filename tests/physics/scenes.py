@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from blast_env.engines import ParticleEngine
+from blast_env.engines.particles import EventEngine
 from blast_env.geometry import Rectangle
-from blast_env.physics.engine import BallStates, BlastRun, ParticleEngine
-from blast_env.physics.event.engine import EventEngine
+from blast_env.physics.engine import BallStates, BlastRun
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, CollisionType
 from blast_env.physics.scene import Charge, Scene, StructureOutline

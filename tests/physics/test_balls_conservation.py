@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from blast_env.physics.engine import ParticleEngine
-from blast_env.physics.pymunk.engine import PymunkEngine
+from blast_env.engines import ParticleEngine
+from blast_env.engines.particles import PymunkEngine
 from blast_env.physics.scene import Scene
 from tests.physics.scenes import (
     AIR,

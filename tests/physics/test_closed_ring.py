@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
+from blast_env.engines import simulate
 from blast_env.scenario import Scenario
-from blast_env.simulation import simulate
 from blast_env.units import MODULE_SIDE_M
 
 

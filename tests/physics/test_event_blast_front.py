@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blast_env.physics.event.engine import EventEngine
+from blast_env.engines.particles import EventEngine
 from tests.physics.blast_front import (
     FrontCase,
     density_peak,

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from blast_env import load_scenario, simulate
+from blast_env.engines import ParticleEngine
+from blast_env.engines.particles import EventEngine
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.physics.engine import BlastRun, ParticleEngine
-from blast_env.physics.event.engine import EventEngine
+from blast_env.physics.engine import BlastRun
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.scene import Scene
 from tests.physics.scenes import AIR, EVENT, EXPLOSIVE, balls, finished, parameters, scene, wall

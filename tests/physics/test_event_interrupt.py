@@ -6,11 +6,12 @@ import time
 import numpy as np
 import pytest
 
+from blast_env.engines import Blast
+from blast_env.engines.particles import EventEngine
 from blast_env.physics.event import loop
-from blast_env.physics.event.engine import EventEngine, EventRun
+from blast_env.physics.event.engine import EventRun
 from blast_env.physics.scene import Scene
 from blast_env.scenario import Scenario
-from blast_env.simulation import Blast
 
 
 def touching_air() -> Scene:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from blast_env.engines import ParticleEngine
+from blast_env.engines.particles import PymunkEngine
 from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
-from blast_env.physics.engine import ParticleEngine
 from blast_env.physics.particles import CollisionType
-from blast_env.physics.pymunk.engine import PymunkEngine
 from tests.physics.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, wall
 
 FACADE = wall((100.0, 90.0), 10, 1)

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from blast_env.engines import CALIBRATED_ENGINES, ParticleEngine
+from blast_env.engines.particles import PymunkEngine, find_particle_engine
 from blast_env.geometry import Rectangle
-from blast_env.physics.engine import BlastRun, EndReason, ParticleEngine
-from blast_env.physics.engines import PARTICLE_ENGINES, find_particle_engine
+from blast_env.physics.engine import BlastRun, EndReason
 from blast_env.physics.particles import (
     Balls,
     CollisionType,
@@ -17,7 +18,7 @@ from blast_env.physics.particles import (
     explosion_fan,
     lattice_capacity,
 )
-from blast_env.physics.pymunk.engine import PymunkEngine, PymunkRun
+from blast_env.physics.pymunk.engine import PymunkRun
 from blast_env.physics.scene import Scene
 from tests.physics.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, wall
 
@@ -95,7 +96,7 @@ def test_no_scene_has_more_air_than_its_capacity(seed: int, spacing: float, widt
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine_name", PARTICLE_ENGINES)
+@pytest.mark.parametrize("engine_name", CALIBRATED_ENGINES)
 @given(
     kind=st.sampled_from([EXPLOSIVE, AIR]),
     speed=st.floats(10.0, 1e6),

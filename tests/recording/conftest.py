@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from blast_env.engines import BlastResult, simulate
 from blast_env.scenario import (
     BuildZone,
     ConcreteSquareSection,
@@ -13,7 +14,6 @@ from blast_env.scenario import (
     SimulationSection,
     Site,
 )
-from blast_env.simulation import BlastResult, simulate
 
 SEED = 2**60 + 1
 """Greater than what Excel can hold as a number."""

@@ -6,6 +6,7 @@ from zipfile import ZipFile
 import pandas as pd
 import pytest
 
+from blast_env.engines import BlastResult, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.recording.excel import (
     EXCEL_ROWS,
@@ -21,7 +22,6 @@ from blast_env.recording.tables import (
     STRUCTURE_COLUMNS,
     RunRecord,
 )
-from blast_env.simulation import BlastResult, simulate
 from blast_env.tables import Column
 from tests.agents.search_cases import small_scenario
 from tests.recording import workbooks

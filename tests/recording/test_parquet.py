@@ -7,10 +7,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from blast_env.engines import BlastResult
 from blast_env.errors import BlastEnvError
 from blast_env.recording.parquet import METADATA_KEY, read_parquet, write_parquet
 from blast_env.recording.tables import COLLISION_COLUMNS
-from blast_env.simulation import BlastResult
 
 
 @pytest.mark.parametrize("fixture", ["blast", "quiet_blast"])

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from blast_env.engines import BlastResult
 from blast_env.physics.collisions import COLLISION_DTYPE, CollisionArray
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import ModularObstacle
@@ -15,7 +16,6 @@ from blast_env.recording.tables import (
     module_table,
     structure_table,
 )
-from blast_env.simulation import BlastResult
 from blast_env.tables import Column
 
 

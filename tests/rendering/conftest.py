@@ -1,6 +1,6 @@
 import pytest
 
-from blast_env.simulation import Blast, BlastResult
+from blast_env.engines import Blast, BlastResult
 from tests.rendering.scenes import small_blast
 
 

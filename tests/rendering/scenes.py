@@ -1,7 +1,7 @@
 from typing import Any
 
+from blast_env.engines import Blast
 from blast_env.scenario import Scenario
-from blast_env.simulation import Blast
 
 LAYOUT = tuple((row, 1) for row in range(2, 9))
 

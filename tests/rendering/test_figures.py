@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 from PIL import Image
 
+from blast_env.engines import BlastResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.recording.tables import faces_hit
 from blast_env.rendering.figures import (
@@ -18,7 +19,6 @@ from blast_env.rendering.figures import (
     save_figure,
 )
 from blast_env.rendering.style import short_number
-from blast_env.simulation import BlastResult
 
 
 def modules_of(figure: Figure, panel: int) -> PatchCollection:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from blast_env.engines import Blast, BlastResult
 from blast_env.errors import BlastEnvError
 from blast_env.rendering.film import FilmPlan, plan_film, write_film
 from blast_env.rendering.style import shown_until_s
-from blast_env.simulation import Blast, BlastResult
 
 
 def test_an_mp4_has_the_planned_frames_and_even_sizes(blast: Blast, tmp_path: Path) -> None:

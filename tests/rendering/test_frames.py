@@ -7,13 +7,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from blast_env.engines import Blast
 from blast_env.errors import BlastEnvError
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import load_colour
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.frames import FramePainter, balls_at_start
 from blast_env.rendering.style import AIR, BARRIER, BORDER, EXPLOSIVE, PROTECTED
-from blast_env.simulation import Blast
 from blast_env.units import MODULE_SIDE_UNITS
 
 

@@ -15,8 +15,8 @@ from PIL import Image
 
 from blast_env import Charge
 from blast_env.calibration.references import kingery_bulmash
+from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.gas.probes import GroundMap
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.film import plan_until
@@ -37,7 +37,6 @@ from blast_env.rendering.pressure_frames import (
 )
 from blast_env.rendering.site_plan import draw_what_stands, layout_legend
 from blast_env.scenario.build_scene import build_site
-from blast_env.simulation.gas import GasBlast, GasResult
 from tests.catalogue_sites import WALL as PIECES
 from tests.catalogue_sites import yard
 from tests.gas_sites import WALL, hut

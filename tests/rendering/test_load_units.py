@@ -7,11 +7,11 @@ import pytest
 from blast_env import simulate
 from blast_env.calibration import LoadUnit
 from blast_env.calibration.model import seen_width_m
+from blast_env.engines import BlastResult
 from blast_env.rendering.figures import common_scale, heat_map, impulse_over_time
 from blast_env.rendering.film import largest_load
 from blast_env.rendering.frames import ONE_SEED, FramePainter
 from blast_env.rendering.style import nice_ceiling
-from blast_env.simulation import BlastResult
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 from tests.agents.search_cases import small_scenario
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from imageio.plugins import ffmpeg
 
+from blast_env.engines import Blast
 from blast_env.errors import BlastEnvError
 from blast_env.rendering.film import FilmPanel, plan_film, write_side_by_side
 from blast_env.rendering.frames import FramePainter
-from blast_env.simulation import Blast
 
 WIDTH_PX = 640
 

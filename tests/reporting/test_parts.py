@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Piece
 from blast_env.physics.scene import Charge
@@ -16,7 +17,6 @@ from blast_env.reporting.loads import TargetLoad, first_phase_s, targets_of
 from blast_env.reporting.study import Runs, layout_from
 from blast_env.reporting.threats import asked_threats, chief_threats, other_masses, other_places
 from blast_env.scenario import Scenario, ScenarioError
-from blast_env.simulation.gas import GasBlast
 from tests.gas_sites import site_document
 from tests.reporting.sites import small_hut
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document

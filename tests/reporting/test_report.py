@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
+from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, layout_text
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Study, StudyOptions, run_study, write_report
 from blast_env.reporting.loads import Measured, measure, targets_of
@@ -21,7 +21,6 @@ from blast_env.reporting.page import report_html
 from blast_env.reporting.study import Runs
 from blast_env.reporting.threats import chief_threats
 from blast_env.scenario import Scenario, save_scenario, write_layout
-from blast_env.simulation.gas import GasBlast
 from tests.catalogue_sites import WALL, yard
 from tests.reporting.sites import LAYOUT, small_hut
 

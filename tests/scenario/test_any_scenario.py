@@ -38,7 +38,7 @@ THREAT = Threat(CHARGE, 0)
 PUBLIC = (
     "blast_env",
     "blast_env.scenario",
-    "blast_env.simulation",
+    "blast_env.engines",
     "blast_env.evaluation",
     "blast_env.export",
     "blast_env.sites",

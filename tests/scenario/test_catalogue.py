@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from blast_env.engines import simulate
 from blast_env.errors import LayoutError
 from blast_env.geometry import Piece, Rectangle
 from blast_env.scenario import (
@@ -27,7 +28,6 @@ from blast_env.scenario import (
     write_layout,
 )
 from blast_env.scenario.build_scene import build_scene, build_site
-from blast_env.simulation import simulate
 from tests.catalogue_sites import ITEMS, WALL, item, yard, yard_document
 from tests.scenario.documents import REPOSITORY, Document
 from tests.scenario.zones import buildable, catalogue_documents, pieces_may_stand

@@ -5,12 +5,12 @@ import pytest
 from blast_agents.rules import random_layout
 
 from blast_env import load_scenario
+from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.envs.registration import FOR_GAS
 from blast_env.geometry import Layout, Piece
-from blast_env.physics.gas.engine import CHECKED_CELLS, GasEngine
+from blast_env.physics.gas.engine import CHECKED_CELLS
 from blast_env.scenario import Placement, Scenario
 from blast_env.scenario.build_scene import worst_places
-from blast_env.simulation.gas import GasBlast
 
 WITH_VEHICLES = ("hotel_forecourt", "shopping_street")
 

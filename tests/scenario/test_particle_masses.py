@@ -3,10 +3,10 @@
 import pytest
 
 from blast_env import simulate
+from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.scenario import Scenario, ScenarioError
-from blast_env.simulation.gas import GasBlast
 from tests.gas_sites import site_document
 
 HEAVY_KG = 90_000.0

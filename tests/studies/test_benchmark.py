@@ -4,8 +4,8 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from blast_env import Blast, load_scenario
+from blast_env.engines.particles import PymunkEngine
 from blast_env.errors import BlastEnvError
-from blast_env.physics.pymunk.engine import PymunkEngine
 from blast_env.physics.pymunk.space import build_space
 from blast_env.scenario.build_scene import build_scene
 from blast_env.studies.benchmark import engines, parallel

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blast_env import Scenario, load_scenario, simulate
-from blast_env.physics.event.engine import EventEngine
+from blast_env.engines.particles import EventEngine
 from blast_env.studies.benchmark.environment import (
     TimedEngine,
     benchmark_engine,

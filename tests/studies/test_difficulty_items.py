@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from blast_env import load_scenario
+from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.scenario import Placement, Scenario, VehicleCharge
 from studies.difficulty.__main__ import elsewhere_text, item_rows, joint_rows, with_items
 from studies.difficulty.items import (

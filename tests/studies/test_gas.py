@@ -6,13 +6,12 @@ from math import cbrt
 import numpy as np
 import pytest
 
+from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.gas.source import TNT
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
-from blast_env.simulation.gas import GasBlast
 from studies.gas.cells import CellLoads, cell_loads, difference
 from studies.gas.corners import BlockGeometry, corner_waves
 from studies.gas.ending import Ending, ending

@@ -22,11 +22,10 @@ from blast_agents.league.store import ResultStore, evaluation_key, search_key
 from blast_agents.league.tracks import Track, practice_of
 from blast_agents.proposal import Proposal, timed_proposal
 from blast_agents.search import BlastMeter, BudgetError, LayoutProblem, SearchResult
+from blast_env.engines import Engine, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Objective
 from blast_env.geometry import Layout
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine, is_gas
 from blast_env.runner import as_completed, check_workers
 
 Found = TypeVar("Found")
@@ -341,5 +340,4 @@ class _Meter:
 
 def _engine_words(engine: str | Engine) -> str:
     """Return what people call an engine: its name, with the cells that it has."""
-    found = find_engine(engine)
-    return f"{found.name}, cells of {found.cell_m:g} m" if is_gas(found) else found.name
+    return find_engine(engine).words

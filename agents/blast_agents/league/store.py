@@ -17,14 +17,12 @@ import blast_agents
 from blast_agents.league.entries import Search
 from blast_agents.league.tracks import practice_of
 from blast_agents.proposal import Proposal
-from blast_env.calibration.model import scenario_calibration
 from blast_env.documents import checked_as, parse_json
+from blast_env.engines import Engine, find_engine
 from blast_env.evaluation import Case, Threat
 from blast_env.evaluation.store import calibration_digest, engine_text
 from blast_env.files import FolderStore
 from blast_env.geometry import Layout
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import find_engine, is_gas
 from blast_env.provenance import code_version, versions
 from blast_env.scenario import AnyCharge, AnyScenario, VehicleCharge, check_layout
 
@@ -211,7 +209,6 @@ def _search_code(own: Path) -> str:
 
 def _model(case: Case, engine: str | Engine) -> Model:
     found = find_engine(engine)
-    digest = ""  # gas dynamics needs no calibration
-    if not is_gas(found):
-        digest = calibration_digest(scenario_calibration(case.scenario, found.name))
+    law = found.calibration(case.scenario)
+    digest = "" if law is None else calibration_digest(law)
     return Model(case.scenario.content_hash, engine_text(found), digest, code_version())

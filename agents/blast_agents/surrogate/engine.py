@@ -4,18 +4,15 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
 from blast_agents.surrogate.network import Surrogate, load_surrogate, packaged_surrogate
 from blast_agents.surrogate.walls import Site, site_of
 from blast_env.arrays import FloatArray
-from blast_env.envs.arguments import check_names
-from blast_env.evaluation.loads import BlastLoads, StructureLoad
+from blast_env.engines import BlastLoads, Engine, StructureLoad, find_engine
 from blast_env.geometry import Element
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import ENGINE_NAMES, find_engine
 from blast_env.scenario import AnyCharge, Scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.units import PA_PER_PSI
@@ -28,7 +25,7 @@ _KEPT_SITES: Final = 64
 
 
 @dataclass(frozen=True)
-class SurrogateEngine:
+class SurrogateEngine(Engine):
     """Tells the loads on each protected structure by guesses: an engine without a blast.
 
     `gymnasium.make("BlastBarrier-v0", scenario=..., engine=SurrogateEngine())` has episodes of
@@ -40,7 +37,16 @@ class SurrogateEngine:
         digest: Its digest.
     """
 
+    has_peaks: ClassVar[bool] = True
+    title: ClassVar[str] = "Surrogate"
+    caveat: ClassVar[str] = (
+        "These are guesses of gas dynamics, not blasts: judge with engine 'gas'."
+    )
+    checked_for: ClassVar[str] = "what a blast says: they are guesses"
+
     surrogate: Surrogate = field(default_factory=packaged_surrogate, repr=False)
+    name: str = field(init=False, default=SURROGATE)
+    version: str = field(init=False)
     digest: str = field(init=False)
     _sites: OrderedDict[str, Site] = field(
         default_factory=OrderedDict, init=False, repr=False, compare=False
@@ -49,24 +55,22 @@ class SurrogateEngine:
     def __post_init__(self) -> None:
         """Work out the digest, which tells results of different surrogates apart."""
         object.__setattr__(self, "digest", self.surrogate.digest)
+        object.__setattr__(self, "version", f"{SURROGATE} {self.digest}")
 
-    @property
-    def name(self) -> str:
-        """Name in records."""
-        return SURROGATE
-
-    @property
-    def version(self) -> str:
-        """Which surrogate."""
-        return f"{SURROGATE} {self.digest}"
-
-    def loads(self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> BlastLoads:
+    def loads(
+        self,
+        scenario: Scenario,
+        layout: Sequence[Element],
+        charge: AnyCharge,
+        seed: int = 0,  # noqa: ARG002
+    ) -> BlastLoads:
         """Return what the surrogate guesses, a charge and a layout at a time.
 
         Args:
             scenario: The scenario.
             layout: A legal layout.
             charge: What goes off: where it does, or the vehicle that brings it.
+            seed: Changes nothing: guesses have no noise.
 
         Returns:
             The loads. Those of a structure's modules are all the same, since only their mean is
@@ -132,9 +136,6 @@ def engine_to_train_on(name: str, cell_m: float | None = None) -> Engine:
         UnknownNameError: If there is no engine of that name.
         BlastEnvError: If it has no such cells, or the file is no surrogate.
     """
-    if name == SURROGATE:
-        return find_engine(SurrogateEngine(), cell_m)
-    if is_surrogate(name):
+    if Path(name).suffix == ".json":
         return find_engine(SurrogateEngine(load_surrogate(Path(name))), cell_m)
-    check_names("engine", [name], [*ENGINE_NAMES, SURROGATE])
     return find_engine(name, cell_m)

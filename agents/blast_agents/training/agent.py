@@ -29,6 +29,7 @@ from blast_agents.training.hyperparameters import (
     schedule,
 )
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
+from blast_env.engines import Engine
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import (
     OBSERVATIONS,
@@ -43,7 +44,6 @@ from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout
-from blast_env.physics.engine import Engine
 from blast_env.scenario import (
     AnyCharge,
     AnyScenario,

@@ -30,12 +30,11 @@ from blast_env.documents import (
     parse_json,
     read_text,
 )
+from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import OBSERVATIONS
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import is_temporary, make_folder, sync, write_atomically
-from blast_env.physics.engine import Engine
-from blast_env.physics.engines import GAS, find_engine
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
 
@@ -134,7 +133,7 @@ class TrainingSettings(BaseModel):
             UnknownNameError: If there is no engine of that name.
             BlastEnvError: If it has no such cells.
         """
-        return find_engine(GAS) if self.guesses else self.blast_engine
+        return find_engine(JUDGE) if self.guesses else self.blast_engine
 
     @property
     def judge(self) -> Engine:

@@ -34,6 +34,7 @@ from blast_agents.training.checkpoint import Checkpoint, Label
 from blast_agents.training.hyperparameters import schedule
 from blast_agents.training.recorder import Progress
 from blast_agents.training.run_folder import RolloutRow, RunConfiguration, RunFolder
+from blast_env.engines import Engine
 from blast_env.envs.observations import OBSERVATIONS, EpisodeObservation, Observable
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.errors import BlastEnvError
@@ -41,7 +42,6 @@ from blast_env.evaluation import Case, Evaluators
 from blast_env.evaluation.evaluator import BlastAsked
 from blast_env.evaluation.store import BlastCache, DiskCache, LoadsCache
 from blast_env.geometry import Layout
-from blast_env.physics.engine import Engine
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement
 from blast_env.scenario.vehicles import source_of

@@ -1,8 +1,6 @@
 """The event-driven engine: the paper's model with hard discs and without a time step."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from importlib.metadata import version
 from typing import Any, Final
 
 import numpy as np
@@ -25,23 +23,6 @@ _END_REASONS: Final = {
     loop.OUT_OF_REACH: EndReason.OUT_OF_REACH,
     loop.EVENT_LIMIT: EndReason.EVENT_LIMIT,
 }
-
-
-@dataclass(frozen=True)
-class EventEngine:
-    """Runs scenes from one collision to the next, in compiled code.
-
-    Attributes:
-        cell_units: Side of the cells in which neighbours are looked up; see `world_of`.
-    """
-
-    name: str = "event"
-    version: str = f"event 1 (numba {version('numba')})"
-    cell_units: float | None = None
-
-    def start(self, scene: Scene) -> "EventRun":
-        """Return a run of the scene at time 0."""
-        return EventRun(scene, self.cell_units)
 
 
 class EventRun:

@@ -8,7 +8,6 @@ loads on the structures are complete.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from math import cbrt, ceil, hypot, inf, isclose
 from typing import Final
 
@@ -65,8 +64,8 @@ def _none(_: GasGrid) -> Sequence[Recorder]:
 
 
 @dataclass(frozen=True)
-class GasEngine:
-    """Runs blasts as compressible gas, in compiled code.
+class GasSettings:
+    """How finely and how long a blast is run as compressible gas.
 
     Attributes:
         cell_m: Side of a cell; a module's side must be a whole number of them.
@@ -88,8 +87,6 @@ class GasEngine:
     settled_s: float = 0.06
     threads: int = 1
     time_limit_s: float | None = None
-    name: str = "gas"
-    version: str = f"gas 3 (numba {version('numba')})"
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -108,19 +105,6 @@ class GasEngine:
         limit_s = self.time_limit_s
         if limit_s is not None and not finite_number("time_limit_s", limit_s) > 0.0:
             raise BlastEnvError(f"time_limit_s is {limit_s:g}, must be above 0")
-
-    def start_on(self, site: BlastSite, recorders: Recorders = _none) -> "GasRun":
-        """Return a run at time 0, independent of every other run.
-
-        Args:
-            site: What stands where.
-            recorders: Makes further recorders for the grid: maps, pictures.
-
-        Raises:
-            BlastEnvError: If the grid would not fit into memory, or the charge or a gauge is in a
-                solid.
-        """
-        return GasRun(self, site, recorders)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +133,7 @@ class GasRun:
 
     Attributes:
         site: What stands where.
-        engine: The engine.
+        settings: How it is run.
         grid: The grid.
         solver: The solver.
         charge: The charge.
@@ -164,9 +148,11 @@ class GasRun:
         notes: Why the result is to be distrusted, a sentence each.
     """
 
-    def __init__(self, engine: GasEngine, site: BlastSite, recorders: Recorders = _none) -> None:
-        self.engine, self.site = engine, site
-        self.grid, owner = _grid(engine, site)
+    def __init__(
+        self, settings: GasSettings, site: BlastSite, recorders: Recorders = _none
+    ) -> None:
+        self.settings, self.site = settings, site
+        self.grid, owner = _grid(settings, site)
         self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
         reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
         self.handover_radius_m = largest_radius_m(self.grid, self.charge, reserved)
@@ -182,8 +168,8 @@ class GasRun:
             recorders=(*own, *recorders(self.grid)),
             with_fuel=True,
             burning=self.charge.burning,
-            settling=Settling(engine.settled_s * scale, _HOTTEST),
-            threads=engine.threads,
+            settling=Settling(settings.settled_s * scale, _HOTTEST),
+            threads=settings.threads,
         )
         set_charge(self.solver, self.charge, self.handover_radius_m)
         if self.gauges is not None:
@@ -195,7 +181,7 @@ class GasRun:
         self._impulses: FloatArray | None = None
         waves_s = _way_m(self.charge, site, watched) / _SOUND_M_S + _SWING_S * scale
         self._check_s = waves_s - self._window_s
-        self.limit_s = engine.time_limit_s or waves_s + _TIME_LIMIT_S * scale
+        self.limit_s = settings.time_limit_s or waves_s + _TIME_LIMIT_S * scale
 
     @property
     def time_s(self) -> float:
@@ -242,7 +228,7 @@ class GasRun:
                 f"the charge is {clear:.2g} m from a solid, below the {least:.2g} m "
                 "that its source needs"
             )
-        cells = cbrt(self.charge.mass_kg) / self.engine.cell_m
+        cells = cbrt(self.charge.mass_kg) / self.settings.cell_m
         if cells < CHECKED_CELLS:
             notes.append(
                 f"{cells:.2g} cells per m/kg^(1/3) of the charge, checked from {CHECKED_CELLS:g}: "
@@ -257,14 +243,14 @@ def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
     return hypot(distance, site.charge.height_m) / cbrt(site.charge.tnt_kg)
 
 
-def _grid(engine: GasEngine, site: BlastSite) -> tuple[GasGrid, NDArray[np.int64]]:
+def _grid(settings: GasSettings, site: BlastSite) -> tuple[GasGrid, NDArray[np.int64]]:
     """Return the grid, and what each column of cells belongs to.
 
     Returns:
         The grid; index of the structure (-1: none), row and column of the module (3, nx, ny).
     """
-    cell_m = engine.cell_m
-    margin = ceil(engine.margin_m / cell_m)
+    cell_m = settings.cell_m
+    margin = ceil(settings.margin_m / cell_m)
     low = np.array([site.site.left, site.site.bottom]) / UNITS_PER_M
     high = np.array([site.site.right, site.site.top]) / UNITS_PER_M
     plan = np.ceil(np.round((high - low) / cell_m, 9)).astype(int) + 2 * margin
@@ -274,7 +260,7 @@ def _grid(engine: GasEngine, site: BlastSite) -> tuple[GasGrid, NDArray[np.int64
         cell_m,
         np.broadcast_to(np.False_, shape),
         (float(origin[0]), float(origin[1]), 0.0),
-        skirt=layers_to(engine.border_m / cell_m),
+        skirt=layers_to(settings.border_m / cell_m),
     )
     needed = state_bytes(grid, "single", with_fuel=True)
     if needed > _MOST_BYTES:

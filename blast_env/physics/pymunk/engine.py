@@ -1,7 +1,6 @@
 """The reference engine: pymunk, step by step."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from math import hypot
 from typing import Any, Final, NamedTuple
@@ -138,18 +137,6 @@ class _Touch(NamedTuple):
     is_lasting: bool
     velocity: pymunk.Vec2d
     outward_normal: pymunk.Vec2d
-
-
-@dataclass(frozen=True)
-class PymunkEngine:
-    """Runs scenes on pymunk (Chipmunk)."""
-
-    name: str = "pymunk"
-    version: str = f"pymunk {pymunk.version}"
-
-    def start(self, scene: Scene) -> "PymunkRun":
-        """Return a run of the scene in a new space."""
-        return PymunkRun(scene)
 
 
 class PymunkRun:

@@ -13,12 +13,12 @@ from time import process_time
 import numpy as np
 import pymunk
 
-from blast_env.physics.pymunk.engine import PymunkEngine
+from blast_env.engines import Blast
+from blast_env.engines.particles import PymunkEngine
 from blast_env.physics.pymunk.space import build_space
 from blast_env.physics.scene import Scene
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import build_scene
-from blast_env.simulation import Blast
 
 Departures = Mapping[int, list[int]]
 """Balls that leave the space after a step, by the number of the step."""

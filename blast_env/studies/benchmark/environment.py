@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.calibration.model import calibrated_engines
+from blast_env.engines import Blast, ParticleEngine
+from blast_env.engines.particles import find_particle_engine
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.physics.collisions import CollisionLog
-from blast_env.physics.engine import BallStates, BlastRun, EndReason, ParticleEngine
-from blast_env.physics.engines import find_particle_engine
+from blast_env.physics.engine import BallStates, BlastRun, EndReason
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Placement, Scenario
 from blast_env.scenario.build_scene import build_scene
-from blast_env.simulation import Blast
 from blast_env.units import MS_PER_S
 
 FRAME_BALLS: Final = 2000
@@ -27,7 +27,7 @@ FRAME_BALLS: Final = 2000
 
 
 @dataclass
-class TimedEngine:
+class TimedEngine(ParticleEngine):
     """An engine that adds up the processor time that it takes.
 
     Attributes:
@@ -38,15 +38,9 @@ class TimedEngine:
     engine: ParticleEngine
     seconds: float = 0.0
 
-    @property
-    def name(self) -> str:
-        """Name of the engine that does the work."""
-        return self.engine.name
-
-    @property
-    def version(self) -> str:
-        """Its version."""
-        return self.engine.version
+    def __post_init__(self) -> None:
+        """Go by the name of the engine that does the work."""
+        self.name, self.version = self.engine.name, self.engine.version
 
     def start(self, scene: Scene) -> BlastRun:
         """Return a run of the scene at time 0."""

@@ -14,9 +14,9 @@ import numpy as np
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode
 from numpy.typing import NDArray
 
+from blast_env.engines import Blast, simulate_many
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.scenario import Scenario
-from blast_env.simulation import Blast, simulate_many
 from blast_env.studies.benchmark.environment import benchmark_engine, random_action
 
 _LOT_S: Final = 1.0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from blast_env.calibration.references import kingery_bulmash
+from blast_env.engines.gas import GasEngine
 from blast_env.geometry import Rectangle
-from blast_env.physics.gas.engine import GasEngine
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import Gauges

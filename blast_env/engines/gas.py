@@ -1,22 +1,25 @@
-"""A blast of the gas engine: loads in Pa s and Pa directly, no calibration between.
+"""Gas dynamics as an engine: loads in Pa s and Pa directly, no calibration between.
 
 Impulse is the sum of all positive phases; the first positive phase and the negative ones stand
 beside it. One charge and one layout have one result: there is no noise, and a seed only draws the
 charge.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 import pandas as pd
 
 from blast_env.arrays import FloatArray
 from blast_env.calibration.model import ScaledImpulse
+from blast_env.engines.contract import Engine, EngineOption
+from blast_env.engines.loads import BlastLoads, StructureLoad
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Element, layout_text
 from blast_env.physics.engine import EndReason
@@ -24,8 +27,8 @@ from blast_env.physics.gas.engine import (
     CHECKED_SCALED_DISTANCE,
     FACE_NAMES,
     ROOF,
-    GasEngine,
     GasRun,
+    GasSettings,
     Recorders,
     scaled_distance,
 )
@@ -36,7 +39,7 @@ from blast_env.provenance import versions
 from blast_env.recording.excel import SheetTable, write_tables
 from blast_env.recording.parquet import write_table
 from blast_env.recording.tables import RunRecord
-from blast_env.scenario import AnyCharge, ScenarioField
+from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.scenario.build_scene import build_site, draw_threat
 from blast_env.tables import Column, as_types, table_of, texts
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
@@ -101,6 +104,62 @@ GAUGE_COLUMNS: Final = (
     Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase"),
     Column("negative_impulse_pa_s", "Pa s", "impulse of all negative phases, 0 or below"),
 )
+
+
+@dataclass(frozen=True)
+class GasEngine(GasSettings, Engine):
+    """Runs blasts as compressible gas, in compiled code; see `GasSettings` for its settings."""
+
+    has_peaks: ClassVar[bool] = True
+    title: ClassVar[str] = "Gas dynamics"
+    checked_for: ClassVar[str] = "what gas dynamics was checked for"
+    options: ClassVar[tuple[EngineOption, ...]] = (
+        EngineOption("cell_m", "Side of the cells of gas dynamics, m."),
+    )
+    unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingGas"
+    screening: ClassVar[str] = "blast_env.rendering.pressure_film:PressureScreening"
+    shown: ClassVar[str] = "blast_env.cli.simulate:ShownGas"
+
+    name: str = "gas"
+    version: str = f"gas 3 (numba {version('numba')})"
+
+    def start_on(self, site: BlastSite, recorders: Recorders = lambda _: ()) -> GasRun:
+        """Return a run at time 0, independent of every other run.
+
+        Args:
+            site: What stands where.
+            recorders: Makes further recorders for the grid: maps, pictures.
+
+        Raises:
+            BlastEnvError: If the grid would not fit into memory, or the charge or a gauge is in a
+                solid.
+        """
+        return GasRun(self, site, recorders)
+
+    def blast(
+        self,
+        scenario: AnyScenario,
+        layout: Sequence[Element] = (),
+        seed: int = 0,
+        charge: AnyCharge | None = None,
+    ) -> "GasBlast":
+        """Return one blast, to be run and looked into."""
+        return GasBlast(find_scenario(scenario), layout, seed, self, charge)
+
+    def loads(
+        self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge, seed: int
+    ) -> BlastLoads:
+        """Return the loads of one blast; the seed changes nothing."""
+        return self.blast(scenario, layout, seed, charge).run().loads()
+
+    @property
+    def words(self) -> str:
+        """Its name, and the side of its cells."""
+        return f"{self.name}, cells of {self.cell_m:g} m"
+
+    def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
+        """Return in a line which engine spoke, and with which cells."""
+        return f"{super().describe(scenarios)}, cells of {self.cell_m:g} m"
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,6 +377,28 @@ class GasResult:
         notes = self._notes(structure)
         pa_s = float(table["positive_impulse_pa_s"].loc[structure])
         return ScaledImpulse(pa_s / PA_PER_PSI, not notes, notes)
+
+    def loads(self) -> BlastLoads:
+        """Return the loads on all structures; gas has no simulation units (NaN)."""
+        sections = {each.name: each for each in self.blast.scenario.structures}
+        loads = []
+        for row in self.structures.to_dict("records"):
+            scaled = self.impulse(row["structure"])
+            loads.append(
+                StructureLoad(
+                    name=row["structure"],
+                    protected=row["protected"],
+                    weight=row["weight"],
+                    impulse_sim=np.nan,
+                    transferred_impulse_sim=np.nan,
+                    impulse_psi_s=scaled.psi_s,
+                    peak_pa=float(row["peak_pa"]),
+                    peak_weight=sections[row["structure"]].counted_peak_weight,
+                    in_range=scaled.in_range,
+                    notes=scaled.notes,
+                )
+            )
+        return BlastLoads(tuple(loads), self.module_impulse_n_s)
 
     @cached_property
     def module_impulse_n_s(self) -> FloatArray:

@@ -1,11 +1,16 @@
-"""Blasts of the particle engines, and `simulate` for all engines."""
+"""The particle engines: the paper's model on pymunk or event by event, and what a blast gives.
 
+Their impulses are in simulation units; a calibration of the scenario turns them into Pa s.
+"""
+
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
@@ -16,32 +21,149 @@ from blast_env.calibration.model import (
     ScaledImpulse,
     scenario_calibration,
 )
+from blast_env.engines.contract import Engine
+from blast_env.engines.loads import BlastLoads, StructureLoad
+from blast_env.engines.table import find_engine
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, layout_text
 from blast_env.physics.collisions import CollisionArray
-from blast_env.physics.engine import BallStates, BlastRun, EndReason, Engine, ParticleEngine
-from blast_env.physics.engines import (
-    STEP_NAMES,
-    find_engine,
-    find_particle_engine,
-    is_gas,
-)
+from blast_env.physics.engine import BallStates, BlastRun, EndReason
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.provenance import versions
-from blast_env.runner import check_workers, in_order
-from blast_env.scenario import AnyCharge, AnyScenario, ScenarioField
+from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.scenario.build_scene import build_scene, draw_threat
 from blast_env.values import number_pair, path_of
 
-if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
+if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
 
-    from blast_env.physics.gas.engine import GasEngine
+    from blast_env.physics.event.engine import EventRun
+    from blast_env.physics.pymunk.engine import PymunkRun
     from blast_env.recording.tables import RunRecord
-    from blast_env.simulation.gas import GasResult
 
-_PROGRESS_CALLS = 200
+_PROGRESS_CALLS: Final = 200
+
+PARTICLES_OVERRATE: Final = (
+    "The particle model overrates barriers: on 'courtyard' it promised 5.1 times the reduction of"
+    " gas dynamics, with a rank correlation of 0.61 (docs/engineers/validity.md). Judge what"
+    " matters with engine 'gas'."
+)
+"""Said of every evaluation with particles; measured by `python -m studies.gas judge`."""
+
+
+class ParticleEngine(Engine):
+    """An engine of the particle model: it runs scenes of balls."""
+
+    has_noise: ClassVar[bool] = True
+    knows_heights: ClassVar[bool] = False
+    needs_calibration: ClassVar[bool] = True
+    title: ClassVar[str] = "Particles"
+    caveat: ClassVar[str] = PARTICLES_OVERRATE
+    unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingParticles"
+    screening: ClassVar[str] = "blast_env.rendering.placing:BlastScreening"
+    shown: ClassVar[str] = "blast_env.cli.simulate:ShownParticles"
+    step_name: ClassVar[str] = "steps"
+
+    @abstractmethod
+    def start(self, scene: Scene) -> BlastRun:
+        """Return a run of the scene at time 0, independent of every other run."""
+
+    def blast(
+        self,
+        scenario: AnyScenario,
+        layout: Sequence[Element] = (),
+        seed: int = 0,
+        charge: AnyCharge | None = None,
+    ) -> "Blast":
+        """Return one blast, to be run and looked into."""
+        return Blast(find_scenario(scenario), layout, seed, self, charge)
+
+    def loads(
+        self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge, seed: int
+    ) -> BlastLoads:
+        """Return the loads of one blast, through the scenario's calibration.
+
+        Raises:
+            CalibrationError: If the scenario names no calibration, or one that was made with
+                other parameters or another engine.
+        """
+        return self.blast(scenario, layout, seed, charge).run().loads(self.calibration(scenario))
+
+    def check(self, scenario: Scenario) -> None:
+        """Refuse a scenario that particles cannot run, or that has no calibration for them."""
+        super().check(scenario)
+        scenario.check_for_particles()
+        self.calibration(scenario)
+
+    def calibration(self, scenario: Scenario) -> Calibration:
+        """Return the scenario's calibration, checked against its parameters and this engine."""
+        return scenario_calibration(scenario, self.name)
+
+    def preset(self, scenario: Scenario) -> str:
+        """Return the name of the scenario's parameters."""
+        return scenario.simulation.preset
+
+    def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
+        """Return in a line which engine spoke, and with which presets."""
+        presets = dict.fromkeys(_preset_text(each) for each in scenarios)
+        text = super().describe()
+        return f"{text}, preset {', '.join(presets)}" if presets else text
+
+
+def _preset_text(scenario: Scenario) -> str:
+    section = scenario.simulation
+    return section.preset + (" with overrides" if section.overrides else "")
+
+
+@dataclass(frozen=True)
+class PymunkEngine(ParticleEngine):
+    """Runs scenes on pymunk (Chipmunk): the reference of the paper's model."""
+
+    name: str = "pymunk"
+    version: str = f"pymunk {version('pymunk')}"
+
+    def start(self, scene: Scene) -> "PymunkRun":
+        """Return a run of the scene in a new space."""
+        from blast_env.physics.pymunk.engine import PymunkRun  # loads a compiled library
+
+        return PymunkRun(scene)
+
+
+@dataclass(frozen=True)
+class EventEngine(ParticleEngine):
+    """Runs scenes from one collision to the next, in compiled code.
+
+    Attributes:
+        cell_units: Side of the cells in which neighbours are looked up; see `world_of`.
+    """
+
+    step_name: ClassVar[str] = "events"
+
+    name: str = "event"
+    version: str = f"event 1 (numba {version('numba')})"
+    cell_units: float | None = None
+
+    def start(self, scene: Scene) -> "EventRun":
+        """Return a run of the scene at time 0."""
+        from blast_env.physics.event.engine import EventRun  # Numba takes half a second to import
+
+        return EventRun(scene, self.cell_units)
+
+
+def find_particle_engine(engine: str | Engine) -> ParticleEngine:
+    """Return an engine of particles by its name, or the engine itself.
+
+    Raises:
+        UnknownNameError: If there is no engine of that name.
+        BlastEnvError: If it is no engine of particles.
+    """
+    found = find_engine(engine)
+    if not isinstance(found, ParticleEngine):
+        raise BlastEnvError(
+            f"engine {found.name!r} has no particles: this is for the particle engines"
+        )
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +278,7 @@ class BlastResult:
     @property
     def step_name(self) -> str:
         """What `steps` counts: steps of time, or the events of an engine that goes by them."""
-        return STEP_NAMES.get(self.engine_name, "steps")
+        return self.blast.particle_engine.step_name
 
     @cached_property
     def collisions(self) -> "pd.DataFrame":
@@ -239,6 +361,35 @@ class BlastResult:
             return scaled
         notes = (*scaled.notes, f"the blast was cut off: {self.end_reason}")
         return ScaledImpulse(scaled.psi_s, False, notes)
+
+    def loads(self, calibration: Calibration | None = None) -> BlastLoads:
+        """Return the loads on all structures.
+
+        Args:
+            calibration: By default the scenario's.
+        """
+        law = self.calibration if calibration is None else calibration
+        structures = [obstacle for obstacle in self.obstacles if obstacle.cells is None]
+        impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
+        return BlastLoads(
+            structures=tuple(self._structure_load(each, law) for each in structures),
+            module_impulse_sim=np.array(impulse, dtype=np.float64),
+        )
+
+    def _structure_load(self, obstacle: ModularObstacle, calibration: Calibration) -> StructureLoad:
+        scaled = self.impulse(obstacle.name, calibration)
+        return StructureLoad(
+            name=obstacle.name,
+            protected=obstacle.protected,
+            weight=obstacle.weight,
+            impulse_sim=obstacle.impulse,
+            transferred_impulse_sim=obstacle.transferred_impulse,
+            impulse_psi_s=scaled.psi_s,
+            peak_pa=None,
+            peak_weight=obstacle.weight,
+            in_range=scaled.in_range,
+            notes=scaled.notes,
+        )
 
     @cached_property
     def load_unit(self) -> LoadUnit:
@@ -328,119 +479,3 @@ class BlastResult:
         from blast_env.recording.parquet import write_parquet
 
         return write_parquet(self, path_of(path))
-
-
-@overload
-def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
-    scenario: AnyScenario,
-    layout: Sequence[Element] = ...,
-    seed: int = ...,
-    *,
-    engine: "Literal['gas'] | GasEngine",
-    charge: AnyCharge | None = ...,
-    progress: Callable[[float], None] | None = ...,
-    cell_m: float | None = ...,
-) -> "GasResult": ...
-
-
-@overload
-def simulate(
-    scenario: AnyScenario,
-    layout: Sequence[Element] = ...,
-    seed: int = ...,
-    engine: str | Engine = ...,
-    charge: AnyCharge | None = ...,
-    progress: Callable[[float], None] | None = ...,
-) -> BlastResult: ...
-
-
-def simulate(
-    scenario: AnyScenario,
-    layout: Sequence[Element] = (),
-    seed: int = 0,
-    engine: str | Engine = "pymunk",
-    charge: AnyCharge | None = None,
-    progress: Callable[[float], None] | None = None,
-    cell_m: float | None = None,
-) -> "BlastResult | GasResult":
-    """Run a blast to its end.
-
-    The result is a pure function of the arguments, to the last bit and in any process.
-
-    Args:
-        scenario: The scenario, or its bundled name or path; see `load_scenario`.
-        layout: (row, column) of the build-zone cells that hold a barrier module.
-        seed: Decides the charge, where the scenario leaves it open, the fan and the air.
-        engine: Name of an engine, or an engine: the particle engines `"pymunk"` and `"event"`, or
-            gas dynamics, `"gas"`, for which the seed does no more than draw the charge.
-        charge: The charge, instead of one drawn from the scenario.
-        progress: Called from time to time with the share of the time limit that has passed.
-        cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
-
-    Returns:
-        A `BlastResult` of the particle engines, a `GasResult` of gas dynamics.
-
-    Raises:
-        LayoutError: If the layout does not fit the build zone.
-        UnknownNameError: If there is no such engine.
-        ScenarioError: If the charge is not clear of a structure or the border.
-        BlastEnvError: If `cell_m` does not divide the side of a module, or is given for an engine
-            that has no cells.
-        BlastEnvError: If the seed is no integer, negative or too large.
-    """
-    found = find_engine(engine, cell_m)
-    # Anything else is refused where it is read.
-    cells = tuple(layout) if isinstance(layout, Iterable) else layout
-    if is_gas(found):
-        from blast_env.simulation.gas import GasBlast  # Numba takes half a second to import
-
-        return GasBlast(scenario, cells, seed, found, charge).run(progress)
-    return Blast(scenario, cells, seed, found, charge).run(progress)
-
-
-def simulate_many(
-    blasts: Sequence[Blast],
-    threads: int = 1,
-    progress: Callable[[float], None] | None = None,
-) -> list[BlastResult]:
-    """Run blasts to their ends, several at a time in threads of this process.
-
-    The results are those of `Blast.run`, to the last bit, whatever the number of threads. Threads
-    pay with the compiled engines; with `pymunk` they change nothing but the order of the work.
-    The preparation of a blast and its result are Python, which one thread at a time runs.
-
-    Args:
-        blasts: The blasts.
-        threads: How many run at the same time; more than there are cores do not help.
-        progress: Called in the caller's thread with the share of the blasts that is done.
-
-    Returns:
-        The results, in the order of the blasts.
-
-    Raises:
-        BlastEnvError: If `threads` is not a whole number of at least 1, or if a blast cannot be
-            run; the message says which, the first one of them. Those that have not begun yet are
-            left out then.
-    """
-    check_workers("threads", threads)
-    results: list[BlastResult] = []
-    for result in in_order(_run_numbered, list(enumerate(blasts)), threads, "threads"):
-        if isinstance(result, BlastEnvError):
-            raise result
-        results.append(result)
-        if progress is not None:
-            progress(len(results) / len(blasts))
-    return results
-
-
-def _run_numbered(numbered: tuple[int, Blast]) -> BlastResult | BlastEnvError:
-    """Run a blast; an error of the user's says which one it was.
-
-    It is returned, not raised: the first one in the order of the blasts counts, whichever thread
-    comes to one first.
-    """
-    number, blast = numbered
-    try:
-        return blast.run()
-    except ValueError as error:  # what unusable arguments cause, `BlastEnvError` among it
-        return BlastEnvError(f"blasts[{number}]: {error}")

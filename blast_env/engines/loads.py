@@ -1,22 +1,12 @@
 """The loads that one blast puts on the structures."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.calibration.model import Calibration
-from blast_env.geometry import Element
-from blast_env.physics.engine import Engine
-from blast_env.physics.structure import ModularObstacle
-from blast_env.scenario import AnyCharge, AnyScenario, ObjectiveSection, Scenario, find_scenario
-from blast_env.simulation import BlastResult
+from blast_env.scenario import AnyScenario, ObjectiveSection, find_scenario
 from blast_env.units import PA_PER_PSI
-
-if TYPE_CHECKING:
-    from blast_env.simulation.gas import GasResult
 
 
 @dataclass(frozen=True)
@@ -125,76 +115,3 @@ class BlastLoads:
     def in_range(self) -> bool:
         """Whether the calibration was made for this distance to every protected structure."""
         return all(load.in_range for load in self.protected)
-
-
-@runtime_checkable
-class LoadModel(Engine, Protocol):
-    """An engine that tells loads without running a blast; it has no noise and no calibration."""
-
-    def loads(self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> BlastLoads:
-        """Return the loads behind a layout; peaks where the scenario's objective counts them.
-
-        Args:
-            scenario: The scenario.
-            layout: A legal layout.
-            charge: What goes off: where it does, or the vehicle that brings it.
-        """
-
-
-def blast_loads(result: BlastResult, calibration: Calibration) -> BlastLoads:
-    """Return the loads of a blast.
-
-    Args:
-        result: The blast.
-        calibration: The calibration of its scenario, checked against parameters and engine.
-    """
-    structures = [obstacle for obstacle in result.obstacles if obstacle.cells is None]
-    impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
-    return BlastLoads(
-        structures=tuple(_structure_load(result, each, calibration) for each in structures),
-        module_impulse_sim=np.array(impulse, dtype=np.float64),
-    )
-
-
-def gas_loads(result: "GasResult") -> BlastLoads:
-    """Return the loads of a blast of gas dynamics, which has no simulation units (NaN)."""
-    table = result.structures
-    structures = []
-    peak_weights = {
-        each.name: each.counted_peak_weight for each in result.blast.scenario.structures
-    }
-    for row in table.to_dict("records"):
-        scaled = result.impulse(row["structure"])
-        structures.append(
-            StructureLoad(
-                name=row["structure"],
-                protected=row["protected"],
-                weight=row["weight"],
-                impulse_sim=np.nan,
-                transferred_impulse_sim=np.nan,
-                impulse_psi_s=scaled.psi_s,
-                peak_pa=float(row["peak_pa"]),
-                peak_weight=peak_weights[row["structure"]],
-                in_range=scaled.in_range,
-                notes=scaled.notes,
-            )
-        )
-    return BlastLoads(tuple(structures), result.module_impulse_n_s)
-
-
-def _structure_load(
-    result: BlastResult, obstacle: ModularObstacle, calibration: Calibration
-) -> StructureLoad:
-    scaled = result.impulse(obstacle.name, calibration)
-    return StructureLoad(
-        name=obstacle.name,
-        protected=obstacle.protected,
-        weight=obstacle.weight,
-        impulse_sim=obstacle.impulse,
-        transferred_impulse_sim=obstacle.transferred_impulse,
-        impulse_psi_s=scaled.psi_s,
-        peak_pa=None,
-        peak_weight=obstacle.weight,
-        in_range=scaled.in_range,
-        notes=scaled.notes,
-    )

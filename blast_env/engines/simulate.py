@@ -1,0 +1,126 @@
+"""Running blasts: pure functions of scenario, layout, seed and engine."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Literal, overload
+
+from blast_env.engines.contract import Engine, Result
+from blast_env.engines.particles import Blast, BlastResult
+from blast_env.engines.table import find_engine
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element
+from blast_env.runner import check_workers, in_order
+from blast_env.scenario import AnyCharge, AnyScenario
+
+if TYPE_CHECKING:  # Numba takes a third of a second to import
+    from blast_env.engines.gas import GasEngine, GasResult
+
+
+@overload
+def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
+    scenario: AnyScenario,
+    layout: Sequence[Element] = ...,
+    seed: int = ...,
+    *,
+    engine: "Literal['gas'] | GasEngine",
+    charge: AnyCharge | None = ...,
+    progress: Callable[[float], None] | None = ...,
+    cell_m: float | None = ...,
+) -> "GasResult": ...
+
+
+@overload
+def simulate(
+    scenario: AnyScenario,
+    layout: Sequence[Element] = ...,
+    seed: int = ...,
+    engine: str | Engine = ...,
+    charge: AnyCharge | None = ...,
+    progress: Callable[[float], None] | None = ...,
+) -> BlastResult: ...
+
+
+def simulate(
+    scenario: AnyScenario,
+    layout: Sequence[Element] = (),
+    seed: int = 0,
+    engine: str | Engine = "pymunk",
+    charge: AnyCharge | None = None,
+    progress: Callable[[float], None] | None = None,
+    cell_m: float | None = None,
+) -> Result:
+    """Run a blast to its end.
+
+    The result is a pure function of the arguments, to the last bit and in any process.
+
+    Args:
+        scenario: The scenario, or its bundled name or path; see `load_scenario`.
+        layout: (row, column) of the build-zone cells that hold a barrier module.
+        seed: Decides the charge, where the scenario leaves it open, the fan and the air.
+        engine: Name of an engine, or an engine: the particle engines `"pymunk"` and `"event"`, or
+            gas dynamics, `"gas"`, for which the seed does no more than draw the charge.
+        charge: The charge, instead of one drawn from the scenario.
+        progress: Called from time to time with the share of the time limit that has passed.
+        cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
+
+    Returns:
+        A `BlastResult` of the particle engines, a `GasResult` of gas dynamics.
+
+    Raises:
+        LayoutError: If the layout does not fit the build zone.
+        UnknownNameError: If there is no such engine.
+        ScenarioError: If the charge is not clear of a structure or the border.
+        BlastEnvError: If `cell_m` does not divide the side of a module, or is given for an engine
+            that has no cells.
+        BlastEnvError: If the seed is no integer, negative or too large.
+    """
+    # Anything else is refused where it is read.
+    cells = tuple(layout) if isinstance(layout, Iterable) else layout
+    return find_engine(engine, cell_m).blast(scenario, cells, seed, charge).run(progress)
+
+
+def simulate_many(
+    blasts: Sequence[Blast],
+    threads: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> list[BlastResult]:
+    """Run blasts to their ends, several at a time in threads of this process.
+
+    The results are those of `Blast.run`, to the last bit, whatever the number of threads. Threads
+    pay with the compiled engines; with `pymunk` they change nothing but the order of the work.
+    The preparation of a blast and its result are Python, which one thread at a time runs.
+
+    Args:
+        blasts: The blasts.
+        threads: How many run at the same time; more than there are cores do not help.
+        progress: Called in the caller's thread with the share of the blasts that is done.
+
+    Returns:
+        The results, in the order of the blasts.
+
+    Raises:
+        BlastEnvError: If `threads` is not a whole number of at least 1, or if a blast cannot be
+            run; the message says which, the first one of them. Those that have not begun yet are
+            left out then.
+    """
+    check_workers("threads", threads)
+    results: list[BlastResult] = []
+    for result in in_order(_run_numbered, list(enumerate(blasts)), threads, "threads"):
+        if isinstance(result, BlastEnvError):
+            raise result
+        results.append(result)
+        if progress is not None:
+            progress(len(results) / len(blasts))
+    return results
+
+
+def _run_numbered(numbered: tuple[int, Blast]) -> BlastResult | BlastEnvError:
+    """Run a blast; an error of the user's says which one it was.
+
+    It is returned, not raised: the first one in the order of the blasts counts, whichever thread
+    comes to one first.
+    """
+    number, blast = numbered
+    try:
+        return blast.run()
+    except ValueError as error:  # what unusable arguments cause, `BlastEnvError` among it
+        return BlastEnvError(f"blasts[{number}]: {error}")
