@@ -1,5 +1,6 @@
 """Processes that do the work of all designs: started beforehand, given work, stopped."""
 
+import asyncio
 import os
 import secrets
 import subprocess
@@ -7,6 +8,7 @@ import sys
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import Final
@@ -16,6 +18,8 @@ from blast_env.files import make_folder
 
 _GRACE_S: Final = 5.0
 """How long work may take to stop before its process is ended."""
+
+_MOST_READINGS: Final = 2
 
 _COMMAND: Final = (sys.executable, "-m", "blast_env.app.worker")
 
@@ -77,9 +81,13 @@ class Workers:
 
     Attributes:
         most: Most processes that work at the same time.
+        readings: What reads the files that are handed over takes one of these: each is a process.
     """
 
     most: int = field(default_factory=lambda: min(max(os.cpu_count() or 1, 1), 4))
+    readings: asyncio.Semaphore = field(
+        default_factory=partial(asyncio.Semaphore, _MOST_READINGS), init=False
+    )
     _processes: list[_Process] = field(default_factory=list, init=False)
     _waiting: deque[Path] = field(default_factory=deque, init=False)
 

@@ -1,5 +1,6 @@
 """What is kept of a blast, and the table in which layouts stand beside each other."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -354,6 +355,6 @@ def check_key(key: str) -> str:
     Raises:
         BlastEnvError: If it could lead anywhere else.
     """
-    if not key or not all(each.isascii() and (each.isalnum() or each in "-_") for each in key):
-        raise BlastEnvError(f"{key!r} is no name of a design or a blast")
+    if re.fullmatch(r"[A-Za-z0-9_-]{1,100}", key) is None:  # longer ones are no names of folders
+        raise BlastEnvError(f"{key[:100]!r} is no name of a design or a blast")
     return key

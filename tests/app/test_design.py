@@ -118,7 +118,7 @@ def test_what_is_no_design_is_refused(tmp_path: Path, content: str) -> None:
         folder.load()
 
 
-@pytest.mark.parametrize("name", ["..", "../other", "a/b", "", "nothing"])
+@pytest.mark.parametrize("name", ["..", "../other", "a/b", "", "nothing", "a" * 5000, "a\n"])
 def test_a_name_leads_nowhere_else(tmp_path: Path, name: str) -> None:
     with pytest.raises(BlastEnvError, match=r"is no name|no design"):
         WorkFolder(tmp_path).open(name)

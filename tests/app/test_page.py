@@ -7,6 +7,7 @@ import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
+from time import sleep
 from typing import Any
 
 import pytest
@@ -22,6 +23,7 @@ from blast_env.app.records import Engine
 from blast_env.app.server import MOST_PAGES, add_pages
 from blast_env.app.session import Sessions
 from blast_env.app.work import read_status, write_status
+from blast_env.errors import BlastEnvError
 from blast_env.reading import Reading
 from blast_env.scenario import Scenario, load_scenario
 from tests.app.here import Here
@@ -240,7 +242,7 @@ def test_a_broken_file_is_a_message_and_the_design_stays(tmp_path: Path) -> None
             await element.handle_uploads(
                 [SmallFileUpload(name="bad.toml", content_type="", _data=b"schema_version = ")]
             )
-        await user.should_see("line 1, column 18", retries=50)
+        await user.should_see("line 1, column 18", retries=200)
         await user.should_see("Nothing was changed")
         assert session.design == before
 
@@ -259,10 +261,10 @@ def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
             )
         await user.should_see("protected buildings (names, by commas)")
         user.find(marker="import").click()
-        await user.should_see("no building is protected", retries=50)
+        await user.should_see("no building is protected", retries=200)
         user.find("protected buildings (names, by commas)").type("Library")
         user.find(marker="import").click()
-        await user.should_see(marker="take-site", retries=50)
+        await user.should_see(marker="take-site", retries=200)
         await user.should_see("of its outline")
         user.find(marker="take-site").click()
         assert session.scenario.georeference is not None
@@ -315,6 +317,45 @@ def test_two_tabs_do_not_mix(tmp_path: Path) -> None:
         await user.should_see("0 of 6 modules")
         other.put("wall", other.design.with_layout(WALL[:2]))
         await user.should_see("2 of 6 modules")
+
+    play(tmp_path, story)
+
+
+def test_not_all_files_are_read_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    at_work: list[int] = []
+
+    class Counted:
+        def __init__(self, *_: object) -> None:
+            at_work.append(at_work[-1] + 1 if at_work else 1)
+
+        def __enter__(self) -> "Counted":
+            return self
+
+        def result(self) -> Scenario:
+            sleep(0.05)
+            raise BlastEnvError("no site")
+
+        def end(self) -> None:
+            """End nothing."""
+
+        def __exit__(self, *_: object) -> None:
+            at_work.append(at_work[-1] - 1)
+
+    monkeypatch.setattr(uploads, "Reading", Counted)
+
+    async def story(user: User, sessions: Sessions) -> None:
+        await user.open("/")
+        (element,) = user.find(kind=ui.upload).elements
+        with user:
+            await element.handle_uploads(
+                [SmallFileUpload(name="x.toml", content_type="", _data=b"x")] * 5
+            )
+        for _ in range(100):
+            await asyncio.sleep(0.1)
+            if len(at_work) == 10:
+                break
+        assert max(at_work) == 2
+        assert at_work[-1] == 0
 
     play(tmp_path, story)
 

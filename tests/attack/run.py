@@ -22,6 +22,7 @@ from tests.attack.disks import outcome_after_full_device, size_of, small_device
 from tests.attack.formats import FORMATS, Format
 from tests.attack.kills import JOBS, outcome_after_kill, steps_and_outcome
 from tests.attack.mutants import mutants
+from tests.attack.web import ATTACKS, attempts_of, victim
 
 _KB: Final = 1024
 _RESET_PEAK: Final = "5"
@@ -231,6 +232,27 @@ def disks(
         print(f"not tried: {error}")
         return
     _attack_jobs("KiB on the disk | devices", only, partial(_without_room, most))
+
+
+@app.command()
+def web(
+    only: Annotated[str, typer.Option(help="Attacks with this in their names.")] = "",
+) -> None:
+    """Attack a server of the page; print how often, and what got through."""
+    failed = 0
+    print("| attack | tried | held | time, s |")
+    print("|---|---|---|---|")
+    with TemporaryDirectory() as folder, victim(Path(folder, "work")) as server:
+        for name in ATTACKS:
+            if only not in name:
+                continue
+            began_s = time()
+            tried, through = attempts_of(name, server)
+            cells = (name, tried, tried - len(through), f"{time() - began_s:.0f}")
+            print(f"| {' | '.join(map(str, cells))} |", flush=True)
+            print("".join(f"    {each}\n" for each in through), end="", flush=True)
+            failed += len(through)
+    raise typer.Exit(1 if failed else 0)
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ class FilesMenu:
                     ui.notify(note, type="warning", multi_line=True)
                 self._after()
 
-            site_upload("drop a file here, or press +", use)
+            site_upload("drop a file here, or press +", self._session.workers, use)
             ui.button("cancel", on_click=dialog.close).props("flat no-caps")
 
     def _open_layout(self) -> None:
@@ -67,7 +67,7 @@ class FilesMenu:
             ui.label(f"A layout file (.json) into layout {SLOTS[active]}")
 
             async def take(event: events.UploadEventArguments) -> None:
-                file = await read_upload(event.file, layout_of_file)
+                file = await read_upload(self._session.workers, event.file, layout_of_file)
                 if file is None:
                     return
                 dialog.close()

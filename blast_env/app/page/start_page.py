@@ -54,7 +54,7 @@ class StartPage:
             )
         ui.separator()
         ui.label("or from a file").classes("be-quiet")
-        site_upload("drop a file here, or press +", self._create)
+        site_upload("drop a file here, or press +", self._sessions.workers, self._create)
 
     def _designs(self) -> None:
         ui.label("Go on with a design").classes("be-head")

@@ -9,6 +9,7 @@ from nicegui import events, run, ui
 from nicegui.elements.upload_files import FileUpload
 
 from blast_env.app.guard import MOST_BYTES
+from blast_env.app.jobs import Workers
 from blast_env.app.sources import MAPS, SITES, imported_site, is_map, site_of_file
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder
@@ -31,10 +32,13 @@ def complain(error: BlastEnvError) -> None:
         ui.button("close", on_click=dialog.close).props("autofocus no-caps")
 
 
-async def read_upload(file: FileUpload, read: Callable[..., Read], *arguments: Any) -> Read | None:
+async def read_upload(
+    workers: Workers, file: FileUpload, read: Callable[..., Read], *arguments: Any
+) -> Read | None:
     """Return what a file holds, read in a process of its own, which ends with the page.
 
     Args:
+        workers: The processes; not all files are read at the same time.
         file: The file.
         read: Reads it, from a path; it, its arguments and what it returns pickle.
         arguments: Further arguments.
@@ -47,15 +51,11 @@ async def read_upload(file: FileUpload, read: Callable[..., Read], *arguments: A
     # The name stands in messages and names the site; nothing of it leads anywhere.
     name = re.sub(r"[^\w.() +-]", "_", file.name)[-_MOST_LETTERS:].lstrip(".") or "file"
     try:
-        with scratch_folder() as folder:
-            path = Path(folder, name)
-            await file.save(path)
-            try:
-                with Reading(name, read, path, *arguments) as reading:
-                    client.on_delete(reading.end)
-                    found = await run.io_bound(reading.result)
-            except BlastEnvError as error:
-                raise BlastEnvError(str(error).replace(f"{folder}/", "")) from error
+        async with workers.readings:
+            if client.is_deleted:
+                return None
+            with scratch_folder() as folder:
+                found = await _read_apart(Path(folder, name), file, read, *arguments)
     except BlastEnvError as error:
         if not client.is_deleted:
             complain(error)
@@ -63,19 +63,32 @@ async def read_upload(file: FileUpload, read: Callable[..., Read], *arguments: A
     return None if client.is_deleted else found
 
 
-def site_upload(label: str, use: Callable[[Scenario, str], None]) -> None:
+async def _read_apart(
+    path: Path, file: FileUpload, read: Callable[..., Read], *arguments: Any
+) -> Read | None:
+    await file.save(path)
+    try:
+        with Reading(path.name, read, path, *arguments) as reading:
+            ui.context.client.on_delete(reading.end)
+            return await run.io_bound(reading.result)
+    except BlastEnvError as error:
+        raise BlastEnvError(str(error).replace(f"{path.parent}/", "")) from error
+
+
+def site_upload(label: str, workers: Workers, use: Callable[[Scenario, str], None]) -> None:
     """Make a place to hand over the file of a site.
 
     Args:
         label: What stands on it.
+        workers: The processes, of which one reads it.
         use: Takes the site, and the name of the file.
     """
 
     async def take(event: events.UploadEventArguments) -> None:
         if is_map(event.file.name):
-            ImportDialog(event.file, use)
+            ImportDialog(event.file, workers, use)
             return
-        scenario = await read_upload(event.file, site_of_file)
+        scenario = await read_upload(workers, event.file, site_of_file)
         if scenario is not None:
             use(scenario, event.file.name)
 
@@ -117,11 +130,15 @@ class ImportDialog:
 
     Args:
         file: The file.
+        workers: The processes, of which one reads it.
         use: Takes the site, and the name of the file.
     """
 
-    def __init__(self, file: FileUpload, use: Callable[[Scenario, str], None]) -> None:
+    def __init__(
+        self, file: FileUpload, workers: Workers, use: Callable[[Scenario, str], None]
+    ) -> None:
         self._file = file
+        self._workers = workers
         self._use = use
         with ui.dialog(value=True) as self._dialog, ui.card().classes("w-[560px] max-w-full gap-2"):
             ui.label(f"Import {file.name}").style("font-weight: 600; font-size: 16px")
@@ -172,7 +189,7 @@ class ImportDialog:
             complain(error)
             return
         self._wait.visible = True
-        found = await read_upload(self._file, imported_site, options)
+        found = await read_upload(self._workers, self._file, imported_site, options)
         if self._wait.is_deleted:  # the page was closed meanwhile
             return
         self._wait.visible = False
