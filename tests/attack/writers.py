@@ -1,7 +1,6 @@
 """Every writer of the packages, with something small to write."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -70,8 +69,7 @@ def _checkpoint(path: Path) -> None:
     configuration = RunConfiguration(
         settings=settings(path), hyperparameters=hyperparameters(), scenario_hash="0" * 64
     )
-    start = Checkpoint.of_start(configuration)
-    replace(start, policy={"weight": torch.zeros(2000)}).save(path)
+    Checkpoint.of_start(configuration, {"weight": torch.zeros(2000)}).save(path)
 
 
 def _report(html: Path, pdf: Path | None = None, words: int = 600) -> None:

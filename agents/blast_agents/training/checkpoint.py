@@ -68,30 +68,14 @@ class Label:
 _LABELS: Final = TypeAdapter(tuple[Label, ...])
 
 
-class _Content(BaseModel):
-    """What is in the file; see `Checkpoint`."""
-
-    model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
-
-    format: Literal[2]
-    configuration: RunConfiguration
-    counters: Counters
-    policy: dict[str, torch.Tensor]
-    optimizer: dict[str, Any]
-    best_policy: dict[str, torch.Tensor]
-    rollouts: tuple[RolloutRow, ...]
-    evaluations: tuple[EvaluationRow, ...]
-    labels: tuple[Label, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Checkpoint:
+class Checkpoint(BaseModel):
     """What training goes on from, and what it has come to.
 
     It is one file, so that every moment of a run is before one rollout or after it. There is no
     state of random numbers: each rollout has seeds of its own.
 
     Attributes:
+        format: Version of this form.
         configuration: Of the run, which the weights belong to.
         counters: How far the run is.
         policy: Weights of the policy, by name; none before the first rollout.
@@ -102,13 +86,16 @@ class Checkpoint:
         labels: What self-labelling has found, a label a case.
     """
 
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+    format: Literal[2] = CHECKPOINT_FORMAT
     configuration: RunConfiguration
     counters: Counters
-    policy: Weights
-    optimizer: Mapping[str, Any]
-    best_policy: Weights
-    rollouts: tuple[RolloutRow, ...]
-    evaluations: tuple[EvaluationRow, ...]
+    policy: dict[str, torch.Tensor]
+    optimizer: dict[str, Any]
+    best_policy: dict[str, torch.Tensor]
+    rollouts: tuple[RolloutRow, ...] = ()
+    evaluations: tuple[EvaluationRow, ...] = ()
     labels: tuple[Label, ...] = ()
 
     @classmethod
@@ -121,7 +108,13 @@ class Checkpoint:
             configuration: Of the run.
             weights: Those that it begins with; fresh ones unless given.
         """
-        return cls(configuration, Counters(), weights, {}, {}, (), ())
+        return cls(
+            configuration=configuration,
+            counters=Counters(),
+            policy=dict(weights),
+            optimizer={},
+            best_policy={},
+        )
 
     @property
     def is_start(self) -> bool:
@@ -135,12 +128,12 @@ class Checkpoint:
             BlastEnvError: If it cannot be written.
         """
         content = {
-            "format": CHECKPOINT_FORMAT,
+            "format": self.format,
             "configuration": self.configuration.document(),
             "counters": asdict(self.counters),
-            "policy": dict(self.policy),
-            "optimizer": dict(self.optimizer),
-            "best_policy": dict(self.best_policy),
+            "policy": self.policy,
+            "optimizer": self.optimizer,
+            "best_policy": self.best_policy,
             "rollouts": [asdict(row) for row in self.rollouts],
             "evaluations": [asdict(row) for row in self.evaluations],
             "labels": _LABELS.dump_python(self.labels, mode="json"),
@@ -167,14 +160,11 @@ class Checkpoint:
                 f"{path}: is of format {value_text(found)}, must be {CHECKPOINT_FORMAT}"
             )
         try:
-            checked = _Content.model_validate(content)
+            return cls.model_validate(content)
         except ValidationError as error:
             raise BlastEnvError(
                 f"{path}: is damaged, or no checkpoint: {described(error)}"
             ) from error
-        values = {name: getattr(checked, name) for name in _Content.model_fields}
-        del values["format"]
-        return cls(**values)
 
     def check_configuration(self, configuration: RunConfiguration, place: Path) -> None:
         """Refuse the configuration of another run: with it the weights would say other things.
@@ -229,7 +219,7 @@ class Checkpoint:
             BlastEnvError: If it does not fit.
         """
         try:
-            optimizer.load_state_dict(dict(self.optimizer))
+            optimizer.load_state_dict(self.optimizer)
         # torch says in errors of many kinds what does not fit.
         except Exception as error:
             raise BlastEnvError(f"{place}: the optimiser's state does not fit: {error}") from error

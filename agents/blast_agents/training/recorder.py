@@ -1,7 +1,8 @@
 """What happens between two rollouts: seeds, evaluation, tables, checkpoint, learning curve."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from math import nan
 from pathlib import Path
 from statistics import fmean
 from time import perf_counter
@@ -32,21 +33,6 @@ with render_extra():
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, PercentFormatter
-
-
-@dataclass
-class Episodes:
-    """The episodes that ended in a rollout.
-
-    Attributes:
-        rewards: One an episode.
-        reductions: One an episode.
-        modules: One an episode.
-    """
-
-    rewards: list[float] = field(default_factory=list)
-    reductions: list[float] = field(default_factory=list)
-    modules: list[int] = field(default_factory=list)
 
 
 @dataclass
@@ -145,7 +131,7 @@ class Recorder(BaseCallback):
         self.settings = configuration.settings
         self.selection, self.progress, self.show = selection, progress, show
         self.algorithm: Model
-        self._episodes = Episodes()
+        self._episodes: list[tuple[float, float, float]] = []
         self._is_pending = False
         self._blasts: dict[int, tuple[int, int]] = {}
         self._before = progress.counters
@@ -161,28 +147,27 @@ class Recorder(BaseCallback):
         self.training_env.seed(environment_seed)
         self.algorithm._last_obs = self.training_env.reset()  # type: ignore[assignment]
         self.algorithm._last_episode_starts = np.ones(self.training_env.num_envs, dtype=bool)
-        self._episodes = Episodes()
+        self._episodes = []
 
     def _on_step(self) -> bool:
         for index, info in enumerate(self.locals["infos"]):
             if "reduction" not in info:
                 continue
-            self._episodes.rewards.append(float(info["episode"]["r"]))
-            self._episodes.reductions.append(float(info["reduction"]))
-            self._episodes.modules.append(len(info["layout"]))
+            modules = float(len(info["layout"]))
+            self._episodes.append((float(info["episode"]["r"]), info["reduction"], modules))
             self._blasts[index] = (info["blasts"], info["cache_hits"])
         self.show(min(self.num_timesteps / self.settings.steps, 1.0))
         return True
 
     def _on_rollout_end(self) -> None:
         counters = self._counted()
-        episodes = self._episodes
+        reward, reduction, modules = _means(self._episodes)
         row = RolloutRow(
             steps=counters.steps,
-            episodes=len(episodes.rewards),
-            reward=_mean(episodes.rewards),
-            reduction=_mean(episodes.reductions),
-            modules=_mean(episodes.modules),
+            episodes=len(self._episodes),
+            reward=reward,
+            reduction=reduction,
+            modules=modules,
             blasts=counters.blasts,
             cache_hits=counters.cache_hits,
             seconds=counters.seconds,
@@ -231,7 +216,7 @@ class Recorder(BaseCallback):
         return replace(
             now,
             steps=self.num_timesteps,
-            episodes=now.episodes + len(self._episodes.rewards),
+            episodes=now.episodes + len(self._episodes),
             blasts=before.blasts + sum(blasts for blasts, _ in self._blasts.values()),
             cache_hits=before.cache_hits + sum(hits for _, hits in self._blasts.values()),
             seconds=self._seconds(),
@@ -253,9 +238,12 @@ class Recorder(BaseCallback):
         return self._before.seconds + perf_counter() - self._began
 
 
-def _mean(values: list[float] | list[int]) -> float:
-    """Return the mean; NaN where no episode ended."""
-    return fmean(values) if values else float("nan")
+def _means(episodes: Sequence[tuple[float, float, float]]) -> tuple[float, float, float]:
+    """Return the means of reward, reduction and modules; NaN where no episode ended."""
+    if not episodes:
+        return nan, nan, nan
+    reward, reduction, modules = (fmean(column) for column in zip(*episodes, strict=True))
+    return reward, reduction, modules
 
 
 # Okabe and Ito's colours, which people with any colour vision can tell apart.
