@@ -17,7 +17,6 @@ from enum import StrEnum
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
@@ -118,6 +117,8 @@ def piece_responses(
         raise BlastEnvError(
             f"pressure_pa has shape {pressure_pa.shape}, must be ({len(pieces)}, {len(time_s)})"
         )
+    from blast_env.response.kernels import rock, slide
+
     rows = np.zeros((len(pieces), 4))
     steps = int(np.ceil((float(time_s[-1] - time_s[0]) + _AFTER_S) / _STEP_S))
     begin_s = float(time_s[0])
@@ -129,52 +130,7 @@ def piece_responses(
             rows[index] = 0.0, 0.0, np.inf, 1.0
             continue
         weight = piece.mass_kg_m * _GRAVITY_M_S2
-        slide_m = _slide(force, piece.mass_kg_m, piece.friction * weight, _STEP_S)
-        tilt, overturn_s = _rock(force, piece.mass_kg_m, piece.height_m, piece.base_m, _STEP_S)
+        slide_m = slide(force, piece.mass_kg_m, piece.friction * weight, _STEP_S)
+        tilt, overturn_s = rock(force, piece.mass_kg_m, piece.height_m, piece.base_m, _STEP_S)
         rows[index] = slide_m, tilt, begin_s + overturn_s, 0.0
     return PieceResponses(*rows.T)
-
-
-@njit(cache=True)
-def _slide(force: FloatArray, mass: float, friction: float, step_s: float) -> float:
-    """Return the largest distance from where it stood, per metre of length."""
-    x, v, most = 0.0, 0.0, 0.0
-    for push in force:
-        if v == 0.0:
-            net = max(abs(push) - friction, 0.0) * (1.0 if push >= 0.0 else -1.0)
-        else:
-            net = push - friction * (1.0 if v > 0.0 else -1.0)
-        new_v = v + net / mass * step_s
-        if v != 0.0 and new_v * v < 0.0:
-            new_v = 0.0  # friction stops it, and does not push it back
-        x += 0.5 * (v + new_v) * step_s
-        v = new_v
-        most = max(most, abs(x))
-    return most
-
-
-@njit(cache=True)
-def _rock(
-    force: FloatArray, mass: float, height: float, base: float, step_s: float
-) -> tuple[float, float]:
-    """Return the largest tilt over that at which it overturns, and when it did."""
-    inertia = mass * (height * height + base * base) / 3.0
-    limit = np.arctan(base / height)
-    angle, speed, most = 0.0, 0.0, 0.0
-    for step, push in enumerate(force):
-        side = 1.0 if angle > 0.0 or (angle == 0.0 and push >= 0.0) else -1.0
-        size = abs(angle)
-        weight = 0.5 * mass * 9.81 * (base * np.cos(size) - height * np.sin(size))
-        moment = 0.5 * height * push * np.cos(size) - side * weight
-        if angle == 0.0 and side * moment <= 0.0:
-            speed = 0.0
-            continue
-        speed += moment / inertia * step_s
-        new_angle = angle + speed * step_s
-        if angle != 0.0 and new_angle * angle < 0.0:
-            new_angle, speed = 0.0, 0.0  # it comes down on its base, and stays
-        angle = new_angle
-        most = max(most, abs(angle))
-        if most >= limit:
-            return most / limit, step * step_s
-    return most / limit, np.inf

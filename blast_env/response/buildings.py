@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
 import numpy as np
-from scipy.special import ndtr
 
 from blast_env.arrays import FloatArray
 from blast_env.response.walls import DamageLevel
@@ -70,6 +69,8 @@ def eardrum_rupture_probability(peak_pa: FloatArray) -> FloatArray:
 
 
 def _probability(probit: FloatArray) -> FloatArray:
+    from scipy.special import ndtr  # a quarter of a second to import
+
     result: FloatArray = ndtr(probit - 5.0)
     return result
 

@@ -27,7 +27,6 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
@@ -36,9 +35,7 @@ from blast_env.response.sdof import (
     STEPS_PER_PERIOD,
     Resistance,
     System,
-    impulse_until,
     impulses,
-    polyline,
 )
 
 YOUNG_PA: Final = 71.7e9
@@ -311,6 +308,8 @@ def glazing_responses(
 
 
 def _one(pane: Pane, time_s: FloatArray, pressure_pa: FloatArray, limit: float) -> FloatArray:
+    from blast_env.response.kernels import bend
+
     curve = pane.curve
     resistance = curve.resistance
     system = System(pane.mass_kg_m2, curve.load_mass_factor, resistance)
@@ -330,13 +329,13 @@ def _one(pane: Pane, time_s: FloatArray, pressure_pa: FloatArray, limit: float) 
         step_s,
         int(np.ceil(lasts_s / step_s)),
     )
-    _bend(*arguments, np.inf, found)
+    bend(*arguments, np.inf, found)
     peak_m, damage = found[0], found[1]
     risk = damage ** (WEIBULL_M / STATIC_FATIGUE)
     probability = float(-np.expm1(-risk))
     # The median of those that break: half of them have broken by then.
     median = -np.log1p(-0.5 * probability)
-    _bend(*arguments, median ** (STATIC_FATIGUE / WEIBULL_M), found)
+    bend(*arguments, median ** (STATIC_FATIGUE / WEIBULL_M), found)
     break_s, break_m, break_m_s = found[2], found[3], found[4]
     # The net impulse so far is K_LM m v: broken, the pane flies on with it and what is to come.
     left = _impulse_after(time_s, pressure_pa, break_s)
@@ -399,47 +398,3 @@ def _impulse_after(time_s: FloatArray, pressure_pa: FloatArray, at_s: float) -> 
     times = np.append(at_s, time_s[time_s > at_s])
     pressure = np.maximum(np.interp(times, time_s, pressure_pa), 0.0)
     return float(np.trapezoid(pressure, times)) if len(times) > 1 else 0.0
-
-
-@njit(cache=True)
-def _bend(
-    mass: float,
-    points: FloatArray,
-    values: FloatArray,
-    log_points: FloatArray,
-    log_rate: FloatArray,
-    time_s: FloatArray,
-    pressure_pa: FloatArray,
-    impulse_pa_s: FloatArray,
-    step_s: float,
-    steps: int,
-    until: float,
-    out: FloatArray,
-) -> None:
-    """Bend a pane until its damage reaches a bound; `out`: peak, damage, time, place, speed."""
-    x, damage, peak, at_s = 0.0, 0.0, 0.0, time_s[0]
-    pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, at_s + 0.5 * step_s)
-    v = pushed / mass
-    for step in range(1, steps + 1):
-        x += step_s * v
-        at_s = time_s[0] + step * step_s
-        now, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, at_s + 0.5 * step_s)
-        v += (now - pushed - step_s * polyline(points, values, x)) / mass
-        pushed = now
-        peak = max(peak, x)
-        if x != 0.0:
-            damage += step_s / 60.0 * np.exp(_log_log(log_points, log_rate, np.log(abs(x))))
-        if damage >= until:
-            break
-    out[0], out[1], out[2], out[3], out[4] = peak, damage, at_s, x, v
-
-
-@njit(cache=True)
-def _log_log(points: FloatArray, values: FloatArray, at: float) -> float:
-    """Return a polyline's value, straight on beyond both ends."""
-    upper = 1
-    while upper < len(points) - 1 and points[upper] < at:
-        upper += 1
-    slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
-    value: float = values[upper - 1] + slope * (at - points[upper - 1])
-    return value

@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
@@ -28,8 +27,6 @@ STEPS_PER_PERIOD: Final = 100
 
 _PERIODS_AFTER_LOAD: Final = 1.0
 _NO_CRACK: Final = np.inf
-_MOST_TIMES: Final = 50
-"""A panel that falls is followed for so many times the load and a period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,12 +164,14 @@ def responses(
         )
     if len(time_s) < 2 or not (np.diff(time_s) > 0.0).all():
         raise BlastEnvError("time_s must ascend, and have at least two times")
+    from blast_env.response.kernels import integrate
+
     rows = np.zeros((len(systems), 6))
     for index, system in enumerate(systems):
         resistance = system.resistance
         step_s = system.shortest_period_s / steps_per_period
         lasts_s = float(time_s[-1] - time_s[0]) + _PERIODS_AFTER_LOAD * system.period_s
-        _integrate(
+        integrate(
             system.load_mass_factor * system.mass_kg_m2,
             resistance.deflection_m,
             resistance.pressure_pa,
@@ -191,88 +190,7 @@ def responses(
     return Responses(*rows.T)
 
 
-@njit(cache=True)
-def polyline(points: FloatArray, values: FloatArray, at: float) -> float:
-    """Return a polyline's value; odd below 0, straight on beyond its end."""
-    size = abs(at)
-    upper = 1
-    while upper < len(points) - 1 and points[upper] < size:
-        upper += 1
-    slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
-    value: float = values[upper - 1] + slope * (size - points[upper - 1])
-    return value if at >= 0.0 else -value
-
-
-@njit(cache=True)
-def impulse_until(
-    time_s: FloatArray, pressure_pa: FloatArray, impulse_pa_s: FloatArray, begin: int, at_s: float
-) -> tuple[float, int]:
-    """Return the impulse of a history until a time, and where in the history that is.
-
-    The impulse at the points of the history is given: a load shorter than a step keeps its own.
-    """
-    if at_s <= time_s[0]:
-        return 0.0, begin
-    if at_s >= time_s[-1]:
-        return impulse_pa_s[-1], begin
-    place = begin
-    while time_s[place + 1] < at_s:
-        place += 1
-    gone_s = at_s - time_s[place]
-    slope = (pressure_pa[place + 1] - pressure_pa[place]) / (time_s[place + 1] - time_s[place])
-    return impulse_pa_s[place] + gone_s * (pressure_pa[place] + 0.5 * slope * gone_s), place
-
-
 def impulses(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
     """Return the impulse of a history until each of its points, Pa s (times,)."""
     steps = 0.5 * (pressure_pa[1:] + pressure_pa[:-1]) * np.diff(time_s)
     return np.append(0.0, np.cumsum(steps))
-
-
-@njit(cache=True)
-def _integrate(
-    mass: float,
-    points: FloatArray,
-    values: FloatArray,
-    cap: float,
-    rebound_cap: float,
-    crack: float,
-    cracked_points: FloatArray,
-    cracked_values: FloatArray,
-    time_s: FloatArray,
-    pressure_pa: FloatArray,
-    impulse_pa_s: FloatArray,
-    step_s: float,
-    least_steps: int,
-    out: FloatArray,
-) -> None:
-    """Integrate one system until it comes back; `out` gets the fields of `Responses`."""
-    x, offset, is_cracked = 0.0, 0.0, 0.0
-    largest, resistance = 0.0, 0.0
-    pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
-    v = pushed / mass
-    for step in range(1, _MOST_TIMES * least_steps):
-        x += step_s * v
-        if abs(x) > crack:
-            is_cracked = 1.0
-        if is_cracked:
-            resistance = polyline(cracked_points, cracked_values, x)
-        else:
-            resistance = polyline(points, values, x - offset)
-            if resistance > cap:
-                offset += (resistance - cap) / (values[1] / points[1])
-                resistance = cap
-            elif resistance < -rebound_cap:
-                offset += (resistance + rebound_cap) / (values[1] / points[1])
-                resistance = -rebound_cap
-        now_s = time_s[0] + step * step_s
-        until, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, now_s + 0.5 * step_s)
-        v += (until - pushed - step_s * resistance) / mass
-        pushed = until
-        largest = max(largest, resistance)
-        if x > out[0]:
-            out[0], out[2] = x, now_s
-        out[1] = min(out[1], x)
-        if step >= least_steps and v * x <= 0.0:
-            break
-    out[3], out[4], out[5] = largest, offset, is_cracked

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any, Final, TypeVar
 
@@ -15,6 +15,8 @@ from blast_env.physics.parameters import AirParameters, SimulationParameters
 from blast_env.physics.particles import lattice_capacity
 from blast_env.physics.presets import for_charge
 from blast_env.physics.structure import BARRIER_NAME
+from blast_env.response.components import Component, Glazing, Wall
+from blast_env.scenario.facade import facade_problems
 from blast_env.scenario.heights import air_height_m, depth_inside_m, is_over
 from blast_env.scenario.problems import Problem, extent
 from blast_env.scenario.sections import (
@@ -68,6 +70,9 @@ _BUILD_ZONE: Final = TypeAdapter(BuildZone)
 _GAUGE: Final = TypeAdapter(GaugeSection)
 
 
+_COMPONENTS: Final[TypeAdapter[Mapping[str, Glazing | Wall]]] = TypeAdapter(dict[str, Component])
+
+
 _SIMULATION: Final = TypeAdapter(SimulationSection)
 
 
@@ -83,6 +88,7 @@ class Parts:
         build_zone: The build zone, if there is one and it is sound.
         parameters: The parameters of the blast model, if they are sound.
         gauges: The sound gauges, by their index.
+        components: The sound components, by name.
     """
 
     site: Site | None
@@ -92,6 +98,7 @@ class Parts:
     build_zone: BuildZone | None
     parameters: SimulationParameters | None
     gauges: Mapping[int, GaugeSection]
+    components: Mapping[str, Glazing | Wall] = field(default_factory=dict)
 
     @property
     def air_height_m(self) -> float:
@@ -125,6 +132,7 @@ def sound_parts(document: Mapping[str, Any]) -> Parts:
         build_zone=_sound(_BUILD_ZONE, document.get("build_zone")),
         parameters=None if simulation is None else simulation.parameters,
         gauges=_sound_items(_GAUGE, document.get("gauges")),
+        components=_sound(_COMPONENTS, document.get("components", {})) or {},
     )
 
 
@@ -138,6 +146,7 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
         *_simulation_problems(parts),
         *_height_problems(parts),
         *_gauge_problems(parts),
+        *facade_problems(parts.structures, parts.components),
     )
 
 

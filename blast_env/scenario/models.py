@@ -25,6 +25,8 @@ from blast_env.errors import BlastEnvError, value_text
 from blast_env.geometry import Cell
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.scene import Charge
+from blast_env.response.components import Component
+from blast_env.response.facade import FilledBay
 from blast_env.scenario.checks import (
     Parts,
     charge_radius_m,
@@ -34,6 +36,7 @@ from blast_env.scenario.checks import (
     sound_parts,
     vehicle_ground,
 )
+from blast_env.scenario.facade import facade_bays
 from blast_env.scenario.georeference import AnyGeoreference
 from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
 from blast_env.scenario.objective import ObjectiveSection
@@ -103,7 +106,7 @@ _LATER_KEYS: Final = (
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
 
-_NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference"}
+_NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference", "components"}
 """Sections that do not count for the hash; what `simulation` says is there as parameters."""
 
 
@@ -127,6 +130,7 @@ class Scenario(Section):
         gauges: Where overpressure is recorded, by engines that know it.
         objective: Which load counts, and how those of several charges become one.
         georeference: Where on a map or drawing the site lies; no result depends on it.
+        components: Components of facades by name, beside those of the catalogue.
     """
 
     schema_version: Annotated[StrictInt, AfterValidator(check_version)]
@@ -141,6 +145,16 @@ class Scenario(Section):
     gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100)] = ()
     objective: ObjectiveSection = ObjectiveSection()
     georeference: AnyGeoreference | None = None
+    components: Annotated[dict[Name, Component], Field(max_length=100)] = Field(
+        default_factory=dict
+    )
+
+    @property
+    def bays(self) -> tuple[FilledBay, ...]:
+        """The bays of all facades, with what stands in them."""
+        return tuple(
+            bay for structure in self.structures for bay in facade_bays(structure, self.components)
+        )
 
     @property
     def zone(self) -> BuildZone:
@@ -204,6 +218,7 @@ class Scenario(Section):
         content = self.model_dump(mode="json", exclude=_NO_INFLUENCE)
         for structure in content["structures"]:
             structure.pop("building", None)
+            structure.pop("facade", None)
         content["schema_version"] = FIRST_VERSION  # newer keys are there or not, which says it all
         if self.site.air_height_m == default_air_height_m(self.structures, self.build_zone):
             del content["site"]["air_height_m"]
@@ -392,6 +407,7 @@ class Scenario(Section):
             build_zone=self.build_zone,
             parameters=self.parameters,
             gauges=dict(enumerate(self.gauges)),
+            components=self.components,
         )
 
 

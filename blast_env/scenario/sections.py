@@ -5,7 +5,7 @@ heights are above the ground, which is flat.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from itertools import chain
 from typing import Annotated, Any, Final, Literal, Self
@@ -27,6 +27,7 @@ from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.presets import PRESETS, preset
 from blast_env.physics.scene import WALLS, Charge, WallName
+from blast_env.response.facade import BAY_M, STOREY_M, Bay
 from blast_env.scenario.problems import (
     Problem,
     ScenarioError,
@@ -309,6 +310,56 @@ def _check_faces(faces: tuple[WallName, ...]) -> tuple[WallName, ...]:
     return tuple(wall for wall in WALLS if wall in faces)
 
 
+_Storey = Annotated[StrictInt, Field(ge=1, le=200)]
+
+
+class FacadePart(Section):
+    """Bays that have other components than the rest of the facade.
+
+    Attributes:
+        walls: On which walls; on all unless given.
+        storeys: In which storeys, from 1; in all unless given.
+        glazing: Name of the component of their windows; as the facade's unless given.
+        wall: Name of the component of their walls, in the same way.
+    """
+
+    walls: Annotated[tuple[WallName, ...], Field(min_length=1, max_length=4)] = WALLS
+    storeys: Annotated[tuple[_Storey, ...], Field(min_length=1, max_length=200)] | None = None
+    glazing: Name | None = None
+    wall: Name | None = None
+
+    def covers(self, bay: Bay) -> bool:
+        """Return whether a bay is one of them."""
+        return bay.wall in self.walls and (self.storeys is None or bay.storey in self.storeys)
+
+
+class FacadeSection(Section):
+    """What the walls of a structure are made of.
+
+    Attributes:
+        storey_m: Height of a storey.
+        bay_m: Width of a bay; bays of a wall are made equally wide.
+        glazing: Name of the component of its windows; none unless given.
+        wall: Name of the component of its walls; none unless given.
+        parts: Bays with other components; the last one that covers a bay counts.
+    """
+
+    storey_m: Annotated[StrictFloat, Field(ge=2.0, le=20.0)] = STOREY_M
+    bay_m: Annotated[StrictFloat, Field(ge=0.5, le=50.0)] = BAY_M
+    glazing: Name | None = None
+    wall: Name | None = None
+    parts: Annotated[tuple[FacadePart, ...], Field(max_length=100)] = ()
+
+    def names(self) -> Iterator[tuple[str, str]]:
+        """Yield where a component is named, and its name."""
+        for key in ("glazing", "wall"):
+            if (name := getattr(self, key)) is not None:
+                yield key, name
+            for index, part in enumerate(self.parts):
+                if (name := getattr(part, key)) is not None:
+                    yield f"parts[{index}].{key}", name
+
+
 class StructureSection(Section):
     """Base of the structures.
 
@@ -325,6 +376,7 @@ class StructureSection(Section):
         faces: The walls whose load counts; a wall is named by the side that it looks to.
         building: The building that the structure is a part of, where several make one; for
             people and tables, no result depends on it.
+        facade: What its walls are made of; no load depends on it.
     """
 
     name: Name
@@ -340,6 +392,7 @@ class StructureSection(Section):
         AfterValidator(_check_faces),
     ] = WALLS
     building: Name | None = None
+    facade: FacadeSection | None = None
 
     @property
     def counted_peak_weight(self) -> float:

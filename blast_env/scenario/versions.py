@@ -17,10 +17,10 @@ FIRST_VERSION: Final = 1
 
 
 NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
-    "": ("gauges", "objective", "georeference"),
+    "": ("gauges", "objective", "georeference", "components"),
     "site": ("air_height_m",),
     "charge": ("height_m",),
-    "structures": ("height_m", "faces", "building", "peak_weight"),
+    "structures": ("height_m", "faces", "building", "peak_weight", "facade"),
     "build_zone": ("height_m", "items"),
     "build_zone.access_way": ("gate",),
 }
@@ -88,7 +88,8 @@ def lowest_version(scenario: BaseModel) -> int:
 
 
 def _is_unused(table: BaseModel, key: str) -> bool:
-    return bool(getattr(table, key) == type(table).model_fields[key].default)
+    default = type(table).model_fields[key].get_default(call_default_factory=True)
+    return bool(getattr(table, key) == default)
 
 
 def _tables(content: Any) -> Iterator[tuple[KeyParts, Any, tuple[str, ...]]]:

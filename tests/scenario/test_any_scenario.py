@@ -50,6 +50,8 @@ PUBLIC = (
 )
 GIVEN_BY_THE_CALLER = {
     "Observable",  # what an observation is given
+    "Engine",  # whose scenario was loaded by what evaluates
+    "ParticleEngine",
     "TrainedAgent",
     "Placement",  # whose constructor checks nothing: `of` does
 }

@@ -1,0 +1,185 @@
+"""Compiled loops of the response: apart from the rest, because Numba takes half a second to import.
+
+The leapfrog method throughout: places at the ends of steps, speeds in their middles. The impulse of
+a history goes into each step exactly.
+"""
+
+from typing import Final
+
+import numpy as np
+from numba import njit
+
+from blast_env.arrays import FloatArray
+
+_MOST_TIMES: Final = 50
+"""What falls is followed for so many times the load and a period."""
+
+
+@njit(cache=True)
+def polyline(points: FloatArray, values: FloatArray, at: float) -> float:
+    """Return a polyline's value; odd below 0, straight on beyond its end."""
+    size = abs(at)
+    upper = 1
+    while upper < len(points) - 1 and points[upper] < size:
+        upper += 1
+    slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
+    value: float = values[upper - 1] + slope * (size - points[upper - 1])
+    return value if at >= 0.0 else -value
+
+
+@njit(cache=True)
+def impulse_until(
+    time_s: FloatArray, pressure_pa: FloatArray, impulse_pa_s: FloatArray, begin: int, at_s: float
+) -> tuple[float, int]:
+    """Return the impulse of a history until a time, and where in the history that is.
+
+    The impulse at the points of the history is given: a load shorter than a step keeps its own.
+    """
+    if at_s <= time_s[0]:
+        return 0.0, begin
+    if at_s >= time_s[-1]:
+        return impulse_pa_s[-1], begin
+    place = begin
+    while time_s[place + 1] < at_s:
+        place += 1
+    gone_s = at_s - time_s[place]
+    slope = (pressure_pa[place + 1] - pressure_pa[place]) / (time_s[place + 1] - time_s[place])
+    return impulse_pa_s[place] + gone_s * (pressure_pa[place] + 0.5 * slope * gone_s), place
+
+
+@njit(cache=True)
+def integrate(
+    mass: float,
+    points: FloatArray,
+    values: FloatArray,
+    cap: float,
+    rebound_cap: float,
+    crack: float,
+    cracked_points: FloatArray,
+    cracked_values: FloatArray,
+    time_s: FloatArray,
+    pressure_pa: FloatArray,
+    impulse_pa_s: FloatArray,
+    step_s: float,
+    least_steps: int,
+    out: FloatArray,
+) -> None:
+    """Integrate one system until it comes back; `out` gets the fields of `Responses`."""
+    x, offset, is_cracked = 0.0, 0.0, 0.0
+    largest, resistance = 0.0, 0.0
+    pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
+    v = pushed / mass
+    for step in range(1, _MOST_TIMES * least_steps):
+        x += step_s * v
+        if abs(x) > crack:
+            is_cracked = 1.0
+        if is_cracked:
+            resistance = polyline(cracked_points, cracked_values, x)
+        else:
+            resistance = polyline(points, values, x - offset)
+            if resistance > cap:
+                offset += (resistance - cap) / (values[1] / points[1])
+                resistance = cap
+            elif resistance < -rebound_cap:
+                offset += (resistance + rebound_cap) / (values[1] / points[1])
+                resistance = -rebound_cap
+        now_s = time_s[0] + step * step_s
+        until, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, now_s + 0.5 * step_s)
+        v += (until - pushed - step_s * resistance) / mass
+        pushed = until
+        largest = max(largest, resistance)
+        if x > out[0]:
+            out[0], out[2] = x, now_s
+        out[1] = min(out[1], x)
+        if step >= least_steps and v * x <= 0.0:
+            break
+    out[3], out[4], out[5] = largest, offset, is_cracked
+
+
+@njit(cache=True)
+def bend(
+    mass: float,
+    points: FloatArray,
+    values: FloatArray,
+    log_points: FloatArray,
+    log_rate: FloatArray,
+    time_s: FloatArray,
+    pressure_pa: FloatArray,
+    impulse_pa_s: FloatArray,
+    step_s: float,
+    steps: int,
+    until: float,
+    out: FloatArray,
+) -> None:
+    """Bend a pane until its damage reaches a bound; `out`: peak, damage, time, place, speed."""
+    x, damage, peak, at_s = 0.0, 0.0, 0.0, time_s[0]
+    pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, at_s + 0.5 * step_s)
+    v = pushed / mass
+    for step in range(1, steps + 1):
+        x += step_s * v
+        at_s = time_s[0] + step * step_s
+        now, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, at_s + 0.5 * step_s)
+        v += (now - pushed - step_s * polyline(points, values, x)) / mass
+        pushed = now
+        peak = max(peak, x)
+        if x != 0.0:
+            damage += step_s / 60.0 * np.exp(log_log(log_points, log_rate, np.log(abs(x))))
+        if damage >= until:
+            break
+    out[0], out[1], out[2], out[3], out[4] = peak, damage, at_s, x, v
+
+
+@njit(cache=True)
+def log_log(points: FloatArray, values: FloatArray, at: float) -> float:
+    """Return a polyline's value, straight on beyond both ends."""
+    upper = 1
+    while upper < len(points) - 1 and points[upper] < at:
+        upper += 1
+    slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
+    value: float = values[upper - 1] + slope * (at - points[upper - 1])
+    return value
+
+
+@njit(cache=True)
+def slide(force: FloatArray, mass: float, friction: float, step_s: float) -> float:
+    """Return the largest distance from where it stood, per metre of length."""
+    x, v, most = 0.0, 0.0, 0.0
+    for push in force:
+        if v == 0.0:
+            net = max(abs(push) - friction, 0.0) * (1.0 if push >= 0.0 else -1.0)
+        else:
+            net = push - friction * (1.0 if v > 0.0 else -1.0)
+        new_v = v + net / mass * step_s
+        if v != 0.0 and new_v * v < 0.0:
+            new_v = 0.0  # friction stops it, and does not push it back
+        x += 0.5 * (v + new_v) * step_s
+        v = new_v
+        most = max(most, abs(x))
+    return most
+
+
+@njit(cache=True)
+def rock(
+    force: FloatArray, mass: float, height: float, base: float, step_s: float
+) -> tuple[float, float]:
+    """Return the largest tilt over that at which it overturns, and when it did."""
+    inertia = mass * (height * height + base * base) / 3.0
+    limit = np.arctan(base / height)
+    angle, speed, most = 0.0, 0.0, 0.0
+    for step, push in enumerate(force):
+        side = 1.0 if angle > 0.0 or (angle == 0.0 and push >= 0.0) else -1.0
+        size = abs(angle)
+        weight = 0.5 * mass * 9.81 * (base * np.cos(size) - height * np.sin(size))
+        moment = 0.5 * height * push * np.cos(size) - side * weight
+        if angle == 0.0 and side * moment <= 0.0:
+            speed = 0.0
+            continue
+        speed += moment / inertia * step_s
+        new_angle = angle + speed * step_s
+        if angle != 0.0 and new_angle * angle < 0.0:
+            new_angle, speed = 0.0, 0.0  # it comes down on its base, and stays
+        angle = new_angle
+        most = max(most, abs(angle))
+        if most >= limit:
+            return most / limit, step * step_s
+    return most / limit, np.inf
