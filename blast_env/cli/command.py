@@ -7,43 +7,37 @@ value. Typer gets a function that is made of the fields; its parser, help and co
 import inspect
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields
-from functools import cached_property, partial
+from contextlib import suppress
+from dataclasses import MISSING, dataclass, fields
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from types import EllipsisType
-from typing import (
-    Annotated,
-    Any,
-    ClassVar,
-    Final,
-    NamedTuple,
-    TypeVar,
-    get_args,
-    get_origin,
-    get_type_hints,
-    overload,
-)
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Final, NamedTuple, get_args, get_origin, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from blast_env.errors import BlastEnvError
+from blast_env.option_fields import FOLDER as FOLDER
+from blast_env.option_fields import TEXT, OptionText
+from blast_env.option_fields import argument as argument
+from blast_env.option_fields import option as option
+
 MARKUP: Final = "markdown"
 """How help is written: Rich's own markup takes [row, column] for a style."""
 
-FOLDER: Final[tuple[str, ...]] = ()
-"""Says of an option that the command writes a folder there."""
-
-_TEXT: Final = "text of the command line"
 _UNITS: Final = re.compile(r"_(m|m2|deg)$")
+_COUNTS: Final = MappingProxyType({2: "two", 3: "three"})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
     """Base class of all commands, and of the groups of options that several have in common.
 
-    Each field is an `option` or an `argument`; one of the type `tuple[TYPE, ...]` may be given
-    again and again. Help shows the options of a class before those of its bases.
+    Each field is an `option` or an `argument` (`blast_env.option_fields`); one of the type
+    `tuple[TYPE, ...]` may be given again and again. Help shows the options of a class before those
+    of its bases.
     """
 
     def __call__(self) -> None:
@@ -82,80 +76,7 @@ class Target(NamedTuple):
     suffixes: tuple[str, ...]
 
 
-class _Text(NamedTuple):
-    """What the command line needs to know of a field beside its type and default.
-
-    Attributes:
-        info: Makes Typer's description of it from the names on the command line.
-        flag: What one writes on the command line, where the field's name does not say it.
-        writes: Suffixes of the file that is written there; `FOLDER`; None if nothing is.
-        panel: Heading under which help shows it; None for the first.
-    """
-
-    info: partial[Any]
-    flag: str | None
-    writes: tuple[str, ...] | None
-    panel: str | None
-
-
-_Value = TypeVar("_Value")
-
-
-@overload
-def option(
-    default: EllipsisType,
-    help: str,
-    *,
-    flag: str | None = None,
-    writes: tuple[str, ...] | None = None,
-    panel: str | None = None,
-    **settings: Any,
-) -> Any: ...
-@overload
-def option(
-    default: _Value,
-    help: str,
-    *,
-    flag: str | None = None,
-    writes: tuple[str, ...] | None = None,
-    panel: str | None = None,
-    **settings: Any,
-) -> _Value: ...
-def option(
-    default: Any,
-    help: str,  # noqa: A002  # Typer's word
-    *,
-    flag: str | None = None,
-    writes: tuple[str, ...] | None = None,
-    panel: str | None = None,
-    **settings: Any,
-) -> Any:
-    """Return a field of a command that is an option.
-
-    Args:
-        default: Its default; `...` where it must be given.
-        help: What it says of itself.
-        flag: What one writes on the command line; `--cell` of a field `cell_m` unless given.
-        writes: Suffixes of the file that the command writes there; `FOLDER` for a folder.
-        panel: Heading under which help shows it, unless it is the first.
-        settings: What else `typer.Option` takes.
-    """
-    info = partial(typer.Option, help=help, rich_help_panel=panel, **settings)
-    return _field(default, _Text(info, flag, writes, panel))
-
-
-def argument(help: str, *, default: Any = ..., **settings: Any) -> Any:  # noqa: A002
-    """Return a field of a command that stands without a name on the command line; see `option`."""
-    return _field(default, _Text(partial(typer.Argument, help=help, **settings), None, None, None))
-
-
-def _field(default: Any, text: _Text) -> Any:
-    if default is ...:
-        return field(metadata={_TEXT: text})
-    return field(default=default, metadata={_TEXT: text})
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OptionField:
     """A field of a command, as the command line has it.
 
@@ -169,7 +90,7 @@ class OptionField:
     name: str
     hint: Any
     default: Any
-    text: _Text
+    text: OptionText
 
     @property
     def flag(self) -> str:
@@ -184,21 +105,46 @@ class OptionField:
         return get_origin(self.hint) is tuple and get_args(self.hint)[1:] == (...,)
 
     @property
+    def numbers(self) -> int:
+        """How many numbers with commas between each value of a repeated option has; 0: a text."""
+        item = get_args(self.hint)[0] if self.is_repeated else None
+        return len(get_args(item)) if get_origin(item) is tuple else 0
+
+    @property
     def parameter(self) -> inspect.Parameter:
         """The same for Typer, which has lists where our commands have tuples."""
-        hint, default = self.hint, self.default
+        text, hint, default = self.text, self.hint, self.default
         if self.is_repeated:
-            hint, default = list[get_args(hint)[0]], default or None  # type: ignore[misc]
-            if default is None:
-                hint = hint | None
+            hint = list[str if self.numbers else get_args(hint)[0]]  # type: ignore[misc]
+            default = default or None
+            hint = hint if default else hint | None
         # Of a flag that is set, Typer makes one more that takes it back.
-        names = () if default is True or self.text.info.func is typer.Argument else (self.flag,)
+        names = () if default is True or text.is_argument else (self.flag,)
+        kind = typer.Argument if text.is_argument else typer.Option
+        info = kind(*names, help=text.help, rich_help_panel=text.panel, **text.settings)
+        keyword = inspect.Parameter.KEYWORD_ONLY
         return inspect.Parameter(
-            self.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=default,
-            annotation=Annotated[hint, self.text.info(*names)],
+            self.name, keyword, default=default, annotation=Annotated[hint, info]
         )
+
+    def value(self, given: Any) -> Any:
+        """Return what Typer gives as the field has it.
+
+        Raises:
+            BlastEnvError: If a text is no numbers with commas between.
+        """
+        if not self.is_repeated:
+            return given
+        return tuple(self._numbers_of(each) if self.numbers else each for each in given or ())
+
+    def _numbers_of(self, text: str) -> tuple[float, ...]:
+        with suppress(ValueError):
+            found = tuple(float(part) for part in text.split(","))
+            if len(found) == self.numbers:
+                return found
+        count = _COUNTS.get(self.numbers, str(self.numbers))
+        form = self.text.settings.get("metavar", "numbers with commas")
+        raise BlastEnvError(f"{self.flag} is {text!r}, must be {count} numbers as {form}")
 
 
 def options_of(kind: type[Command]) -> Iterator[OptionField]:
@@ -206,14 +152,14 @@ def options_of(kind: type[Command]) -> Iterator[OptionField]:
     hints, known = get_type_hints(kind), {each.name: each for each in fields(kind)}
     names = (name for each in kind.__mro__ for name in inspect.get_annotations(each))
     for name in dict.fromkeys(names):
-        if name not in known:
+        if name not in known or TEXT not in known[name].metadata:
             continue
         default = known[name].default
         yield OptionField(
             name,
             hints[name],
             inspect.Parameter.empty if default is MISSING else default,
-            known[name].metadata[_TEXT],
+            known[name].metadata[TEXT],
         )
 
 
@@ -222,10 +168,7 @@ def function_of(kind: type[Command]) -> Callable[..., None]:
     options = tuple(options_of(kind))
 
     def call(**values: Any) -> None:
-        for each in options:
-            if each.is_repeated:
-                values[each.name] = tuple(values[each.name] or ())
-        _run(kind, values)
+        _run(kind, {each: values[each.name] for each in options})
 
     made: Any = call
     made.__signature__ = inspect.Signature([each.parameter for each in options])
@@ -234,19 +177,19 @@ def function_of(kind: type[Command]) -> Callable[..., None]:
     return call
 
 
-def _run(kind: type[Command], values: Mapping[str, Any]) -> None:
+def _run(kind: type[Command], values: Mapping[OptionField, Any]) -> None:
     # Here, because the list of commands is shown without what they need.
     from blast_env.cli.output import user_errors
     from blast_env.cli.targets import FileTarget, checked_targets
 
     with user_errors():
-        command = kind(**values)
+        command = kind(**{each.name: each.value(given) for each, given in values.items()})
     files, folders = {}, {}
-    for option, path, suffixes in command.targets():
+    for flag, path, suffixes in command.targets():
         if suffixes:
-            files[option] = FileTarget(path, suffixes)
+            files[flag] = FileTarget(path, suffixes)
         else:
-            folders[option] = path
+            folders[flag] = path
     with user_errors(command.how_to_resume), checked_targets(files, folders):
         command()
 

@@ -13,7 +13,6 @@ from blast_env.cli.output import (
     print_line,
 )
 from blast_env.engines import JUDGE, find_engine
-from blast_env.errors import BlastEnvError
 from blast_env.physics.scene import Charge
 from blast_env.scenario import load_layout, load_scenario
 
@@ -33,7 +32,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
     layout: Path = option(..., "JSON file of the layout.")
     out: Path = option(..., "The page to write: .html.", writes=(".html", ".htm"))
     pdf: Path | None = option(None, "The same as PDF: .pdf.", writes=(".pdf",))
-    charges: tuple[str, ...] = option(
+    charges: tuple[tuple[float, float, float], ...] = option(
         (),
         "A threat, site metres and kg TNT; more than one will do.",
         flag="--charge",
@@ -86,16 +85,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
         given: dict[str, Any] = {
             each.name: getattr(self, each.name) for each in fields(StudyOptions)
         }
-        given["charges"] = tuple(_charge(text) for text in self.charges)
+        given["charges"] = tuple(Charge((x_m, y_m), tnt_kg) for x_m, y_m, tnt_kg in self.charges)
         given["limits"] = tuple(Limit.parsed(text, units) for text in self.limits)
         given["units"] = units
         return StudyOptions(**given)
-
-
-def _charge(text: str) -> Charge:
-    """Return a charge from `x,y,kg`."""
-    try:
-        x_m, y_m, tnt_kg = (float(part) for part in text.split(","))
-    except ValueError:
-        raise BlastEnvError(f"--charge is {text!r}, must be three numbers as X,Y,KG") from None
-    return Charge((x_m, y_m), tnt_kg)

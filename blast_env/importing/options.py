@@ -6,9 +6,14 @@ from types import MappingProxyType
 from typing import Final
 
 from blast_env.errors import BlastEnvError
+from blast_env.option_fields import option
 from blast_env.units import MODULE_SIDE_M
 
 PlaceXY = tuple[float, float]
+
+_PLACE: Final = (
+    "In the coordinates of the file: longitude and latitude, or as --crs or a drawing has them."
+)
 
 CALIBRATIONS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -43,73 +48,69 @@ _BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 class ImportOptions:
     """What a user decides about an import; places are in the coordinates of the file.
 
-    Attributes:
-        name: Name of the scenario; without it, that of the file.
-        crs: Reference system of GeoJSON's coordinates; see `read_geojson`.
-        units: Unit of a drawing; see `read_dxf`.
-        origin: Where the site's lower left corner is to be.
-        centre: Where its middle is to be, instead.
-        size_m: Its extents along x and y; without them, as much as everything needs.
-        margin_m: How far the site then reaches beyond what is on it.
-        rotation_deg: Direction of the site's x axis from east; without it, that of most walls.
-        buildings_from: What in the file is a building; see `Selector`.
-        charges_from: Where charges may be.
-        zone_from: What is the build zone.
-        keep_outs_from: What must stay empty.
-        protect: Names of buildings whose load counts.
-        protect_near: A place: the building nearest to it counts.
-        tnt_kg: Mass of charges of which the file says none.
-        charge_at: Places of further charges.
-        zone_m: The build zone in site metres: left, bottom, width, height.
-        zone_around_m: Instead, how far the zone reaches around the protected buildings.
-        stock: How many modules there are to place.
-        wall_height_m: Height of the modules.
-        clearance_m: Least clear distance between modules and structures.
-        preset: Parameters of the particle model.
-        height_from: The tag with the height; without it, the usual ones.
-        default_height_m: Height of buildings of which the file says none; without it, they are
-            as high as the air.
-        level_height_m: Height of a storey, where only their number is known.
-        least_area_m2: Smaller buildings are left out.
-        most_area_deviation: Largest share of a building's area by which modules may miss it.
-        most_outline_deviation_m: Largest distance of its outline from that of the modules.
-        most_rectangles: Rectangles that a building may take.
-        repair: Whether outlines that cross themselves are put right.
-
     Raises:
         BlastEnvError: If something is out of bounds, or two of them exclude each other.
     """
 
-    name: str | None = None
-    crs: str | None = None
-    units: str | None = None
-    origin: PlaceXY | None = None
-    centre: PlaceXY | None = None
-    size_m: PlaceXY | None = None
-    margin_m: float = 10.0
-    rotation_deg: float | None = None
-    buildings_from: tuple[str, ...] = ()
-    charges_from: tuple[str, ...] = ()
-    zone_from: tuple[str, ...] = ()
-    keep_outs_from: tuple[str, ...] = ()
-    protect: tuple[str, ...] = ()
-    protect_near: PlaceXY | None = None
-    tnt_kg: float = 100.0
-    charge_at: tuple[PlaceXY, ...] = ()
-    zone_m: tuple[float, float, float, float] | None = None
-    zone_around_m: float | None = None
-    stock: int = 20
-    wall_height_m: float = 3.0
-    clearance_m: float = 1.0
-    preset: str = "collisional"
-    height_from: str | None = None
-    default_height_m: float | None = None
-    level_height_m: float = 3.0
-    least_area_m2: float = 4.0
-    most_area_deviation: float = 0.2
-    most_outline_deviation_m: float = 1.0
-    most_rectangles: int = 16
-    repair: bool = False
+    name: str | None = option(None, "Name of the scenario.")
+    origin: PlaceXY | None = option(None, f"The site's lower left corner. {_PLACE}", metavar="X Y")
+    centre: PlaceXY | None = option(None, "The site's middle, instead of --origin.", metavar="X Y")
+    size_m: PlaceXY | None = option(
+        None,
+        "The site's extents, m.",
+        metavar="WIDTH HEIGHT",
+        show_default="as much as everything in the file needs",
+    )
+    margin_m: float = option(10.0, "Ground around everything without --size, m.")
+    rotation_deg: float | None = option(
+        None,
+        "Direction of the site's x axis, degrees from east, counterclockwise.",
+        show_default="that of most walls",
+    )
+    crs: str | None = option(
+        None,
+        "Reference system of the coordinates: EPSG:25832, or local for plain metres.",
+        show_default="what GeoJSON says, else EPSG:4326; none for DXF",
+    )
+    units: str | None = option(None, "Unit of a drawing: m, mm, cm, dm, km, in, ft.")
+    buildings_from: tuple[str, ...] = option(
+        (), "What is a building: KEY, KEY=VALUE, or a layer of a drawing."
+    )
+    charges_from: tuple[str, ...] = option(
+        (), "Where charges may be, named in the same way.", show_default="streets, car parks"
+    )
+    zone_from: tuple[str, ...] = option((), "Where barriers may stand, named in the same way.")
+    keep_outs_from: tuple[str, ...] = option((), "What must stay empty, named in the same way.")
+    protect: tuple[str, ...] = option((), "Name of a building whose load counts.")
+    protect_near: PlaceXY | None = option(
+        None, "Protect the building nearest to this.", metavar="X Y"
+    )
+    tnt_kg: float = option(100.0, "Mass of the charges, kg TNT.", metavar="KG")
+    charge_at: tuple[PlaceXY, ...] = option((), "A further place of a charge.", metavar="X,Y")
+    zone_m: tuple[float, float, float, float] | None = option(
+        None, "The build zone, site metres.", metavar="LEFT BOTTOM WIDTH HEIGHT"
+    )
+    zone_around_m: float | None = option(
+        None, "Zone around what is protected, so many metres wide."
+    )
+    stock: int = option(20, "Modules that there are to place.", min=1)
+    wall_height_m: float = option(3.0, "Height of the modules, m.")
+    clearance_m: float = option(1.0, "Least distance of modules from structures, m.", min=0.0)
+    preset: str = option("collisional", "Parameters of the particle model.")
+    height_from: str | None = option(None, "Property with the height.")
+    default_height_m: float | None = option(
+        None, "Height of buildings without one, m.", show_default="as high as the air"
+    )
+    level_height_m: float = option(3.0, "Height of a storey, m.")
+    least_area_m2: float = option(4.0, "Leave out smaller buildings, m2.")
+    most_area_deviation: float = option(
+        0.2, "Refuse a building of which modules miss more, share of area."
+    )
+    most_outline_deviation_m: float = option(
+        1.0, "Refuse a building whose outline is farther off, m."
+    )
+    most_rectangles: int = option(16, "Rectangles that a building may take; coarser blocks beyond.")
+    repair: bool = option(False, "Put outlines right that cross themselves.")
 
     def __post_init__(self) -> None:
         """Check them."""
@@ -124,9 +125,9 @@ class ImportOptions:
         _refuse_both("--zone", self.zone_m, "--zone-around", self.zone_around_m)
         _refuse_both("--zone-from", self.zone_from or None, "--zone", self.zone_m)
         _refuse_both("--zone-from", self.zone_from or None, "--zone-around", self.zone_around_m)
-        for option, place in (("--origin", self.origin), ("--centre", self.centre)):
+        for flag, place in (("--origin", self.origin), ("--centre", self.centre)):
             if place is not None and self.size_m is None:
-                raise BlastEnvError(f"{option} needs --size: how large the site is to be")
+                raise BlastEnvError(f"{flag} needs --size: how large the site is to be")
         if self.size_m is not None and self.origin is None and self.centre is None:
             raise BlastEnvError("--size needs --origin or --centre: where the site is to be")
 
