@@ -50,8 +50,6 @@ PUBLIC = (
 )
 GIVEN_BY_THE_CALLER = {
     "Observable",  # what an observation is given
-    "Engine",  # whose scenario was loaded by what evaluates
-    "ParticleEngine",
     "TrainedAgent",
     "Placement",  # whose constructor checks nothing: `of` does
 }
@@ -64,8 +62,8 @@ def _callables(module_name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
         value = getattr(module, name)
         if not callable(value) or not getattr(value, "__module__", "").startswith("blast"):
             continue
-        if getattr(value, "_is_protocol", False):
-            continue
+        if getattr(value, "_is_protocol", False) or inspect.isabstract(value):
+            continue  # for those who write one, and are given a loaded scenario
         if name not in GIVEN_BY_THE_CALLER:
             yield name, value
         if inspect.isclass(value):
