@@ -159,7 +159,7 @@ def _particles(
     blast = Blast(scenario, layout, 0, "event", charge)
     bare = Blast(scenario, (), 0, "event", charge).run()
     unit = bare.load_unit
-    painter = FramePainter.for_blast(
+    painter = FramePainter(
         blast,
         width_px=_FILM_PX,
         full_impulse=largest_load(bare, unit),

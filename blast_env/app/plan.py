@@ -1,46 +1,50 @@
 """The plan of a site as SVG, and where a pixel of it is on the site."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from html import escape
+from itertools import groupby
 from math import ceil, floor
 from typing import Final
 
 import numpy as np
 
-from blast_env.app import edits, placing
+from blast_env.app import edits
 from blast_env.app.editor import Ghost
 from blast_env.app.edits import Kind, Thing
-from blast_env.arrays import BoolArray
 from blast_env.geometry import Cell, Layout, Rectangle
+from blast_env.labels import Wanted, labels_of, leader, settle, solid
 from blast_env.physics.structure import Colour
-from blast_env.rendering.style import (
-    BARRIER,
-    BORDER,
-    EXPLOSIVE,
+from blast_env.plan import (
     FAINT,
     INK,
-    PROTECTED,
     QUIET_INK,
-    SITE,
-    STRUCTURE,
+    STANDING,
+    Feature,
+    FeatureKind,
+    Kinds,
+    Look,
+    in_order,
+    rectangles_of,
+    site_features,
+    vehicle_features,
+    without,
 )
-from blast_env.scenario import AnySource, Placement, RectangleSource, Scenario, VehicleSource
-from blast_env.scenario.build_scene import vehicle_reach, worst_places
+from blast_env.scenario import Placement, Scenario
 from blast_env.scenario.sections import PointM
-from blast_env.scenario.vehicles import nearest_point_m, squares_of
 from blast_env.units import MODULE_SIDE_M
 
 _FITS: Final = "#0072B2"  # Okabe and Ito: blue and orange, whatever one's colour vision
 _REFUSED: Final = "#D55E00"
 _SELECTED: Final = "#0072B2"
-_GAUGE: Final = "#7B2D8B"
-_COST: Final = "#E69F00"
 
 _LEAST_CELL_PX: Final = 9.0  # below it cells are not drawn one by one
 _LEAST_LINES_PX: Final = 24.0
 _MARGIN: Final = 0.04
 _MOST_ZOOM: Final = 60.0
+_LETTER_PX: Final = 7.2  # of the typeface, on average
+_LINE_PX: Final = 15.0
+_SIGN_PX: Final = 9.0
 
 
 def _hex(colour: Colour) -> str:
@@ -114,20 +118,25 @@ class View:
 
 def plan_svg(view: View, scenario: Scenario, layout: Layout, selected: Thing | None) -> str:
     """Return what stands on a site; `overlay_svg` goes on top of it."""
+    features = in_order((*site_features(scenario, layout), *vehicle_features(scenario, layout)))
     return "".join(
         (
-            _PATTERNS,
-            *_ground(view, scenario),
-            *_zone(view, scenario, layout),
-            *_reach(view, scenario, layout),
-            *_structures(view, scenario),
-            *_charges(view, scenario),
-            *_layout(view, scenario, layout),
-            *_gauges(view, scenario),
+            _BLOCKED,
+            *draw_features(view, [each for each in features if each.kind is Kinds.SITE]),
+            *_lines(view, scenario),
+            *_cells(view, scenario, layout),
+            *draw_features(view, without(features, Kinds.SITE)),
+            *_names(view, [_named(each) for each in features]),
             *_selection(view, scenario, selected),
             *_scale_bar(view),
         )
     )
+
+
+def _named(feature: Feature) -> Feature:
+    """Return a feature with its label; the page has no legend that would explain the zone."""
+    is_zone = feature.kind is Kinds.BUILD_ZONE
+    return replace(feature, label=feature.name) if is_zone else feature
 
 
 def overlay_svg(view: View, scenario: Scenario, ghost: Ghost | None, cursor: Cell | None) -> str:
@@ -141,14 +150,116 @@ def overlay_svg(view: View, scenario: Scenario, ghost: Ghost | None, cursor: Cel
     return "".join(parts)
 
 
-_PATTERNS: Final = (
+_BLOCKED: Final = (
     '<pattern id="blocked" width="7" height="7" patternUnits="userSpaceOnUse"'
     ' patternTransform="rotate(45)"><rect width="7" height="7" fill="#e2e4e8"></rect>'
     '<line x1="0" y1="0" x2="0" y2="7" stroke="#9ea4ae" stroke-width="1.6"></line></pattern>'
-    '<pattern id="keepout" width="9" height="9" patternUnits="userSpaceOnUse"'
-    ' patternTransform="rotate(-45)"><line x1="0" y1="0" x2="0" y2="9" stroke="#5c636e"'
-    ' stroke-width="2"></line></pattern>'
 )
+
+
+# Features.
+
+
+def draw_features(view: View, features: Iterable[Feature]) -> Iterator[str]:
+    """Yield the features by their geometry and their look; areas of a kind are one figure."""
+    for (kind, colour, corners), group in groupby(
+        features, key=lambda each: (each.kind, each.colour, min(len(each.places_m), 3))
+    ):
+        places = [[view.pixel(*place) for place in each.places_m] for each in group]
+        if corners == 3:
+            yield from _areas(kind, colour, places)
+        elif corners == 2:
+            yield from (_line(kind.look, start, end) for start, end in places)
+        else:
+            yield from (_sign(kind.look, *place) for (place,) in places)
+
+
+def _areas(kind: FeatureKind, colour: Colour | None, outlines: list[list[PointM]]) -> Iterator[str]:
+    look = kind.look
+    path = "".join(f"M{'L'.join(f'{x:g} {y:g}' for x, y in outline)}Z" for outline in outlines)
+    fill = "none" if colour is None else _hex(colour)
+    if look.hatched:
+        ink, fill = _hex(look.line or QUIET_INK), f"url(#{kind.name})"
+        yield (
+            f'<pattern id="{kind.name}" width="9" height="9" patternUnits="userSpaceOnUse"'
+            f' patternTransform="rotate(-45)"><line x1="0" y1="0" x2="0" y2="9" stroke="{ink}"'
+            ' stroke-width="2"></line></pattern>'
+        )
+    stroke = "none" if look.line is None else _hex(look.line)
+    dashed = ' stroke-dasharray="7 4"' if look.dashed else ""
+    yield (
+        f'<path d="{path}" fill="{fill}" fill-opacity="{look.opacity:g}" stroke="{stroke}"'
+        f' stroke-width="{look.width:g}"{dashed}></path>'
+    )
+
+
+def _line(look: Look, start: PointM, end: PointM) -> str:
+    (x0, y0), (x1, y1), colour = start, end, _hex(look.line or INK)
+    dashed = ' stroke-dasharray="5 3"' if look.dashed else ""
+    line = (
+        f'<line x1="{x0}" y1="{y0}" x2="{x1}" y2="{y1}" stroke="{colour}"'
+        f' stroke-width="{1.3 * look.width:g}"{dashed}></line>'
+    )
+    length = float(np.hypot(x1 - x0, y1 - y0))
+    if not look.arrows or length == 0.0:
+        return line
+    x, y = (x1 - x0) / length, (y1 - y0) / length
+    heads = "".join(
+        f"M{tip_x} {tip_y}l{turn * 9.0 * x - 4.0 * y:.1f} {turn * 9.0 * y + 4.0 * x:.1f}"
+        f"l{8.0 * y:.1f} {-8.0 * x:.1f}Z"
+        for tip_x, tip_y, turn in ((x0, y0, 1.0), (x1, y1, -1.0))
+    )
+    return f'{line}<path d="{heads}" fill="{colour}"></path>'
+
+
+def _sign(look: Look, x: float, y: float) -> str:
+    colour = _hex(look.line or INK)
+    if look.sign == "star":
+        return _star(x, y, colour)
+    return (
+        f'<circle cx="{x}" cy="{y}" r="5" fill="white" stroke="{colour}" stroke-width="2">'
+        f'</circle><path d="M{x - 9} {y}h18M{x} {y - 9}v18" stroke="{colour}"></path>'
+    )
+
+
+def _names(view: View, features: Sequence[Feature]) -> Iterator[str]:
+    """Yield the labels of features, so that none covers another."""
+
+    def box(feature: Feature) -> Rectangle:  # pixels, y upwards
+        left, top, width, height = view.box(feature.bounds_m)
+        grown = _SIGN_PX if len(feature.places_m) == 1 else 0.0
+        return Rectangle(left, -top - height, left + width, -top).grown(grown)
+
+    labels = labels_of(features)[::-1]
+    lines = [label.text.split("\n") for label in labels]
+    owns = [box(label.feature) for label in labels]
+    rooms = [
+        own if label.feature.kind in STANDING else None
+        for own, label in zip(owns, labels, strict=True)
+    ]
+    wanted = [
+        Wanted(own, (_LETTER_PX * max(map(len, each)) + 4.0, _LINE_PX * len(each)), room)
+        for own, room, each in zip(owns, rooms, lines, strict=True)
+    ]
+    within = Rectangle(0.0, -float(view.height_px), float(view.width_px), 0.0)
+    places = settle(wanted, [box(each) for each in solid(features)], within, 4.0)
+    for label, wish, place, texts in zip(labels, wanted, places, lines, strict=True):
+        kind = label.feature.kind
+        colour = _hex(INK if kind is Kinds.STRUCTURE else kind.look.line or INK)
+        line = leader(wish.own, place, 10.0)
+        if line is not None:
+            (x0, y0), (x1, y1) = line
+            yield (
+                f'<line x1="{x0:g}" y1="{-y0:g}" x2="{x1:g}" y2="{-y1:g}" stroke="{colour}"'
+                ' stroke-width="0.8"></line>'
+            )
+        x, _ = place.centre
+        for number, text in enumerate(texts):
+            y = -place.top + _LINE_PX * (number + 0.8)
+            yield _text(x, y, text, colour, 13 if number == 0 else 12)
+
+
+# The ground.
 
 
 def _rectangle(
@@ -179,9 +290,9 @@ def _text(
     )
 
 
-def _ground(view: View, scenario: Scenario) -> Iterator[str]:
+def _lines(view: View, scenario: Scenario) -> Iterator[str]:
+    """Yield lines at round distances."""
     site = scenario.site.rectangle_m
-    yield _rectangle(view, site, _hex(SITE), _hex(BORDER), 2.0)
     steps = (1.0, 5.0, 10.0, 50.0, 100.0)
     step = next((each for each in steps if each * view.pixels_per_m >= _LEAST_LINES_PX), 500.0)
     lines = []
@@ -195,24 +306,17 @@ def _ground(view: View, scenario: Scenario) -> Iterator[str]:
     yield f'<path d="{path}" stroke="#e3e7ec" stroke-width="1" fill="none"></path>'
 
 
-def _zone(view: View, scenario: Scenario, layout: Layout) -> Iterator[str]:
+def _cells(view: View, scenario: Scenario, layout: Layout) -> Iterator[str]:
+    """Yield which cells of the build zone may take something."""
     zone = scenario.build_zone
     if zone is None:
         return
-    yield _rectangle(view, zone.rectangle_m, "#e9f3ec", _hex(QUIET_INK), 1.6, dash="7 4")
+    yield _rectangle(view, zone.rectangle_m, "#e9f3ec")
     usable = Placement.of(scenario, layout).usable
-    for box in merged_cells(~usable):
-        yield _rectangle(view, _cells_m(scenario, box), "url(#blocked)")
+    for box in rectangles_of(~usable, zone.corner_m):
+        yield _rectangle(view, box, "url(#blocked)")
     if MODULE_SIDE_M * view.pixels_per_m >= _LEAST_CELL_PX:
         yield from _cell_lines(view, zone.rectangle_m)
-    for cost_area in zone.cost_areas:
-        yield _rectangle(view, cost_area.rectangle_m, _COST, _COST, 1.5, opacity=0.25)
-    for keep_out in zone.keep_outs:
-        ink = _hex(QUIET_INK)
-        yield _rectangle(view, keep_out.rectangle_m, "url(#keepout)", ink, 1.5, opacity=0.75)
-    yield _rectangle(view, zone.rectangle_m, "none", _hex(QUIET_INK), 1.6, dash="7 4")
-    x, y = view.pixel(zone.rectangle_m.left, zone.rectangle_m.top)
-    yield _text(x, y - 5.0, "build zone", _hex(QUIET_INK), 12, "start")
 
 
 def _cell_lines(view: View, zone_m: Rectangle) -> Iterator[str]:
@@ -224,122 +328,12 @@ def _cell_lines(view: View, zone_m: Rectangle) -> Iterator[str]:
     yield f'<path d="{path}" stroke="{_hex(FAINT)}" stroke-width="0.7" fill="none"></path>'
 
 
-def _cells_m(scenario: Scenario, box: tuple[int, int, int, int]) -> Rectangle:
-    """Return the rectangle of cells from the lower left one to beyond the upper right one."""
-    bottom, left, top, right = box
-    first = scenario.zone.cell_rectangle_m((bottom, left))
-    last = scenario.zone.cell_rectangle_m((top - 1, right - 1))
-    return Rectangle(first.left, first.bottom, last.right, last.top)
-
-
-def merged_cells(cells: BoolArray) -> list[tuple[int, int, int, int]]:
-    """Return few rectangles that cover cells: first row and column, last ones excluded."""
-    boxes: list[tuple[int, int, int, int]] = []
-    growing: dict[tuple[int, int], int] = {}
-    for row in range(len(cells) + 1):
-        runs = _runs(cells[row]) if row < len(cells) else []
-        for run, first in [*growing.items()]:
-            if run not in runs:
-                boxes.append((first, run[0], row, run[1]))
-                del growing[run]
-        for run in runs:
-            growing.setdefault(run, row)
-    return boxes
-
-
-def _runs(row: BoolArray) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], row, [False])).astype(np.int8)))
-    return [(int(edges[k]), int(edges[k + 1])) for k in range(0, len(edges), 2)]
-
-
-def _structures(view: View, scenario: Scenario) -> Iterator[str]:
-    for each in scenario.structures:
-        colour = _hex(PROTECTED if each.protected else STRUCTURE)
-        fill = "#cfe8e3" if each.protected else "#d9d6d0"
-        yield _rectangle(view, each.rectangle_m, fill, colour, 3.0 if each.protected else 2.0)
-        x, y = view.pixel(*each.rectangle_m.centre)
-        height = "" if each.height_m is None else f"{each.height_m:g} m high"
-        yield _text(x, y, each.name, _hex(INK))
-        if height:
-            yield _text(x, y + 15.0, height, _hex(QUIET_INK), 11)
-
-
-def _reach(view: View, scenario: Scenario, layout: Layout) -> Iterator[str]:
-    """Yield the ground that vehicles reach, and what stand-off is left."""
-    red = _hex(EXPLOSIVE)
-    for source in scenario.vehicles:
-        rows, columns = squares_of(scenario.site)
-        ground = vehicle_reach(scenario, source, layout).ground(rows, columns)
-        for bottom, left, top, right in merged_cells(ground):
-            sides_m = (MODULE_SIDE_M * each for each in (left, bottom, right, top))
-            yield _rectangle(view, Rectangle(*sides_m), red, opacity=0.14)
-        place_m = worst_places(scenario, source, layout).places_m[0]
-        wall_m = nearest_point_m(scenario.structures, place_m)
-        (x0, y0), (x1, y1) = view.pixel(*place_m), view.pixel(*wall_m)
-        yield (
-            f'<line x1="{x0}" y1="{y0}" x2="{x1}" y2="{y1}" stroke="{_hex(INK)}"'
-            ' stroke-width="1.5" stroke-dasharray="5 3"></line>'
-        )
-        yield _star(x0, y0, red)
-        stand_off_m = float(np.hypot(*np.subtract(place_m, wall_m)))
-        words = f"stand-off {stand_off_m:.1f} m"
-        yield _text((x0 + x1) / 2.0, (y0 + y1) / 2.0 - 6.0, words, _hex(INK), 12)
-
-
-def _charges(view: View, scenario: Scenario) -> Iterator[str]:
-    red = _hex(EXPLOSIVE)
-    for number, source in enumerate(scenario.charge, start=1):
-        yield _charge_place(view, source, scenario.charge_radius_m, red)
-        centre = edits.rectangle_of(scenario, Thing(Kind.CHARGE, number - 1)).centre
-        x, y = view.pixel(*centre)
-        if not isinstance(source, RectangleSource | VehicleSource):
-            yield _star(x, y, red)
-        raised = f", {source.height_m:g} m up" if source.height_m > 0.0 else ""
-        kind = "vehicle" if isinstance(source, VehicleSource) else "charge"
-        words = f"{kind} {number}: {source.tnt_kg:g} kg{raised}"
-        near_left = x < 0.2 * view.width_px
-        anchor, shift = ("start", 12.0) if near_left else ("middle", 0.0)
-        yield _text(x + shift, y - 12.0, words, red, 12, anchor)
-
-
-def _charge_place(view: View, source: AnySource, radius_m: float, colour: str) -> str:
-    radius_px = max(radius_m * view.pixels_per_m, 4.0)
-    if isinstance(source, RectangleSource):
-        area = source.rectangle_m.grown(radius_m)
-        return _rectangle(view, area, colour, colour, 1.5, opacity=0.25)
-    lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
-    return "".join(_charge_line(view, line_m, radius_px, colour) for line_m in lines_m)
-
-
-def _charge_line(view: View, line_m: tuple[PointM, PointM], radius_px: float, colour: str) -> str:
-    (x0, y0), (x1, y1) = (view.pixel(*place) for place in line_m)
-    return (
-        f'<line x1="{x0}" y1="{y0}" x2="{x1}" y2="{y1}" stroke="{colour}" stroke-opacity="0.35"'
-        f' stroke-width="{2.0 * radius_px:.1f}" stroke-linecap="round"></line>'
-    )
-
-
 def _star(x: float, y: float, colour: str) -> str:
     points = []
     for k in range(16):
         angle, reach = k * np.pi / 8.0, 9.0 if k % 2 == 0 else 4.0
         points.append(f"{x + reach * np.sin(angle):.1f},{y - reach * np.cos(angle):.1f}")
     return f'<polygon points="{" ".join(points)}" fill="{colour}" stroke="white"></polygon>'
-
-
-def _layout(view: View, scenario: Scenario, layout: Layout) -> Iterator[str]:
-    for solid in placing.solids(scenario, layout):
-        yield _rectangle(view, solid.rectangle_m, _hex(BARRIER), "white", 0.8)
-
-
-def _gauges(view: View, scenario: Scenario) -> Iterator[str]:
-    for gauge in scenario.gauges:
-        x, y = view.pixel(gauge.position_m[0], gauge.position_m[1])
-        yield (
-            f'<circle cx="{x}" cy="{y}" r="5" fill="white" stroke="{_GAUGE}" stroke-width="2">'
-            f'</circle><path d="M{x - 9} {y}h18M{x} {y - 9}v18" stroke="{_GAUGE}"></path>'
-        )
-        yield _text(x + 10.0, y + 14.0, gauge.name, _GAUGE, 12, "start")
 
 
 def _selection(view: View, scenario: Scenario, selected: Thing | None) -> Iterator[str]:
@@ -405,7 +399,6 @@ def _ghost(view: View, ghost: Ghost) -> list[str]:
 
 
 _LINE: Final = 48  # characters of a reason on a line
-_LINE_PX: Final = 15.0
 
 
 def _wrapped(view: View, x_px: float, y_px: float, text: str) -> list[str]:

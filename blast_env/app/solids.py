@@ -3,21 +3,17 @@
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from blast_env.app import placing
 from blast_env.geometry import Layout, Rectangle
-from blast_env.scenario import AnySource, RectangleSource, Scenario, VehicleSource
-from blast_env.scenario.sections import PointM
+from blast_env.physics.structure import Colour
+from blast_env.plan import EXPLOSIVE, STANDING, Feature, Kinds, site_features
+from blast_env.scenario import Scenario
 
-PROTECTED: Final = "#008070"
-STRUCTURE: Final = "#8a8276"
-BARRIER: Final = "#1f2023"
-CHARGE: Final = "#e21c24"
-GAUGE: Final = "#7b2d8b"
-GROUND: Final = "#dfe4ea"
-ZONE: Final = "#b9d9c3"
-
+_GROUND: Final[Colour] = (223, 228, 234)
+_ZONE: Final[Colour] = (185, 217, 195)
 _GROUND_M: Final = 0.1
-_DOT_M: Final = 0.6
+_LINE_M: Final = 0.3
+_SIGN_M: Final = 0.6
+_SEE_THROUGH: Final = 0.45
 
 
 class Box(NamedTuple):
@@ -40,55 +36,53 @@ class Box(NamedTuple):
 
 def boxes(scenario: Scenario, layout: Layout) -> Iterator[Box]:
     """Yield a site with what stands on it; what has no height goes up to the air, see-through."""
-    air_m = scenario.air_height_m
-    yield _box(scenario.site.rectangle_m, -_GROUND_M, 0.0, GROUND, 1.0, "site")
-    if scenario.build_zone is not None:
-        zone_m = scenario.build_zone.rectangle_m
-        yield _box(zone_m, 0.0, 0.04, ZONE, 1.0, "build zone")
-    for each in scenario.structures:
-        colour = PROTECTED if each.protected else STRUCTURE
-        yield _standing(each.rectangle_m, each.height_m, air_m, colour, each.name)
-    for solid in placing.solids(scenario, layout):
-        yield _standing(solid.rectangle_m, solid.height_m, air_m, BARRIER, solid.name or "barrier")
-    for number, source in enumerate(scenario.charge, start=1):
-        yield from _charge(source, f"charge {number}")
-    for gauge in scenario.gauges:
-        x_m, y_m, z_m = gauge.position_m
-        dot = Rectangle(x_m, y_m, x_m, y_m).grown(_DOT_M / 4.0)
-        yield _box(dot, z_m - _DOT_M / 4.0, z_m + _DOT_M / 4.0, GAUGE, 1.0, gauge.name)
+    for feature in site_features(scenario, layout):
+        bounds_m = feature.bounds_m
+        if feature.kind is Kinds.SITE:
+            yield _box(bounds_m, -_GROUND_M, 0.0, _GROUND, 1.0, "site")
+        elif feature.kind is Kinds.BUILD_ZONE:
+            yield _box(bounds_m, 0.0, 0.04, _ZONE, 1.0, feature.name)
+        elif feature.kind in STANDING:
+            yield _standing(feature, scenario.air_height_m)
+        elif feature.kind in (Kinds.CHARGE_PLACE, Kinds.GAUGE):
+            yield from _place(feature)
 
 
-def _standing(
-    rectangle_m: Rectangle, height_m: float | None, air_m: float, colour: str, name: str
-) -> Box:
-    opacity = 1.0 if height_m is not None else 0.45
-    return _box(rectangle_m, 0.0, height_m or air_m, colour, opacity, name)
+def _standing(feature: Feature, air_m: float) -> Box:
+    height_m = feature.properties.get("height_m")
+    known = isinstance(height_m, float)
+    colour = feature.colour if feature.kind is Kinds.BARRIER else feature.kind.look.line
+    name = str(feature.properties.get("item", feature.name))
+    top_m = height_m if isinstance(height_m, float) else air_m
+    opacity = 1.0 if known else _SEE_THROUGH
+    return _box(feature.bounds_m, 0.0, top_m, colour or EXPLOSIVE, opacity, name)
 
 
-def _charge(source: AnySource, name: str) -> Iterator[Box]:
-    if isinstance(source, RectangleSource):
-        low = source.height_m
-        yield _box(source.rectangle_m, low, low + 0.2, CHARGE, 0.5, name)
+def _place(feature: Feature) -> Iterator[Box]:
+    """Yield where a charge may be, or a gauge: a point, a line along an axis, an area."""
+    low_m, colour = feature.above_ground_m, feature.kind.look.line or EXPLOSIVE
+    name, bounds_m = feature.label or feature.name, feature.bounds_m
+    if len(feature.places_m) > 2:
+        yield _box(bounds_m, low_m, low_m + 0.2, colour, 0.5, name)
         return
-    lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
-    for line_m in lines_m:
-        yield from _charge_on_line(line_m, source.height_m, name)
-
-
-def _charge_on_line(line_m: tuple[PointM, PointM], height_m: float, name: str) -> Iterator[Box]:
-    (x0, y0), (x1, y1) = line_m
-    line = Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
-    if x0 == x1 or y0 == y1:
-        yield _box(line.grown(0.15), height_m, height_m + 0.2, CHARGE, 0.6, name)
-    middle = Rectangle(*line.centre, *line.centre).grown(_DOT_M / 2.0)
-    yield _box(middle, height_m, height_m + _DOT_M, CHARGE, 1.0, name)
+    if len(feature.places_m) == 2 and (
+        bounds_m.left == bounds_m.right or bounds_m.bottom == bounds_m.top
+    ):
+        line_m = bounds_m.grown(_LINE_M / 2.0)
+        yield _box(line_m, low_m, low_m + 0.2, colour, 0.6, name)
+    x_m, y_m = bounds_m.centre
+    middle_m = Rectangle(x_m, y_m, x_m, y_m).grown(_SIGN_M / 2.0)
+    yield _box(middle_m, low_m, low_m + _SIGN_M, colour, 1.0, name)
 
 
 def _box(
-    rectangle_m: Rectangle, low_m: float, high_m: float, colour: str, opacity: float, name: str
+    rectangle_m: Rectangle, low_m: float, high_m: float, colour: Colour, opacity: float, name: str
 ) -> Box:
     x_m, y_m = rectangle_m.centre
-    across, along = rectangle_m.right - rectangle_m.left, rectangle_m.top - rectangle_m.bottom
-    return Box(
-        (x_m, y_m, (low_m + high_m) / 2.0), (across, along, high_m - low_m), colour, opacity, name
+    size_m = (
+        rectangle_m.right - rectangle_m.left,
+        rectangle_m.top - rectangle_m.bottom,
+        high_m - low_m,
     )
+    middle_m = (x_m, y_m, (low_m + high_m) / 2.0)
+    return Box(middle_m, size_m, "#{:02x}{:02x}{:02x}".format(*colour), opacity, name)

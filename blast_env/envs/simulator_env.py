@@ -182,7 +182,7 @@ class UnfoldingParticles(Unfolding):
         from blast_env.rendering.frames import FramePainter
 
         if self._painter is None:
-            self._painter = FramePainter.for_blast(self.blast)
+            self._painter = FramePainter(self.blast)
         return self._painter.paint(self.run.balls(), self.run.obstacles, self.run.time_s)
 
     @staticmethod

@@ -1,7 +1,8 @@
 """Layouts as files for other programs: JSON, CSV, GeoJSON and DXF."""
 
 from blast_env.export.files import SUFFIXES, check_target, export_layout, export_layouts, is_file
-from blast_env.export.plan import Feature, FeatureKind, LayoutPlan
+from blast_env.export.plan import LayoutPlan
+from blast_env.plan import Feature, FeatureKind
 
 __all__ = [
     "SUFFIXES",

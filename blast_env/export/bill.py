@@ -5,8 +5,9 @@ from math import fsum
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from blast_env.export.plan import LayoutPlan, rounded_m
+from blast_env.export.plan import LayoutPlan
 from blast_env.geometry import Element, Piece
+from blast_env.plan import rounded_m
 from blast_env.provenance import package_version
 from blast_env.scenario import Placement
 from blast_env.tables import Column, as_types, table_of

@@ -1,16 +1,23 @@
 """What a drawing has to say beside its lines: conditions of the site, and how far they reach."""
 
+import textwrap
 from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from math import floor, pi, tan
 from pathlib import Path
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from blast_env.errors import import_extra
-from blast_env.export.labels import Label, key_of, labels_of, wrapped
-from blast_env.export.plan import Feature, FeatureKind, LayoutPlan
+from blast_env.export.plan import LayoutPlan
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
+from blast_env.labels import best_place
+from blast_env.plan import SITE_KINDS, Feature, FeatureKind, Kinds
 from blast_env.scenario import BuildZone, Placement
+from blast_env.scenario.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 
 _DIGITS: Final = 9  # of a metre: what is beyond is rounding
@@ -120,6 +127,146 @@ def _rounded_outline(rectangle: Rectangle, radius: float) -> tuple[CornerM, ...]
     )
 
 
+_STEPS: Final = 12  # places that are tried along a line
+
+
+_SIGN_WIDTH: Final = 0.75  # in heights; of most typefaces that programs take for drawings
+
+
+_OFF_LINE: Final = 0.9  # from a line to the middle of a letter, in heights of the text
+
+
+@dataclass(frozen=True)
+class Text:
+    """A text on the drawing: structures and pieces have it inside them, the others a letter.
+
+    Attributes:
+        text: The text.
+        feature: What it belongs to.
+        centre_m: Its middle.
+        height_m: Height of the letters.
+        upright: Whether it is turned by 90 degrees.
+    """
+
+    text: str
+    feature: Feature
+    centre_m: PointM
+    height_m: float
+    upright: bool = False
+
+    @property
+    def box_m(self) -> Rectangle:
+        """The rectangle that it takes."""
+        long, short = _SIGN_WIDTH * len(self.text) * self.height_m, self.height_m
+        width, height = (short, long) if self.upright else (long, short)
+        x, y = self.centre_m
+        return Rectangle(x - width / 2.0, y - height / 2.0, x + width / 2.0, y + height / 2.0)
+
+
+def key_of(plan: LayoutPlan) -> dict[str, str]:
+    """Return the letter of each name that the notes explain; the same name has the same letter."""
+    names = dict.fromkeys(_name(each) for each in plan.features if _has_letter(each))
+    return {name: _letter(number) for number, name in enumerate(names)}
+
+
+def texts_of(plan: LayoutPlan, height_m: float) -> tuple[Text, ...]:
+    """Return all texts on the site.
+
+    Args:
+        plan: What is drawn.
+        height_m: Height of the letters; names inside things are smaller where they must.
+    """
+    inside = [_text_inside(each, height_m) for each in plan.features if _words_inside(each)]
+    modules = [each.bounds_m for each in plan.features if each.kind is Kinds.BARRIER]
+    taken = [text.box_m for text in inside] + modules
+    key = key_of(plan)
+    letters = []
+    for feature in filter(_has_letter, plan.features):
+        words = key[_name(feature)]
+        tries = [Text(words, feature, place, height_m) for place in _places(feature, height_m)]
+        boxes = [each.box_m for each in tries]
+        chosen = best_place([(box, taken) for box in boxes], Rectangle.around(boxes))
+        taken.append(chosen)
+        letters.append(tries[boxes.index(chosen)])
+    return (*inside, *letters)
+
+
+def _letter(number: int) -> str:
+    """Return A to Z, then AA, AB and so on."""
+    before, last = divmod(number, 26)
+    return (_letter(before - 1) if before else "") + chr(ord("A") + last)
+
+
+def _name(feature: Feature) -> str:
+    return " ".join(feature.name.split())  # a line break would end a text
+
+
+def _has_letter(feature: Feature) -> bool:
+    return feature.kind.named == "letter"
+
+
+def _words_inside(feature: Feature) -> str:
+    """Return what is written inside a structure or a piece; nothing in a module."""
+    if feature.kind.named == "inside":
+        return _name(feature)
+    if "item" in feature.properties:
+        return f"{feature.properties['item']} {feature.properties['height_m']:g} m"
+    return ""
+
+
+def _text_inside(feature: Feature, height_m: float) -> Text:
+    """Return a text along the middle, as high as there is room for."""
+    text, outline = _words_inside(feature), feature.bounds_m
+    width_m, depth_m = outline.right - outline.left, outline.top - outline.bottom
+    signs = _SIGN_WIDTH * len(text)
+    upright = depth_m > width_m and signs * height_m > width_m
+    long_m, short_m = (depth_m, width_m) if upright else (width_m, depth_m)
+    piece_m = MODULE_SIDE_M / 2.0 if feature.kind is Kinds.BARRIER else height_m
+    fitting_m = min(height_m, piece_m, 0.6 * short_m, 0.95 * long_m / signs)
+    return Text(text, feature, outline.centre, fitting_m, upright)
+
+
+def _places(feature: Feature, height_m: float) -> list[PointM]:
+    """Return where a letter may stand, the best place first."""
+    off_m = _OFF_LINE * height_m
+    if len(feature.places_m) > 2:
+        return list(_places_of_area(feature.bounds_m, off_m))
+    if len(feature.places_m) == 2:
+        return list(_places_along(feature.places_m[0], feature.places_m[1], off_m))
+    (x, y), gap_m = feature.places_m[0], off_m + MODULE_SIDE_M
+    around = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
+    return [(x + right * gap_m, y + up * gap_m) for right, up in around]
+
+
+def _places_of_area(outline: Rectangle, off_m: float) -> Iterator[PointM]:
+    """Yield places along the sides, inside first; from the lower left corner on."""
+    width_m, depth_m = outline.right - outline.left, outline.top - outline.bottom
+    inside = min(width_m, depth_m) > 2.0 * off_m
+    for ring in (outline.grown(-off_m),) * inside + (outline.grown(off_m),):
+        shares = np.linspace(0.0, 1.0, _STEPS)
+        for y in (ring.bottom, ring.top):
+            for share in shares:
+                yield ring.left + share * (ring.right - ring.left), y
+        for x in (ring.left, ring.right):
+            for share in shares:
+                yield x, ring.bottom + share * (ring.top - ring.bottom)
+
+
+def _places_along(start: PointM, end: PointM, off_m: float) -> Iterator[PointM]:
+    """Yield places on either side of a line."""
+    along = np.array(end) - np.array(start)
+    across = off_m * np.array((-along[1], along[0])) / np.hypot(*along)
+    for share in np.linspace(0.0, 1.0, _STEPS):
+        for side in (across, -across):
+            x, y = np.array(start) + share * along + side
+            yield float(x), float(y)
+
+
+def wrapped(lines: Sequence[str], characters: int) -> list[str]:
+    """Return lines that have at most so many characters, broken between words."""
+    return [part for line in lines for part in textwrap.wrap(line, characters)]
+
+
 with import_extra("export", "DXF files"):
     from ezdxf import units
     from ezdxf.document import Drawing
@@ -170,19 +317,6 @@ class _Style(NamedTuple):
     line_type: str = "CONTINUOUS"
 
 
-_STYLES: Final = {
-    FeatureKind.SITE: _Style(8),
-    FeatureKind.BUILD_ZONE: _Style(3, "DASHED"),
-    FeatureKind.COST_AREA: _Style(6, "DASHED"),
-    FeatureKind.KEEP_OUT: _Style(30, "DASHED"),
-    FeatureKind.STRUCTURE: _Style(7),
-    FeatureKind.PROTECTED_STRUCTURE: _Style(132),
-    FeatureKind.CHARGE_PLACE: _Style(1, "DASHED"),
-    FeatureKind.CHARGE: _Style(1),
-    FeatureKind.BARRIER: _Style(140),
-}
-
-
 _OTHER_STYLES: Final = {
     CLEARANCE_LAYER: _Style(52, "DASHED"),
     NOTES_LAYER: _Style(7),
@@ -190,9 +324,13 @@ _OTHER_STYLES: Final = {
 }
 
 
+def _style_of(kind: FeatureKind) -> _Style:
+    return _Style(kind.look.cad_colour, "DASHED" if kind.look.drawn_dashed else "CONTINUOUS")
+
+
 def layer_name(kind: FeatureKind) -> str:
     """Return the layer that a kind of feature is on: `KEEP_OUT`."""
-    return kind.value.upper()
+    return kind.name.upper()
 
 
 def drawing(plan: LayoutPlan) -> Drawing:
@@ -208,7 +346,8 @@ def drawing(plan: LayoutPlan) -> Drawing:
         ("coordinates", "local site metres, x to the right, y upwards from the lower left corner"),
     ):
         document.header.custom_vars.append(name, value)
-    styles = {layer_name(kind): style for kind, style in _STYLES.items()} | _OTHER_STYLES
+    kinds = dict.fromkeys((*SITE_KINDS, *(feature.kind for feature in plan.features)))
+    styles = {layer_name(kind): _style_of(kind) for kind in kinds} | _OTHER_STYLES
     for layer, style in styles.items():
         document.layers.add(layer, color=style.colour, linetype=style.line_type)
     space = document.modelspace()
@@ -216,8 +355,8 @@ def drawing(plan: LayoutPlan) -> Drawing:
         _draw(space, feature)
     _draw_clearance(space, plan)
     height_m = text_height_m(plan)
-    for label in labels_of(plan, height_m):
-        _write(space, label)
+    for text in texts_of(plan, height_m):
+        _write(space, text)
     shown = _write_notes(space, plan, height_m)
     document.set_modelspace_vport(height=1.1 * max(shown.right, shown.top), center=shown.centre)
     return document
@@ -246,7 +385,7 @@ def _draw(space: Modelspace, feature: Feature) -> None:
         height_m = feature.properties.get("height_m")
         if isinstance(height_m, float):
             outline.dxf.thickness = height_m  # what stands is drawn as high as it is
-        if feature.kind is FeatureKind.BARRIER:
+        if feature.kind is Kinds.BARRIER:
             outline.set_xdata(APPLICATION, [(_STRING, text) for text in _barrier_texts(feature)])
 
 
@@ -258,16 +397,16 @@ def _barrier_texts(feature: Feature) -> list[str]:
     return [feature.name, f"item={feature.properties['item']}", f"height_m={height}"]
 
 
-def _write(space: Modelspace, label: Label) -> None:
+def _write(space: Modelspace, text: Text) -> None:
     """Write a text; those of pieces are on a layer of their own."""
-    kind = label.feature.kind
-    text = space.add_text(
-        label.text,
-        height=label.height_m,
-        rotation=90.0 if label.upright else 0.0,
-        dxfattribs={"layer": ITEMS_LAYER if kind is FeatureKind.BARRIER else layer_name(kind)},
+    kind = text.feature.kind
+    entity = space.add_text(
+        text.text,
+        height=text.height_m,
+        rotation=90.0 if text.upright else 0.0,
+        dxfattribs={"layer": ITEMS_LAYER if kind is Kinds.BARRIER else layer_name(kind)},
     )
-    text.set_placement(label.centre_m, align=TextEntityAlignment.MIDDLE_CENTER)
+    entity.set_placement(text.centre_m, align=TextEntityAlignment.MIDDLE_CENTER)
 
 
 def _draw_clearance(space: Modelspace, plan: LayoutPlan) -> None:

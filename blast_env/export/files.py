@@ -12,10 +12,12 @@ import numpy as np
 from blast_env import tables
 from blast_env.errors import BlastEnvError, suggestion
 from blast_env.export.bill import bill_of_quantities, element_table, write_excel
-from blast_env.export.plan import Feature, LayoutPlan, PlaceM
+from blast_env.export.plan import LayoutPlan
 from blast_env.files import make_folder, write_atomically
+from blast_env.plan import Feature
 from blast_env.scenario import write_layout
 from blast_env.scenario.georeference import AnyGeoreference
+from blast_env.scenario.sections import PointM
 from blast_env.values import path_of
 
 _DIGITS: Final = 9  # of a coordinate on a map: a tenth of a millimetre in degrees
@@ -101,7 +103,7 @@ def _feature(
     return {
         "type": "Feature",
         "properties": {
-            "kind": feature.kind.value,
+            "kind": feature.kind.name,
             "name": feature.name,
             **feature.properties,
             "coordinate_system": coordinate_words,
@@ -110,7 +112,7 @@ def _feature(
     }
 
 
-def _on_map(places_m: Sequence[PlaceM], georeference: AnyGeoreference | None) -> list[list[float]]:
+def _on_map(places_m: Sequence[PointM], georeference: AnyGeoreference | None) -> list[list[float]]:
     """Return places of the site in the coordinates of its map, if it has one."""
     if georeference is None:
         return [list(place) for place in places_m]

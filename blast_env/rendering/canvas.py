@@ -1,7 +1,8 @@
 """The site in pixels: view, lettering, strips and the layer that does not move."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,10 @@ from numpy.typing import NDArray
 from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.physics.scene import Scene, StructureOutline
+from blast_env.labels import Label, Wanted, labels_of, leader, settle, solid
 from blast_env.physics.structure import Colour, ModularObstacle, ModularPart, load_colour
-from blast_env.rendering.style import (
-    AIR,
+from blast_env.plan import (
     BARRIER,
-    BORDER,
     EXPLOSIVE,
     FAINT,
     INK,
@@ -24,12 +23,12 @@ from blast_env.rendering.style import (
     QUIET_INK,
     SITE,
     STRUCTURE,
-    nice_floor,
-    render_extra,
-    short_number,
+    Feature,
+    Kinds,
+    Look,
 )
-from blast_env.scenario.models import BuildZone
-from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
+from blast_env.rendering.style import nice_floor, render_extra, short_number
+from blast_env.units import MODULE_SIDE_M, MODULE_SIDE_UNITS, UNITS_PER_M
 
 with render_extra():
     import matplotlib
@@ -209,53 +208,97 @@ def colour_bar(
     return surface
 
 
-_LEGEND_ROWS = 3
+Draw = Callable[[pygame.Surface, pygame.Rect], object]
+"""Draws a sign into a place."""
+
+Sign = tuple[str, Draw]
+"""A sign with what it means."""
+
+_LEGEND_ROWS = 5
 
 
-def legend(
-    lettering: Lettering, scene: Scene, build_zone: BuildZone | None, widest_px: int
-) -> pygame.Surface:
-    """Return what the signs of the site mean, in as many columns as `widest_px` allows."""
-    entries = [(lettering.write(text), draw) for text, draw in _legend_entries(scene, build_zone)]
-    sign, gap = lettering.size_px, lettering.size_px // 2
-    cell_width = sign + gap + max(text.get_width() for text, _ in entries) + 2 * gap
-    columns = max(1, min(widest_px // cell_width, -(-len(entries) // _LEGEND_ROWS)))
-    rows = -(-len(entries) // columns)
-    pitch = round(1.45 * lettering.size_px)
+def legend(lettering: Lettering, signs: Sequence[Sign], widest_px: int) -> pygame.Surface:
+    """Return what signs mean, in as many columns as `widest_px` allows."""
+    texts = [lettering.write(text) for text, _ in signs]
+    side, gap = lettering.size_px, lettering.size_px // 2
+    cell_width = side + gap + max(text.get_width() for text in texts) + 2 * gap
+    columns = max(1, min((widest_px + 2 * gap) // cell_width, -(-len(signs) // _LEGEND_ROWS)))
+    rows, pitch = -(-len(signs) // columns), round(1.45 * lettering.size_px)
     surface = empty_surface(columns * cell_width - 2 * gap, rows * pitch)
-    for index, (text, draw) in enumerate(entries):
+    for index, (text, (_, draw)) in enumerate(zip(texts, signs, strict=True)):
         left, top = (index // rows) * cell_width, (index % rows) * pitch
-        draw(surface, pygame.Rect(left, top + (pitch - sign) // 2, sign, sign))
-        surface.blit(text, (left + sign + gap, top + (pitch - text.get_height()) // 2))
+        draw(surface, pygame.Rect(left, top + (pitch - side) // 2, side, side))
+        surface.blit(text, (left + side + gap, top + (pitch - text.get_height()) // 2))
     return surface
 
 
-Draw = Callable[[pygame.Surface, pygame.Rect], None]
+def signs_of(features: Iterable[Feature]) -> list[Sign]:
+    """Return a sign for everything that differs among features, what is on top first."""
+    shown = {(each.title, min(len(each.places_m), 3)): each for each in features}
+    ordered = sorted(shown.values(), key=lambda each: -each.kind.level)
+    return [(each.title, partial(_draw_sign, each)) for each in ordered]
 
 
-def _legend_entries(scene: Scene, build_zone: BuildZone | None) -> list[tuple[str, Draw]]:
-    """Return the text and the sign of everything that the scene has."""
-    outlines = scene.structures
-    entries: list[tuple[str, Draw]] = [
-        ("charge", lambda s, r: draw_star(s, r.center, 0.5 * r.width)),
-        ("explosive ball", _ball_sign(EXPLOSIVE)),
-    ]
-    if scene.parameters.air.spacing_units > 0.0:
-        entries.append(("air ball", _ball_sign(AIR)))
-    if any(outline.protected for outline in outlines):
-        entries.append(("protected structure", _module_sign(PROTECTED, 3)))
-    if any(not outline.protected and outline.cells is None for outline in outlines):
-        entries.append(("other structure", _module_sign(STRUCTURE, 2)))
-    if any(outline.cells is not None for outline in outlines):
-        entries.append(("barrier module", _module_sign(BARRIER, 2)))
-    if any(outline.capacity is not None for outline in outlines):
-        entries.append(("destroyed module", draw_destroyed))
-    if build_zone is not None:
-        entries.append(("build zone", lambda s, r: dashed_rectangle(s, r, QUIET_INK, 3)))
-        if build_zone.keep_outs:
-            entries.append(("keep-out", lambda s, r: hatch(s, r, FAINT)))
-    entries.append(("site border", _border_sign))
-    return entries
+def _draw_sign(feature: Feature, surface: pygame.Surface, place: pygame.Rect) -> None:
+    if len(feature.places_m) > 2:
+        _draw_area(surface, place, feature)
+    elif len(feature.places_m) == 2:
+        _draw_line(surface, place.midleft, place.midright, feature.kind.look)
+    else:
+        _draw_place(surface, place.center, feature.kind.look, 0.5 * place.width)
+
+
+def draw_features(surface: pygame.Surface, view: View, features: Iterable[Feature]) -> None:
+    """Draw features by their geometry and their look, in their order."""
+    for feature in features:
+        if len(feature.places_m) > 2:
+            _draw_area(surface, view.rectangle(feature.bounds_m.scaled(UNITS_PER_M)), feature)
+            continue
+        places = [view.pixel(x * UNITS_PER_M, y * UNITS_PER_M) for x, y in feature.places_m]
+        if len(places) == 2:
+            _draw_line(surface, places[0], places[1], feature.kind.look)
+        else:
+            _draw_place(surface, places[0], feature.kind.look, _SIGN_PX)
+
+
+def _draw_area(surface: pygame.Surface, place: pygame.Rect, feature: Feature) -> None:
+    look = feature.kind.look
+    if feature.colour is not None:
+        veil = empty_surface(*place.size)
+        veil.fill((*feature.colour, round(255 * look.opacity)))
+        surface.blit(veil, place)
+    if look.hatched:
+        hatch(surface, place, look.line or _HATCH)
+    elif look.dashed:
+        dashed_rectangle(surface, place, look.line or INK, min(6, place.width // 5))
+    elif look.line is not None:
+        pygame.draw.rect(surface, look.line, place, max(round(look.width), 1))
+
+
+def _draw_line(surface: pygame.Surface, start: Point, end: Point, look: Look) -> None:
+    colour, width = look.line or INK, max(round(look.width), 1)
+    along = np.subtract(end, start)
+    length = float(np.hypot(*along))
+    if not look.dashed or length == 0.0:
+        pygame.draw.line(surface, colour, start, end, width)
+    else:
+        for begin in np.arange(0.0, length, 2 * _DASH_PX):
+            shares = (begin / length, min((begin + _DASH_PX) / length, 1.0))
+            first, last = ((np.array(start) + share * along).tolist() for share in shares)
+            pygame.draw.line(surface, colour, first, last, width)
+    if look.arrows and length > 0.0:
+        for tip, way in ((start, along / length), (end, -along / length)):
+            across = np.array([-way[1], way[0]])
+            wings = [np.array(tip) + 0.5 * _DASH_PX * (2.0 * way + k * across) for k in (-1, 1)]
+            pygame.draw.polygon(surface, colour, [tip, *(wing.tolist() for wing in wings)])
+
+
+def _draw_place(surface: pygame.Surface, centre: Point, look: Look, radius_px: float) -> None:
+    if look.sign == "star":
+        draw_star(surface, centre, radius_px)
+        return
+    pygame.draw.circle(surface, PAGE, centre, 0.6 * radius_px)
+    pygame.draw.circle(surface, look.line or INK, centre, 0.6 * radius_px, 2)
 
 
 def draw_destroyed(surface: pygame.Surface, place: pygame.Rect) -> None:
@@ -266,11 +309,9 @@ def draw_destroyed(surface: pygame.Surface, place: pygame.Rect) -> None:
     pygame.draw.line(surface, INK, (right, place.top), (place.left, bottom))
 
 
-def _border_sign(surface: pygame.Surface, place: pygame.Rect) -> None:
-    pygame.draw.rect(surface, BORDER, place, 2)
+def ball_sign(colour: Colour) -> Draw:
+    """Return the sign of balls of a colour."""
 
-
-def _ball_sign(colour: Colour) -> Draw:
     def draw(surface: pygame.Surface, place: pygame.Rect) -> None:
         ball = disc(place.width * 0.36, colour)
         surface.blit(ball, ball.get_rect(center=place.center))
@@ -278,7 +319,9 @@ def _ball_sign(colour: Colour) -> Draw:
     return draw
 
 
-def _module_sign(outline: Colour, width: int) -> Draw:
+def module_sign(outline: Colour, width: int) -> Draw:
+    """Return the sign of modules that no load is on, with an outline."""
+
     def draw(surface: pygame.Surface, place: pygame.Rect) -> None:
         pygame.draw.rect(surface, load_colour(0.0), place)
         pygame.draw.rect(surface, outline, place, width)
@@ -314,7 +357,7 @@ def flow(
     return placed, top - gap
 
 
-_FOOTER_LINES = 7.5
+_FOOTER_LINES = 8.7
 """Lines of small letters that the signs below a site have room for, whatever the site has."""
 
 
@@ -465,24 +508,21 @@ def _draw_module(
         pygame.draw.line(surface, (red, green, blue), place.topleft, (place.left, place.bottom - 1))
 
 
-def draw_build_zone(surface: pygame.Surface, view: View, zone: BuildZone) -> None:
-    """Draw where modules may stand, with the grid where it is legible, and the keep-outs."""
-    whole = view.rectangle(zone.rectangle_m.scaled(UNITS_PER_M))
-    if view.pixels_per_unit * MODULE_SIDE_UNITS >= _SMALLEST_GRID_PX:
-        for cell in zone.cells():
-            place = view.rectangle(zone.cell_rectangle_m(cell).scaled(UNITS_PER_M))
-            pygame.draw.line(surface, FAINT, place.topleft, place.topright)
-            pygame.draw.line(surface, FAINT, place.topleft, place.bottomleft)
-    for keep_out in zone.keep_outs:
-        hatch(surface, view.rectangle(keep_out.rectangle_m.scaled(UNITS_PER_M)), FAINT)
-    dashed_rectangle(surface, whole, QUIET_INK)
+_SIGN_PX = 9.0
+_HATCH: Colour = (158, 164, 174)
+_DASH_PX = 6.0
+_NAME_GAP_PX = 6.0
 
 
-def draw_charge_mark(
-    surface: pygame.Surface, view: View, scene: Scene, radius_px: float = 9.0
-) -> None:
-    """Draw the star where the charge is that marks it in all pictures."""
-    draw_star(surface, view.pixel(*scene.charge_centre), radius_px)
+def draw_grid(surface: pygame.Surface, view: View, zone_m: Rectangle) -> None:
+    """Draw the cells of a build zone where they are large enough to be told apart."""
+    whole, side_px = view.rectangle(zone_m.scaled(UNITS_PER_M)), view.pixels_per_m * MODULE_SIDE_M
+    if side_px < _SMALLEST_GRID_PX:
+        return
+    for x in np.rint(np.arange(whole.left, whole.right, side_px)).astype(int).tolist():
+        pygame.draw.line(surface, FAINT, (x, whole.top), (x, whole.bottom - 1))
+    for y in np.rint(np.arange(whole.bottom, whole.top, -side_px)).astype(int).tolist():
+        pygame.draw.line(surface, FAINT, (whole.left, y), (whole.right - 1, y))
 
 
 def draw_star(surface: pygame.Surface, centre: Point, radius_px: float) -> None:
@@ -497,57 +537,54 @@ def draw_star(surface: pygame.Surface, centre: Point, radius_px: float) -> None:
     pygame.draw.aalines(surface, INK, True, points)
 
 
-def name_plates(
-    lettering: Lettering, view: View, outlines: Sequence[StructureOutline]
-) -> list[tuple[pygame.Surface, Point]]:
-    """Return the names of the structures, each with a place where it covers no other one."""
+def names_layer(
+    lettering: Lettering, view: View, features: Sequence[Feature], size_px: tuple[int, int]
+) -> pygame.Surface:
+    """Return the labels of features on a transparent ground, none of which covers another.
+
+    Args:
+        lettering: What writes them.
+        view: The site in the frame.
+        features: What is on the site, with everything that is not to be covered.
+        size_px: Width and height of the frame.
+    """
+
+    def box(feature: Feature) -> Rectangle:  # y upwards
+        place = view.rectangle(feature.bounds_m.scaled(UNITS_PER_M))
+        grown = _SIGN_PX if len(feature.places_m) == 1 else 0.0
+        return Rectangle(place.left, -place.bottom, place.right, -place.top).grown(grown)
+
+    labels = labels_of(features)[::-1]
+    plates = [_plate(lettering, label) for label in labels]
+    # The outer modules alone bear loads: a name on the inner ones hides nothing.
+    ring = MODULE_SIDE_UNITS * view.pixels_per_unit
+    wanted = [
+        Wanted(box(label.feature), plate.get_size(), box(label.feature).grown(-ring))
+        for label, plate in zip(labels, plates, strict=True)
+    ]
     site = view.rectangle(view.site)
-    named = [outline for outline in outlines if outline.cells is None]
-    taken = [view.rectangle(outline.rectangle) for outline in outlines]
-    plates: list[tuple[pygame.Surface, Point]] = []
-    for outline in sorted(named, key=lambda outline: not outline.protected):
-        plate = _plate(lettering, outline)
-        own = view.rectangle(outline.rectangle)
-        # The outer modules alone bear loads: a name on the inner ones hides nothing.
-        ring = 2 * round(MODULE_SIDE_UNITS * view.pixels_per_unit)
-        place = _free_place(plate.get_rect(), own, own.inflate(-ring, -ring), taken, site)
-        if place is not None:
-            taken.append(place)
-            plates.append((plate, place.topleft))
-    return plates
+    within = Rectangle(site.left, -site.bottom, site.right, -site.top).grown(-_NAME_GAP_PX)
+    places = settle(wanted, [box(each) for each in solid(features)], within, _NAME_GAP_PX)
+    layer = empty_surface(*size_px)
+    for label, wish, place in zip(labels, wanted, places, strict=True):
+        line = leader(wish.own, place, 2.0 * _NAME_GAP_PX)
+        if line is not None:
+            (x0, y0), (x1, y1) = line
+            pygame.draw.aaline(layer, label.feature.kind.look.line or INK, (x0, -y0), (x1, -y1))
+    for plate, place in zip(plates, places, strict=True):
+        layer.blit(plate, (round(place.left), round(-place.top)))
+    return layer
 
 
-def _plate(lettering: Lettering, outline: StructureOutline) -> pygame.Surface:
-    colour = PROTECTED if outline.protected else INK
-    text = lettering.write(outline.name, colour, bold=outline.protected)
-    plate = empty_surface(text.get_width() + 8, text.get_height() + 2)
+def _plate(lettering: Lettering, label: Label) -> pygame.Surface:
+    kind = label.feature.kind
+    colour = INK if kind is Kinds.STRUCTURE else kind.look.line or INK
+    bold = kind is Kinds.PROTECTED_STRUCTURE
+    lines = [lettering.write(line, colour, bold) for line in label.text.split("\n")]
+    pitch = lines[0].get_height()
+    width = max(line.get_width() for line in lines)
+    plate = empty_surface(width + 8, pitch * len(lines) + 2)
     plate.fill((*SITE, 225))
-    plate.blit(text, (4, 1))
+    for number, line in enumerate(lines):
+        plate.blit(line, (4 + (width - line.get_width()) // 2, 1 + pitch * number))
     return plate
-
-
-def _free_place(
-    plate: pygame.Rect,
-    own: pygame.Rect,
-    inner: pygame.Rect,
-    taken: list[pygame.Rect],
-    site: pygame.Rect,
-) -> pygame.Rect | None:
-    """Return a place inside the structure or beside it that nothing else takes, if any."""
-    inside = plate.copy()
-    inside.center = own.center
-    if inner.contains(inside):
-        return inside
-    gap = 6
-    for corner, place in (
-        ("midbottom", (own.centerx, own.top - gap)),
-        ("midtop", (own.centerx, own.bottom + gap)),
-        ("midleft", (own.right + gap, own.centery)),
-        ("midright", (own.left - gap, own.centery)),
-    ):
-        beside = plate.copy()
-        setattr(beside, corner, place)
-        beside.clamp_ip(site.inflate(-2 * gap, -2 * gap))
-        if beside.collidelist(taken) == -1:
-            return beside
-    return None

@@ -11,36 +11,42 @@ from blast_env.evaluation.cases import Case
 from blast_env.evaluation.comparison import Comparison
 from blast_env.evaluation.report import LayoutEvaluation
 from blast_env.geometry import Layout, layout_counts
-from blast_env.physics.scene import BlastSite
+from blast_env.physics.scene import BlastSite, Charge
 from blast_env.physics.structure import ModularObstacle
-from blast_env.rendering.site_plan import (
-    draw_charge,
-    draw_loads,
-    draw_outline,
-    draw_site,
-    draw_what_stands,
-    draw_zone,
-    in_metres,
-    layout_legend,
-    load_colours,
-    what_stands,
-    write_heading,
-    write_names,
-)
-from blast_env.rendering.style import (
+from blast_env.plan import (
     EXPLOSIVE,
     INK,
     PROTECTED,
     QUIET_INK,
+    Feature,
+    Kinds,
+    charge_feature,
+    site_features,
+    stand_off_text,
+    vehicle_features,
+    without,
+    without_counts,
+)
+from blast_env.rendering.site_plan import (
+    draw_loads,
+    draw_outline,
+    draw_plan,
+    in_metres,
+    legend_of,
+    load_colours,
+    write_heading,
+    write_legend,
+    write_names,
+)
+from blast_env.rendering.style import (
     count_of,
     nice_ceiling,
     number_on_axis,
     render_extra,
     unit_interval,
 )
-from blast_env.rendering.vehicle_plan import draw_vehicles, stand_off_text, vehicle_legend
-from blast_env.scenario import BuildZone
-from blast_env.scenario.build_scene import build_site
+from blast_env.scenario import Scenario
+from blast_env.scenario.build_scene import build_site, charge_against
 from blast_env.statistics import Estimate
 
 with render_extra():
@@ -56,21 +62,11 @@ with render_extra():
 _PERCENT = 100.0
 
 
-def draw_plan(axes: Axes, evaluation: LayoutEvaluation, scene: BlastSite) -> None:
-    """Draw the site, the layout, and the charges in the colours of their reductions."""
-    draw_layout(axes, evaluation.scenario.build_zone, scene)
-    draw_vehicles(axes, evaluation.scenario, evaluation.layout)
-    _draw_charges(axes, evaluation)
-    axes.add_line(_worst_ring(*evaluation.worst.charge.position_m))
-    axes.set_title("Site, layout and charges", fontsize=11)
-
-
-def draw_layout(axes: Axes, zone: BuildZone | None, scene: BlastSite) -> None:
-    """Draw the site and what stands on it, the modules of the barrier as filled squares."""
-    draw_site(axes, in_metres(scene.site))
-    if zone is not None:
-        draw_zone(axes, zone)
-    draw_what_stands(axes, scene.structures)
+def _shown(scenario: Scenario, layout: Layout, charge: Charge | None = None) -> list[Feature]:
+    """Return what is on the site with a layout: charges are drawn as they went off."""
+    features = (*site_features(scenario, layout, charge), *vehicle_features(scenario, layout))
+    entries = [each for each in features if each.kind is Kinds.CHARGE_PLACE and scenario.vehicles]
+    return [*without(features, Kinds.CHARGE_PLACE, Kinds.CHARGE), *entries]
 
 
 def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
@@ -100,16 +96,12 @@ def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
     bar.set_label("charges: reduction of the impulse on the protected structures (%)")
 
 
-def plan_legend(evaluation: LayoutEvaluation, scene: BlastSite) -> list[Artist]:
-    """Return the legend entries for what the plan shows."""
+def _charge_legend(evaluation: LayoutEvaluation) -> list[Artist]:
+    """Return the legend entries for the charges."""
     handles: list[Artist] = [_charge_handle("o", "charge")]
     if not evaluation.in_range:
-        label = "charge outside the calibration's range"
-        handles.append(_charge_handle("s", label))
-    handles.append(_worst_ring())
-    handles += vehicle_legend(evaluation.scenario)
-    site = layout_legend(scene.structures, evaluation.scenario.build_zone)
-    return [*handles, *(handle for handle in site if handle.get_label() != "charge")]
+        handles.append(_charge_handle("s", "charge outside the calibration's range"))
+    return [*handles, _worst_ring()]
 
 
 def _charge_handle(marker: str, label: str) -> Line2D:
@@ -180,13 +172,18 @@ def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
     modules = [figure.add_subplot(lower[column]) for column in range(2)]
     threat = evaluation.threats[0]
     scene = build_site(evaluation.scenario, evaluation.layout, threat.seed, threat.charge)
-    draw_plan(plan, evaluation, scene)
+    features = _shown(evaluation.scenario, evaluation.layout)
+    draw_plan(plan, features)
+    plan.set_title("Site, layout and charges", fontsize=11)
+    _draw_charges(plan, evaluation)
+    plan.add_line(_worst_ring(*evaluation.worst.charge.position_m))
     _draw_threats(threats, evaluation)
     _draw_modules(modules, evaluation, scene)
-    handles = plan_legend(evaluation, scene)
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=9, frameon=False)
+    handles = [*_charge_legend(evaluation), *legend_of(features)]
+    write_legend(figure, handles)
     write_heading(figure, _title(evaluation), _subtitle(evaluation))
-    write_names(plan, what_stands(scene.structures))
+    charges = [charge_feature(each.charge, "charge") for each in evaluation.outcomes]
+    write_names(plan, [*features, *charges])
     return figure
 
 
@@ -371,10 +368,15 @@ class _Panel:
     reduction: float
     in_range: bool
 
-    def scene(self) -> BlastSite:
+    @property
+    def charge(self) -> Charge:
+        """The first charge, where it goes off."""
+        return charge_against(self.case.scenario, self.layout, self.case.threats[0].charge)
+
+    def features(self) -> list[Feature]:
         """Return the site with the layout and the first charge."""
-        threat = self.case.threats[0]
-        return build_site(self.case.scenario, self.layout, threat.seed, threat.charge)
+        charge = charge_feature(self.charge, "charge")
+        return [*_shown(self.case.scenario, self.layout), charge]
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
@@ -399,22 +401,15 @@ def comparison_figure(comparison: Comparison) -> Figure:
     columns = min(len(shown), _COLUMNS)
     figure, all_axes = _empty_panels(shown, columns)
     is_one_site = len({panel.case.scenario.content_hash for panel in panels}) == 1
-    scenes = [panel.scene() for panel in shown]
-    for number, (axes, panel, scene) in enumerate(
-        zip(all_axes, shown, scenes, strict=True), start=1
-    ):
-        _draw_case(axes, panel, scene, f"case {number}")
-        _write_threat(axes, panel, scene, "" if is_one_site else f"{panel.case.scenario.name}, ")
+    features: list[Feature] = []
+    for number, (axes, panel) in enumerate(zip(all_axes, shown, strict=True), start=1):
+        of_panel = panel.features()
+        features += of_panel
+        _draw_case(axes, panel, of_panel, f"case {number}")
+        _write_threat(axes, panel, "" if is_one_site else f"{panel.case.scenario.name}, ")
         axes.set_xlabel("x (m)" if number > len(shown) - columns else "")
         axes.set_ylabel("y (m)" if number % columns == 1 or columns == 1 else "")
-    all_zones = [panel.case.scenario.build_zone for panel in shown]
-    zones = [zone for zone in all_zones if zone is not None]
-    richest = max(zones, key=lambda zone: len(zone.keep_outs), default=None)
-    structures = [outline for scene in scenes for outline in scene.structures]
-    handles = layout_legend(structures, richest)
-    driven = next((each.case.scenario for each in shown if each.case.scenario.vehicles), None)
-    handles += [] if driven is None else vehicle_legend(driven)
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+    write_legend(figure, legend_of(without_counts(features)))
     place = panels[0].case.scenario.name if is_one_site else "different sites"
     write_heading(
         figure,
@@ -440,10 +435,8 @@ def _empty_panels(shown: Sequence[_Panel], columns: int) -> tuple[Figure, list[A
     return figure, panels[: len(shown)]
 
 
-def _draw_case(axes: Axes, panel: _Panel, scene: BlastSite, name: str) -> None:
-    draw_layout(axes, panel.case.scenario.build_zone, scene)
-    draw_vehicles(axes, panel.case.scenario, panel.layout)
-    draw_charge(axes, scene.charge.position_m)
+def _draw_case(axes: Axes, panel: _Panel, features: Sequence[Feature], name: str) -> None:
+    draw_plan(axes, features)
     axes.tick_params(labelsize=7.5)
     mark = "" if panel.in_range else _OUT_OF_RANGE
     axes.set_title(
@@ -455,9 +448,9 @@ def _draw_case(axes: Axes, panel: _Panel, scene: BlastSite, name: str) -> None:
     )
 
 
-def _write_threat(axes: Axes, panel: _Panel, scene: BlastSite, site: str) -> None:
+def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
     """Write two quiet lines between title and panel."""
-    (x_m, y_m), tnt_kg = scene.charge.position_m, scene.charge.tnt_kg
+    (x_m, y_m), tnt_kg = panel.charge.position_m, panel.charge.tnt_kg
     charge = f"{tnt_kg:g} kg TNT at ({x_m:.1f}, {y_m:.1f}) m"
     axes.annotate(
         f"{site}{layout_counts(panel.layout)}\n{charge}",

@@ -1,6 +1,7 @@
 """Figures of one blast: scheme of the site, initial velocities, impulse over time."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -17,6 +18,16 @@ from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.particles import CollisionType, explosion_fan
 from blast_env.physics.scene import Scene, StructureOutline
 from blast_env.physics.structure import Colour, ModularObstacle, load_colour
+from blast_env.plan import (
+    BARRIER,
+    EXPLOSIVE,
+    INK,
+    QUIET_INK,
+    STRUCTURE,
+    Feature,
+    Kinds,
+    area_feature,
+)
 from blast_env.recording.tables import faces_hit
 from blast_env.rendering.heat_map import LoadScale, common_scale, heat_map
 from blast_env.rendering.site_plan import (
@@ -24,17 +35,11 @@ from blast_env.rendering.site_plan import (
     draw_site,
     in_metres,
     rectangle_patch,
-    what_stands,
     write_heading,
     write_names,
 )
 from blast_env.rendering.style import (
     AIR,
-    BARRIER,
-    EXPLOSIVE,
-    INK,
-    QUIET_INK,
-    STRUCTURE,
     blast_title,
     count_of,
     number_on_axis,
@@ -84,8 +89,18 @@ def model_scheme(scene: Scene) -> Figure:
         frameon=False,
     )
     figure.suptitle("Model scheme: the state at the detonation", fontsize=14, fontweight="bold")
-    write_names(plan, what_stands(scene.structures), below=True)
+    write_names(plan, [_feature_of(outline) for outline in scene.structures])
     return figure
+
+
+def _feature_of(outline: StructureOutline) -> Feature:
+    """Return a structure as a feature whose label is its name; a barrier has none."""
+    kind = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE
+    if outline.cells is not None:
+        return area_feature(Kinds.BARRIER, in_metres(outline.rectangle), outline.name)
+    return replace(
+        area_feature(kind, in_metres(outline.rectangle), outline.name), label=outline.name
+    )
 
 
 def _draw_obstacles(axes: Axes, scene: Scene) -> None:

@@ -17,15 +17,10 @@ from blast_env.engines import Blast, BlastResult
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.engine import BlastRun
+from blast_env.plan import PAGE
 from blast_env.rendering.canvas import Frame
-from blast_env.rendering.frames import ONE_SEED, SIMULATION_UNITS, FramePainter
-from blast_env.rendering.style import (
-    PAGE,
-    nice_load,
-    nice_numbers,
-    render_extra,
-    shown_until_s,
-)
+from blast_env.rendering.frames import SIMULATION_UNITS, FramePainter
+from blast_env.rendering.style import nice_load, nice_numbers, render_extra, shown_until_s
 from blast_env.units import MS_PER_S
 from blast_env.values import path_of
 
@@ -352,9 +347,7 @@ def write_film(
         if full_impulse is None:
             full_impulse = largest_load(result, unit)
         even_px = width_px - width_px % 2
-        painter = FramePainter.for_blast(
-            blast, width_px=even_px, full_impulse=full_impulse, unit=unit
-        )
+        painter = FramePainter(blast, width_px=even_px, full_impulse=full_impulse, unit=unit)
         with open_film(suffix, temporary, plan, blast.scenario.name, _comment(plan, blast)) as film:
             _draw(blast.start(), painter, plan, film, tell)
     tell(1.0)
@@ -560,14 +553,12 @@ def _painters(
     full_impulse = nice_load(unit, largest) if largest > 0.0 else None
     return [
         FramePainter(
-            panel.blast.scene,
+            panel.blast,
             title=panel.title,
             subtitle=panel.subtitle,
             width_px=width_px - width_px % 2,
             full_impulse=full_impulse,
-            build_zone=panel.blast.scenario.build_zone,
             unit=unit.with_loads_of(result.load_unit),
-            remark=ONE_SEED,
         )
         for panel, result in zip(panels, results, strict=True)
     ]

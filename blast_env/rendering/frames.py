@@ -1,7 +1,7 @@
 """Frames of a blast after the paper's Figure 4, drawn in memory: no display is needed."""
 
 from collections.abc import Sequence
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 
@@ -11,30 +11,43 @@ from blast_env.physics.engine import BallStates
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
+from blast_env.plan import (
+    BARRIER,
+    BORDER,
+    EXPLOSIVE,
+    PROTECTED,
+    STANDING,
+    STRUCTURE,
+    Kinds,
+    blast_features,
+    without,
+)
 from blast_env.rendering.canvas import (
     Frame,
     Sheet,
+    Sign,
     View,
+    ball_sign,
     colour_bar,
     disc,
-    draw_build_zone,
-    draw_charge_mark,
+    draw_destroyed,
+    draw_features,
+    draw_grid,
     draw_obstacle,
     legend,
-    name_plates,
+    module_sign,
+    names_layer,
     pixels_of,
     scale_bar,
+    signs_of,
 )
 from blast_env.rendering.style import (
     AIR,
-    BORDER,
-    EXPLOSIVE,
     blast_title,
     free_flight_impulse,
     nice_ceiling,
     render_extra,
 )
-from blast_env.scenario.models import BuildZone
 from blast_env.units import MS_PER_S
 
 with render_extra():
@@ -54,15 +67,14 @@ class FramePainter:
     """Draws the states of one blast, all on the same ground and with the same colour scale.
 
     Args:
-        scene: The initial state; it has the site, the structures and the charge.
-        title: Heading of every frame.
-        subtitle: Line under the heading.
+        blast: The blast; its site, structures and charge are drawn.
+        title: Heading of every frame; the scenario's name unless given.
+        subtitle: Line under the heading; charge, layout and seed unless given.
         width_px: Width of the frames, 320 to 4096; the height follows from the site and is even.
         height_px: Height of the frames where the site needs less; even.
         full_impulse: Impulse of a module, simulation units, that has the last colour of the
             scale. Without it a bound from the scene alone is used, so that all layouts of one
             scenario and charge have the same scale.
-        build_zone: Where barrier modules may stand; drawn as a dashed grid.
         unit: In what loads are shown.
         remark: A third line, quiet as the second.
 
@@ -72,53 +84,40 @@ class FramePainter:
 
     def __init__(
         self,
-        scene: Scene,
+        blast: Blast,
         *,
-        title: str = "",
-        subtitle: str = "",
+        title: str | None = None,
+        subtitle: str | None = None,
         width_px: int = 960,
         height_px: int = 0,
         full_impulse: float | None = None,
-        build_zone: BuildZone | None = None,
         unit: LoadUnit = SIMULATION_UNITS,
-        remark: str = "",
+        remark: str = ONE_SEED,
     ) -> None:
+        scene = blast.scene
         if full_impulse is None or full_impulse <= 0.0:
             full_impulse = nice_ceiling(free_flight_impulse(scene))
         self.full_impulse = full_impulse
         self._unit = unit
         self._scene = scene
         self._sheet = Sheet(scene.site, width_px)
-        signs = self._signs(build_zone)
+        features = blast_features(blast.scenario, blast.layout, scene.charge)
+        self._on_ground = without(features, Kinds.SITE, *STANDING)
+        signs = self._signs()
         self._size_px = (width_px, max(self._sheet.height_px(signs), height_px))
-        self._ground = self._sheet.ground((title, subtitle, remark), signs, self._size_px[1])
-        if build_zone is not None:
-            draw_build_zone(self._ground, self.view, build_zone)
-        draw_charge_mark(self._ground, self.view, scene)
-        self._plates = name_plates(self._sheet.small, self.view, scene.structures)
-        self._discs: dict[tuple[int, int], pygame.Surface] = {}
-
-    @classmethod
-    def for_blast(
-        cls,
-        blast: Blast,
-        *,
-        width_px: int = 960,
-        full_impulse: float | None = None,
-        unit: LoadUnit = SIMULATION_UNITS,
-    ) -> Self:
-        """Return a painter that names scenario, charge, layout and seed in every frame."""
-        title, subtitle = blast_title(blast)
-        return cls(
-            blast.scene,
-            title=title,
-            subtitle=subtitle,
-            width_px=width_px,
-            full_impulse=full_impulse,
-            build_zone=blast.scenario.build_zone,
-            unit=unit,
-            remark=ONE_SEED,
+        usual_title, usual_subtitle = blast_title(blast)
+        lines = (
+            usual_title if title is None else title,
+            usual_subtitle if subtitle is None else subtitle,
+            remark,
         )
+        self._ground = self._sheet.ground(lines, signs, self._size_px[1])
+        for feature in self._on_ground:
+            if feature.kind is Kinds.BUILD_ZONE:
+                draw_grid(self._ground, self.view, feature.bounds_m)
+        draw_features(self._ground, self.view, self._on_ground)
+        self._names = names_layer(self._sheet.small, self.view, features, self._size_px)
+        self._discs: dict[tuple[int, int], pygame.Surface] = {}
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -149,8 +148,7 @@ class FramePainter:
         self._draw_balls(surface, balls)
         for obstacle in obstacles:
             draw_obstacle(surface, self.view, obstacle, self.full_impulse)
-        for plate, place in self._plates:
-            surface.blit(plate, place)
+        surface.blit(self._names, (0, 0))
         pygame.draw.rect(surface, BORDER, self._sheet.border, 3)
         lines = (f"{time_s * MS_PER_S:.2f} ms", note, self._so_far(obstacles))
         self._sheet.write(surface, lines, _SHARE_OF_CLOCK, right=True)
@@ -162,12 +160,12 @@ class FramePainter:
         loads = [f"{each.name} {self._unit.of_structure(each)}" for each in protected]
         return f"so far: {', '.join(loads)}" if loads else ""
 
-    def _signs(self, build_zone: BuildZone | None) -> list[pygame.Surface]:
+    def _signs(self) -> list[pygame.Surface]:
         """Return what explains the frames: the scale, the signs, the colours of the loads."""
         sheet, room_px = self._sheet, self._sheet.room_px
         return [
-            scale_bar(sheet.small, self.view.pixels_per_m, round(0.16 * sheet.width_px)),
-            legend(sheet.small, self._scene, build_zone, round(0.55 * sheet.width_px)),
+            scale_bar(sheet.small, self.view.pixels_per_m, round(0.14 * sheet.width_px)),
+            legend(sheet.small, self._legend_signs(), round(0.55 * sheet.width_px)),
             colour_bar(
                 sheet.small,
                 self.full_impulse,
@@ -175,6 +173,24 @@ class FramePainter:
                 self._unit,
             ),
         ]
+
+    def _legend_signs(self) -> list[Sign]:
+        """Return what the signs of the frames mean."""
+        scene = self._scene
+        signs: list[Sign] = [("explosive ball", ball_sign(EXPLOSIVE))]
+        if scene.parameters.air.spacing_units > 0.0:
+            signs.append(("air ball", ball_sign(AIR)))
+        for each in scene.structures:
+            if each.cells is not None:
+                signs.append(("barrier module", module_sign(BARRIER, 2)))
+            elif each.protected:
+                signs.append((Kinds.PROTECTED_STRUCTURE.words, module_sign(PROTECTED, 3)))
+            else:
+                signs.append((Kinds.STRUCTURE.words, module_sign(STRUCTURE, 2)))
+        if any(each.capacity is not None for each in scene.structures):
+            signs.append(("destroyed module", draw_destroyed))
+        ground = signs_of(self._on_ground)
+        return [*dict(signs).items(), *ground]
 
     def _draw_balls(self, surface: pygame.Surface, balls: BallStates) -> None:
         """Draw the air, and the explosive balls over it."""

@@ -18,19 +18,13 @@ from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import layout_counts
 from blast_env.physics.scene import WALLS, StructureOutline, WallName
+from blast_env.plan import FAINT, QUIET_INK
 from blast_env.rendering.site_plan import (
     in_metres,
     load_colours,
     write_heading,
 )
-from blast_env.rendering.style import (
-    FAINT,
-    QUIET_INK,
-    nice_ceiling,
-    number_on_axis,
-    render_extra,
-    unit_interval,
-)
+from blast_env.rendering.style import nice_ceiling, number_on_axis, render_extra, unit_interval
 from blast_env.units import MS_PER_S, UNITS_PER_M
 
 with render_extra():

@@ -12,6 +12,7 @@ from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.opening import Opening, opening_of
 from blast_env.physics.gas.probes import GroundMap
 from blast_env.physics.scene import BlastSite
+from blast_env.plan import BORDER, INK, Feature, Kinds, blast_features, without, without_counts
 from blast_env.rendering.gas import (
     Quantity,
     both_results,
@@ -22,24 +23,15 @@ from blast_env.rendering.gas import (
 )
 from blast_env.rendering.site_plan import (
     add_outline,
-    draw_charge,
-    draw_site,
-    draw_what_stands,
-    draw_zone,
+    draw_features,
+    draw_plan,
     in_metres,
-    layout_legend,
-    what_stands,
+    legend_of,
     write_heading,
+    write_legend,
     write_names,
 )
-from blast_env.rendering.style import (
-    BORDER,
-    INK,
-    number_on_axis,
-    render_extra,
-    short_number,
-    unit_interval,
-)
+from blast_env.rendering.style import number_on_axis, render_extra, short_number, unit_interval
 
 with render_extra():
     from matplotlib import patheffects
@@ -156,22 +148,24 @@ def ground_map(
     bar.ax.yaxis.set_major_locator(FixedLocator(levels))
     bar.ax.yaxis.set_minor_locator(NullLocator())
     bar.set_label(kind.label)
-    structures = [outline for each in results for outline in each.run.site.structures]
-    handles = layout_legend(structures, result.blast.scenario.build_zone)
+    features = [feature for each in results for feature in _features(each)]
+    handles = legend_of(without_counts(features) if len(results) > 1 else features)
     if result.run.charge.on_ground:
         handles.append(
             Line2D([], [], color=unit_interval(INK), linestyle=(0, (1.0, 2.0)), label=_FINER)
         )
-    columns = -(-len(handles) // -(-len(handles) // int(figure.get_figwidth() / 1.75)))
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
-    )
+    write_legend(figure, handles)
     height_m = result.run.grid.centres_m(2)[0]
     title, subtitle = gas_heading(results, f"{kind.name} over the ground")
     write_heading(figure, title, f"{subtitle}; {height_m:g} m above the ground")
     for axes, each in zip(plans, results, strict=True):
-        write_names(axes, what_stands(each.run.site.structures))
+        write_names(axes, _features(each))
     return figure
+
+
+def _features(result: GasResult) -> tuple[Feature, ...]:
+    blast = result.blast
+    return blast_features(blast.scenario, blast.layout, blast.site.charge)
 
 
 def _map_size_in(site: BlastSite, count: int) -> tuple[float, float]:
@@ -209,9 +203,9 @@ def _contour_levels(parts: Sequence[FloatArray]) -> list[float]:
 def _draw_ground(
     axes: Axes, result: GasResult, values: FloatArray, levels: Sequence[float], scale: Normalize
 ) -> None:
-    site, site_m = result.run.site, in_metres(result.run.site.site)
-    grid = result.run.grid
-    draw_site(axes, site_m)
+    grid, site_m = result.run.grid, in_metres(result.run.site.site)
+    features = _features(result)
+    draw_plan(axes, [each for each in features if each.kind is Kinds.SITE])
     x_m, y_m, inside = _on_site(result, values)
     half = grid.cell_m / 2.0
     image = axes.imshow(
@@ -231,11 +225,8 @@ def _draw_ground(
         x_m, y_m, inside.T, levels=levels, colors=[unit_interval(INK)], linewidths=0.7
     )
     _write_levels(axes, lines, result)
-    if result.blast.scenario.build_zone is not None:
-        draw_zone(axes, result.blast.scenario.build_zone)
+    draw_features(axes, without(features, Kinds.SITE))
     add_outline(axes, site_m, edgecolor=unit_interval(BORDER), linewidth=1.8)
-    draw_what_stands(axes, site.structures)
-    draw_charge(axes, site.charge.position_m)
     if result.run.charge.on_ground:
         circle = _taken_over(result)
         axes.add_patch(circle)

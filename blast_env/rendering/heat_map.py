@@ -8,22 +8,28 @@ from blast_env.calibration import LoadUnit
 from blast_env.engines import BlastResult
 from blast_env.errors import BlastEnvError
 from blast_env.physics.structure import ModularObstacle
+from blast_env.plan import (
+    BARRIER,
+    INK,
+    PROTECTED,
+    STANDING,
+    Feature,
+    Kinds,
+    blast_features,
+    without,
+)
 from blast_env.rendering.site_plan import (
-    draw_charge,
     draw_loads,
     draw_outline,
-    draw_site,
-    draw_zone,
+    draw_plan,
     in_metres,
-    legend_handles,
+    legend_of,
     load_colours,
-    what_stands,
     write_heading,
+    write_legend,
     write_names,
 )
 from blast_env.rendering.style import (
-    INK,
-    PROTECTED,
     blast_title,
     count_of,
     nice_ceiling,
@@ -39,13 +45,14 @@ with render_extra():
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
     from matplotlib.ticker import FuncFormatter
 
 _HEIGHT_IN = 6.6
 _PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 4.6, (4.0, 8.0)
 _PANELS_HEIGHT_IN, _PANELS_WIDTHS_IN = 4.9, (2.2, 6.0)
 _PLAN_LABELS_IN, _PANEL_LABELS_IN, _COLOUR_BAR_IN = 1.0, 0.7, 1.3
-_LEGEND_ENTRY_IN = 1.5
 _MOST_PANELS = 4
 _POINTS_PER_IN = 72.0
 _LARGEST_NUMBER_PT, _SMALLEST_NUMBER_PT = 9.0, 5.5
@@ -108,7 +115,7 @@ def heat_map(
     _add_legend(figure, result)
     title, subtitle = blast_title(result.blast)
     write_heading(figure, f"{title}: impulse per module", subtitle)
-    write_names(overview, what_stands(result.blast.scene.structures))
+    write_names(overview, _features(result), inside=False)
     return figure
 
 
@@ -156,16 +163,17 @@ def _widths_in(
 
 
 def _draw_overview(axes: Axes, result: BlastResult, scale: LoadScale) -> None:
-    blast = result.blast
-    zone = blast.scenario.build_zone
-    draw_site(axes, in_metres(blast.scene.site))
-    if zone is not None:
-        draw_zone(axes, zone)
+    # Modules have the colours of their loads in the place of a fill.
+    draw_plan(axes, without(_features(result), *STANDING))
     for obstacle in result.obstacles:
         draw_loads(axes, obstacle, scale.norm, 0.25, scale.unit.factor)
         draw_outline(axes, obstacle)
-    draw_charge(axes, blast.scene.charge.position_m)
     axes.set_title("Site", fontsize=11)
+
+
+def _features(result: BlastResult) -> tuple[Feature, ...]:
+    blast = result.blast
+    return blast_features(blast.scenario, blast.layout, blast.scene.charge)
 
 
 def _total(result: BlastResult, obstacle: ModularObstacle) -> str:
@@ -230,11 +238,15 @@ def _write_numbers(axes: Axes, obstacle: ModularObstacle, scale: LoadScale, size
 
 
 def _add_legend(figure: Figure, result: BlastResult) -> None:
-    handles = legend_handles(result.obstacles, result.blast.scenario.build_zone)
-    columns = min(len(handles), int(figure.get_figwidth() / _LEGEND_ENTRY_IN))
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
-    )
+    features = _features(result)
+    handles = legend_of(without(features, Kinds.BARRIER))
+    if any(each.kind is Kinds.BARRIER for each in features):
+        edge = unit_interval(BARRIER)
+        handles.insert(0, Patch(fill=False, edgecolor=edge, label="barrier module"))
+    if any(obstacle.capacity is not None for obstacle in result.obstacles):
+        ink = unit_interval(INK)
+        handles.append(Line2D([], [], marker="x", linestyle="none", color=ink, label="destroyed"))
+    write_legend(figure, handles)
 
 
 def _add_colour_bar(

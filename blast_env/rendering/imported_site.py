@@ -4,22 +4,20 @@ import numpy as np
 
 from blast_env.importing import FittedBuilding, ImportedSite
 from blast_env.importing.plane import rotated
-from blast_env.rendering.site_plan import draw_site, draw_zone, rectangle_patch, write_heading
-from blast_env.rendering.style import (
-    BORDER,
-    EXPLOSIVE,
-    INK,
-    PROTECTED,
-    QUIET_INK,
-    STRUCTURE,
-    render_extra,
-    unit_interval,
+from blast_env.plan import INK, PROTECTED, STRUCTURE, Kinds, site_features, without
+from blast_env.rendering.site_plan import (
+    draw_plan,
+    legend_of,
+    rectangle_patch,
+    write_heading,
+    write_legend,
 )
-from blast_env.scenario import PointSource, RectangleSource
+from blast_env.rendering.style import render_extra, unit_interval
 
 with render_extra():
     import shapely
     from matplotlib import patheffects
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.collections import LineCollection, PatchCollection
     from matplotlib.figure import Figure
@@ -33,6 +31,19 @@ _ARROW_PT = 34.0
 _FAINT = 0.35
 
 
+def _box(label: str, colour: tuple[float, float, float]) -> Patch:
+    return Patch(facecolor=(*colour, _FAINT), edgecolor=colour, label=label)
+
+
+def _legend() -> list[Artist]:
+    """Return the legend entries for what the features of the site do not show."""
+    return [
+        Line2D([], [], color=unit_interval(INK), linewidth=1.3, label="outline on the map"),
+        _box("modules, protected", unit_interval(PROTECTED)),
+        _box("modules, not protected", unit_interval(STRUCTURE)),
+    ]
+
+
 def imported_plan(imported: ImportedSite) -> Figure:
     """Return the plan of an imported site: modules filled, the map's outlines as lines over them.
 
@@ -43,16 +54,12 @@ def imported_plan(imported: ImportedSite) -> Figure:
     height_in = np.clip(_WIDTH_IN * height_m / width_m + _HEADING_IN, _LEAST_IN, _MOST_IN)
     figure = Figure(figsize=(_WIDTH_IN, float(height_in)), layout="constrained")
     axes = figure.subplots()
-    draw_site(axes, scenario.site.rectangle_m)
+    features = without(site_features(scenario), Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE)
+    draw_plan(axes, features)
     for building in imported.buildings:
         _draw_building(axes, building)
-    if scenario.build_zone is not None:
-        draw_zone(axes, scenario.build_zone)
-    _draw_charges(axes, imported)
     _draw_north(axes, imported)
-    figure.legend(
-        handles=_legend(imported), loc="outside lower center", ncols=3, fontsize=9, frameon=False
-    )
+    write_legend(figure, [*_legend(), *legend_of(features)])
     worst = max(imported.buildings, key=lambda each: each.deviation.outline_m)
     write_heading(
         figure,
@@ -90,22 +97,6 @@ def _draw_building(axes: Axes, building: FittedBuilding) -> None:
     text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
 
 
-def _draw_charges(axes: Axes, imported: ImportedSite) -> None:
-    colour = unit_interval(EXPLOSIVE)
-    for source in imported.scenario.charge:
-        if isinstance(source, RectangleSource):
-            patch = rectangle_patch(source.rectangle_m)
-            patch.set(facecolor=(*colour, _FAINT), edgecolor=colour, linewidth=1.0, zorder=4)
-            axes.add_patch(patch)
-        else:
-            marker = "*" if isinstance(source, PointSource) else ""
-            for line_m in source.lines_m:
-                x, y = np.transpose(line_m)
-                axes.plot(
-                    x, y, color=colour, linewidth=2.2, marker=marker, markersize=11.0, zorder=4
-                )
-
-
 def _draw_north(axes: Axes, imported: ImportedSite) -> None:
     """Draw an arrow to the north, or along a drawing's y axis, in the upper right corner."""
     georeference = imported.scenario.georeference
@@ -123,25 +114,3 @@ def _draw_north(axes: Axes, imported: ImportedSite) -> None:
         va="center",
         fontweight="bold",
     )
-
-
-def _legend(imported: ImportedSite) -> list[Patch | Line2D]:
-    handles: list[Patch | Line2D] = [
-        Line2D([], [], color=unit_interval(INK), linewidth=1.3, label="outline on the map"),
-        _box("modules, protected", unit_interval(PROTECTED)),
-        _box("modules, not protected", unit_interval(STRUCTURE)),
-        Line2D([], [], color=unit_interval(EXPLOSIVE), linewidth=2.2, label="where charges may be"),
-    ]
-    zone = imported.scenario.build_zone
-    if zone is not None:
-        quiet = unit_interval(QUIET_INK)
-        handles.append(Patch(fill=False, edgecolor=quiet, linestyle="--", label="build zone"))
-        if zone.keep_outs:
-            handles.append(Patch(fill=False, edgecolor=quiet, hatch="////", label="keep-out"))
-    border = unit_interval(BORDER)
-    handles.append(Patch(fill=False, edgecolor=border, linewidth=2.0, label="site border"))
-    return handles
-
-
-def _box(label: str, colour: tuple[float, float, float]) -> Patch:
-    return Patch(facecolor=(*colour, _FAINT), edgecolor=colour, label=label)

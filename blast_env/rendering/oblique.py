@@ -1,51 +1,25 @@
 """The oblique view of a site: isometric, so that lengths, widths and heights have one scale."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import cos, radians, sin, tan
-from types import MappingProxyType
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.geometry import Element, Piece, Rectangle
-from blast_env.rendering.style import (
-    BORDER,
-    EXPLOSIVE,
-    INK,
-    PROTECTED,
-    QUIET_INK,
-    SITE,
-    STRUCTURE,
-    nice_floor,
-    render_extra,
-    unit_interval,
-)
-from blast_env.rendering.vehicle_plan import REACHED_ALPHA
-from blast_env.scenario import (
-    AnySource,
-    BuildZone,
-    PointSource,
-    RectangleSource,
-    Scenario,
-    SegmentSource,
-    VehicleSource,
-)
-from blast_env.scenario.build_scene import vehicle_reach, worst_places
-from blast_env.scenario.sections import PointM
-from blast_env.scenario.vehicles import nearest_point_m, squares_of
+from blast_env.geometry import Element, Rectangle
+from blast_env.plan import INK, STANDING, Feature, Kinds, site_features, vehicle_features, without
+from blast_env.rendering.site_plan import draw_features
+from blast_env.rendering.style import nice_floor, render_extra, unit_interval
+from blast_env.scenario import Scenario
 from blast_env.scenario.zone import TOLERANCE_M, source_bounds_m
-from blast_env.units import MODULE_SIDE_M
 
 with render_extra():
-    from matplotlib import patheffects
     from matplotlib.axes import Axes
     from matplotlib.collections import PolyCollection
     from matplotlib.lines import Line2D
-    from matplotlib.patches import FancyArrowPatch, PathPatch, Polygon
-    from matplotlib.path import Path
 
 CORNERS: Final = ("southwest", "southeast", "northeast", "northwest")
 """Over which corner of a site one looks at it; south is towards smaller y, west smaller x."""
@@ -58,50 +32,7 @@ _TOP, _RIGHT_SIDE, _LEFT_SIDE = 1.0, 0.82, 0.66
 """How bright the three faces are that one sees of a box."""
 
 
-_ITEM_COLOURS: Final = (
-    *((0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.80, 0.47, 0.65), (0.34, 0.71, 0.91)),
-    *((0.94, 0.89, 0.26), (0.55, 0.34, 0.16), (0.42, 0.31, 0.66), (0.98, 0.66, 0.55)),
-)
-"""Okabe and Ito's without the red of charges and the green of what is protected, and others."""
-
-
-_DARKER: Final = 0.6
-
-
-_OVER_STAR_PT: Final = 13.0
-"""How far above the middle of a short stand-off its length is written."""
-
-
 Colour = tuple[float, float, float]
-
-
-def item_colours(zone: BuildZone | None) -> Mapping[str, Colour]:
-    """Return the colour of each item of a catalogue, and of single modules under no name."""
-    names = [""] if zone is None or not zone.items else [item.name for item in zone.items]
-    colours: dict[str, Colour] = {}
-    for number, name in enumerate(names):
-        darker = _DARKER ** (number // len(_ITEM_COLOURS))
-        red, green, blue = _ITEM_COLOURS[number % len(_ITEM_COLOURS)]
-        colours[name] = (darker * red, darker * green, darker * blue)
-    return MappingProxyType(colours)
-
-
-DEARER: Final[Colour] = (0.99, 0.84, 0.48)
-"""Ground on which building costs more."""
-
-
-WAY: Final[Colour] = (0.10, 0.35, 0.85)
-"""The access way."""
-
-
-_WAY_PLACES: Final = (0.5, 0.75, 0.25, 0.875, 0.125)
-
-
-class View(Protocol):
-    """How places on a site become places in a picture."""
-
-    def places(self, points_m: FloatArray) -> FloatArray:
-        """Return places in the picture (n, 2) of x, y and height (n, 3), m."""
 
 
 @dataclass(frozen=True)
@@ -229,7 +160,7 @@ def painted_order(view: ObliqueView, rectangles_m: Sequence[Rectangle]) -> list[
 
 def draw_oblique(
     axes: Axes, scenario: Scenario, layout: Sequence[Element] = (), corner: str | None = None
-) -> ObliqueView:
+) -> tuple[ObliqueView, tuple[Feature, ...]]:
     """Draw a site with what stands on it, heights to scale, and where charges may go off.
 
     What has no height is drawn as high as the air; charges and stand-offs are drawn over
@@ -242,47 +173,44 @@ def draw_oblique(
         corner: Over which corner one looks; that on the side of the charges unless given.
 
     Returns:
-        The view, to draw more in it.
+        The view, to draw more in it, and what was drawn.
 
     Raises:
         UnknownNameError: If there is no such corner.
     """
     site_m = scenario.site.rectangle_m
     view = ObliqueView(site_m, corner or corner_towards(scenario))
-    boxes = boxes_of(scenario, layout)
+    features = (*_raised(scenario, layout), *vehicle_features(scenario, layout))
+    boxes = [_box_of(each) for each in features if each.kind in STANDING]
     _set_up(axes, view, boxes)
-    _draw_ground(axes, view, scenario, layout)
+    draw_features(axes, without(features, *STANDING), view)
     _draw_boxes(axes, view, boxes)
-    _draw_stand_offs(axes, view, scenario, layout)
-    _write_names(axes, view, scenario)
     _draw_scale(axes, view)
-    return view
+    return view, features
 
 
 def boxes_of(scenario: Scenario, layout: Sequence[Element] = ()) -> list[Box]:
     """Return what stands on a site: the structures, then each module or piece of the layout."""
-    air_m, edge = scenario.air_height_m, unit_interval(INK)
-    boxes = [
-        Box(
-            each.rectangle_m,
-            air_m if each.height_m is None else each.height_m,
-            _lighter(unit_interval(PROTECTED if each.protected else STRUCTURE)),
-            edge,
-        )
-        for each in scenario.structures
-    ]
-    colours = item_colours(scenario.build_zone)
-    for element in layout:
-        height_m = scenario.zone.catalogue.variant(element).height_m
-        boxes.append(
-            Box(
-                scenario.zone.element_rectangle_m(element),
-                air_m if height_m is None else height_m,
-                colours[element.item if isinstance(element, Piece) else ""],
-                edge,
-            )
-        )
-    return boxes
+    return [_box_of(each) for each in _raised(scenario, layout) if each.kind in STANDING]
+
+
+def _raised(scenario: Scenario, layout: Sequence[Element]) -> tuple[Feature, ...]:
+    """Return what is on a site; what stands there without a height is as high as the air."""
+    air = {"height_m": scenario.air_height_m}
+    return tuple(
+        replace(each, properties={**air, **each.properties}) if each.kind in STANDING else each
+        for each in site_features(scenario, layout)
+    )
+
+
+def _box_of(feature: Feature) -> Box:
+    height_m = feature.properties["height_m"]
+    assert isinstance(height_m, float)
+    if feature.kind is Kinds.BARRIER:
+        colour = unit_interval(feature.colour or INK)
+    else:
+        colour = _lighter(unit_interval(feature.kind.look.line or INK))
+    return Box(feature.bounds_m, height_m, colour, unit_interval(INK))
 
 
 def scale_length_m(site_m: Rectangle) -> float:
@@ -306,113 +234,6 @@ def _set_up(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
     axes.axis("off")
 
 
-def _draw_ground(
-    axes: Axes, view: ObliqueView, scenario: Scenario, layout: Sequence[Element]
-) -> None:
-    border = {"facecolor": unit_interval(SITE), "edgecolor": unit_interval(BORDER)}
-    add_area(axes, view, view.site_m, linewidth=1.5, zorder=1.0, **border)
-    zone = scenario.build_zone
-    if zone is not None:
-        quiet = unit_interval(QUIET_INK)
-        hatched = {"hatch": "////", "edgecolor": (*quiet, 0.4), "linewidth": 0.0, "fill": False}
-        for keep_out in zone.keep_outs:
-            add_area(axes, view, keep_out.rectangle_m, zorder=1.5, **hatched)
-        dashed = {"edgecolor": quiet, "linestyle": "--", "linewidth": 0.9, "fill": False}
-        add_area(axes, view, zone.rectangle_m, zorder=1.6, **dashed)
-        draw_conditions(axes, view, zone, [each.rectangle_m for each in scenario.structures])
-    for source in scenario.vehicles:
-        _draw_reached(axes, view, scenario, source, layout)
-        for ends_m in source.lines_m:
-            _add_line(axes, view, ends_m, color=unit_interval(EXPLOSIVE), linewidth=4.0, zorder=2.0)
-    draw_sources(axes, view, scenario.charge)
-
-
-def draw_conditions(
-    axes: Axes, view: View, zone: BuildZone, structures_m: Sequence[Rectangle]
-) -> None:
-    """Draw what a zone has beside keep-outs: dearer ground, the way that stays open, its gate."""
-    for area in zone.cost_areas:
-        add_area(axes, view, area.rectangle_m, zorder=1.2, linewidth=0.0, facecolor=DEARER)
-    way = zone.access_way
-    if way is None:
-        return
-    if way.gate is not None:
-        add_area(axes, view, way.gate.rectangle_m, zorder=1.7, facecolor=(*WAY, 0.3), edgecolor=WAY)
-    start, end = view.places(
-        np.array([(*end_m, 0.0) for end_m in access_way_ends_m(zone, structures_m)])
-    )
-    arrow = FancyArrowPatch(
-        (start[0], start[1]), (end[0], end[1]), arrowstyle="<->", shrinkA=0, shrinkB=0
-    )
-    arrow.set(color=WAY, linewidth=1.8, zorder=2.2, mutation_scale=14.0)
-    axes.add_patch(arrow)
-
-
-def access_way_ends_m(zone: BuildZone, structures_m: Sequence[Rectangle]) -> tuple[PointM, PointM]:
-    """Return from where to where an arrow for the access way of a zone goes.
-
-    Where the way runs is left open; the arrow is where no structure stands, or through the gate.
-    """
-    way = zone.access_way
-    assert way is not None
-    left, bottom, right, top = zone.rectangle_m
-    places = [
-        (left + share * (right - left), bottom + share * (top - bottom)) for share in _WAY_PLACES
-    ]
-    if way.gate is not None:
-        places = [way.gate.rectangle_m.centre]
-    arrows = [
-        ((left, y), (right, y)) if way.between == "left_right" else ((x, bottom), (x, top))
-        for x, y in places
-    ]
-    free = (ends for ends in arrows if not any(each.meets_segment(*ends) for each in structures_m))
-    return next(free, arrows[0])
-
-
-def draw_sources(axes: Axes, view: View, sources: Sequence[AnySource]) -> None:
-    """Draw where charges may be that come from no vehicle: stars on stems, lines, areas."""
-    red = unit_interval(EXPLOSIVE)
-    for source in sources:
-        if isinstance(source, PointSource):
-            draw_star(axes, view, source.position_m, source.height_m)
-        elif isinstance(source, SegmentSource):
-            _add_line(axes, view, source.segment_m, color=red, linewidth=2.2, zorder=2.0)
-        elif isinstance(source, RectangleSource):
-            style = {"facecolor": (*red, 0.35), "edgecolor": red, "linewidth": 1.0}
-            add_area(axes, view, source.rectangle_m, zorder=1.8, **style)
-
-
-def _draw_reached(
-    axes: Axes,
-    view: ObliqueView,
-    scenario: Scenario,
-    source: VehicleSource,
-    layout: Sequence[Element],
-) -> None:
-    """Draw the ground that a vehicle reaches as one figure, whose parts leave no seams."""
-    rows, columns = squares_of(scenario.site)
-    ground = vehicle_reach(scenario, source, layout).ground(rows, columns)
-    paths = [
-        Path(view.on_ground(rectangle_m)[[0, 1, 2, 3, 0]], closed=True)
-        for rectangle_m in _runs(ground)
-    ]
-    if paths:
-        patch = PathPatch(Path.make_compound_path(*paths), linewidth=0.0, zorder=1.4)
-        patch.set_facecolor((*unit_interval(EXPLOSIVE), REACHED_ALPHA))
-        axes.add_patch(patch)
-
-
-def _runs(ground: BoolArray) -> list[Rectangle]:
-    """Return rectangles that cover the squares of a grid, one for each run in a row, m."""
-    side = MODULE_SIDE_M
-    steps = np.diff(np.pad(ground, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    begins, ends = np.argwhere(steps == 1), np.argwhere(steps == -1)
-    return [
-        Rectangle(begin * side, row * side, end * side, (row + 1) * side)
-        for (row, begin), (_, end) in zip(begins.tolist(), ends.tolist(), strict=True)
-    ]
-
-
 def _draw_boxes(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
     polygons: list[FloatArray] = []
     colours: list[Colour] = []
@@ -427,60 +248,6 @@ def _draw_boxes(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
     faces = PolyCollection(polygons, facecolor=colours, edgecolor=edges, linewidth=0.5, zorder=3.0)
     faces.set_joinstyle("round")
     axes.add_collection(faces, autolim=False)
-
-
-def _draw_stand_offs(
-    axes: Axes, view: ObliqueView, scenario: Scenario, layout: Sequence[Element]
-) -> None:
-    """Draw a star at the worst place of each vehicle, and the line to the nearest wall."""
-    dashed = {"color": unit_interval(INK), "linestyle": (0, (3.0, 1.5)), "linewidth": 1.4}
-    for source in scenario.vehicles:
-        place_m = worst_places(scenario, source, layout).places_m[0]
-        wall_m = nearest_point_m(scenario.structures, place_m)
-        _add_line(axes, view, (place_m, wall_m), zorder=5.0, **dashed)
-        ends_m = np.array([place_m, wall_m])
-        middle = view.places(np.array([(*ends_m.mean(axis=0), 0.0)]))[0]
-        _write(
-            axes, f"{np.hypot(*np.diff(ends_m, axis=0)[0]):.1f} m", middle, lift_pt=_OVER_STAR_PT
-        )
-        draw_star(axes, view, place_m, source.height_m)
-
-
-def draw_star(axes: Axes, view: View, place_m: PointM, height_m: float) -> None:
-    """Draw the star of a charge, over everything, on a stem to the ground."""
-    ends = view.places(np.array([(*place_m, 0.0), (*place_m, height_m)]))
-    ink = unit_interval(INK)
-    axes.add_line(Line2D(*ends.T, color=ink, linewidth=0.8, zorder=5.0))
-    star = Line2D(*ends[1:].T, marker="*", markersize=13.0, linestyle="none", zorder=5.5)
-    star.set(color=unit_interval(EXPLOSIVE), markeredgecolor=ink, markeredgewidth=0.6)
-    axes.add_line(star)
-
-
-def _write_names(axes: Axes, view: ObliqueView, scenario: Scenario) -> None:
-    """Write the names of the structures on their roofs, with the heights that are known."""
-    for structure in scenario.structures:
-        height_m, (x_m, y_m) = structure.height_m, structure.rectangle_m.centre
-        words = structure.name if height_m is None else f"{structure.name}\n{height_m:g} m"
-        top_m = scenario.air_height_m if height_m is None else height_m
-        place = view.places(np.array([(x_m, y_m, top_m)]))[0]
-        _write(axes, words, place, bold=structure.protected)
-
-
-def _write(
-    axes: Axes, words: str, place: FloatArray, *, bold: bool = False, lift_pt: float = 0.0
-) -> None:
-    """Write over everything, on a white rim, at a place or a little above it."""
-    text = axes.annotate(
-        words,
-        (place[0], place[1]),
-        xytext=(0.0, lift_pt),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        zorder=6.0,
-    )
-    text.set(fontsize=8, color=unit_interval(INK), fontweight="bold" if bold else "normal")
-    text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
 
 
 def _draw_scale(axes: Axes, view: ObliqueView) -> None:
@@ -501,20 +268,3 @@ def _draw_scale(axes: Axes, view: ObliqueView) -> None:
         fontsize=8,
         color=ink,
     )
-
-
-def add_area(axes: Axes, view: View, rectangle_m: Rectangle, **style: object) -> None:
-    """Add a rectangle on the ground; `style` is matplotlib's."""
-    left, bottom, right, top = rectangle_m
-    corners_m = np.array([(left, bottom, 0.0), (right, bottom, 0.0), (right, top, 0.0)])
-    corners_m = np.vstack([corners_m, (left, top, 0.0)])
-    patch = Polygon(view.places(corners_m), closed=True)
-    patch.set(**style)
-    axes.add_patch(patch)
-
-
-def _add_line(axes: Axes, view: View, ends_m: Sequence[PointM], **style: object) -> None:
-    """Add a line on the ground; `style` is matplotlib's."""
-    line = Line2D(*view.places(np.array([(*end, 0.0) for end in ends_m])).T)
-    line.set(**style)
-    axes.add_line(line)

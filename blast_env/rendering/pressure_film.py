@@ -18,6 +18,7 @@ from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import Snapshots
 from blast_env.physics.gas.solver import Recorder
 from blast_env.physics.scene import BlastSite, StructureOutline
+from blast_env.plan import PAGE
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.film import FilmPlan, for_gif, known_suffix, open_film, plan_until
 from blast_env.rendering.gas import (
@@ -34,7 +35,7 @@ from blast_env.rendering.pressure_frames import (
     default_section,
 )
 from blast_env.rendering.site_plan import in_metres
-from blast_env.rendering.style import PAGE, nice_ceiling
+from blast_env.rendering.style import nice_ceiling
 
 _EVERY_S: Final = 0.0002  # of 100 kg
 _LONGEST_S: Final = 4.0  # of 100 kg

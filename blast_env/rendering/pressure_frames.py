@@ -5,7 +5,7 @@ They begin at the detonation: until the grid takes a blast over, its spherical s
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any, Final, Literal, NamedTuple, Protocol
 
@@ -22,6 +22,21 @@ from blast_env.physics.gas.opening import Opening
 from blast_env.physics.gas.probes import Snapshot
 from blast_env.physics.scene import BlastSite, StructureOutline
 from blast_env.physics.structure import Colour
+from blast_env.plan import (
+    BARRIER,
+    BORDER,
+    FAINT,
+    INK,
+    PROTECTED,
+    QUIET_INK,
+    STANDING,
+    STRUCTURE,
+    Feature,
+    Kinds,
+    area_feature,
+    blast_features,
+    without,
+)
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.gas import (
     MINUS,
@@ -31,22 +46,12 @@ from blast_env.rendering.gas import (
 )
 from blast_env.rendering.site_plan import (
     draw_charge,
-    draw_zone,
+    draw_features,
     in_metres,
-    layout_legend,
+    legend_of,
     rectangle_patch,
 )
-from blast_env.rendering.style import (
-    BARRIER,
-    BORDER,
-    FAINT,
-    INK,
-    PROTECTED,
-    QUIET_INK,
-    STRUCTURE,
-    render_extra,
-    unit_interval,
-)
+from blast_env.rendering.style import render_extra, unit_interval
 from blast_env.units import MS_PER_S
 
 with render_extra():
@@ -397,13 +402,8 @@ class PressurePainter:
             top_m = site.air_height_m if outline.height_m is None else outline.height_m
             for rectangle in _parts(outline):
                 self._add_solid(axes, rectangle, outline, is_cut=top_m > height_m)
-        zone = shot.result.blast.scenario.build_zone
-        if zone is not None:
-            drawn = len(axes.patches)
-            draw_zone(axes, zone)
-            self._let_move(axes, axes.patches[drawn:])
+        self._let_move(axes, draw_features(axes, _on_ground(shot)))
         before = len(axes.lines)
-        draw_charge(axes, site.charge.position_m)
         line = axes.axhline if shot.section.axis == "y" else axes.axvline
         line(shot.layer_m(1), color=unit_interval(INK), linewidth=0.8, linestyle=_CUT)
         self._let_move(axes, axes.lines[before:])
@@ -432,10 +432,11 @@ class PressurePainter:
                 if part[shot.section.normal] < at_m < part[shot.section.normal + 2]:
                     rectangle = Rectangle(part[along], 0.0, part[along + 2], top_m)
                     self._add_solid(axes, rectangle, outline, is_cut=True)
-        before = len(axes.lines)
         charge = site.charge
         if abs(charge.position_m[shot.section.normal] - at_m) <= shot.result.run.grid.cell_m:
-            draw_charge(axes, (charge.position_m[along], charge.height_m))
+            star = draw_charge(axes, (charge.position_m[along], charge.height_m))
+            self._let_move(axes, star)
+        before = len(axes.lines)
         axes.axhline(shot.layer_m(0), color=unit_interval(INK), linewidth=0.8, linestyle=_CUT)
         self._let_move(axes, axes.lines[before:])
         self._frame(axes, (f"{'xy'[along]} (m)", "z (m)" if number == 0 else ""), QUIET_INK)
@@ -518,10 +519,14 @@ class PressurePainter:
         bar.set_label("overpressure (kPa), the same scale everywhere", fontsize=9)
 
     def _handles(self) -> list[Artist]:
-        structures = [each for shot in self.shots for each in shot.result.run.site.structures]
-        handles = layout_legend(structures, self.shots[0].result.blast.scenario.build_zone)
+        features = [
+            feature
+            for shot in self.shots
+            for feature in (*_on_ground(shot), *_solids(shot.result.run.site))
+        ]
+        handles = legend_of(features)
         for handle in handles:
-            if isinstance(handle, Line2D):
+            if isinstance(handle, Line2D) and handle.get_marker() == "*":
                 handle.set_markersize(10.0)
         ink = unit_interval(INK)
         handles.append(
@@ -580,6 +585,26 @@ class PressurePainter:
 def _signed(value: float, position: int | None) -> str:  # noqa: ARG001
     """Return the number at a tick that may be below 0."""
     return f"{value:g}".replace("-", MINUS)
+
+
+def _on_ground(shot: PressureShot) -> tuple[Feature, ...]:
+    """Return what lies on the ground."""
+    blast = shot.result.blast
+    features = blast_features(blast.scenario, (), shot.result.run.site.charge)
+    return without(features, Kinds.SITE, *STANDING)
+
+
+def _solids(site: BlastSite) -> list[Feature]:
+    """Return what stands, in the colours that a plane through it shows."""
+    found = []
+    for outline in site.structures:
+        if outline.cells is not None:
+            kind, fill = Kinds.BARRIER, BARRIER
+        else:
+            kind, fill = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE, FAINT
+        feature = area_feature(kind, in_metres(outline.rectangle), outline.name)
+        found.append(replace(feature, fill=fill, words="barrier" if fill is BARRIER else ""))
+    return found
 
 
 def _parts(outline: StructureOutline) -> list[Rectangle]:

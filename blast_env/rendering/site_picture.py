@@ -1,48 +1,34 @@
 """A site before any blast: its plan and its oblique view, side by side or each alone."""
 
-from collections import Counter
 from collections.abc import Sequence
-from math import ceil, cos, radians, sin
+from math import cos, radians, sin
 from typing import Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.geometry import Element, Piece, layout_counts
-from blast_env.rendering.oblique import (
-    DEARER,
-    WAY,
-    View,
-    add_area,
-    boxes_of,
-    draw_conditions,
-    draw_oblique,
-    draw_sources,
-    draw_star,
+from blast_env.geometry import Element, layout_counts
+from blast_env.plan import (
+    INK,
+    Feature,
     item_colours,
-    scale_length_m,
+    item_words,
+    site_features,
+    stand_off_text,
+    vehicle_features,
 )
+from blast_env.rendering.oblique import boxes_of, draw_oblique, scale_length_m
 from blast_env.rendering.site_plan import (
-    draw_outline,
-    draw_site,
-    draw_zone,
-    legend_handles,
-    what_stands,
+    PLAN,
+    View,
+    draw_plan,
+    legend_of,
     write_heading,
+    write_legend,
     write_names,
 )
-from blast_env.rendering.style import EXPLOSIVE, INK, PAGE, render_extra, unit_interval
-from blast_env.rendering.vehicle_plan import draw_vehicles, stand_off_text, vehicle_legend
-from blast_env.scenario import (
-    AnyScenario,
-    Placement,
-    RectangleSource,
-    Scenario,
-    SegmentSource,
-    find_scenario,
-)
-from blast_env.scenario.build_scene import build_site, worst_places
+from blast_env.rendering.style import render_extra, unit_interval
+from blast_env.scenario import AnyScenario, BuildZone, Placement, Scenario, find_scenario
 
 with render_extra():
     from matplotlib.artist import Artist
@@ -67,21 +53,7 @@ _HEADING_IN: Final = 0.9
 _LEGEND_ROW_IN: Final = 0.24
 
 
-_LEGEND_COLUMN_IN: Final = 3.0
-
-
 _ARROW_PT: Final = 26.0
-
-
-class PlanView:
-    """The view from above: heights do not show."""
-
-    def places(self, points_m: FloatArray) -> FloatArray:
-        """Return x and y (n, 2) of x, y and height (n, 3), m."""
-        return np.asarray(points_m, dtype=np.float64)[:, :2]
-
-
-PLAN: Final = PlanView()
 
 
 def site_picture(
@@ -112,104 +84,40 @@ def site_picture(
     placement = Placement.of(found, layout)
     views = SITE_VIEWS[1:] if view == "both" else (view,)
     widths_in = [_width_in(placement, each) for each in views]
-    handles = site_legend(found, placement)
-    columns = max(int(sum(widths_in) / _LEGEND_COLUMN_IN), 2)
-    legend_in = ceil(len(handles) / columns) * _LEGEND_ROW_IN
-    figure = Figure(
-        figsize=(sum(widths_in), _PANEL_IN + _HEADING_IN + legend_in), layout="constrained"
-    )
+    layout = placement.layout
+    features = (*site_features(found, layout), *vehicle_features(found, layout))
+    handles = [*legend_of(features), *_items_left(found.build_zone, placement)]
+    height_in = _PANEL_IN + _HEADING_IN
+    figure = Figure(figsize=(sum(widths_in), height_in), layout="constrained")
+    figure.set_figheight(height_in + write_legend(figure, handles) * _LEGEND_ROW_IN)
     panels = figure.subplots(1, len(views), width_ratios=widths_in, squeeze=False)[0]
+    shown: list[tuple[Axes, Sequence[Feature], View]] = []
     for axes, each in zip(panels, views, strict=True):
         if each == "oblique":
-            _draw_directions(axes, found, draw_oblique(axes, found, placement.layout, corner))
+            oblique, raised = draw_oblique(axes, found, layout, corner)
+            _draw_directions(axes, found, oblique)
+            shown.append((axes, raised, oblique))
         else:
-            draw_full_plan(axes, found, placement.layout)
+            draw_plan(axes, features)
             _draw_plan_scale(axes, found)
             _draw_north(axes, found, PLAN)
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
-    )
+            shown.append((axes, features, PLAN))
     write_heading(figure, found.name, _subtitle(found, placement))
-    if "plan" in views:
-        write_names(panels[0], what_stands(build_site(found, placement.layout).structures))
+    for axes, of_view, seen in shown:
+        write_names(axes, of_view, seen)
     return figure
 
 
-def draw_full_plan(axes: Axes, scenario: Scenario, layout: Sequence[Element] = ()) -> None:
-    """Draw the plan of a site with everything that can be drawn before a blast.
-
-    Args:
-        axes: Empty axes.
-        scenario: The scenario.
-        layout: What stands on the build zone; it must fit there.
-    """
-    draw_site(axes, scenario.site.rectangle_m)
-    zone = scenario.build_zone
-    if zone is not None:
-        draw_zone(axes, zone)
-        draw_conditions(axes, PLAN, zone, [each.rectangle_m for each in scenario.structures])
-    draw_vehicles(axes, scenario, layout)
-    draw_sources(axes, PLAN, scenario.charge)
-    for source in scenario.vehicles:
-        draw_star(axes, PLAN, worst_places(scenario, source, layout).places_m[0], 0.0)
-    for outline in build_site(scenario).structures:
-        draw_outline(axes, outline)
-    colours = item_colours(zone)
-    for element in layout:
-        add_area(
-            axes,
-            PLAN,
-            scenario.zone.element_rectangle_m(element),
-            facecolor=colours[element.item if isinstance(element, Piece) else ""],
-            edgecolor=unit_interval(PAGE),
-            linewidth=0.4,
-            zorder=4.0,
-        )
-
-
-def site_legend(scenario: Scenario, placement: Placement) -> list[Artist]:
-    """Return the legend entries for a plan and an oblique view of a site.
-
-    The items of a catalogue are there with their heights, and how many of them stand.
-    """
-    zone, red = scenario.build_zone, unit_interval(EXPLOSIVE)
-    star, *handles = legend_handles(build_site(scenario).structures, zone)
-    if scenario.vehicles:
-        star.set_label("worst place of a vehicle")
-    stars = any(not isinstance(each, SegmentSource | RectangleSource) for each in scenario.charge)
-    handles = [star, *handles] if stars else handles
-    if any(isinstance(each, SegmentSource) for each in scenario.charge):
-        line = Line2D([], [], color=red, linewidth=2.2, label="road on which the charge may be")
-        handles.append(line)
-    if any(isinstance(each, RectangleSource) for each in scenario.charge):
-        label = "area in which the charge may be"
-        handles.append(Patch(facecolor=(*red, 0.35), edgecolor=red, label=label))
-    handles += vehicle_legend(scenario)
+def _items_left(zone: BuildZone | None, placement: Placement) -> list[Artist]:
+    """Return the legend entries for the items of which nothing stands."""
     if zone is None:
-        return handles
-    if zone.cost_areas:
-        handles.append(Patch(facecolor=DEARER, label="building costs more"))
-    if zone.access_way is not None:
-        label = "access way that stays open"
-        line = Line2D([], [], color=WAY, linewidth=1.8, marker="D", markersize=4.0, label=label)
-        handles.append(line)
-        if zone.access_way.gate is not None:
-            handles.append(Patch(facecolor=(*WAY, 0.3), edgecolor=WAY, label="its gate"))
-    return [*handles, *_items_legend(scenario, placement)]
-
-
-def _items_legend(scenario: Scenario, placement: Placement) -> list[Artist]:
-    zone, catalogue = scenario.zone, placement.catalogue
-    placed = Counter(each.item if isinstance(each, Piece) else "" for each in placement.layout)
-    handles: list[Artist] = []
-    for number, (name, colour) in enumerate(item_colours(zone).items()):
-        variant = next(each for each in catalogue.variants if each.item == number)
-        height = "as high as the air" if variant.height_m is None else f"{variant.height_m:g} m"
-        label = (
-            f"{name or 'barrier module'}, {height}: {placed[name]} of {catalogue.stocks[number]}"
-        )
-        handles.append(Patch(facecolor=colour, edgecolor=unit_interval(INK), label=label))
-    return handles
+        return []
+    words, standing = item_words(zone, placement.layout), item_words(zone, ())
+    return [
+        Patch(facecolor=unit_interval(colour), edgecolor=unit_interval(INK), label=words[name])
+        for name, colour in item_colours(zone).items()
+        if words[name] == standing[name]
+    ]
 
 
 def _width_in(placement: Placement, view: str) -> float:

@@ -1,28 +1,29 @@
-"""The plan of a site in matplotlib, with captions."""
+"""The plan of a site in matplotlib: features by their geometry and look, loads, names, headings."""
 
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Final
+from collections.abc import Iterable, Sequence
+from typing import Any, Final, Protocol
 
 import numpy as np
 
+from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
+from blast_env.labels import Wanted, labels_of, leader, settle, solid
 from blast_env.physics.scene import StructureOutline
 from blast_env.physics.structure import LoadColours, ModularObstacle
-from blast_env.rendering.style import (
+from blast_env.plan import (
     BARRIER,
-    BORDER,
-    EXPLOSIVE,
     INK,
     PAGE,
     PROTECTED,
     QUIET_INK,
-    SITE,
     STRUCTURE,
-    render_extra,
-    unit_interval,
+    Feature,
+    FeatureKind,
+    Kinds,
+    Look,
+    area_feature,
 )
-from blast_env.scenario.models import BuildZone
+from blast_env.rendering.style import render_extra, unit_interval
 from blast_env.units import UNITS_PER_M
 
 with render_extra():
@@ -33,13 +34,32 @@ with render_extra():
     from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+    from matplotlib.patches import FancyArrowPatch, Patch, PathPatch
     from matplotlib.patches import Rectangle as RectanglePatch
-    from matplotlib.text import Annotation
+    from matplotlib.path import Path
+    from matplotlib.text import Text
     from matplotlib.transforms import Bbox
 
 
 Obstacle = ModularObstacle | StructureOutline
+
+
+class View(Protocol):
+    """How places on a site become places in a picture."""
+
+    def places(self, points_m: FloatArray) -> FloatArray:
+        """Return places in the picture (n, 2) of x, y and height (n, 3), m."""
+
+
+class PlanView:
+    """The view from above: heights do not show."""
+
+    def places(self, points_m: FloatArray) -> FloatArray:
+        """Return x and y (n, 2) of x, y and height (n, 3), m."""
+        return np.asarray(points_m, dtype=np.float64)[:, :2]
+
+
+PLAN: Final = PlanView()
 
 
 def load_colours() -> Colormap:
@@ -72,6 +92,12 @@ def add_outline(axes: Axes, rectangle: Rectangle, **style: object) -> None:
 
 def draw_site(axes: Axes, site_m: Rectangle, margin: float = 0.03) -> None:
     """Set up axes in metres with equal scales and draw ground and border."""
+    draw_plan(axes, [area_feature(Kinds.SITE, site_m, "site")], margin)
+
+
+def draw_plan(axes: Axes, features: Sequence[Feature], margin: float = 0.03) -> None:
+    """Set up axes in metres with equal scales for a site, and draw what is on it."""
+    (site_m,) = (each.bounds_m for each in features if each.kind is Kinds.SITE)
     reach = margin * max(site_m.right, site_m.top)
     axes.set_xlim(site_m.left - reach, site_m.right + reach)
     axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
@@ -79,19 +105,136 @@ def draw_site(axes: Axes, site_m: Rectangle, margin: float = 0.03) -> None:
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     axes.spines[:].set_visible(False)
-    ground = rectangle_patch(site_m)
-    ground.set(facecolor=unit_interval(SITE), edgecolor=unit_interval(BORDER), linewidth=1.8)
-    axes.add_patch(ground)
+    draw_features(axes, features)
 
 
-def draw_zone(axes: Axes, zone: BuildZone) -> None:
-    """Draw where barrier modules may stand, and the keep-outs as hatched areas."""
-    quiet = unit_interval(QUIET_INK)
-    for keep_out in zone.keep_outs:
-        add_outline(
-            axes, keep_out.rectangle_m, hatch="////", edgecolor=(*quiet, 0.4), linewidth=0.0
-        )
-    add_outline(axes, zone.rectangle_m, edgecolor=quiet, linestyle="--", linewidth=0.9)
+def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) -> list[Artist]:
+    """Draw features by their geometry and their look.
+
+    Args:
+        axes: The axes, in metres.
+        features: What is drawn, on the ground or, where it says so, above it.
+        view: How the picture shows the site.
+
+    Returns:
+        What was drawn, the lowest first.
+    """
+    drawn: list[Artist] = []
+    areas: dict[tuple[FeatureKind, object], list[Path]] = {}
+    for feature in features:
+        places = _places(feature, view)
+        if len(feature.places_m) > 2:
+            outline = Path(np.vstack([places, places[:1]]), closed=True)
+            areas.setdefault((feature.kind, feature.colour), []).append(outline)
+        elif len(feature.places_m) == 2:
+            drawn.append(_line(feature, places))
+        else:
+            drawn += _sign(feature, places, view)
+    for (kind, fill), paths in areas.items():
+        # One patch, so that neighbours have no seam.
+        patch = PathPatch(Path.make_compound_path(*paths))
+        patch.set(**_area_style(kind, fill), zorder=kind.level)
+        drawn.append(patch)
+    drawn.sort(key=lambda artist: artist.get_zorder())
+    for artist in drawn:
+        axes.add_artist(artist)
+    return drawn
+
+
+def _places(feature: Feature, view: View) -> FloatArray:
+    """Return where the places of a feature are in the picture."""
+    height_m = feature.above_ground_m if len(feature.places_m) == 1 else 0.0
+    return view.places(np.array([(*place_m, height_m) for place_m in feature.places_m]))
+
+
+def _area_style(kind: FeatureKind, fill: object) -> dict[str, Any]:
+    """Return matplotlib's style for an area."""
+    look = kind.look
+    line = QUIET_INK if look.line is None else look.line
+    style: dict[str, Any] = {
+        "facecolor": (*unit_interval(fill), look.opacity) if isinstance(fill, tuple) else "none",
+        "edgecolor": (*unit_interval(line), 0.4 if look.hatched else 1.0),
+        "linewidth": 0.0 if look.line is None else look.width,
+        "linestyle": "--" if look.dashed else "-",
+    }
+    return style | {"hatch": "////"} if look.hatched else style
+
+
+def _line(feature: Feature, places: FloatArray) -> Artist:
+    look, (start, end) = feature.kind.look, places.tolist()
+    colour = unit_interval(look.line or INK)
+    if look.arrows:
+        arrow = FancyArrowPatch(start, end, arrowstyle="<->", shrinkA=0, shrinkB=0)
+        arrow.set(color=colour, linewidth=look.width, mutation_scale=14.0)
+        arrow.set_zorder(feature.kind.level)
+        return arrow
+    line = Line2D(*places.T, color=colour, linewidth=look.width, linestyle=_dashes(look))
+    line.set(solid_capstyle="butt", zorder=feature.kind.level)
+    return line
+
+
+def _dashes(look: Look) -> tuple[float, Sequence[float]] | None:
+    """Return matplotlib's pattern of a line."""
+    return (0.0, (3.0, 1.5)) if look.dashed else None
+
+
+def _sign(feature: Feature, places: FloatArray, view: View) -> list[Artist]:
+    """Return the sign of a single place, on a stem where the view shows that it is raised."""
+    sign = Line2D(*places.T, **_sign_style(feature.kind))
+    sign.set_zorder(Kinds.CHARGE.level)
+    on_ground = view.places(np.array([(*feature.places_m[0], 0.0)]))
+    if (on_ground == places).all():
+        return [sign]
+    stem = Line2D(*np.vstack([on_ground, places]).T, color=unit_interval(INK), linewidth=0.8)
+    stem.set_zorder(Kinds.CHARGE.level - 0.05)
+    return [stem, sign]
+
+
+def _sign_style(kind: FeatureKind, size_pt: float = 13.0) -> dict[str, Any]:
+    colour = unit_interval(kind.look.line or INK)
+    if kind.look.sign == "ring":
+        style: dict[str, Any] = {"marker": "o", "markersize": 0.55 * size_pt}
+        return style | {"color": "white", "markeredgecolor": colour, "linestyle": "none"}
+    style = {"marker": "*", "markersize": size_pt, "color": colour, "linestyle": "none"}
+    return style | {"markeredgecolor": unit_interval(INK), "markeredgewidth": 0.6}
+
+
+def legend_of(features: Iterable[Feature]) -> list[Artist]:
+    """Return a legend entry for everything that differs among features, what is on top first."""
+    shown = {(feature.title, min(len(feature.places_m), 3)): feature for feature in features}
+    ordered = sorted(shown.values(), key=lambda feature: -feature.kind.level)
+    return [_legend_entry(feature) for feature in ordered]
+
+
+def _legend_entry(feature: Feature) -> Artist:
+    kind, look = feature.kind, feature.kind.look
+    entry: Artist
+    if len(feature.places_m) > 2:
+        entry = Patch(**_area_style(kind, feature.colour))
+    elif len(feature.places_m) == 1:
+        entry = Line2D([], [], **_sign_style(kind))
+    else:
+        colour = unit_interval(look.line or INK)
+        entry = Line2D([], [], color=colour, linewidth=look.width, linestyle=_dashes(look))
+        if look.arrows:
+            entry.set(marker="D", markersize=4.0)
+    entry.set_label(feature.title)
+    return entry
+
+
+_LETTER_IN: Final = 0.075  # of a legend; its signs and gaps take as much as seven
+
+
+def write_legend(figure: Figure, handles: Sequence[Artist]) -> int:
+    """Write a legend below a figure, in as many columns as fit; return its lines."""
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    columns = max(int(figure.get_figwidth() / (_LETTER_IN * (longest + 7))), 1)
+    lines = -(-len(handles) // columns)
+    columns = -(-len(handles) // lines)  # no more than these lines need
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
+    )
+    return lines
 
 
 def draw_outline(axes: Axes, obstacle: Obstacle, linewidth: float = 1.6) -> None:
@@ -105,35 +248,6 @@ def draw_outline(axes: Axes, obstacle: Obstacle, linewidth: float = 1.6) -> None
             linewidth=1.5 * linewidth if obstacle.protected else linewidth,
             zorder=3,
         )
-
-
-def draw_what_stands(axes: Axes, structures: Sequence[StructureOutline]) -> None:
-    """Draw the outlines of the structures, and what the barrier consists of as filled.
-
-    Pieces of a catalogue have light edges, and are the lighter the lower they are.
-    """
-    for outline in structures:
-        draw_outline(axes, outline)
-        if outline.cells is None:
-            continue
-        blocks = outline.blocks
-        parts = [rectangle_patch(in_metres(block.rectangle)) for block in blocks]
-        if outline.pieces is None:
-            axes.add_collection(PatchCollection(parts, color=unit_interval(BARRIER), zorder=4))
-            continue
-        shades = [_shade(block.height_m, outline.height_m) for block in blocks]
-        edge = unit_interval(PAGE)
-        axes.add_collection(
-            PatchCollection(parts, facecolor=shades, edgecolor=edge, linewidth=0.5, zorder=4)
-        )
-
-
-def _shade(height_m: float | None, highest_m: float | None) -> tuple[float, float, float]:
-    """Return the colour of a piece: that of barriers for the highest item, lighter below."""
-    share = 1.0 if height_m is None or highest_m is None else height_m / highest_m
-    dark, light = np.array(unit_interval(BARRIER)), np.array(unit_interval(SITE))
-    red, green, blue = dark + 0.6 * (1.0 - share) * (light - dark)
-    return float(red), float(green), float(blue)
 
 
 def draw_loads(
@@ -182,112 +296,65 @@ def draw_loads(
     return modules
 
 
-def draw_charge(axes: Axes, position_m: tuple[float, float]) -> None:
+def draw_charge(axes: Axes, position_m: tuple[float, float]) -> list[Artist]:
     """Draw a star at the charge."""
-    axes.add_line(_star(*position_m))
+    return draw_features(axes, [Feature(Kinds.CHARGE, (position_m,), "charge")])
 
 
-BARRIER_MODULE: Final = "barrier module"
+_GAP_PT: Final = 4.0
+_STAR_PT: Final = 15.0
+_FAR_PT: Final = 7.0  # from where on a name is joined to its own by a line
 
 
-def legend_handles(obstacles: Sequence[Obstacle], zone: BuildZone | None) -> list[Artist]:
-    """Return the legend entries for what a site has."""
-    handles: list[Artist] = [_star()]
-    in_pieces = any(obstacle.pieces is not None for obstacle in obstacles)
-    barrier = "barrier piece, darker is higher" if in_pieces else BARRIER_MODULE
-    roles = (
-        ("protected structure", PROTECTED, 2.4, lambda o: o.protected),
-        ("other structure", STRUCTURE, 1.6, lambda o: not o.protected and o.cells is None),
-        (barrier, BARRIER, 1.2, lambda o: o.cells is not None),
-    )
-    for label, colour, linewidth, matches in roles:
-        if any(matches(obstacle) for obstacle in obstacles):
-            handles.append(_box(label, unit_interval(colour), linewidth))
-    if any(obstacle.capacity is not None for obstacle in obstacles):
-        ink = unit_interval(INK)
-        handles.append(Line2D([], [], marker="x", linestyle="none", color=ink, label="destroyed"))
-    if zone is not None:
-        handles.append(_box("build zone", unit_interval(QUIET_INK), 0.9, linestyle="--"))
-        if zone.keep_outs:
-            handles.append(_box("keep-out", unit_interval(QUIET_INK), 0.0, hatch="////"))
-    handles.append(_box("site border", unit_interval(BORDER), 1.8))
-    return handles
-
-
-def layout_legend(structures: Sequence[Obstacle], zone: BuildZone | None) -> list[Artist]:
-    """Return the legend entries for a charge and for what `draw_what_stands` shows."""
-    handles = legend_handles(structures, zone)
-    for handle in handles:
-        if str(handle.get_label()).startswith("barrier "):
-            handle.set(fill=True, facecolor=unit_interval(BARRIER))
-    return handles
-
-
-def _box(
-    label: str, colour: tuple[float, float, float], linewidth: float, **style: object
-) -> Patch:
-    patch = Patch(fill=False, edgecolor=colour, linewidth=linewidth, label=label)
-    patch.set(**style)
-    return patch
-
-
-def _star(*position_m: float) -> Line2D:
-    """Return the star that marks a charge; without a position, one for the legend."""
-    return Line2D(
-        position_m[:1],
-        position_m[1:],
-        marker="*",
-        markersize=15.0,
-        color=unit_interval(EXPLOSIVE),
-        markeredgecolor=unit_interval(INK),
-        markeredgewidth=0.6,
-        linestyle="none",
-        label="charge",
-        zorder=5,
-    )
-
-
-_GAP_PT = 4.0
-_TALL: Final = 3.0  # a structure so many times as high as wide has its name beside it
-
-
-def write_heading(figure: Figure, title: str, subtitle: str) -> None:
-    """Write the title of a figure and a quiet line under it."""
-    # The empty lines make the layout keep room for the second text, which it does not see.
-    heading = figure.suptitle(f"{title}\n", fontsize=14, fontweight="bold", linespacing=1.5)
-    line = figure.axes[0].annotate(
-        subtitle,
-        xy=(0.5, 0.12),
-        xycoords=heading,
-        ha="center",
-        va="bottom",
-        fontsize=10,
-        color=unit_interval(QUIET_INK),
-        annotation_clip=False,
-    )
-    line.set_in_layout(False)
-
-
-def write_names(axes: Axes, obstacles: Sequence[Obstacle], below: bool = False) -> None:
-    """Write the names of the structures beside them, so that none covers anything.
+def write_names(
+    axes: Axes, features: Sequence[Feature], view: View = PLAN, *, inside: bool = True
+) -> None:
+    """Write the labels of features inside or beside them, so that none covers anything.
 
     To be called last: places are found in the figure as it is laid out then.
 
     Args:
-        axes: The site plan; its first patch is the site.
-        obstacles: All that stands on the site.
-        below: Whether names are rather to be below their structures than above.
+        axes: The picture of the site.
+        features: What is on it, and with it everything that is not to be covered.
+        view: How the picture shows the site.
+        inside: Whether names may stand on what they belong to; not where it has colours to read.
     """
     figure = axes.get_figure(root=True)
-    named = [obstacle for obstacle in obstacles if obstacle.cells is None]
-    texts = [_name(axes, obstacle) for obstacle in named]
-    if figure is None or not texts:
+    labels = labels_of(features)[::-1]  # what is on top has the first choice
+    if figure is None or not labels:
         return
+    texts = [_text(axes, label.text, label.feature.kind) for label in labels]
     _lay_out(figure)
-    taken = [_pixels(axes, obstacle) for obstacle in obstacles] + _stars_and_texts(axes, texts)
-    site = axes.patches[0].get_window_extent()
-    for text, obstacle in zip(texts, named, strict=True):
-        taken.append(_settle(text, _pixels(axes, obstacle), taken, site, below))
+    pixels_per_pt = figure.dpi / 72.0
+    taken = [_boxes(axes, each, view, pixels_per_pt)[0] for each in solid(features)]
+    taken += _other_texts(axes, texts)
+    wanted = []
+    for text, label in zip(texts, labels, strict=True):
+        own, room = _boxes(axes, label.feature, view, pixels_per_pt)
+        extent = text.get_window_extent()
+        wanted.append(Wanted(own, (extent.width, extent.height), room if inside else None))
+    within = Rectangle(*axes.get_window_extent().extents)
+    places = settle(wanted, taken, within, _GAP_PT * pixels_per_pt)
+    to_data = axes.transData.inverted()
+    for text, wish, place in zip(texts, wanted, places, strict=True):
+        x, y = to_data.transform(place.centre).tolist()
+        text.set_position((x, y))
+        line = leader(wish.own, place, _FAR_PT * pixels_per_pt)
+        if line is not None:
+            ends = to_data.transform(line)
+            axes.add_line(Line2D(*ends.T, color=text.get_color(), linewidth=0.6, zorder=5.9))
+
+
+def _text(axes: Axes, words: str, kind: FeatureKind) -> Text:
+    protected = kind is Kinds.PROTECTED_STRUCTURE
+    colour = unit_interval(INK if kind.look.line is None else kind.look.line)
+    if kind is Kinds.STRUCTURE:
+        colour = unit_interval(INK)
+    text = axes.text(0.0, 0.0, words, ha="center", va="center", fontsize=9, color=colour, zorder=6)
+    text.set(fontweight="bold" if protected else "normal", clip_on=True)
+    text.set_path_effects([patheffects.withStroke(linewidth=3, foreground="white")])
+    text.set_in_layout(False)
+    return text
 
 
 def _lay_out(figure: Figure) -> None:
@@ -299,75 +366,48 @@ def _lay_out(figure: Figure) -> None:
         axes.apply_aspect()
 
 
-def _stars_and_texts(axes: Axes, names: Sequence[Annotation]) -> list[Bbox]:
-    """Return where charges and texts other than the names are."""
-    texts = [text for text in axes.texts if text not in names and text.get_text()]
-    stars = [line for line in axes.lines if line.get_marker() == "*"]
-    return [each.get_window_extent() for each in (*texts, *stars)]
+def _other_texts(axes: Axes, names: Sequence[Text]) -> list[Rectangle]:
+    """Return where texts other than the names are."""
+    others = [text for text in axes.texts if text not in names and text.get_text()]
+    boxes: list[Bbox] = [text.get_window_extent() for text in others]
+    return [Rectangle(*box.extents) for box in boxes]
 
 
-def what_stands(structures: Sequence[StructureOutline]) -> list[StructureOutline]:
-    """Return what names should not cover: structures, and the barrier's modules one by one."""
-    obstacles = [outline for outline in structures if outline.cells is None]
-    for outline in structures:
-        if outline.cells is not None:
-            corners = [part.rectangle[:2] for part in outline.build().parts]
-            single = replace(
-                outline, rows=1, columns=1, cells=((0, 0),), heights_m=None, pieces=None
-            )
-            obstacles += [replace(single, corner=corner) for corner in corners]
-    return obstacles
+def _boxes(
+    axes: Axes, feature: Feature, view: View, pixels_per_pt: float
+) -> tuple[Rectangle, Rectangle]:
+    """Return the pixels that a feature takes, its roof or its sign, and the box around these."""
+    height_m = feature.properties.get("height_m", feature.above_ground_m)
+    places = view.places(np.array([(*place_m, height_m) for place_m in feature.places_m]))
+    pixels = axes.transData.transform(places)
+    (left, bottom), (right, top) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
+    around = Rectangle(left, bottom, right, top)
+    if len(feature.places_m) == 1:
+        around = around.grown(_STAR_PT / 2.0 * pixels_per_pt)
+    if len(feature.places_m) < 3 or view is PLAN:
+        return around, around
+    # A slanted roof fills the middle of its box alone.
+    width, height = (right - left) / 4.0, (top - bottom) / 4.0
+    return Rectangle(left + width, bottom + height, right - width, top - height), around
 
 
-def _name(axes: Axes, obstacle: Obstacle) -> Annotation:
-    text = axes.annotate(
-        obstacle.name,
-        in_metres(obstacle.rectangle).centre,
-        xytext=(0.0, 0.0),
-        textcoords="offset points",
+_HEADING_SHARE: Final = 0.97  # of the width of a figure
+
+
+def write_heading(figure: Figure, title: str, subtitle: str) -> None:
+    """Write the title of a figure and a quiet line under it."""
+    # The empty lines make the layout keep room for the second text, which it does not see.
+    heading = figure.suptitle(f"{title}\n", fontsize=14, fontweight="bold", linespacing=1.5)
+    share = heading.get_window_extent().width / (_HEADING_SHARE * figure.bbox.width)
+    heading.set_fontsize(14 / max(share, 1.0))
+    line = figure.axes[0].annotate(
+        subtitle,
+        xy=(0.5, 0.12),
+        xycoords=heading,
         ha="center",
-        va="center",
-        fontsize=9,
-        fontweight="bold" if obstacle.protected else "normal",
-        color=unit_interval(PROTECTED if obstacle.protected else INK),
-        zorder=6,
+        va="bottom",
+        fontsize=10,
+        color=unit_interval(QUIET_INK),
+        annotation_clip=False,
     )
-    text.set_path_effects([patheffects.withStroke(linewidth=3, foreground="white")])
-    text.set_in_layout(False)
-    return text
-
-
-def _settle(text: Annotation, own: Bbox, taken: Sequence[Bbox], site: Bbox, below: bool) -> Bbox:
-    """Move a text from the middle of its structure to the first free place; return its box."""
-    box = text.get_window_extent()
-    figure = text.get_figure(root=True)
-    assert figure is not None
-    points_per_pixel = 72.0 / figure.dpi
-    gap = _GAP_PT / points_per_pixel
-    first = ((own.height + box.height) / 2.0 + gap) * (-1.0 if below else 1.0)
-    side = (own.width + box.width) / 2.0 + gap
-    low = own.height / 2.0 - box.height
-    over_or_under = [(0.0, first), (0.0, -first)]
-    beside = [(sign * side, shift) for shift in (0.0, low, -low) for sign in (1.0, -1.0)]
-    if own.height > _TALL * own.width:
-        over_or_under, beside = beside, over_or_under
-    for across, along in (
-        *over_or_under,
-        *beside,
-        *((sign * side, shift) for shift in (first, -first) for sign in (1.0, -1.0)),
-        *((shift, 2.0 * far) for far in (first, -first) for shift in (0.0, side, -side)),
-    ):
-        place = box.translated(across, along)
-        inside = Bbox.intersection(place, site)
-        if inside is None or inside.width < 0.99 * place.width or inside.height < place.height:
-            continue
-        if place.count_overlaps(taken) == 0:
-            text.set_position((across * points_per_pixel, along * points_per_pixel))
-            return place
-    return box
-
-
-def _pixels(axes: Axes, obstacle: Obstacle) -> Bbox:
-    left, bottom, right, top = in_metres(obstacle.rectangle)
-    corners = axes.transData.transform([(left, bottom), (right, top)])
-    return Bbox(corners)
+    line.set_in_layout(False)

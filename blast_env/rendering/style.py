@@ -31,37 +31,7 @@ def render_extra() -> Iterator[None]:
         yield
 
 
-PAGE: Final[Colour] = (255, 255, 255)
-
-
-SITE: Final[Colour] = (245, 247, 250)
-
-
-INK: Final[Colour] = (30, 34, 42)
-
-
-QUIET_INK: Final[Colour] = (92, 99, 110)
-
-
-FAINT: Final[Colour] = (206, 211, 219)
-
-
-EXPLOSIVE: Final[Colour] = (226, 28, 36)
-
-
 AIR: Final[Colour] = (30, 46, 122)
-
-
-BORDER: Final[Colour] = (200, 20, 40)
-
-
-STRUCTURE: Final[Colour] = (104, 98, 88)
-
-
-PROTECTED: Final[Colour] = (0, 128, 112)
-
-
-BARRIER: Final[Colour] = (12, 12, 14)
 
 
 _NICE_STEPS: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)

@@ -11,39 +11,40 @@ from blast_env.engines.gas import GasBlast
 from blast_env.geometry import Layout
 from blast_env.physics.gas.engine import ROOF
 from blast_env.physics.scene import Charge
+from blast_env.plan import (
+    INK,
+    QUIET_INK,
+    Feature,
+    Kinds,
+    charge_feature,
+    site_features,
+    vehicle_features,
+    without,
+)
 from blast_env.rendering.gas import KINDS, Kind, facades
 from blast_env.rendering.pressure_film import record_planes, scale_end_kpa
 from blast_env.rendering.pressure_frames import PressurePainter, default_section
-from blast_env.rendering.site_plan import add_outline, draw_site, draw_zone, rectangle_patch
-from blast_env.rendering.style import (
-    BARRIER,
-    EXPLOSIVE,
-    INK,
-    PROTECTED,
-    QUIET_INK,
-    STRUCTURE,
-    count_of,
-    render_extra,
-    unit_interval,
+from blast_env.rendering.site_plan import (
+    draw_plan,
+    legend_of,
+    rectangle_patch,
+    write_legend,
+    write_names,
 )
-from blast_env.rendering.vehicle_plan import draw_vehicles, vehicle_legend
+from blast_env.rendering.style import count_of, render_extra, unit_interval
 from blast_env.reporting.loads import Measured, Target
 from blast_env.reporting.outcomes import FrontPoint, ItemWorth, Outcome
 from blast_env.reporting.threats import NamedCharge
 from blast_env.reporting.units import UnitSystem
-from blast_env.scenario import RectangleSource, Scenario, SegmentSource
+from blast_env.scenario import Scenario
 from blast_env.units import MODULE_SIDE_M, MS_PER_S
 
 with render_extra():
-    from matplotlib import patheffects
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import PatchCollection
     from matplotlib.colors import TwoSlopeNorm
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
     from matplotlib.ticker import PercentFormatter
     from PIL import Image
 
@@ -55,6 +56,8 @@ _STILL_HEIGHT_M: Final = 1.5
 _LEAST_SHARE: Final = 0.1  # of a building's walls, for the walls of a part to be drawn
 _MOST_FACADES: Final = 4
 _BARE, _WALLED = "#D55E00", "#0072B2"  # Okabe and Ito's
+
+_ZONE: Final = (Kinds.BUILD_ZONE, Kinds.KEEP_OUT, Kinds.COST_AREA, Kinds.GATE, Kinds.ACCESS_WAY)
 
 Picture = tuple[str, bytes]
 """A caption, and a PNG."""
@@ -70,123 +73,41 @@ def png(figure: Figure) -> bytes:
 # The site.
 
 
-def site_plan(
-    scenario: Scenario,
-    targets: Sequence[Target],
-    threats: Sequence[NamedCharge],
-    layout: Layout,
-) -> bytes:
+def site_plan(scenario: Scenario, threats: Sequence[NamedCharge], layout: Layout) -> bytes:
     """Return the plan of a site with buildings, heights, threats and the layout.
 
     Vehicles and their charges are where the layout lets them come.
     """
     figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.9), layout="constrained")
     axes = figure.subplots()
-    draw_site(axes, scenario.site.rectangle_m)
-    for target in targets:
-        _draw_target(axes, target)
-    if scenario.build_zone is not None:
-        draw_zone(axes, scenario.build_zone)
-    _draw_sources(axes, scenario)
-    draw_vehicles(axes, scenario, layout)
-    patches = [rectangle_patch(scenario.zone.element_rectangle_m(each)) for each in layout]
-    axes.add_collection(PatchCollection(patches, color=unit_interval(BARRIER), zorder=4))
-    for threat in threats:
-        _draw_threat(axes, threat.name, threat.against(scenario, layout))
-    figure.legend(
-        handles=_site_legend(scenario),
-        loc="outside lower center",
-        ncols=4,
-        fontsize=9,
-        frameon=False,
-    )
+    charges = [
+        charge_feature(
+            threat.against(scenario, layout),
+            threat.name,
+            f"{threat.name}: {threat.charge.tnt_kg:g} kg",
+        )
+        for threat in threats
+    ]
+    vehicles = without(vehicle_features(scenario, layout), Kinds.CHARGE)
+    features = (*_unlabelled(site_features(scenario, layout)), *vehicles, *charges)
+    draw_plan(axes, features)
+    write_legend(figure, legend_of(features))
+    write_names(axes, features)
     return png(figure)
+
+
+def _unlabelled(features: Sequence[Feature]) -> list[Feature]:
+    """Return what is on a site, its charges without labels: threats have names of their own."""
+    return [
+        replace(each, label="") if each.kind is Kinds.CHARGE_PLACE else each
+        for each in features
+        if each.kind is not Kinds.CHARGE_PLACE or len(each.places_m) > 1
+    ]
 
 
 def _height_in(scenario: Scenario) -> float:
     low, high = _HEIGHTS_IN
     return min(max(_WIDTH_IN * scenario.site.height_m / scenario.site.width_m, low), high)
-
-
-def _draw_target(axes: Axes, target: Target) -> None:
-    colour = unit_interval(PROTECTED if target.protected else STRUCTURE)
-    patches = [rectangle_patch(each.rectangle_m) for each in target.structures]
-    axes.add_collection(
-        PatchCollection(patches, facecolor=(*colour, 0.35), edgecolor=colour, zorder=3)
-    )
-    height = "as high as the air" if target.height_m is None else f"{target.height_m:g} m"
-    biggest = max(target.structures, key=lambda each: each.rows * each.columns)
-    text = axes.text(
-        *biggest.rectangle_m.centre,
-        f"{target.name}\n{height}",
-        ha="center",
-        va="center",
-        fontsize=8,
-        fontweight="bold" if target.protected else "normal",
-        zorder=6,
-        clip_on=True,
-    )
-    text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
-
-
-def _draw_sources(axes: Axes, scenario: Scenario) -> None:
-    colour = unit_interval(EXPLOSIVE)
-    for source in scenario.charge:
-        if isinstance(source, RectangleSource):
-            add_outline(
-                axes, source.rectangle_m, facecolor=(*colour, 0.2), edgecolor=colour, fill=True
-            )
-        elif isinstance(source, SegmentSource):
-            line_m = np.transpose(source.segment_m)
-            axes.plot(*line_m, color=(*colour, 0.5), linewidth=2.5, zorder=2)
-
-
-def _draw_threat(axes: Axes, name: str, charge: Charge) -> None:
-    x_m, y_m = charge.position_m
-    axes.plot(
-        x_m,
-        y_m,
-        marker="*",
-        markersize=15,
-        color=unit_interval(EXPLOSIVE),
-        zorder=7,
-        markeredgecolor=unit_interval(INK),
-        markeredgewidth=0.6,
-    )
-    text = axes.annotate(
-        f"{name}: {charge.tnt_kg:g} kg",
-        (x_m, y_m),
-        xytext=(8, 8),
-        textcoords="offset points",
-        fontsize=9,
-        fontweight="bold",
-        color=unit_interval(EXPLOSIVE),
-        zorder=8,
-    )
-    text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
-
-
-def _site_legend(scenario: Scenario) -> list[Artist]:
-    protected, other = unit_interval(PROTECTED), unit_interval(STRUCTURE)
-    quiet, red = unit_interval(QUIET_INK), unit_interval(EXPLOSIVE)
-    handles: list[Artist] = [
-        Patch(facecolor=(*protected, 0.35), edgecolor=protected, label="protected"),
-        Patch(facecolor=unit_interval(BARRIER), label="layout"),
-        Line2D([], [], marker="*", linestyle="none", markersize=12, color=red, label="threat"),
-    ]
-    if not all(each.protected for each in scenario.structures):
-        handles.insert(1, Patch(facecolor=(*other, 0.35), edgecolor=other, label="other building"))
-    if any(isinstance(each, SegmentSource | RectangleSource) for each in scenario.charge):
-        handles.append(
-            Line2D([], [], color=(*red, 0.5), linewidth=2.5, label="where charges may be")
-        )
-    handles += vehicle_legend(scenario)
-    zone = scenario.build_zone
-    if zone is not None:
-        handles.append(Patch(fill=False, edgecolor=quiet, linestyle="--", label="build zone"))
-        if zone.keep_outs:
-            handles.append(Patch(fill=False, edgecolor=quiet, hatch="////", label="keep-out"))
-    return handles
 
 
 # A threat.
@@ -286,14 +207,12 @@ def film_stills(
 # What is worth what.
 
 
-def worth_map(scenario: Scenario, targets: Sequence[Target], items: Sequence[ItemWorth]) -> bytes:
+def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
     """Return the layout with every module or piece in the colour of what it is worth."""
     figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.3), layout="constrained")
     axes = figure.subplots()
-    draw_site(axes, scenario.site.rectangle_m)
-    for target in targets:
-        _draw_target(axes, target)
-    draw_zone(axes, scenario.zone)
+    features = without(site_features(scenario), Kinds.CHARGE_PLACE)
+    draw_plan(axes, features)
     worths = 100.0 * np.array([each.worth for each in items])
     reach = max(float(np.abs(worths).max()), 1e-6)
     scale = TwoSlopeNorm(0.0, -reach, reach)
@@ -310,6 +229,7 @@ def worth_map(scenario: Scenario, targets: Sequence[Target], items: Sequence[Ite
     axes.set_ylim(max(bottom, 0.0), min(top, scenario.site.height_m))
     bar = figure.colorbar(ScalarMappable(scale, modules.get_cmap()), ax=axes, shrink=0.8)
     bar.set_label("worth: percentage points of reduction lost without it")
+    write_names(axes, features)
     return png(figure)
 
 
@@ -339,25 +259,19 @@ def _bars(axes: Axes, outcomes: Sequence[Outcome], units: UnitSystem) -> None:
 
 
 def place_figure(
-    scenario: Scenario,
-    targets: Sequence[Target],
-    charges: Sequence[Charge],
-    outcomes: Sequence[Outcome],
+    scenario: Scenario, charges: Sequence[Charge], outcomes: Sequence[Outcome]
 ) -> bytes:
     """Return the plan with the reduction for charges at other places.
 
     Args:
         scenario: The scenario.
-        targets: Its buildings.
         charges: Where they go off with the layout.
         outcomes: One a charge.
     """
     figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.3), layout="constrained")
     axes = figure.subplots()
-    draw_site(axes, scenario.site.rectangle_m)
-    for target in targets:
-        _draw_target(axes, target)
-    _draw_sources(axes, scenario)
+    features = without(_unlabelled(site_features(scenario)), *_ZONE)
+    draw_plan(axes, features)
     places = np.array([each.position_m for each in charges])
     shares = 100.0 * np.array([each.reduction for each in outcomes])
     reach = max(float(np.nanmax(np.abs(shares))), 1e-6)
@@ -373,6 +287,7 @@ def place_figure(
         zorder=6,
     )
     figure.colorbar(dots, ax=axes, shrink=0.8).set_label("reduction (%)")
+    write_names(axes, [*features, *(charge_feature(each, "charge") for each in charges)])
     return png(figure)
 
 

@@ -16,8 +16,8 @@ from blast_env.errors import BlastEnvError, import_extra
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.geometry import layout_counts, layout_text
 from blast_env.physics.gas.engine import CHECKED_SCALED_DISTANCE
+from blast_env.plan import stand_off_text
 from blast_env.provenance import code_version, command, versions
-from blast_env.rendering.vehicle_plan import stand_off_text
 from blast_env.reporting.figures import (
     front_figure,
     mass_figure,
@@ -150,7 +150,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "fine": fine,
         "protected": protected,
         "others": [each for each in study.targets if not each.protected],
-        "plan": site_plan(scenario, study.targets, study.threats, study.layout),
+        "plan": site_plan(scenario, study.threats, study.layout),
         "place_texts": {
             each.name: each.place_text(scenario, study.layout) for each in study.threats
         },
@@ -158,9 +158,9 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "summary": _summary(study),
         "verdicts": _verdicts(study),
         "grid_error": study.grid_error,
-        "worth_map": worth_map(scenario, study.targets, study.items) if study.items else None,
+        "worth_map": worth_map(scenario, study.items) if study.items else None,
         "mass_figure": mass_figure(study.masses, options.units),
-        "place_figure": place_figure(scenario, study.targets, places, study.places),
+        "place_figure": place_figure(scenario, places, study.places),
         "front_figure": _front(study) if study.front else None,
         "checked": CHECKED_SCALED_DISTANCE,
         "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),

@@ -7,18 +7,9 @@ from typing import Any, Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
+from blast_env.plan import EXPLOSIVE, INK, PROTECTED, QUIET_INK, SITE, STRUCTURE
 from blast_env.rendering.site_plan import rectangle_patch
-from blast_env.rendering.style import (
-    EXPLOSIVE,
-    INK,
-    PROTECTED,
-    QUIET_INK,
-    SITE,
-    STRUCTURE,
-    count_of,
-    render_extra,
-    unit_interval,
-)
+from blast_env.rendering.style import count_of, render_extra, unit_interval
 from blast_env.scenario import BuildZone, Scenario, VehicleSource
 from blast_env.scenario.zone import source_bounds_m
 

@@ -7,24 +7,30 @@ import numpy as np
 
 from blast_env.evaluation import LayoutEvaluation
 from blast_env.physics.scene import Scene
+from blast_env.plan import (
+    BARRIER,
+    EXPLOSIVE,
+    PROTECTED,
+    STANDING,
+    STRUCTURE,
+    Feature,
+    Kinds,
+    site_features,
+    without,
+)
 from blast_env.rendering.site_plan import (
+    draw_features,
     draw_loads,
     draw_outline,
     draw_site,
-    draw_zone,
     in_metres,
+    legend_of,
     load_colours,
     rectangle_patch,
-    what_stands,
     write_heading,
     write_names,
 )
 from blast_env.rendering.style import (
-    BARRIER,
-    EXPLOSIVE,
-    PROTECTED,
-    QUIET_INK,
-    STRUCTURE,
     count_of,
     nice_ceiling,
     number_on_axis,
@@ -52,8 +58,6 @@ with render_extra():
     from matplotlib.patches import Patch
     from matplotlib.ticker import FuncFormatter
 
-# Okabe and Ito's blue: with the others here it can be told apart with any colour vision.
-_WAY: Final = "#0072B2"
 _FREE, _DEAR = "#d6eedb", "#f6dfa4"
 _PLAN_WIDTH_IN: Final = 6.6
 _EXTRA_HEIGHT_IN: Final = 2.1
@@ -74,7 +78,7 @@ def difficulty_figure(evaluation: LayoutEvaluation, name: str) -> Figure:
     height_in = _PLAN_WIDTH_IN * scenario.site.height_m / scenario.site.width_m + _EXTRA_HEIGHT_IN
     figure = Figure(figsize=(2.0 * _PLAN_WIDTH_IN + 1.0, height_in), layout="constrained")
     plans = figure.subplots(1, 2, sharey=True)
-    scenes = _draw_plans(plans, evaluation)
+    _draw_plans(plans, evaluation)
     plans[0].set_title(f"no barrier: {evaluation.unprotected_impulse_pa_s.value:,.0f} Pa·s")
     with_pa_s = evaluation.impulse_pa_s.value
     plans[1].set_title(f"{name}, {count_of('module', count)}: {with_pa_s:,.0f} Pa·s")
@@ -90,26 +94,24 @@ def difficulty_figure(evaluation: LayoutEvaluation, name: str) -> Figure:
         f"{scenario.simulation.preset}, calibration {evaluation.calibration}, engine "
         f"{evaluation.engine.name}",
     )
-    for axes, scene in zip(plans, scenes, strict=True):
+    for axes, layout in zip(plans, ((), evaluation.layout), strict=True):
         # The others have names that say little and would cover much.
-        standing = what_stands(scene.structures)
-        write_names(axes, [each for each in standing if each.protected or each.cells])
+        features = without(site_features(scenario, layout), Kinds.STRUCTURE, Kinds.CHARGE_PLACE)
+        write_names(axes, features, inside=False)
     return figure
 
 
-def _draw_plans(plans: Sequence[Axes], evaluation: LayoutEvaluation) -> list[Scene]:
-    """Draw the site without and with the layout, with the loads on one scale; return the scenes."""
+def _draw_plans(plans: Sequence[Axes], evaluation: LayoutEvaluation) -> None:
+    """Draw the site without and with the layout, with the loads on one scale."""
     scenario, modules, threat = evaluation.scenario, evaluation.module_table, evaluation.threats[0]
     columns = ["unprotected_impulse_sim", "impulse_sim"]
     protected = [structure.name for structure in scenario.structures if structure.protected]
     highest = float(modules.loc[modules.structure.isin(protected), columns].to_numpy().max())
     scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
-    scenes = []
     for axes, column, layout in zip(plans, columns, ((), evaluation.layout), strict=True):
         scene = build_scene(scenario, layout, threat.seed, threat.charge)
         impulse = dict(zip(modules.module_id, modules[column], strict=True))
         _draw_plan(axes, scenario, scene, impulse, scale)
-        scenes.append(scene)
     figure = plans[0].get_figure(root=True)
     assert figure is not None
     bar = figure.colorbar(
@@ -120,7 +122,6 @@ def _draw_plans(plans: Sequence[Axes], evaluation: LayoutEvaluation) -> list[Sce
         format=FuncFormatter(number_on_axis),
     )
     bar.set_label("mean impulse per module (simulation units); white: not hit")
-    return scenes
 
 
 def _draw_plan(
@@ -129,8 +130,7 @@ def _draw_plan(
     draw_site(axes, in_metres(scene.site))
     if scenario.build_zone is not None:
         _draw_cells(axes, scenario, scenario.build_zone)
-        draw_zone(axes, scenario.build_zone)
-        _draw_way(axes, scenario.build_zone)
+        draw_features(axes, _conditions(scenario))
     for obstacle in scene.obstacles():
         if obstacle.protected:
             for part in obstacle.parts:
@@ -166,17 +166,10 @@ def _draw_cells(axes: Axes, scenario: Scenario, zone: BuildZone) -> None:
     )
 
 
-def _draw_way(axes: Axes, zone: BuildZone) -> None:
-    """Draw the two sides of the zone that the access way connects."""
-    if zone.access_way is None:
-        return
-    left, bottom, right, top = zone.rectangle_m
-    sides = {
-        "left_right": (((left, left), (bottom, top)), ((right, right), (bottom, top))),
-        "bottom_top": (((left, right), (bottom, bottom)), ((left, right), (top, top))),
-    }[zone.access_way.between]
-    for xs, ys in sides:
-        axes.add_line(Line2D(xs, ys, color=_WAY, linewidth=2.6, zorder=2.5))
+def _conditions(scenario: Scenario) -> tuple[Feature, ...]:
+    """Return the zone and its conditions; what cells cost is drawn cell by cell."""
+    features = without(site_features(scenario), Kinds.SITE, Kinds.COST_AREA, *STANDING)
+    return without(features, Kinds.CHARGE_PLACE)
 
 
 def _draw_source(axes: Axes, source: AnySource, share: float) -> None:
@@ -246,19 +239,12 @@ def _legend(scenario: Scenario) -> list[Artist]:
     handles.append(Patch(color=unit_interval(BARRIER), label="barrier module"))
     if zone is None:
         return handles
-    quiet = unit_interval(QUIET_INK)
-    handles.append(Patch(fill=False, edgecolor=quiet, linestyle="--", label="build zone"))
     handles.append(Patch(color=_FREE, label=_free_label(zone)))
     if zone.cost_areas:
         costs = sorted({f"{area.module_cost:g}" for area in zone.cost_areas})
         budget = "" if zone.budget is None else f" (budget {zone.budget:g})"
         handles.append(Patch(color=_DEAR, label=f"cost {' or '.join(costs)}{budget}"))
-    if zone.keep_outs:
-        handles.append(Patch(fill=False, edgecolor=quiet, hatch="////", label="keep-out"))
-    if zone.access_way is not None:
-        label = f"sides joined by an access way of {zone.access_way.width_m:g} m"
-        handles.append(Line2D([], [], color=_WAY, linewidth=2.6, label=label))
-    return handles
+    return [*handles, *legend_of(_conditions(scenario))]
 
 
 def _free_label(zone: BuildZone) -> str:

@@ -5,18 +5,18 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.physics.scene import StructureOutline
-from blast_env.rendering.evaluation_figures import draw_layout
-from blast_env.rendering.site_plan import (
-    draw_charge,
-    layout_legend,
-    what_stands,
-    write_heading,
-    write_names,
+from blast_env.plan import (
+    INK,
+    PROTECTED,
+    QUIET_INK,
+    Feature,
+    charge_feature,
+    site_features,
+    stand_off_text,
+    vehicle_features,
 )
-from blast_env.rendering.style import INK, PROTECTED, QUIET_INK, render_extra, unit_interval
-from blast_env.rendering.vehicle_plan import draw_vehicles, stand_off_text, vehicle_legend
-from blast_env.scenario.build_scene import build_site
+from blast_env.rendering.site_plan import draw_plan, legend_of, write_heading, write_names
+from blast_env.rendering.style import render_extra, unit_interval
 from studies.difficulty.items import ItemResult, Purchase, cost_of, pieces_text
 
 with render_extra():
@@ -52,7 +52,7 @@ def items_figure(result: ItemResult) -> Figure:
         figsize=(_WIDTH_IN, max(plan_in, _ROW_IN * rows + 0.8) + 2.3), layout="constrained"
     )
     plan, chart = figure.subplots(1, 2, width_ratios=(_PLAN_SHARE, 1.0 - _PLAN_SHARE))
-    standing = _draw_plan(plan, result)
+    features = _draw_plan(plan, result)
     _draw_reductions(chart, result)
     layout = best.layouts[0]
     budget = scenario.zone.budget
@@ -62,29 +62,29 @@ def items_figure(result: ItemResult) -> Figure:
         f"{scenario.name}: the best found takes off {_PERCENT * best.reduction.value:.0f} %",
         "; ".join(filter(None, (pieces_text(layout), spent, stand_off_text(scenario, layout)))),
     )
-    write_names(plan, what_stands(standing))
+    write_names(plan, features)
     return figure
 
 
-def _draw_plan(axes: Axes, result: ItemResult) -> Sequence[StructureOutline]:
-    """Draw the best layout and every place of the charge; return what stands."""
+def _draw_plan(axes: Axes, result: ItemResult) -> Sequence[Feature]:
+    """Draw the best layout and every place of the charge; return what was drawn."""
     scenario, layout = result.scenario, result.best.layouts[0]
     places = [place.charge_against(scenario, layout) for place in result.places]
-    scene = build_site(scenario, layout, charge=result.places[0].charge)
-    draw_layout(axes, scenario.build_zone, scene)
-    draw_vehicles(axes, scenario, layout)
-    for place in places:
-        draw_charge(axes, place.position_m)
-    handles = [*layout_legend(scene.structures, scenario.build_zone), *vehicle_legend(scenario)]
+    features = (
+        *site_features(scenario, layout),
+        *vehicle_features(scenario, layout),
+        *(charge_feature(place, "charge") for place in places),
+    )
+    draw_plan(axes, features)
     axes.legend(
-        handles=handles,
+        handles=legend_of(features),
         loc="upper center",
         bbox_to_anchor=(0.5, -0.14),
         ncols=3,
         fontsize=8.5,
         frameon=False,
     )
-    return scene.structures
+    return features
 
 
 def _draw_reductions(axes: Axes, result: ItemResult) -> None:

@@ -9,11 +9,11 @@ from blast_env.app.editor import Editor, Tool
 from blast_env.app.edits import Kind, Thing
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
-from blast_env.app.plan import View, merged_cells, overlay_svg, plan_svg
+from blast_env.app.plan import View, overlay_svg, plan_svg
 from blast_env.app.session import Session
 from blast_env.app.solids import boxes
 from blast_env.geometry import Piece
-from blast_env.scenario import load_scenario, usable_cells
+from blast_env.scenario import load_scenario
 from tests.gas_sites import WALL, hut
 from tests.vehicle_sites import POSTS, gate_site
 
@@ -162,16 +162,6 @@ def test_pixels_and_metres_are_each_other_s_reverse() -> None:
     assert kept.pixel(12.5, 7.0) == pytest.approx((x_px, y_px), abs=0.02)
 
 
-def test_merged_cells_cover_exactly_what_they_should() -> None:
-    for name in ("courtyard", "perimeter_gate"):
-        blocked = ~usable_cells(load_scenario(name))
-        covered = blocked & False
-        for bottom, left, top, right in merged_cells(blocked):
-            assert not covered[bottom:top, left:right].any()
-            covered[bottom:top, left:right] = True
-        assert (covered == blocked).all()
-
-
 def test_the_plan_says_nothing_that_a_browser_could_run() -> None:
     document = load_scenario("courtyard").model_dump(mode="json", exclude_none=True)
     document["build_zone"]["keep_outs"][0]["reason"] = "<script>alert(1)</script>"
@@ -196,7 +186,7 @@ def test_solids_have_the_heights_of_the_site() -> None:
     solids = {each.name: each for each in boxes(scenario, WALL)}
     assert solids["hut"].size_m == (2.0, 2.0, 2.0)
     assert solids["hut"].opacity == 1.0
-    assert solids["barrier"].centre_m[2] == 0.75
+    assert all(box.centre_m[2] == 0.75 for name, box in solids.items() if name.startswith("cell"))
     open_air = {each.name: each for each in boxes(load_scenario("courtyard"), ())}
     assert open_air["building"].size_m[2] == 12.0
     assert open_air["building"].opacity < 1.0

@@ -15,11 +15,10 @@ from ezdxf.math import bulge_to_arc
 
 from blast_env import load_scenario
 from blast_env.export import LayoutPlan, export_layout
-from blast_env.export.dxf import note_lines
-from blast_env.export.labels import key_of, labels_of
-from blast_env.export.plan import FeatureKind
+from blast_env.export.dxf import key_of, note_lines, texts_of
 from blast_env.geometry import Rectangle
 from blast_env.physics.scene import Charge
+from blast_env.plan import Kinds
 from blast_env.scenario import Placement, Scenario
 
 GATE = load_scenario("perimeter_gate")  # a clearance and an access way
@@ -91,12 +90,13 @@ def test_notes_say_what_has_no_place_on_the_site(tmp_path: Path) -> None:
         "Modules: 3 of a stock of 16, 0.5 m x 0.5 m each",
         "Clearance: 1.5 m at least between modules and structures",
         "Access way: 6 m wide, from left to right of the build zone, to be kept open",
-        "A: build zone",
-        "B: the lane through the gap, and room to wait for the check",
-        "C: the lane turns off to the car park here",
+        "A: the lane through the gap, and room to wait for the check",
+        "B: the lane turns off to the car park here",
+        "C: build zone",
         "D: charge of 500 kg TNT may be here",
         "E: charge of 100 kg TNT may be here",
-        "F: charge of 500 kg TNT",
+        "F: access way of 6 m from left to right",
+        "G: charge of 500 kg TNT",
     ]
 
 
@@ -166,10 +166,10 @@ def test_no_text_covers_another_or_a_module(name: str) -> None:
     scenario = load_scenario(name)
     layout = random_layout(scenario, np.random.default_rng(0)) if scenario.build_zone else ()
     plan = LayoutPlan(scenario, layout)
-    labels = labels_of(plan, 0.6)
+    labels = texts_of(plan, 0.6)
     for one, other in combinations([label.box_m for label in labels], 2):
         assert not one.overlaps(other)
-    pieces = [each for each in plan.features if each.kind is FeatureKind.BARRIER]
+    pieces = [each for each in plan.features if each.kind is Kinds.BARRIER]
     for label in labels:
         if label.feature not in pieces:
             outlines = [Rectangle(*piece.places_m[0], *piece.places_m[2]) for piece in pieces]
@@ -182,7 +182,7 @@ def test_no_text_covers_another_or_a_module(name: str) -> None:
 def test_every_letter_is_explained_once() -> None:
     plan = LayoutPlan(load_scenario("control_room"), ())  # three places of one charge
     key = key_of(plan)
-    letters = [label.text for label in labels_of(plan, 0.5) if len(label.text) == 1]
+    letters = [label.text for label in texts_of(plan, 0.5) if len(label.text) == 1]
     assert set(letters) == set(key.values())
     assert letters.count(key["charge of 100 kg TNT may be here"]) == 3
 

@@ -15,9 +15,10 @@ from ezdxf.layouts.layout import Modelspace
 
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.export import SUFFIXES, FeatureKind, LayoutPlan, export_layout, export_layouts
+from blast_env.export import SUFFIXES, LayoutPlan, export_layout, export_layouts
 from blast_env.export.bill import MODULE_COLUMNS
 from blast_env.physics.scene import Charge
+from blast_env.plan import SITE_KINDS
 from blast_env.scenario import LayoutFile, Scenario, load_layout
 from blast_env.scenario.build_scene import build_scene
 
@@ -110,7 +111,7 @@ def test_dxf_is_in_metres_with_a_layer_a_kind(tmp_path: Path) -> None:
     document = readfile(export_layout(plan(), tmp_path / "layout.dxf"))
     assert document.units == units.M
     assert not document.audit().has_issues
-    assert {kind.value.upper() for kind in FeatureKind} <= {
+    assert {kind.name.upper() for kind in SITE_KINDS} <= {
         layer.dxf.name for layer in document.layers
     }
     space = document.modelspace()
@@ -139,6 +140,7 @@ def test_every_part_of_a_site_is_in_every_drawing(name: str, tmp_path: Path) -> 
             "build_zone": 1,
             "keep_out": len(zone.keep_outs),
             "cost_area": len(zone.cost_areas),
+            "access_way": int(zone.access_way is not None),
             "protected_structure": sum(each.protected for each in scenario.structures),
             "structure": sum(not each.protected for each in scenario.structures),
             "charge_place": len(scenario.charge),
@@ -160,7 +162,7 @@ def test_a_reason_with_a_line_break_leaves_the_drawing_whole(tmp_path: Path) -> 
     drawing = readfile(export_layout(plan(scenario), tmp_path / "layout.dxf"))
     (notes,) = drawing.modelspace().query('MTEXT[layer=="NOTES"]')
     lines = notes.plain_text(split=True)  # type: ignore[attr-defined]
-    assert "B: a door and 0 EOF, {größer}" in lines
+    assert "A: a door and 0 EOF, {größer}" in lines
 
 
 def test_a_folder_gets_every_layout_in_every_form(tmp_path: Path) -> None:

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from blast_env import Charge, load_scenario
 from blast_env.evaluation import Case, Comparison, Threat
+from blast_env.plan import Kinds
 from blast_env.rendering.evaluation_figures import MOST_SHOWN, comparison_figure
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import Scenario
@@ -63,10 +63,9 @@ def test_every_panel_has_its_own_charge_modules_and_reduction() -> None:
     for number, axes in enumerate(drawn):
         (star,) = axes.lines
         assert tuple(np.ravel(star.get_xydata())) == (5.0, 8.0 + number)
-        (modules,) = (c for c in axes.collections if isinstance(c, PatchCollection))
-        corners = {
-            tuple(np.asarray(path.vertices).min(axis=0).tolist()) for path in modules.get_paths()
-        }
+        (modules,) = (each for each in axes.patches if each.get_zorder() == Kinds.BARRIER.level)
+        squares = np.asarray(modules.get_path().vertices).reshape(-1, 5, 2)
+        corners = {tuple(square.min(axis=0).tolist()) for square in squares}
         left_m, low_m = zone.corner_m
         assert corners == {(left_m, low_m + row * MODULE_SIDE_M) for row in range(number + 1)}
         noun = "module" if number == 0 else "modules"
@@ -110,8 +109,8 @@ def test_the_legend_has_what_is_drawn_and_nothing_else() -> None:
     labels = [text.get_text() for text in comparison_figure(comparison(0.5)).legends[0].get_texts()]
     assert labels == [
         "charge",
+        "barrier module, as high as the air",
         "protected structure",
-        "barrier module",
         "build zone",
         "keep-out",
         "site border",

@@ -102,7 +102,7 @@ def test_title_and_legend_say_how_much_how_sure_and_where_not_to_trust_it(
         "charge outside the calibration's range",
         "charge with the largest impulse",
     ]
-    assert "barrier module" in labels
+    assert "barrier module, as high as the air: 10 of 16" in labels
 
 
 def test_an_empty_layout_and_a_single_threat_can_be_drawn(tmp_path: Path) -> None:

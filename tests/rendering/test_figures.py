@@ -50,10 +50,10 @@ def test_the_heat_map_has_units_and_a_legend(barrier_result: BlastResult) -> Non
     assert figure.axes[-1].get_ylabel() == "impulse per module (simulation units); white: not hit"
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == [
+        "barrier module",
         "charge",
         "protected structure",
         "other structure",
-        "barrier module",
         "build zone",
         "keep-out",
         "site border",

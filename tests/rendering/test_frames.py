@@ -11,9 +11,10 @@ from blast_env.engines import Blast
 from blast_env.errors import BlastEnvError
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import load_colour
+from blast_env.plan import BARRIER, BORDER, EXPLOSIVE, PROTECTED
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.frames import FramePainter, balls_at_start
-from blast_env.rendering.style import AIR, BARRIER, BORDER, EXPLOSIVE, PROTECTED
+from blast_env.rendering.style import AIR
 from blast_env.units import MODULE_SIDE_UNITS
 
 
@@ -28,7 +29,7 @@ def start_frame(painter: FramePainter, blast: Blast) -> Frame:
 
 @pytest.mark.parametrize("width_px", [320, 480, 960, 1921])
 def test_frames_have_the_width_asked_for_and_an_even_height(blast: Blast, width_px: int) -> None:
-    painter = FramePainter.for_blast(blast, width_px=width_px)
+    painter = FramePainter(blast, width_px=width_px)
     frame = start_frame(painter, blast)
     assert frame.shape == (painter.size_px[1], width_px, 3)
     assert frame.dtype == np.uint8
@@ -39,14 +40,14 @@ def test_frames_have_the_width_asked_for_and_an_even_height(blast: Blast, width_
 @pytest.mark.parametrize("width_px", [319, 4097])
 def test_width_out_of_bounds_is_refused(blast: Blast, width_px: int) -> None:
     with pytest.raises(BlastEnvError, match=f"width_px is {width_px}, must be 320 to 4096"):
-        FramePainter.for_blast(blast, width_px=width_px)
+        FramePainter(blast, width_px=width_px)
 
 
 def test_balls_are_where_they_should_be_in_the_papers_colours(blast: Blast) -> None:
     run = blast.start()
     run.advance(0.004)
     balls = run.balls()
-    painter = FramePainter.for_blast(blast)
+    painter = FramePainter(blast)
     frame = painter.paint(balls, run.obstacles, run.time_s)
     # In a corner where nothing but balls is drawn.
     in_corner = (balls.position < 32.0).all(axis=1)
@@ -61,21 +62,21 @@ def test_balls_are_where_they_should_be_in_the_papers_colours(blast: Blast) -> N
 
 def test_the_size_of_frames_does_not_depend_on_the_loads(blast: Blast) -> None:
     loads = (1e-3, 0.0888, 7.0, 888.0, 8.88e4, 3e9)
-    painters = [FramePainter.for_blast(blast, full_impulse=load) for load in loads]
+    painters = [FramePainter(blast, full_impulse=load) for load in loads]
     assert len({painter.size_px for painter in painters}) == 1
 
 
 def test_small_balls_stay_visible(blast: Blast) -> None:
     balls = balls_at_start(blast.scene)
     balls = replace(balls, radius=np.full(len(balls), 0.01))
-    painter = FramePainter.for_blast(blast, width_px=320)
+    painter = FramePainter(blast, width_px=320)
     frame = painter.paint(balls, blast.scene.obstacles(), 0.0)
     x, y = balls.position[0].tolist()
     assert pixel_at(painter, frame, x, y) == AIR
 
 
 def test_y_points_up_and_scales_are_equal(blast: Blast) -> None:
-    view = FramePainter.for_blast(blast).view
+    view = FramePainter(blast).view
     left, low = view.pixel(0.0, 0.0)
     right, high = view.pixel(80.0, 80.0)
     assert high < low
@@ -84,7 +85,7 @@ def test_y_points_up_and_scales_are_equal(blast: Blast) -> None:
 
 
 def test_the_border_is_red_all_around(blast: Blast) -> None:
-    painter = FramePainter.for_blast(blast)
+    painter = FramePainter(blast)
     frame = start_frame(painter, blast)
     ring = painter.view.rectangle(blast.scene.site).inflate(2, 2)
     for edge in (
@@ -97,7 +98,7 @@ def test_the_border_is_red_all_around(blast: Blast) -> None:
 
 
 def test_a_modules_colour_follows_its_load(blast: Blast) -> None:
-    painter = FramePainter.for_blast(blast, full_impulse=100.0)
+    painter = FramePainter(blast, full_impulse=100.0)
     obstacles = blast.scene.obstacles()
     part = obstacles[0].parts[0]
     seen = []
@@ -110,7 +111,7 @@ def test_a_modules_colour_follows_its_load(blast: Blast) -> None:
 
 
 def test_protected_structures_and_barrier_modules_have_their_outlines(barrier_blast: Blast) -> None:
-    painter = FramePainter.for_blast(barrier_blast)
+    painter = FramePainter(barrier_blast)
     frame = start_frame(painter, barrier_blast)
     shelter, _, barrier = barrier_blast.scene.obstacles()
     ring = painter.view.rectangle(shelter.rectangle).inflate(2, 2)
@@ -121,7 +122,7 @@ def test_protected_structures_and_barrier_modules_have_their_outlines(barrier_bl
 
 
 def test_a_destroyed_module_looks_different(blast: Blast) -> None:
-    painter = FramePainter.for_blast(blast)
+    painter = FramePainter(blast)
     obstacles = blast.scene.obstacles()
     whole = painter.paint(balls_at_start(blast.scene), obstacles, 0.0)
     part = obstacles[0].parts[0]
@@ -140,7 +141,7 @@ def test_equal_states_give_equal_frames(barrier_blast: Blast) -> None:
     for _ in range(2):
         run = barrier_blast.start()
         run.advance(0.01)
-        painter = FramePainter.for_blast(barrier_blast)
+        painter = FramePainter(barrier_blast)
         frames.append(painter.paint(run.balls(), run.obstacles, run.time_s))
     assert np.array_equal(frames[0], frames[1])
 
@@ -148,14 +149,14 @@ def test_equal_states_give_equal_frames(barrier_blast: Blast) -> None:
 def test_the_scale_of_all_layouts_of_a_scenario_is_the_same(
     blast: Blast, barrier_blast: Blast
 ) -> None:
-    one, other = (FramePainter.for_blast(each).full_impulse for each in (blast, barrier_blast))
+    one, other = (FramePainter(each).full_impulse for each in (blast, barrier_blast))
     assert one == other > 0.0
 
 
 def test_frames_survive_that_someone_else_quits_pygame(blast: Blast) -> None:
     import pygame
 
-    painter = FramePainter.for_blast(blast)
+    painter = FramePainter(blast)
     before = start_frame(painter, blast)
     pygame.quit()
     assert np.array_equal(before, start_frame(painter, blast))
@@ -168,7 +169,7 @@ def test_frames_need_no_display() -> None:
         "from blast_env.rendering.frames import FramePainter, balls_at_start\n"
         "from tests.rendering.scenes import small_blast\n"
         "blast = small_blast()\n"
-        "painter = FramePainter.for_blast(blast)\n"
+        "painter = FramePainter(blast)\n"
         "frame = painter.paint(balls_at_start(blast.scene), blast.scene.obstacles(), 0.0)\n"
         "assert not pygame.display.get_init()\n"
         "print(frame.shape)\n"
@@ -198,7 +199,7 @@ def test_a_missing_package_is_named_with_the_command_that_installs_it() -> None:
 
 
 def test_module_squares_touch_without_a_gap(blast: Blast) -> None:
-    painter = FramePainter.for_blast(blast, width_px=333)
+    painter = FramePainter(blast, width_px=333)
     parts = blast.scene.obstacles()[0].parts
     for left, right in pairwise(parts[:6]):
         assert right.x - left.x == MODULE_SIDE_UNITS

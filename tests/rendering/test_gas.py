@@ -11,6 +11,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.patches import PathPatch
 from PIL import Image
 
 from blast_env import Charge
@@ -18,6 +19,7 @@ from blast_env.calibration.references import kingery_bulmash
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.physics.gas.probes import GroundMap
+from blast_env.plan import barrier_features
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.film import plan_until
 from blast_env.rendering.gas import facades, full_load, gauge_history
@@ -35,8 +37,7 @@ from blast_env.rendering.pressure_frames import (
     Smooth,
     default_section,
 )
-from blast_env.rendering.site_plan import draw_what_stands, layout_legend
-from blast_env.scenario.build_scene import build_site
+from blast_env.rendering.site_plan import draw_features, legend_of
 from tests.catalogue_sites import WALL as PIECES
 from tests.catalogue_sites import yard
 from tests.gas_sites import WALL, hut
@@ -162,10 +163,11 @@ def test_solids_are_no_ground(walled: GasResult) -> None:
 def test_a_map_names_what_stands_and_numbers_contours(walled: GasResult) -> None:
     figure = ground_map(walled, "impulse")
     words = {text.get_text() for text in figure.axes[0].texts}
-    assert "hut" in words
+    assert "hut\n2 m" in words
     assert words & {"50", "70", "100", "150", "200"}
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert {"charge", "protected structure", "barrier module", "build zone"} <= set(labels)
+    assert {"charge", "protected structure", "build zone"} <= set(labels)
+    assert any(label.startswith("barrier module, ") for label in labels)
     assert_all_is_on_the_page(figure)
 
 
@@ -402,15 +404,14 @@ def test_what_is_no_film_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_pieces_are_drawn_as_wholes_lighter_where_they_are_lower() -> None:
-    figure = Figure()
-    axes = figure.add_subplot()
-    structures = build_site(yard(), PIECES).structures
-    draw_what_stands(axes, structures)
-    (pieces,) = axes.collections
-    boxes = [path.get_extents() for path in pieces.get_paths()]
-    assert [(box.width, box.height) for box in boxes] == [(0.5, 1.5), (0.5, 1.5), (0.5, 0.5)]
-    lightness = np.asarray(pieces.get_facecolor())[:, :3].mean(axis=1)
-    assert lightness[0] == lightness[1] < lightness[2]
-    labels = [str(handle.get_label()) for handle in layout_legend(structures, yard().zone)]
-    assert "barrier piece, darker is higher" in labels
+def test_pieces_are_drawn_as_wholes_in_the_colours_of_their_items() -> None:
+    axes = Figure().add_subplot()
+    features = list(barrier_features(yard().zone, PIECES))
+    walls, post = draw_features(axes, features)
+    assert isinstance(walls, PathPatch)
+    assert isinstance(post, PathPatch)
+    assert walls.get_path().get_extents().bounds == (4.0, 5.0, 0.5, 3.0)
+    assert post.get_path().get_extents().bounds == (4.0, 4.5, 0.5, 0.5)
+    assert walls.get_facecolor() != post.get_facecolor()
+    labels = [handle.get_label() for handle in legend_of(features)]
+    assert labels == ["wall, 2 m: 2 of 3", "post, 1 m: 1 of 4"]

@@ -85,7 +85,7 @@ def test_the_scale_of_a_film_ends_at_a_nice_number_of_pa_s(bare: BlastResult) ->
 def test_frames_say_what_has_come_so_far_and_what_one_seed_is(bare: BlastResult) -> None:
     """The line with the loads changes from frame to frame; the site below it is the same."""
     unit = bare.load_unit
-    painter = FramePainter.for_blast(bare.blast, unit=unit)
+    painter = FramePainter(bare.blast, unit=unit)
     balls = bare.final_balls
     begun = painter.paint(balls, bare.blast.scene.obstacles(), 0.0)
     ended = painter.paint(balls, bare.obstacles, 0.0)

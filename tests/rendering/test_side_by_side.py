@@ -80,7 +80,7 @@ def test_the_same_blast_twice_gives_two_equal_halves(blast: Blast, tmp_path: Pat
 
 def test_the_barrier_is_in_its_own_half_alone(barrier_blast: Blast, both: Written) -> None:
     first = both.frames[0].astype(int)
-    painter = FramePainter.for_blast(barrier_blast, width_px=WIDTH_PX // 2)
+    painter = FramePainter(barrier_blast, width_px=WIDTH_PX // 2)
     part = barrier_blast.scene.obstacles()[-1].parts[0]
     across, down = painter.view.pixel(part.x, part.y)
     left, right = first[down, across], first[down, across + WIDTH_PX // 2]

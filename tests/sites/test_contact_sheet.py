@@ -8,8 +8,9 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.patches import Rectangle as RectanglePatch
 
 from blast_env.errors import BlastEnvError
+from blast_env.plan import EXPLOSIVE
 from blast_env.rendering.figures import save_figure
-from blast_env.rendering.style import EXPLOSIVE, unit_interval
+from blast_env.rendering.style import unit_interval
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.sites.contact_sheet import contact_sheet
 

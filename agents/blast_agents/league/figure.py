@@ -5,8 +5,9 @@ from typing import Final
 import numpy as np
 
 from blast_agents.league.standings import Result, Standings
+from blast_env.plan import INK, QUIET_INK
 from blast_env.rendering.site_plan import write_heading
-from blast_env.rendering.style import INK, QUIET_INK, count_of, render_extra, unit_interval
+from blast_env.rendering.style import count_of, render_extra, unit_interval
 
 with render_extra():
     from matplotlib.axes import Axes

@@ -6,14 +6,9 @@ import numpy as np
 
 from blast_agents.search.problem import Candidate, LayoutProblem, SearchResult
 from blast_env.geometry import layout_counts
+from blast_env.plan import QUIET_INK
 from blast_env.rendering.site_plan import write_heading
-from blast_env.rendering.style import (
-    QUIET_INK,
-    count_of,
-    number_on_axis,
-    render_extra,
-    unit_interval,
-)
+from blast_env.rendering.style import count_of, number_on_axis, render_extra, unit_interval
 
 with render_extra():
     from matplotlib.axes import Axes

@@ -211,6 +211,6 @@ def measure_frame_ms(scenario: Scenario, repeats: int) -> float:
         mass=balls.mass[some],
         radius=balls.radius[some],
     )
-    painter, obstacles = FramePainter.for_blast(blast), blast.scene.obstacles()
+    painter, obstacles = FramePainter(blast), blast.scene.obstacles()
     paint = partial(painter.paint, many, obstacles, 0.0)
     return MS_PER_S * min(_timed(paint) for _ in range(repeats + 1))

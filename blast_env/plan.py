@@ -1,0 +1,540 @@
+"""What is on a site, as one list that every picture, drawing and map shows.
+
+A kind of thing says once what legends call it and how it looks. The back ends (matplotlib, pygame,
+the page's SVG, DXF and GeoJSON) draw any kind by its geometry and its look; none of them has a list
+of its own. So a new condition of the build zone is one more feature in `zone_features`.
+
+Coordinates are local: x to the right and y upwards from the lower left corner of the site.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Final, Literal
+
+import numpy as np
+
+from blast_env.arrays import BoolArray
+from blast_env.geometry import Element, Piece, Rectangle
+from blast_env.physics.scene import Charge
+from blast_env.physics.structure import Colour
+from blast_env.scenario import (
+    AnySource,
+    AnyStructure,
+    BuildZone,
+    PointSource,
+    RectangleSource,
+    Scenario,
+    VehicleSource,
+)
+from blast_env.scenario.build_scene import barrier_outline, vehicle_reach, worst_places
+from blast_env.scenario.sections import PointM
+from blast_env.scenario.vehicles import nearest_point_m, squares_of
+from blast_env.units import MODULE_SIDE_M
+
+PAGE: Final[Colour] = (255, 255, 255)
+SITE: Final[Colour] = (245, 247, 250)
+INK: Final[Colour] = (30, 34, 42)
+QUIET_INK: Final[Colour] = (92, 99, 110)
+FAINT: Final[Colour] = (206, 211, 219)
+EXPLOSIVE: Final[Colour] = (226, 28, 36)
+BORDER: Final[Colour] = (200, 20, 40)
+STRUCTURE: Final[Colour] = (104, 98, 88)
+PROTECTED: Final[Colour] = (0, 128, 112)
+BARRIER: Final[Colour] = (12, 12, 14)
+_DEARER: Final[Colour] = (253, 214, 122)
+_WAY: Final[Colour] = (26, 89, 217)
+_GAUGE: Final[Colour] = (123, 45, 139)
+
+_ITEMS: Final[tuple[Colour, ...]] = (
+    *((0, 114, 178), (230, 159, 0), (204, 121, 167), (86, 180, 233)),
+    *((240, 228, 66), (140, 86, 41), (107, 79, 168), (250, 168, 140)),
+)
+"""Okabe and Ito's without the red of charges and the green of what is protected, and others."""
+
+_DARKER: Final = 0.6  # a ninth item has the colour of the first one, darker
+_DIGITS: Final = 9  # of a metre: what is beyond is rounding
+_WAY_PLACES: Final = (0.5, 0.75, 0.25, 0.875, 0.125)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How things of a kind look.
+
+    Attributes:
+        line: Colour of outlines, lines and signs; without one, areas have no outline.
+        width: Width of lines, points.
+        dashed: Whether lines are dashed.
+        arrows: Whether a line has an arrow at both ends.
+        fill: Colour of an area; without one, it is open.
+        opacity: How much of what is below the fill hides, 0 to 1.
+        hatched: Whether an area is filled with slanted lines.
+        sign: What marks a single place.
+        drawn_dashed: Whether drawings, which have no fills, show it with dashes: a condition
+            rather than a thing.
+        cad_colour: Its colour in drawings, of AutoCAD's index.
+    """
+
+    line: Colour | None = None
+    width: float = 1.0
+    dashed: bool = False
+    arrows: bool = False
+    fill: Colour | None = None
+    opacity: float = 1.0
+    hatched: bool = False
+    sign: Literal["star", "ring"] = "star"
+    drawn_dashed: bool = False
+    cad_colour: int = 7
+
+
+@dataclass(frozen=True)
+class FeatureKind:
+    """What a feature is.
+
+    Attributes:
+        name: Layers of drawings are named after it, and maps have it in `kind`.
+        words: What legends call it.
+        level: What has a higher one lies on top.
+        look: How it looks.
+        named: Where drawings have its name: inside it, explained by a letter beside it, or nowhere.
+    """
+
+    name: str
+    words: str
+    level: float
+    look: Look
+    named: Literal["inside", "letter", ""] = "letter"
+
+
+class Kinds:
+    """The kinds of features that there are."""
+
+    SITE: Final = FeatureKind(
+        "site", "site border", 1.0, Look(BORDER, 1.8, fill=SITE, cad_colour=8), named=""
+    )
+    COST_AREA: Final = FeatureKind(
+        "cost_area",
+        "building has another cost",
+        1.2,
+        Look(fill=_DEARER, drawn_dashed=True, cad_colour=6),
+    )
+    REACHED: Final = FeatureKind(
+        "reached",
+        "ground that a vehicle reaches",
+        1.4,
+        Look(fill=EXPLOSIVE, opacity=0.16, cad_colour=11),
+        named="",
+    )
+    KEEP_OUT: Final = FeatureKind(
+        "keep_out", "keep-out", 1.5, Look(hatched=True, drawn_dashed=True, cad_colour=30)
+    )
+    BUILD_ZONE: Final = FeatureKind(
+        "build_zone",
+        "build zone",
+        1.6,
+        Look(QUIET_INK, 0.9, dashed=True, drawn_dashed=True, cad_colour=3),
+    )
+    GATE: Final = FeatureKind(
+        "gate",
+        "gate of the access way",
+        1.7,
+        Look(_WAY, fill=_WAY, opacity=0.3, drawn_dashed=True, cad_colour=5),
+    )
+    CHARGE_PLACE: Final = FeatureKind(
+        "charge_place",
+        "charge",
+        2.0,
+        Look(EXPLOSIVE, 2.6, fill=EXPLOSIVE, opacity=0.35, drawn_dashed=True, cad_colour=1),
+    )
+    ACCESS_WAY: Final = FeatureKind(
+        "access_way",
+        "access way that stays open",
+        2.2,
+        Look(_WAY, 1.8, arrows=True, drawn_dashed=True, cad_colour=5),
+    )
+    STRUCTURE: Final = FeatureKind(
+        "structure",
+        "other structure",
+        3.0,
+        Look(STRUCTURE, 1.6, fill=STRUCTURE, opacity=0.15, cad_colour=7),
+        named="inside",
+    )
+    PROTECTED_STRUCTURE: Final = FeatureKind(
+        "protected_structure",
+        "protected structure",
+        3.1,
+        Look(PROTECTED, 2.4, fill=PROTECTED, opacity=0.2, cad_colour=132),
+        named="inside",
+    )
+    BARRIER: Final = FeatureKind(
+        "barrier",
+        "barrier module",
+        4.0,
+        Look(PAGE, 0.4, fill=_ITEMS[0], cad_colour=140),
+        named="",
+    )
+    STAND_OFF: Final = FeatureKind(
+        "stand_off", "stand-off", 4.8, Look(INK, 1.4, dashed=True, cad_colour=7), named=""
+    )
+    GAUGE: Final = FeatureKind(
+        "gauge", "gauge", 4.9, Look(_GAUGE, 1.6, sign="ring", cad_colour=200)
+    )
+    CHARGE: Final = FeatureKind("charge", "charge", 5.0, Look(EXPLOSIVE, 2.2, cad_colour=1))
+
+
+STANDING: Final = (Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE, Kinds.BARRIER)
+"""What stands on the ground and has a height."""
+
+SITE_KINDS: Final = tuple(each for each in vars(Kinds).values() if isinstance(each, FeatureKind))
+"""All kinds, the lowest first."""
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One thing on the site.
+
+    Attributes:
+        kind: What it is.
+        places_m: One place of a point, two of a line, more of an area: its corners,
+            counterclockwise, those of a rectangle from the lower left one.
+        name: For people: a structure's name, the reason of a keep-out, a module's identifier.
+        properties: What else there is to say; plain values, units in the keys.
+        words: What legends call it, where that is more than its kind.
+        label: What pictures write beside it.
+        fill: The colour of its area, where things of its kind differ.
+    """
+
+    kind: FeatureKind
+    places_m: tuple[PointM, ...]
+    name: str
+    properties: Mapping[str, str | float | bool] = field(default_factory=dict)
+    words: str = ""
+    label: str = ""
+    fill: Colour | None = None
+
+    @property
+    def title(self) -> str:
+        """What legends call it."""
+        return self.words or self.kind.words
+
+    @property
+    def colour(self) -> Colour | None:
+        """The colour of its area."""
+        return self.fill or self.kind.look.fill
+
+    @property
+    def bounds_m(self) -> Rectangle:
+        """The smallest rectangle around it."""
+        x, y = zip(*self.places_m, strict=True)
+        return Rectangle(min(x), min(y), max(x), max(y))
+
+    @property
+    def above_ground_m(self) -> float:
+        """How high above the ground a place is."""
+        height_m = self.properties.get("above_ground_m", 0.0)
+        assert isinstance(height_m, float)
+        return height_m
+
+
+def site_features(
+    scenario: Scenario, layout: Sequence[Element] = (), charge: Charge | None = None
+) -> tuple[Feature, ...]:
+    """Return everything that a scenario and a layout put on the site, the lowest first.
+
+    Args:
+        scenario: The scenario.
+        layout: What stands on the build zone; it must fit there.
+        charge: The charge, where it is known.
+    """
+    zone = scenario.build_zone
+    found = [area_feature(Kinds.SITE, scenario.site.rectangle_m, scenario.name)]
+    if zone is not None:
+        found += zone_features(zone, [each.rectangle_m for each in scenario.structures])
+        found += barrier_features(zone, layout)
+    found += structure_features(scenario.structures)
+    found += source_features(scenario.charge)
+    if charge is not None:
+        found.append(charge_feature(charge, f"charge of {charge.tnt_kg:g} kg TNT"))
+    for gauge in scenario.gauges:
+        x_m, y_m, z_m = gauge.position_m
+        above = {"above_ground_m": z_m}
+        place = (rounded_m(x_m, y_m),)
+        found.append(Feature(Kinds.GAUGE, place, gauge.name, above, label=gauge.name))
+    return in_order(found)
+
+
+def blast_features(
+    scenario: Scenario, layout: Sequence[Element], charge: Charge
+) -> tuple[Feature, ...]:
+    """Return what is on the site of a blast: its charge alone, not where others may be."""
+    return without(site_features(scenario, layout, charge), Kinds.CHARGE_PLACE)
+
+
+def in_order(features: Iterable[Feature]) -> tuple[Feature, ...]:
+    """Return features so that what lies on top comes last."""
+    return tuple(sorted(features, key=lambda each: each.kind.level))
+
+
+def without(features: Iterable[Feature], *kinds: FeatureKind) -> tuple[Feature, ...]:
+    """Return the features that are of other kinds."""
+    return tuple(each for each in features if each.kind not in kinds)
+
+
+def without_counts(features: Iterable[Feature]) -> tuple[Feature, ...]:
+    """Return features whose legends do not count pieces, for pictures of several layouts."""
+    return tuple(replace(each, words=each.words.split(":")[0]) for each in features)
+
+
+def area_feature(
+    kind: FeatureKind, rectangle_m: Rectangle, name: str, **properties: str | float | bool
+) -> Feature:
+    """Return a rectangle as a feature."""
+    left, bottom, right, top = rectangle_m
+    corners = ((left, bottom), (right, bottom), (right, top), (left, top))
+    return Feature(kind, tuple(rounded_m(x, y) for x, y in corners), name, properties)
+
+
+def charge_feature(charge: Charge, name: str, label: str = "") -> Feature:
+    """Return a charge at its place."""
+    said = {"tnt_kg": charge.tnt_kg, "above_ground_m": charge.height_m}
+    return Feature(Kinds.CHARGE, (rounded_m(*charge.position_m),), name, said, label=label)
+
+
+# The build zone.
+
+
+def zone_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> list[Feature]:
+    """Return the build zone and every condition of it that has a place.
+
+    Args:
+        zone: The build zone.
+        structures_m: What stands on the site; the access way is drawn where nothing does.
+    """
+    conditions: dict[str, str | float] = {"stock": zone.stock, "clearance_m": zone.clearance_m}
+    if zone.items:
+        conditions["items"] = ", ".join(f"{item.stock} {item.name}" for item in zone.items)
+    else:
+        conditions["module_cost"] = zone.module_cost
+    if zone.budget is not None:
+        conditions["budget"] = zone.budget
+    if zone.access_way is not None:
+        conditions["access_way"] = zone.access_way.description
+    found = [area_feature(Kinds.BUILD_ZONE, zone.rectangle_m, "build zone", **conditions)]
+    for area in zone.cost_areas:
+        costs = area.model_dump(include={"module_cost", "cost_factor"}, exclude_none=True)
+        found.append(area_feature(Kinds.COST_AREA, area.rectangle_m, area.reason, **costs))
+    found += (
+        area_feature(Kinds.KEEP_OUT, each.rectangle_m, each.reason) for each in zone.keep_outs
+    )
+    return [*found, *_way_features(zone, structures_m)]
+
+
+def _way_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> Iterator[Feature]:
+    """Yield the access way of a zone and its gate.
+
+    Where the way runs is left open; its arrow is where no structure stands, or through the gate.
+    """
+    way = zone.access_way
+    if way is None:
+        return
+    left, bottom, right, top = zone.rectangle_m
+    places = [
+        (left + share * (right - left), bottom + share * (top - bottom)) for share in _WAY_PLACES
+    ]
+    if way.gate is not None:
+        yield area_feature(Kinds.GATE, way.gate.rectangle_m, "gate of the access way")
+        places = [way.gate.rectangle_m.centre]
+    arrows = [
+        ((left, y), (right, y)) if way.between == "left_right" else ((x, bottom), (x, top))
+        for x, y in places
+    ]
+    free = (ends for ends in arrows if not any(each.meets_segment(*ends) for each in structures_m))
+    ends = next(free, arrows[0])
+    yield Feature(Kinds.ACCESS_WAY, tuple(rounded_m(*end) for end in ends), way.description)
+
+
+def item_colours(zone: BuildZone | None) -> Mapping[str, Colour]:
+    """Return the colour of each item of a catalogue, and of single modules under no name."""
+    names = [""] if zone is None or not zone.items else [item.name for item in zone.items]
+    colours: dict[str, Colour] = {}
+    for number, name in enumerate(names):
+        darker = _DARKER ** (number // len(_ITEMS))
+        red, green, blue = (round(darker * part) for part in _ITEMS[number % len(_ITEMS)])
+        colours[name] = (red, green, blue)
+    return MappingProxyType(colours)
+
+
+def item_words(zone: BuildZone, layout: Sequence[Element]) -> Mapping[str, str]:
+    """Return what legends call each item: with its height, and how many of the stock stand."""
+    placed = Counter(each.item if isinstance(each, Piece) else "" for each in layout)
+    heights = {item.name: f"{item.height_m:g} m" for item in zone.items}
+    stocks = {item.name: item.stock for item in zone.items}
+    if not zone.items:
+        height_m = zone.height_m
+        heights[""] = "as high as the air" if height_m is None else f"{height_m:g} m"
+        stocks[""] = zone.stock
+    return {
+        name: f"{name or 'barrier module'}, {height}: {placed[name]} of {stocks[name]}"
+        for name, height in heights.items()
+    }
+
+
+def barrier_features(zone: BuildZone, layout: Sequence[Element]) -> Iterator[Feature]:
+    """Yield the modules of a layout, or its pieces as wholes, with the names of the tables."""
+    colours, words = item_colours(zone), item_words(zone, layout)
+    if zone.items:
+        items = {item.name: item for item in zone.items}
+        for piece in layout:
+            assert isinstance(piece, Piece)
+            item = items[piece.item]
+            feature = area_feature(
+                Kinds.BARRIER,
+                zone.element_rectangle_m(piece),
+                zone.piece_name(piece),
+                **piece._asdict(),
+                height_m=item.height_m,
+                unit_cost=item.cost,
+                stops_vehicles=item.stops_vehicles,
+            )
+            yield replace(feature, fill=colours[piece.item], words=words[piece.item])
+        return
+    height = {} if zone.height_m is None else {"height_m": zone.height_m}
+    for part in barrier_outline(zone, tuple(layout)).build().parts:
+        rectangle_m = zone.element_rectangle_m((part.row, part.column))
+        cell = {"row": part.row, "column": part.column}
+        feature = area_feature(Kinds.BARRIER, rectangle_m, part.module_id, **cell, **height)
+        yield replace(feature, fill=colours[""], words=words[""])
+
+
+# Structures and charges.
+
+
+def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
+    """Yield the structures; of a building in several parts the largest one has the label."""
+    buildings: dict[str, list[AnyStructure]] = {}
+    for structure in structures:
+        buildings.setdefault(structure.building or structure.name, []).append(structure)
+    for name, parts in buildings.items():
+        largest = max(parts, key=lambda each: each.rows * each.columns)
+        heights = [each.height_m for each in parts if each.height_m is not None]
+        label = f"{name}\n{max(heights):g} m" if len(heights) == len(parts) else name
+        for part in parts:
+            kind = Kinds.PROTECTED_STRUCTURE if part.protected else Kinds.STRUCTURE
+            outline = area_feature(kind, part.rectangle_m, part.name, **_said_of(part))
+            yield replace(outline, label=label if part is largest else "")
+
+
+def _said_of(structure: AnyStructure) -> dict[str, str | float]:
+    """Return what there is to say of a structure beside its name."""
+    said: dict[str, str | float] = {"weight": structure.weight}
+    if structure.height_m is not None:
+        said["height_m"] = structure.height_m
+    if structure.building is not None:
+        said["building"] = structure.building
+    return said
+
+
+def source_features(sources: Iterable[AnySource]) -> Iterator[Feature]:
+    """Yield where charges may be: points, lines or areas, or the entries of vehicles."""
+    for number, source in enumerate(sources, start=1):
+        yield from _places_of(source, number)
+
+
+def _places_of(source: AnySource, number: int) -> Iterator[Feature]:
+    name = f"charge of {source.tnt_kg:g} kg TNT may be here"
+    raised = f", {source.height_m:g} m up" if source.height_m > 0.0 else ""
+    said: dict[str, str | float | bool] = {"tnt_kg": source.tnt_kg, "weight": source.weight}
+    said |= {"above_ground_m": source.height_m}
+    label, words, kind = f"charge {number}: {source.tnt_kg:g} kg{raised}", "", Kinds.CHARGE_PLACE
+    if isinstance(source, RectangleSource):
+        area, words = area_feature(kind, source.rectangle_m, name), "area in which a charge may be"
+        yield Feature(kind, area.places_m, name, said, words, label)
+        return
+    if isinstance(source, VehicleSource):
+        name, words = f"vehicle with {source.tnt_kg:g} kg TNT enters here", "entry of a vehicle"
+        label = f"vehicle {number}: {source.tnt_kg:g} kg{raised}"
+        said |= {"width_m": source.width_m}
+    elif not isinstance(source, PointSource):
+        words = "road on which a charge may be"
+    for ends_m in source.lines_m:
+        line_m = ends_m[:1] if isinstance(source, PointSource) else ends_m
+        yield Feature(kind, tuple(rounded_m(*end) for end in line_m), name, said, words, label)
+        label = ""  # once for all entries
+
+
+# Vehicles: what follows from a layout rather than from the scenario.
+
+
+def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tuple[Feature, ...]:
+    """Return the ground that vehicles reach, their worst places, and the stand-off that is left.
+
+    The stand-off is the line from the vehicle's worst place to the nearest wall that counts, with
+    its length in metres.
+
+    Args:
+        scenario: The scenario; without a vehicle there is nothing.
+        layout: What stands on the build zone.
+    """
+    found: list[Feature] = []
+    for source in scenario.vehicles:
+        ground = vehicle_reach(scenario, source, layout).ground(*squares_of(scenario.site))
+        found += (
+            area_feature(Kinds.REACHED, each, Kinds.REACHED.words) for each in rectangles_of(ground)
+        )
+        place_m = worst_places(scenario, source, layout).places_m[0]
+        wall_m = nearest_point_m(scenario.structures, place_m)
+        length = f"stand-off {np.hypot(*np.subtract(place_m, wall_m)):.1f} m"
+        found.append(Feature(Kinds.STAND_OFF, (place_m, wall_m), "stand-off", label=length))
+        said = {"tnt_kg": source.tnt_kg, "above_ground_m": source.height_m}
+        words = "worst place of a vehicle"
+        found.append(Feature(Kinds.CHARGE, (place_m,), words, said, words))
+    return in_order(found)
+
+
+def stand_off_text(scenario: Scenario, layout: Sequence[Element]) -> str:
+    """Return how near vehicles come with a layout and without, in words; empty without any."""
+    if not scenario.vehicles:
+        return ""
+    with_layout, bare = (
+        min(worst_places(scenario, source, each).stand_off_m for source in scenario.vehicles)
+        for each in (layout, ())
+    )
+    if not layout:
+        return f"stand-off {bare:.1f} m"
+    return f"stand-off {with_layout:.1f} m, {bare:.1f} m without the barrier"
+
+
+def rectangles_of(
+    squares: BoolArray, corner_m: PointM = (0.0, 0.0), side_m: float = MODULE_SIDE_M
+) -> list[Rectangle]:
+    """Return few rectangles that cover squares of a grid, and nothing else.
+
+    Args:
+        squares: Which squares (rows, columns), the lowest row first.
+        corner_m: Lower left corner of the grid.
+        side_m: Side of a square.
+    """
+    found: list[Rectangle] = []
+    growing: dict[tuple[int, int], int] = {}
+    for row in range(len(squares) + 1):
+        runs = _runs(squares[row]) if row < len(squares) else []
+        for run, first in [*growing.items()]:
+            if run not in runs:
+                box = Rectangle(run[0], first, run[1], row).scaled(side_m)
+                x, y = corner_m
+                found.append(Rectangle(box[0] + x, box[1] + y, box[2] + x, box[3] + y))
+                del growing[run]
+        for run in runs:
+            growing.setdefault(run, row)
+    return found
+
+
+def _runs(row: BoolArray) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], row, [False])).astype(np.int8)))
+    return [(int(edges[k]), int(edges[k + 1])) for k in range(0, len(edges), 2)]
+
+
+def rounded_m(x_m: float, y_m: float) -> PointM:
+    """Return a place without what is but rounding."""
+    return round(x_m, _DIGITS), round(y_m, _DIGITS)
