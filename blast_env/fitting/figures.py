@@ -16,8 +16,9 @@ from blast_env.calibration import (
 from blast_env.calibration.model import SimulatedQuantity
 from blast_env.fitting.free_field import CalibrationReport
 from blast_env.fitting.paper import PAPER_LAWS
+from blast_env.plan import INK
 from blast_env.rendering.site_plan import write_heading
-from blast_env.rendering.style import INK, number_on_axis, render_extra, unit_interval
+from blast_env.rendering.style import number_on_axis, render_extra, unit_interval
 from blast_env.units import PA_PER_PSI
 
 with render_extra():
