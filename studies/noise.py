@@ -118,7 +118,7 @@ def reward(
 def _impulses(
     evaluator: BlastEvaluator, layouts: list[Layout], draws: tuple[int, int], processes: int
 ) -> FloatArray:
-    """Return the impulse on the protected structures, psi*s (layouts, charges, seeds)."""
+    """Return the impulse on the protected structures, Pa*s (layouts, charges, seeds)."""
     charge_rng = np.random.default_rng(1)
     charges = [evaluator.scenario.sample_charge(charge_rng) for _ in range(draws[0])]
     threats = [
@@ -128,7 +128,7 @@ def _impulses(
     ]
     with progress_bar(evaluator.scenario.name) as progress:
         loads = evaluator.loads_of_many(product(layouts, threats), processes, progress)
-    impulses = np.array([each.protected_impulse_psi_s for each in loads])
+    impulses = np.array([each.protected_impulse_pa_s for each in loads])
     return impulses.reshape(len(layouts), *draws)
 
 

@@ -18,7 +18,7 @@ from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.statistics import reductions
-from blast_env.units import PA_PER_KPA, PA_PER_PSI
+from blast_env.units import PA_PER_KPA
 
 RECORD: Final = "record.json"
 """Name of the file in the folder of a blast; it is there when all of it is."""
@@ -237,13 +237,9 @@ class Judge:
             return sum(self.counted(record, each) for each in record.loads if each.structure in own)
         structure = next(each for each in self.scenario.structures if each.name == load.structure)
         peak_pa = PA_PER_KPA * load.peak_kpa if self.objective.needs_peaks else 0.0
-        counted = self.objective.counted(
-            load.impulse_pa_s / PA_PER_PSI,
-            peak_pa,
-            structure.weight,
-            structure.counted_peak_weight,
+        return self.objective.load(
+            load.impulse_pa_s, peak_pa, structure.weight, structure.counted_peak_weight
         )
-        return self.objective.in_si(counted)
 
     def together(self, record: BlastRecord) -> float:
         """Return the load that counts of all protected structures."""

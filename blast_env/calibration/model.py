@@ -44,19 +44,19 @@ class ScaledImpulse(NamedTuple):
     """A simulated impulse in the units of the reference.
 
     Attributes:
-        psi_s: Impulse per area, psi*s.
+        pa_s: Impulse per area, Pa*s.
         in_range: Whether the calibration was made for a case like this one.
         notes: Why not, a sentence each.
     """
 
-    psi_s: float
+    pa_s: float
     in_range: bool
     notes: tuple[str, ...]
 
     @property
-    def pa_s(self) -> float:
-        """Impulse per area, Pa*s."""
-        return self.psi_s * PA_PER_PSI
+    def psi_s(self) -> float:
+        """Impulse per area in the paper's unit, psi*s."""
+        return self.pa_s / PA_PER_PSI
 
 
 Amount = Annotated[float, Field(ge=0.0)]
@@ -222,7 +222,7 @@ class Calibration(Section):
                 f"{low_kg:g} kg" if low_kg == high_kg else f"between {low_kg:g} and {high_kg:g} kg"
             )
             notes.append(f"charge {tnt_kg:g} kg TNT is not {bounds}")
-        return ScaledImpulse(psi_s, not notes, tuple(notes))
+        return ScaledImpulse(psi_s * PA_PER_PSI, not notes, tuple(notes))
 
     def convert_load(self, obstacle: ModularObstacle, charge: Charge) -> ScaledImpulse:
         """Convert the load on a structure; see `convert`.

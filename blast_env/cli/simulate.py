@@ -487,7 +487,7 @@ def _scaled(result: "BlastResult | GasResult", name: str) -> dict[str, Any]:
         impulse = result.impulse(name)
     except BlastEnvError as error:
         return {"error": str(error)}
-    return {**impulse._asdict(), "pa_s": impulse.pa_s}
+    return {**impulse._asdict(), "psi_s": impulse.psi_s}
 
 
 def _pa_s_text(scaled: Mapping[str, Any]) -> str:

@@ -11,10 +11,10 @@ from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.calibration.model import ScaledImpulse
@@ -23,26 +23,26 @@ from blast_env.engines.loads import BlastLoads, StructureLoad
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Element, layout_text
 from blast_env.physics.engine import EndReason
-from blast_env.physics.gas.engine import (
+from blast_env.physics.gas.settings import (
     CHECKED_SCALED_DISTANCE,
     FACE_NAMES,
     ROOF,
-    GasRun,
     GasSettings,
-    Recorders,
-    scaled_distance,
 )
-from blast_env.physics.gas.probes import LoadTable
 from blast_env.physics.scene import BlastSite
 from blast_env.physics.structure import module_name
 from blast_env.provenance import versions
-from blast_env.recording.excel import SheetTable, write_tables
-from blast_env.recording.parquet import write_table
-from blast_env.recording.tables import RunRecord
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.scenario.build_scene import build_site, draw_threat
 from blast_env.tables import Column, as_types, table_of, texts
-from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+
+if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
+    import pandas as pd
+
+    from blast_env.physics.gas.engine import GasRun, Recorders
+    from blast_env.physics.gas.probes import LoadTable
+    from blast_env.recording.tables import RunRecord
 
 _PROGRESS_CALLS: Final = 100
 
@@ -123,7 +123,7 @@ class GasEngine(GasSettings, Engine):
     name: str = "gas"
     version: str = f"gas 3 (numba {version('numba')})"
 
-    def start_on(self, site: BlastSite, recorders: Recorders = lambda _: ()) -> GasRun:
+    def start_on(self, site: BlastSite, recorders: "Recorders" = lambda _: ()) -> "GasRun":
         """Return a run at time 0, independent of every other run.
 
         Args:
@@ -134,6 +134,8 @@ class GasEngine(GasSettings, Engine):
             BlastEnvError: If the grid would not fit into memory, or the charge or a gauge is in a
                 solid.
         """
+        from blast_env.physics.gas.engine import GasRun  # Numba takes half a second to import
+
         return GasRun(self, site, recorders)
 
     def blast(
@@ -193,7 +195,7 @@ class GasBlast:
     def run(
         self,
         progress: Callable[[float], None] | None = None,
-        recorders: Recorders = lambda _: (),
+        recorders: "Recorders" = lambda _: (),
     ) -> "GasResult":
         """Run the blast to its end.
 
@@ -220,7 +222,7 @@ class GasResult:
     """
 
     blast: GasBlast
-    run: GasRun
+    run: "GasRun"
 
     @property
     def engine_name(self) -> str:
@@ -248,7 +250,7 @@ class GasResult:
         return self.run.steps
 
     @property
-    def collisions(self) -> pd.DataFrame:
+    def collisions(self) -> "pd.DataFrame":
         """There are none: a gas has no particles that collide.
 
         Raises:
@@ -259,8 +261,10 @@ class GasResult:
         )
 
     @cached_property
-    def faces(self) -> pd.DataFrame:
+    def faces(self) -> "pd.DataFrame":
         """One row a face of a cell, structures and barrier; see `FACE_COLUMNS`."""
+        import pandas as pd  # it takes a third of a second
+
         table = self.run.table
         outlines = self.run.site.structures
         names = np.array([outline.name for outline in outlines], dtype=object)
@@ -280,7 +284,7 @@ class GasResult:
         return as_types(frame, {"structure": "str", "face": "str", "module_id": "str"})
 
     @cached_property
-    def modules(self) -> pd.DataFrame:
+    def modules(self) -> "pd.DataFrame":
         """One row a face of a module that touches air; see `MODULE_COLUMNS`."""
         keys = ["structure", "module_id", "row", "column", "face"]
         groups = self.faces.groupby(keys, sort=False, observed=True)
@@ -303,7 +307,7 @@ class GasResult:
         return table[[column.name for column in MODULE_COLUMNS]]
 
     @cached_property
-    def structures(self) -> pd.DataFrame:
+    def structures(self) -> "pd.DataFrame":
         """One row a structure; see `STRUCTURE_COLUMNS`."""
         rows = []
         for outline in self.run.site.structures:
@@ -335,8 +339,10 @@ class GasResult:
         return table_of(rows, STRUCTURE_COLUMNS)
 
     @cached_property
-    def gauges(self) -> pd.DataFrame:
+    def gauges(self) -> "pd.DataFrame":
         """One row a gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
+        import pandas as pd  # it takes a third of a second
+
         gauges, names = self.run.gauges, [each.name for each in self.run.site.gauges]
         if gauges is None:
             return table_of([], GAUGE_COLUMNS)
@@ -346,12 +352,14 @@ class GasResult:
         frame[["x_m", "y_m", "z_m"]] = centres
         return frame[[column.name for column in GAUGE_COLUMNS]]
 
-    def history(self, gauge: str) -> pd.DataFrame:
+    def history(self, gauge: str) -> "pd.DataFrame":
         """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`.
 
         Raises:
             UnknownNameError: If there is no gauge of that name.
         """
+        import pandas as pd  # it takes a third of a second
+
         names = [each.name for each in self.run.site.gauges]
         if gauge not in names or self.run.gauges is None:
             raise UnknownNameError("gauge", gauge, names)
@@ -371,34 +379,48 @@ class GasResult:
         Raises:
             UnknownNameError: If there is no structure of that name.
         """
-        table = self.structures.set_index("structure")
-        if structure not in table.index:
-            raise UnknownNameError("structure", structure, table.index)
-        notes = self._notes(structure)
-        pa_s = float(table["positive_impulse_pa_s"].loc[structure])
-        return ScaledImpulse(pa_s / PA_PER_PSI, not notes, notes)
+        names = [each.name for each in self.run.site.structures if each.cells is None]
+        if structure not in names:
+            raise UnknownNameError("structure", structure, names)
+        return self._scaled(names.index(structure))
 
     def loads(self) -> BlastLoads:
         """Return the loads on all structures; gas has no simulation units (NaN)."""
-        sections = {each.name: each for each in self.blast.scenario.structures}
+        peak_weights = {
+            each.name: each.counted_peak_weight for each in self.blast.scenario.structures
+        }
         loads = []
-        for row in self.structures.to_dict("records"):
-            scaled = self.impulse(row["structure"])
-            loads.append(
-                StructureLoad(
-                    name=row["structure"],
-                    protected=row["protected"],
-                    weight=row["weight"],
-                    impulse_sim=np.nan,
-                    transferred_impulse_sim=np.nan,
-                    impulse_psi_s=scaled.psi_s,
-                    peak_pa=float(row["peak_pa"]),
-                    peak_weight=sections[row["structure"]].counted_peak_weight,
-                    in_range=scaled.in_range,
-                    notes=scaled.notes,
+        for index, outline in enumerate(self.run.site.structures):
+            if outline.cells is None:
+                scaled = self._scaled(index)
+                loads.append(
+                    StructureLoad(
+                        name=outline.name,
+                        protected=outline.protected,
+                        weight=outline.weight,
+                        impulse_sim=np.nan,
+                        transferred_impulse_sim=np.nan,
+                        impulse_pa_s=scaled.pa_s,
+                        peak_pa=float(self.run.loads.peak_pa[self._walls(index)].max(initial=0.0)),
+                        peak_weight=peak_weights[outline.name],
+                        in_range=scaled.in_range,
+                        notes=scaled.notes,
+                    )
                 )
-            )
         return BlastLoads(tuple(loads), self.module_impulse_n_s)
+
+    def _walls(self, index: int) -> NDArray[np.int64]:
+        """Return the faces of the walls of a structure whose load counts (n,)."""
+        table = self.run.table
+        counting = [FACE_NAMES.index(name) for name in self.run.site.structures[index].faces]
+        return np.flatnonzero((table.structure == index) & np.isin(table.face, counting))
+
+    def _scaled(self, index: int) -> ScaledImpulse:
+        """Return the impulse on a structure, by its index into those of the site."""
+        on_walls = self.run.loads.positive_impulse_pa_s[self._walls(index)]
+        notes = self._notes(index)
+        pa_s = float(on_walls.mean()) if len(on_walls) else np.nan
+        return ScaledImpulse(pa_s, not notes, notes)
 
     @cached_property
     def module_impulse_n_s(self) -> FloatArray:
@@ -406,16 +428,14 @@ class GasResult:
 
         In the order of the structures, row by row.
         """
-        sums = []
-        for outline in self.run.site.structures:
+        table, sums = self.run.table, []
+        for index, outline in enumerate(self.run.site.structures):
             if outline.cells is None:
-                own = self.faces[
-                    (self.faces["structure"] == outline.name) & (self.faces["face"] != ROOF)
-                ]
-                loads = np.zeros((outline.rows, outline.columns))
-                values = own["positive_impulse_pa_s"].to_numpy() * self._cell_area_m2
-                np.add.at(loads, (own["row"].to_numpy(), own["column"].to_numpy()), values)
-                sums.append(loads.ravel())
+                own = (table.structure == index) & (table.face != FACE_NAMES.index(ROOF))
+                momentum = np.zeros((outline.rows, outline.columns))
+                values = self.run.loads.positive_impulse_pa_s[own] * self._cell_area_m2
+                np.add.at(momentum, (table.row[own], table.column[own]), values)
+                sums.append(momentum.ravel())
         return np.concatenate(sums) if sums else np.zeros(0)
 
     @cached_property
@@ -430,7 +450,7 @@ class GasResult:
         return state.hexdigest()
 
     @cached_property
-    def run_record(self) -> RunRecord:
+    def run_record(self) -> "RunRecord":
         """Everything needed to repeat the run: what was run, with which versions."""
         blast, charge, known = self.blast, self.run.site.charge, versions(self.engine_version)
         return {
@@ -467,6 +487,8 @@ class GasResult:
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
+        from blast_env.recording.excel import SheetTable, write_tables
+
         tables = (
             SheetTable("Structures", self.structures, STRUCTURE_COLUMNS),
             SheetTable("Modules", self.modules, MODULE_COLUMNS),
@@ -483,6 +505,8 @@ class GasResult:
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
+        from blast_env.recording.parquet import write_table
+
         faces = self.faces[[column.name for column in FACE_COLUMNS]]
         return write_table(faces, FACE_COLUMNS, self.run_record, path)
 
@@ -506,11 +530,12 @@ class GasResult:
         gauges = self.run.gauges
         return [] if gauges is None else [tuple(cell) for cell in gauges.cells]
 
-    def _notes(self, structure: str) -> tuple[str, ...]:
+    def _notes(self, index: int) -> tuple[str, ...]:
+        from blast_env.physics.gas.engine import scaled_distance  # the run has imported it
+
         notes = list(self.run.notes)
-        (outline,) = (each for each in self.run.site.structures if each.name == structure)
         low, high = CHECKED_SCALED_DISTANCE
-        scaled = scaled_distance(self.run.site, outline)
+        scaled = scaled_distance(self.run.site, self.run.site.structures[index])
         if not low <= scaled <= high:
             notes.append(
                 f"scaled distance {scaled:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
@@ -522,7 +547,7 @@ class GasResult:
         return tuple(notes)
 
 
-def _columns(loads: LoadTable) -> dict[str, FloatArray]:
+def _columns(loads: "LoadTable") -> dict[str, FloatArray]:
     return {
         "positive_impulse_pa_s": loads.positive_impulse_pa_s,
         "first_impulse_pa_s": loads.first_impulse_pa_s,
@@ -532,7 +557,7 @@ def _columns(loads: LoadTable) -> dict[str, FloatArray]:
     }
 
 
-def _means(groups: Any, area_m2: float) -> pd.DataFrame:
+def _means(groups: Any, area_m2: float) -> "pd.DataFrame":
     """Return impulses as means, peaks as the largest, arrivals as the first of each group."""
     table: pd.DataFrame = groups.agg(
         positive_impulse_pa_s=("positive_impulse_pa_s", "mean"),

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.scenario import AnyScenario, ObjectiveSection, find_scenario
-from blast_env.units import PA_PER_PSI
 
 
 @dataclass(frozen=True)
@@ -19,7 +18,7 @@ class StructureLoad:
         weight: How much it counts among the protected structures.
         impulse_sim: Sum of m |v| over the collisions, simulation units.
         transferred_impulse_sim: Momentum really transferred, simulation units.
-        impulse_psi_s: Calibrated impulse per area, psi*s.
+        impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s.
         peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which know none.
         peak_weight: How much that counts among the protected structures.
         in_range: Whether the calibration was made for this distance and charge.
@@ -31,16 +30,11 @@ class StructureLoad:
     weight: float
     impulse_sim: float
     transferred_impulse_sim: float
-    impulse_psi_s: float
+    impulse_pa_s: float
     peak_pa: float | None
     peak_weight: float
     in_range: bool
     notes: tuple[str, ...]
-
-    @property
-    def impulse_pa_s(self) -> float:
-        """Calibrated impulse per area, Pa*s."""
-        return self.impulse_psi_s * PA_PER_PSI
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +55,7 @@ class BlastLoads:
         structures = find_scenario(scenario).structures
         names = [structure.name for structure in structures]
         modules = sum(structure.rows * structure.columns for structure in structures)
-        impulses = np.array([load.impulse_psi_s for load in self.structures])
+        impulses = np.array([load.impulse_pa_s for load in self.structures])
         return (
             [load.name for load in self.structures] == names
             and self.module_impulse_sim.shape == (modules,)
@@ -74,14 +68,9 @@ class BlastLoads:
         return tuple(load for load in self.structures if load.protected)
 
     @property
-    def protected_impulse_psi_s(self) -> float:
-        """Calibrated impulses of the protected structures, by weight, added up, psi*s."""
-        return sum(load.weight * load.impulse_psi_s for load in self.protected)
-
-    @property
     def protected_impulse_pa_s(self) -> float:
-        """Calibrated impulses of the protected structures, by weight, added up, Pa*s."""
-        return self.protected_impulse_psi_s * PA_PER_PSI
+        """Impulses of the protected structures, by weight, added up, Pa*s."""
+        return sum(load.weight * load.impulse_pa_s for load in self.protected)
 
     @property
     def protected_impulse_sim(self) -> float:
@@ -94,22 +83,16 @@ class BlastLoads:
         peaks = [load.peak_pa for load in self.protected]
         return max((np.nan if peak is None else peak for peak in peaks), default=0.0)
 
-    def counted(self, objective: ObjectiveSection) -> float:
-        """Return the load of the protected structures as rewards are paid: psi s, psi or no unit.
+    def load(self, objective: ObjectiveSection) -> float:
+        """Return the load of the protected structures in the unit of the objective.
 
         Args:
             objective: Says which load counts.
         """
         return sum(
-            objective.counted(
-                load.impulse_psi_s, load.peak_pa or 0.0, load.weight, load.peak_weight
-            )
+            objective.load(load.impulse_pa_s, load.peak_pa or 0.0, load.weight, load.peak_weight)
             for load in self.protected
         )
-
-    def load(self, objective: ObjectiveSection) -> float:
-        """Return the load of the protected structures in the unit of the objective."""
-        return objective.in_si(self.counted(objective))
 
     @property
     def in_range(self) -> bool:

@@ -360,7 +360,7 @@ class BlastResult:
         if self.end_reason is not EndReason.EVENT_LIMIT:
             return scaled
         notes = (*scaled.notes, f"the blast was cut off: {self.end_reason}")
-        return ScaledImpulse(scaled.psi_s, False, notes)
+        return ScaledImpulse(scaled.pa_s, False, notes)
 
     def loads(self, calibration: Calibration | None = None) -> BlastLoads:
         """Return the loads on all structures.
@@ -384,7 +384,7 @@ class BlastResult:
             weight=obstacle.weight,
             impulse_sim=obstacle.impulse,
             transferred_impulse_sim=obstacle.transferred_impulse,
-            impulse_psi_s=scaled.psi_s,
+            impulse_pa_s=scaled.pa_s,
             peak_pa=None,
             peak_weight=obstacle.weight,
             in_range=scaled.in_range,

@@ -259,7 +259,7 @@ def _outcome(episode: Episode) -> str:
     load = f"{protected.impulse_psi_s:.3g} psi s ({protected.impulse_pa_s:.3g} Pa s)"
     counts = episode.objective.case.scenario.objective
     if counts.needs_peaks:
-        load = f"{load}, {counts.noun} {counts.text(counts.in_si(protected.counted))}"
+        load = f"{load}, {counts.noun} {counts.text(protected.load)}"
     return f"{of_all}{load}, reduction {reduction_percent:.0f} %"
 
 

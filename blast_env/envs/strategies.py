@@ -231,12 +231,12 @@ class TerminalReward:
 
         The load's is named `impulse` (psi s), `peak` (psi) or `load` (both, without a unit).
         """
-        assess = transition.objective.assess
+        paid = transition.objective.paid
         load = deposit = 0.0
         if transition.begins != transition.ended:
-            deposit = DEPOSIT * assess(()).counted
+            deposit = DEPOSIT * paid(())
         if transition.ended:
-            load = -assess(transition.after).counted
+            load = -paid(transition.after)
         return {transition.term: load, "deposit": deposit if transition.ended else -deposit}
 
 
@@ -254,11 +254,11 @@ class IncrementalReward:
     def __call__(self, transition: Transition) -> Mapping[str, float]:
         """Return the term of the load, named as by `TerminalReward`."""
         load = 0.0
-        assess = transition.objective.assess
+        paid = transition.objective.paid
         if transition.after != transition.before:
-            load += assess(transition.before).counted - assess(transition.after).counted
+            load += paid(transition.before) - paid(transition.after)
         if transition.begins:
-            load -= assess(transition.initial).counted
+            load -= paid(transition.initial)
         return {transition.term: load}
 
 

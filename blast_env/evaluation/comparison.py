@@ -37,29 +37,28 @@ class Assessment:
     Each is the mean over the realisations of a charge, then by the risk measure over the charges.
 
     Attributes:
-        impulse_psi_s: Calibrated impulses per area of the protected structures, by weight, added
-            up, psi*s.
+        impulse_pa_s: Impulses per area of the protected structures, by weight, added up, Pa*s.
         impulse_sim: The same in simulation units.
         peak_pa: The largest overpressure on their walls, Pa; NaN for particles.
-        counted: What the scenario's objective counts, as rewards are paid: psi s for impulses,
-            psi for peaks, without a unit for both.
+        load: What the scenario's objective counts, in its unit: Pa s for impulses, Pa for peaks,
+            without a unit for both.
         in_range: Whether the calibration was made for every one of the blasts.
     """
 
-    impulse_psi_s: float
+    impulse_pa_s: float
     impulse_sim: float
     peak_pa: float
-    counted: float
+    load: float
     in_range: bool
 
     @property
-    def impulse_pa_s(self) -> float:
-        """The calibrated impulse, Pa*s."""
-        return self.impulse_psi_s * PA_PER_PSI
+    def impulse_psi_s(self) -> float:
+        """The impulse in the paper's unit, psi*s."""
+        return self.impulse_pa_s / PA_PER_PSI
 
     def reduction_from(self, unprotected: "Assessment") -> float:
         """Return by which share what counts is below that without a barrier; NaN if that is 0."""
-        return reductions(self.counted, unprotected.counted).item()
+        return reductions(self.load, unprotected.load).item()
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +90,17 @@ class Objective:
             loads, combined = self.loads(key), self.case.combined
             counts = self.case.scenario.objective
             self._assessed[key] = Assessment(
-                impulse_psi_s=combined([each.protected_impulse_psi_s for each in loads]),
+                impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),
                 impulse_sim=combined([each.protected_impulse_sim for each in loads]),
                 peak_pa=combined([each.protected_peak_pa for each in loads]),
-                counted=combined([each.counted(counts) for each in loads]),
+                load=combined([each.load(counts) for each in loads]),
                 in_range=all(each.in_range for each in loads),
             )
         return self._assessed[key]
+
+    def paid(self, layout: Sequence[Element]) -> float:
+        """Return what a layout is worth as rewards are paid: in psi s, psi, or without a unit."""
+        return self.case.scenario.objective.paid(self.assess(layout).load)
 
     def loads(self, layout: Sequence[Element]) -> list[BlastLoads]:
         """Return the loads with a layout, one a threat of the case.

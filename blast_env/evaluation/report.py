@@ -176,9 +176,11 @@ def _structure_row(
         "reduction_high": reduction.high,
         "threats_in_range": sum(load.in_range for load in loads),
     }
-    for name in ("impulse_pa_s", "impulse_psi_s", "impulse_sim", "transferred_impulse_sim"):
+    for name in ("impulse_pa_s", "impulse_sim", "transferred_impulse_sim"):
         for column, each in ((name, loads), (f"unprotected_{name}", bare)):
             row[column] = float(np.mean([getattr(load, name) for load in each]))
+    row["impulse_psi_s"] = float(pa_s.mean()) / PA_PER_PSI
+    row["unprotected_impulse_psi_s"] = float(bare_pa_s.mean()) / PA_PER_PSI
     for column, each in (("peak_pa", loads), ("unprotected_peak_pa", bare)):
         peaks = [np.nan if load.peak_pa is None else load.peak_pa for load in each]
         row[column] = float(np.mean(peaks))

@@ -9,7 +9,7 @@ import numpy as np
 
 from blast_env.engines.gas import GasBlast
 from blast_env.geometry import Layout
-from blast_env.physics.gas.engine import ROOF
+from blast_env.physics.gas.settings import ROOF
 from blast_env.physics.scene import Charge
 from blast_env.plan import (
     INK,

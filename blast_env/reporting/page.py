@@ -15,7 +15,7 @@ import tomli_w
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.geometry import layout_counts, layout_text
-from blast_env.physics.gas.engine import CHECKED_SCALED_DISTANCE
+from blast_env.physics.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.plan import stand_off_text
 from blast_env.provenance import code_version, command, versions
 from blast_env.reporting.figures import (

@@ -104,26 +104,24 @@ class ObjectiveSection(Section):
             return f"{load:.3g}"
         return f"{load:,.0f} {self.unit}"
 
-    def in_si(self, counted: float) -> float:
-        """Return a load in `unit`: one that counts in psi s or psi, as rewards are paid."""
-        return counted if self.quantity == "both" else counted * PA_PER_PSI
+    def paid(self, load: float) -> float:
+        """Return a load, in `unit`, as rewards are paid: in psi s, psi, or without a unit."""
+        return load if self.quantity == "both" else load / PA_PER_PSI
 
-    def counted(
-        self, impulse_psi_s: float, peak_pa: float, weight: float, peak_weight: float
-    ) -> float:
-        """Return the load of one structure as rewards are paid: psi s, psi, or no unit.
+    def load(self, impulse_pa_s: float, peak_pa: float, weight: float, peak_weight: float) -> float:
+        """Return the load of one structure that counts, in `unit`.
 
         Args:
-            impulse_psi_s: Its impulse per area.
+            impulse_pa_s: Its impulse per area.
             peak_pa: Its peak overpressure.
             weight: How much its impulse counts.
             peak_weight: How much its peak counts.
         """
         if self.quantity == "impulse":
-            return weight * impulse_psi_s
+            return weight * impulse_pa_s
         if self.quantity == "peak":
-            return peak_weight * peak_pa / PA_PER_PSI
+            return peak_weight * peak_pa
         assert self.reference_impulse_pa_s is not None
         assert self.reference_peak_pa is not None
-        impulse_share = impulse_psi_s * PA_PER_PSI / self.reference_impulse_pa_s
+        impulse_share = impulse_pa_s / self.reference_impulse_pa_s
         return weight * impulse_share + peak_weight * peak_pa / self.reference_peak_pa

@@ -51,7 +51,7 @@ def test_an_evaluator_finds_the_blasts_of_an_environment(tmp_path: Path) -> None
     threat = Threat(info["charges"][0], info["blast_seeds"][0][0])
     loads = evaluator.loads(info["layout"], threat)
     assert evaluator.blasts == 0
-    assert loads.protected_impulse_psi_s == info["impulse_psi_s"]
+    assert loads.protected_impulse_pa_s == info["impulse_pa_s"]
 
 
 def test_sites_that_the_memory_has_let_go_are_still_in_the_cache(tmp_path: Path) -> None:

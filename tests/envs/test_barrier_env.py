@@ -47,12 +47,12 @@ def test_the_final_information_is_that_of_the_same_blasts_run_by_hand() -> None:
         for layout in (info["layout"], ())
     ]
     impulse, unprotected = (
-        np.mean([loads.protected_impulse_psi_s for loads in each]) for each in by_hand
+        np.mean([loads.protected_impulse_pa_s for loads in each]) for each in by_hand
     )
-    assert info["impulse_psi_s"] == impulse
-    assert info["impulse_pa_s"] == pytest.approx(impulse * PA_PER_PSI)
+    assert info["impulse_pa_s"] == impulse
+    assert info["impulse_psi_s"] == pytest.approx(impulse / PA_PER_PSI)
     assert info["impulse_sim"] == np.mean([loads.protected_impulse_sim for loads in by_hand[0]])
-    assert info["unprotected_impulse_pa_s"] == pytest.approx(unprotected * PA_PER_PSI)
+    assert info["unprotected_impulse_pa_s"] == unprotected
     assert info["reduction"] == pytest.approx(1.0 - impulse / unprotected)
     assert info["scenario_hash"] == scenario.content_hash
     assert info["calibration"] == scenario.calibration
@@ -168,8 +168,8 @@ def test_a_module_earns_what_it_takes_off_the_impulse() -> None:
         info["charges"],
         info["blast_seeds"],
     )
-    before = evaluator.loads([(0, 4)], Threat(charge, seed)).protected_impulse_psi_s
-    assert earned == pytest.approx(before - info["impulse_psi_s"], abs=1e-12)
+    before = evaluator.loads([(0, 4)], Threat(charge, seed)).protected_impulse_pa_s
+    assert PA_PER_PSI * earned == pytest.approx(before - info["impulse_pa_s"], abs=1e-8)
     assert last == 0.0
 
 
@@ -244,12 +244,12 @@ def test_hidden_threats_count_as_their_mean_or_their_worst() -> None:
     for name, arguments in measures.items():
         env = make(threat="hidden", threats=4, **arguments)
         info = play(env, seed=2, blast_seed=10)[-1][4]
-        impulses[name] = info["impulse_psi_s"]
+        impulses[name] = info["impulse_pa_s"]
         assert info["blast_seeds"] == ((10,), (11,), (12,), (13,))
         assert len(set(info["charges"])) > 1
     evaluator = BlastEvaluator(small_scenario(), ThinEngine())
     each = [
-        evaluator.loads(info["layout"], Threat(charge, seed)).protected_impulse_psi_s
+        evaluator.loads(info["layout"], Threat(charge, seed)).protected_impulse_pa_s
         for charge, (seed,) in zip(info["charges"], info["blast_seeds"], strict=True)
     ]
     assert impulses["mean"] == pytest.approx(np.mean(each))

@@ -269,7 +269,7 @@ def test_wrong_content_with_a_right_checksum_counts_as_damaged(
             good, structures=tuple(replace(each, name="x") for each in good.structures)
         ),
         lambda good: replace(
-            good, structures=tuple(replace(each, impulse_psi_s=np.inf) for each in good.structures)
+            good, structures=tuple(replace(each, impulse_pa_s=np.inf) for each in good.structures)
         ),
     ],
 )

@@ -15,7 +15,6 @@ from blast_env.engines import BlastLoads, Engine, StructureLoad, find_engine
 from blast_env.geometry import Element
 from blast_env.scenario import AnyCharge, Scenario
 from blast_env.scenario.build_scene import charge_against
-from blast_env.units import PA_PER_PSI
 
 SURROGATE: Final = "surrogate"
 """Name of the engine that is none."""
@@ -97,7 +96,7 @@ class SurrogateEngine(Engine):
                 weight=each.weight,
                 impulse_sim=np.nan,
                 transferred_impulse_sim=np.nan,
-                impulse_psi_s=load_pa_s / PA_PER_PSI,
+                impulse_pa_s=load_pa_s,
                 peak_pa=on_peak_pa,
                 peak_weight=each.counted_peak_weight,
                 in_range=False,

@@ -18,7 +18,6 @@ from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
-from blast_env.units import PA_PER_PSI
 
 IntArray = NDArray[np.int64]
 
@@ -106,19 +105,18 @@ class Guess(NamedTuple):
     peak_spread: FloatArray | None = None
 
     def loads(self, site: Site) -> FloatArray:
-        """Return the load that counts behind each layout, as rewards are paid (layouts,).
+        """Return the load that counts behind each layout, in the objective's unit (layouts,).
 
         Args:
             site: The site that was guessed.
         """
-        counted, structures = site.scenario.objective.counted, site.protected
-        impulse_psi_s = self.impulse_pa_s / PA_PER_PSI
-        peak_pa = np.zeros_like(impulse_psi_s) if self.peak_pa is None else self.peak_pa
-        both = np.stack((impulse_psi_s, peak_pa), axis=2).tolist()
+        load, structures = site.scenario.objective.load, site.protected
+        peak_pa = np.zeros_like(self.impulse_pa_s) if self.peak_pa is None else self.peak_pa
+        both = np.stack((self.impulse_pa_s, peak_pa), axis=2).tolist()
         return np.array(
             [
                 sum(
-                    counted(impulse, peak, each.weight, each.counted_peak_weight)
+                    load(impulse, peak, each.weight, each.counted_peak_weight)
                     for each, (impulse, peak) in zip(structures, of_layout, strict=True)
                 )
                 for of_layout in both

@@ -8,7 +8,7 @@ loads on the structures are complete.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import cbrt, ceil, hypot, inf, isclose
+from math import cbrt, ceil, hypot
 from typing import Final
 
 import numpy as np
@@ -21,6 +21,7 @@ from blast_env.physics.gas.faces import Faces, exposed_faces
 from blast_env.physics.gas.grid import GasGrid, layers_to
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import FaceLoads, Gauges
+from blast_env.physics.gas.settings import CHECKED_CELLS, FACE_NAMES, GasSettings
 from blast_env.physics.gas.solver import GasSolver, Recorder, Settling, state_bytes
 from blast_env.physics.gas.source import (
     GasCharge,
@@ -31,21 +32,9 @@ from blast_env.physics.gas.source import (
 )
 from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
-from blast_env.values import finite_number
-
-ROOF: Final = "roof"
-FACE_NAMES: Final = (*WALLS, ROOF)
-"""The faces of a structure; those of `FaceTable.face` count through them."""
-
-CHECKED_SCALED_DISTANCE: Final = (1.7, 8.6)
-"""Where the source was checked, m/kg^(1/3) (docs/engineers/gas.md)."""
-CHECKED_CELLS: Final = 9.2
-"""Least cells per cube root of the charge's mass in kg with which it was checked, times 1 m."""
 
 _SOUND_M_S: Final = 340.0
 _MOST_BYTES: Final = 8 * 2**30
-_FARTHEST_M: Final = 10_000.0
-_LEAST_CELL_M: Final = 0.001
 # A charge sends more than one wave: its products swing between too wide and too narrow. All times
 # are those of 100 kg, and grow with the cube root of the mass. A run ends at one of few times that
 # are the same for all layouts, so that their loads can be compared.
@@ -61,50 +50,6 @@ Recorders = Callable[[GasGrid], Sequence[Recorder]]
 
 def _none(_: GasGrid) -> Sequence[Recorder]:
     return ()
-
-
-@dataclass(frozen=True)
-class GasSettings:
-    """How finely and how long a blast is run as compressible gas.
-
-    Attributes:
-        cell_m: Side of a cell; a module's side must be a whole number of them.
-        margin_m: How far the cells keep their size outside the site.
-        border_m: How far the open borders are beyond that, and above the air, at least; the cells
-            between grow outwards.
-        settled_s: When the products of 100 kg are no more than hot gas, see `Settling`; grows with
-            the cube root of the mass. Infinite where they never are.
-        threads: Threads that share a blast; they change nothing but the time.
-        time_limit_s: When a run ends at the latest; by default long after the last wave.
-
-    Raises:
-        BlastEnvError: If one of them is out of bounds.
-    """
-
-    cell_m: float = 0.5
-    margin_m: float = 2.0
-    border_m: float = 24.0
-    settled_s: float = 0.06
-    threads: int = 1
-    time_limit_s: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        cell_m = finite_number("cell_m", self.cell_m)
-        cells = MODULE_SIDE_M / cell_m if cell_m >= _LEAST_CELL_M else 0.0
-        if not (cells >= 1.0 and isclose(cells, round(cells), rel_tol=1e-9)):
-            raise BlastEnvError(
-                f"cell_m is {self.cell_m:g}, must be {MODULE_SIDE_M:g} m, the side of a module, "
-                f"divided by a whole number, and at least {_LEAST_CELL_M:g} m"
-            )
-        for name, length_m in (("margin_m", self.margin_m), ("border_m", self.border_m)):
-            if not 0.0 <= finite_number(name, length_m) <= _FARTHEST_M:
-                raise BlastEnvError(f"{name} is {length_m:g}, must be 0 to {_FARTHEST_M:g}")
-        if self.settled_s != inf and not finite_number("settled_s", self.settled_s) > 0.0:
-            raise BlastEnvError(f"settled_s is {self.settled_s:g}, must be above 0")
-        limit_s = self.time_limit_s
-        if limit_s is not None and not finite_number("time_limit_s", limit_s) > 0.0:
-            raise BlastEnvError(f"time_limit_s is {limit_s:g}, must be above 0")
 
 
 @dataclass(frozen=True, eq=False)
