@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.calibration.model import ScaledImpulse
+from blast_env.engines.bays import BAY_COLUMNS, BayLoads
 from blast_env.engines.contract import Engine, EngineOption
 from blast_env.engines.loads import BlastLoads, StructureLoad
 from blast_env.errors import BlastEnvError, UnknownNameError
@@ -205,11 +206,14 @@ class GasBlast:
                 result, in `run.solver.recorders`.
         """
         run = self.engine.start_on(self.site, recorders)
+        bays = BayLoads.begin(run, self.scenario.bays)
+        if bays.bays:
+            run.record(bays.recorder)
         while run.end_reason is None:
             run.advance(run.time_s + run.limit_s / _PROGRESS_CALLS)
             if progress is not None:
                 progress(min(run.time_s / run.limit_s, 1.0))
-        return GasResult(self, run)
+        return GasResult(self, run, bays)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,10 +223,12 @@ class GasResult:
     Attributes:
         blast: What was run.
         run: The run, at its end.
+        bay_loads: Histories of the bays of facades; `None` where nobody recorded them.
     """
 
     blast: GasBlast
     run: "GasRun"
+    bay_loads: BayLoads | None = None
 
     @property
     def engine_name(self) -> str:
@@ -365,6 +371,21 @@ class GasResult:
             raise UnknownNameError("gauge", gauge, names)
         pressure = np.asarray(self.run.gauges.history_pa)[:, names.index(gauge)]
         return pd.DataFrame({"time_s": self.run.gauges.time_s, "overpressure_pa": pressure})
+
+    @cached_property
+    def bays(self) -> "pd.DataFrame":
+        """One row a bay of the facades: its load, and what becomes of it; see `BAY_COLUMNS`."""
+        return table_of([], BAY_COLUMNS) if self.bay_loads is None else self.bay_loads.table()
+
+    def bay_history(self, name: str) -> "pd.DataFrame":
+        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
+
+        Raises:
+            UnknownNameError: If there is no bay of that name with air before it.
+        """
+        if self.bay_loads is None:
+            raise UnknownNameError("bay", name, ())
+        return self.bay_loads.history(name)
 
     def impulse(self, structure: str) -> ScaledImpulse:
         """Return the impulse of all positive phases, mean over the walls that count.

@@ -301,6 +301,17 @@ class BlastResult:
 
         return structure_table(self.obstacles)
 
+    @property
+    def bays(self) -> "pd.DataFrame":
+        """There are none: particles have no pressure that could load a pane or a panel.
+
+        Raises:
+            BlastEnvError: Always; the message says what does.
+        """
+        raise BlastEnvError(
+            f"engine {self.engine_name!r} knows no overpressure, so no response of bays: take 'gas'"
+        )
+
     @cached_property
     def calibration(self) -> Calibration:
         """The scenario's calibration.

@@ -138,6 +138,16 @@ class GasRun:
         """Steps so far."""
         return self.solver.steps
 
+    def record(self, recorder: Recorder) -> None:
+        """Add a recorder before the first step.
+
+        Raises:
+            ValueError: If the run has begun.
+        """
+        if self.solver.steps:
+            raise ValueError(f"the run is at step {self.solver.steps}: record before the first")
+        self.solver.recorders = (*self.solver.recorders, recorder)
+
     def advance(self, until_s: float) -> None:
         """Go on until the simulated time is at least `until_s`, or the run has ended.
 

@@ -179,6 +179,7 @@ class PatchHistories:
         if len(self._faces) != count or not self._faces.all():
             raise BlastEnvError(f"{count} patches of wall: each must have a face of a cell")
         self._times: list[float] = []
+        self._steps: list[float] = []
         self._history: list[NDArray[np.float32]] = []
 
     def record(self, solver: GasSolver, step_s: float) -> None:
@@ -186,12 +187,18 @@ class PatchHistories:
         over = solver.wall_pressure[self._members] - 1.0
         sums = np.bincount(self._patch, weights=over, minlength=len(self._faces))
         self._times.append(solver.time_s - 0.5 * step_s)
+        self._steps.append(step_s)
         self._history.append((solver.pressure_pa * sums / self._faces).astype(np.float32))
 
     @property
     def time_s(self) -> NDArray[np.float64]:
         """Middles of the steps so far (steps,)."""
         return np.array(self._times)
+
+    @property
+    def step_s(self) -> NDArray[np.float64]:
+        """Lengths of the steps so far (steps,)."""
+        return np.array(self._steps)
 
     @property
     def history_pa(self) -> NDArray[np.float32]:

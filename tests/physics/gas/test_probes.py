@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.faces import exposed_faces, ground_faces
@@ -117,23 +116,12 @@ def test_patches_keep_the_mean_history_of_their_faces() -> None:
     assert isinstance(patches, PatchHistories)
     assert patches.history_pa.shape == (2, solver.steps)
     assert (np.diff(patches.time_s) > 0.0).all()
-    steps_s = np.diff(np.append(0.0, _ends(patches.time_s)))
     whole = loads.positive_impulse_pa_s + loads.negative_impulse_pa_s
     for side, history in enumerate(patches.history_pa):
         members = (solver.faces.axis != 2) & ((solver.faces.side > 0) == bool(side))
-        assert history @ steps_s == pytest.approx(whole[members].mean(), rel=1e-5)
+        assert history @ patches.step_s == pytest.approx(whole[members].mean(), rel=1e-5)
     with pytest.raises(BlastEnvError, match="each must have a face"):
         PatchHistories(np.array([0, 2]), 3)
-
-
-def _ends(middles_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the ends of steps that follow each other, from their middles."""
-    ends = []
-    end = 0.0
-    for middle in middles_s.tolist():
-        end = 2.0 * middle - end
-        ends.append(end)
-    return np.array(ends)
 
 
 def test_gauges_keep_the_history() -> None:

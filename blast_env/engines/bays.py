@@ -1,0 +1,158 @@
+"""Bays under a blast of gas dynamics: their pressure histories, and what becomes of them.
+
+A bay's history is the mean overpressure on the faces of cells in it, step by step. Bays with no air
+before them, as in a wall between two parts of a building, have none and are left out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import UnknownNameError
+from blast_env.physics.gas.settings import FACE_NAMES
+from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond
+from blast_env.response.glass import GlazingCondition
+from blast_env.tables import Column, table_of
+
+if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
+    import pandas as pd
+
+    from blast_env.physics.gas.engine import FaceTable, GasRun
+    from blast_env.physics.gas.probes import PatchHistories
+
+BAY_COLUMNS: Final = (
+    Column("bay", "", "structure/wall/storey/number"),
+    Column("structure", "", "name of the structure"),
+    Column("wall", "", "west, east, south or north"),
+    Column("storey", "", "counted from 1 at the ground"),
+    Column("number", "", "counted from 1 along the wall, from west or from south"),
+    Column("area_m2", "m2", "area of the bay"),
+    Column("peak_pa", "Pa", "largest mean overpressure on the bay"),
+    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases of that mean"),
+    Column("panes", "", "panes in the bay"),
+    Column("break_probability", "", "share of such panes that break"),
+    Column("condition", "", "performance condition of glazing, GSA: 1, 2, 3a, 3b, 4, 5"),
+    Column("ductility", "", "of the wall panel: largest deflection over that at yield"),
+    Column("rotation_deg", "degrees", "support rotation of the wall panel"),
+    Column("damage", "", "damage of the wall panel in the terms of PDC-TR 06-08"),
+)
+"""A row a bay; what a bay does not have is empty."""
+
+
+@dataclass(frozen=True, eq=False)
+class BayLoads:
+    """The pressure histories of the bays of a blast.
+
+    Attributes:
+        bays: The bays with air before them.
+        recorder: Their histories, a patch each.
+    """
+
+    bays: tuple[FilledBay, ...]
+    recorder: "PatchHistories"
+
+    @classmethod
+    def begin(cls, run: "GasRun", bays: Sequence[FilledBay]) -> "BayLoads":
+        """Return the recorder of a run that has not begun; the run has to record it.
+
+        Args:
+            run: The run.
+            bays: The bays of its scenario.
+        """
+        from blast_env.physics.gas.probes import PatchHistories
+
+        patch = _patches(run.table, [each.name for each in run.site.structures], bays)
+        seen = np.unique(patch[patch >= 0])
+        renumbered = np.full(len(bays) + 1, -1)  # the last is for no bay
+        renumbered[seen] = np.arange(len(seen))
+        shown = tuple(bays[index] for index in seen.tolist())
+        return cls(shown, PatchHistories(renumbered[patch], len(shown)))
+
+    @cached_property
+    def response(self) -> FacadeResponse:
+        """What becomes of the bays."""
+        histories = self.recorder.history_pa.astype(np.float64)
+        return respond(self.bays, self.recorder.time_s, histories)
+
+    def history(self, name: str) -> "pd.DataFrame":
+        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
+
+        Raises:
+            UnknownNameError: If there is no bay of that name with air before it.
+        """
+        import pandas as pd
+
+        names = [each.bay.name for each in self.bays]
+        if name not in names:
+            raise UnknownNameError("bay", name, names)
+        history = self.recorder.history_pa[names.index(name)]
+        return pd.DataFrame({"time_s": self.recorder.time_s, "overpressure_pa": history})
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row a bay; see `BAY_COLUMNS`."""
+        return table_of([self._row(index) for index in range(len(self.bays))], BAY_COLUMNS)
+
+    def _row(self, index: int) -> dict[str, object]:
+        filled, found = self.bays[index], self.response
+        bay = filled.bay
+        pressure = found.pressure_pa[index]
+        row: dict[str, object] = {
+            "bay": bay.name,
+            "structure": bay.structure,
+            "wall": bay.wall,
+            "storey": bay.storey,
+            "number": bay.number,
+            "area_m2": bay.area_m2,
+            "peak_pa": pressure.max(),
+            "positive_impulse_pa_s": np.trapezoid(np.maximum(pressure, 0.0), found.time_s),
+            "panes": filled.panes,
+            "break_probability": np.nan,
+            "condition": "",
+            "ductility": np.nan,
+            "rotation_deg": np.nan,
+            "damage": "",
+        }
+        if filled.glazing is not None:
+            pane = found.glazed.tolist().index(index)
+            row["break_probability"] = found.glazing.break_probability[pane]
+            row["condition"] = GlazingCondition(int(found.glazing.condition[pane])).label
+        if filled.wall is not None:
+            panel = found.walled.tolist().index(index)
+            row["ductility"] = found.walls.ductility[panel]
+            row["rotation_deg"] = found.walls.rotation_deg[panel]
+            row["damage"] = found.walls.levels[panel].name.lower()
+        return row
+
+
+def _patches(
+    table: "FaceTable", structures: Sequence[str], bays: Sequence[FilledBay]
+) -> NDArray[np.int64]:
+    """Return which bay each face of a cell is in, -1 for none (faces,)."""
+    patch = np.full(len(table.faces), -1)
+    walls: dict[tuple[str, str], list[int]] = {}
+    for index, each in enumerate(bays):
+        walls.setdefault((each.bay.structure, each.bay.wall), []).append(index)
+    for (structure, wall), members in walls.items():
+        own = np.flatnonzero(
+            (table.structure == structures.index(structure))
+            & (table.face == FACE_NAMES.index(wall))
+        )
+        along = table.centre_m[own, 1 if wall in ("west", "east") else 0]
+        height = table.centre_m[own, 2]
+        for index in members:
+            patch[own[_inside(bays[index].bay, along, height)]] = index
+    return patch
+
+
+def _inside(bay: Bay, along_m: FloatArray, height_m: FloatArray) -> NDArray[np.bool_]:
+    return (
+        (along_m >= bay.left_m)
+        & (along_m < bay.right_m)
+        & (height_m >= bay.floor_m)
+        & (height_m < bay.top_m)
+    )

@@ -1,0 +1,84 @@
+"""Bays under a blast: their histories are those of the walls, and loads stay as they were."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import blast_env
+from blast_env.engines.gas import GasResult
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.scenario import Scenario
+
+FACADE = {"storey_m": 2.0, "glazing": "low", "wall": "brick_215"}
+LOW = {"kind": "glazing", "title": "low window", "source": "made up", "thickness_mm": 3.78}
+LOW |= {"width_m": 0.9, "height_m": 0.8, "sill_m": 0.5}
+CHARGE = blast_env.Charge((2.0, 8.5), 5.0)
+
+
+def site(facade: dict[str, Any] | None) -> Scenario:
+    document = blast_env.load_scenario("control_room").model_dump(mode="json")
+    document["structures"][0]["facade"] = facade
+    document["components"] = {"low": LOW}
+    return Scenario.from_document(document, "test")
+
+
+@pytest.fixture(scope="module")
+def result() -> GasResult:
+    return blast_env.simulate(site(FACADE), engine="gas", charge=CHARGE)
+
+
+def test_bays_change_nothing_but_what_is_recorded(result: GasResult) -> None:
+    bare = blast_env.simulate(site(None), engine="gas", charge=CHARGE)
+    assert result.digest == bare.digest
+    assert len(bare.bays) == 0
+    with pytest.raises(UnknownNameError, match="no bay"):
+        bare.bay_history("control_room/west/1/1")
+
+
+def test_the_bays_of_a_wall_have_its_load(result: GasResult) -> None:
+    """Impulses by area: positive and negative phases together add up exactly."""
+    bays = result.bays
+    assert list(bays["storey"]) == [1, 1, 1, 2, 2, 2]
+    faces = result.faces
+    west = faces[(faces["structure"] == "control_room") & (faces["face"] == "west")]
+    whole = west["positive_impulse_pa_s"] + west["negative_impulse_pa_s"]
+    loads = result.bay_loads
+    assert loads is not None
+    sums = loads.recorder.history_pa @ loads.recorder.step_s
+    in_bay = [
+        whole[
+            (west["y_m"] >= each.bay.left_m)
+            & (west["y_m"] < each.bay.right_m)
+            & (west["z_m"] >= each.bay.floor_m)
+            & (west["z_m"] < each.bay.top_m)
+        ].mean()
+        for each in loads.bays
+    ]
+    assert sums == pytest.approx(np.array(in_bay), rel=1e-4)
+
+
+def test_the_middle_of_the_front_is_loaded_most(result: GasResult) -> None:
+    lower = result.bays[result.bays["storey"] == 1].set_index("number")
+    assert lower["positive_impulse_pa_s"].idxmax() == 2
+    assert (lower["break_probability"] > 0.5).all()
+    history = result.bay_history("control_room/west/1/2")
+    assert history["overpressure_pa"].max() == pytest.approx(lower["peak_pa"][2])
+
+
+def test_unknown_bays_name_the_nearest(result: GasResult) -> None:
+    with pytest.raises(UnknownNameError, match="control_room/west/1/1"):
+        result.bay_history("control_room/west/1/9")
+
+
+def test_a_run_that_has_begun_takes_no_recorder(result: GasResult) -> None:
+    loads = result.bay_loads
+    assert loads is not None
+    with pytest.raises(ValueError, match="record before the first"):
+        result.run.record(loads.recorder)
+
+
+def test_particles_say_that_they_have_no_bays() -> None:
+    result = blast_env.simulate(site(FACADE), engine="event", charge=CHARGE)
+    with pytest.raises(BlastEnvError, match="no overpressure"):
+        _ = result.bays
