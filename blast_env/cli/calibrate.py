@@ -22,7 +22,7 @@ from blast_env.cli.output import (
     result_console,
     save_pictures,
 )
-from blast_env.engines import find_engine
+from blast_env.engines import CALIBRATED_ENGINES, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder
 from blast_env.scenario import Scenario, load_scenario
@@ -56,7 +56,7 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
     first_seed: int = option(1000, "The seeds count from here.", min=0)
     scenario: str = option("free_field", "A scenario with one point charge and one structure.")
     preset: str | None = option(None, "Parameters of this name.")
-    engine: str = option("pymunk", "pymunk or event.")
+    engine: str = option("pymunk", f"{' or '.join(CALIBRATED_ENGINES)}.")
     law: LawName = option(
         "power", "The law to store: proportional, linear or power.", metavar="LAW"
     )

@@ -10,6 +10,7 @@ from blast_env.cli.command import FOLDER, Target, option
 from blast_env.cli.options import (
     CELL_HELP,
     CVAR_HELP,
+    ENGINE_HELP,
     CacheOptions,
     ChargeOptions,
     ClusterOptions,
@@ -59,7 +60,7 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         min=0,
         show_default="the first one that no training and no search meets",
     )
-    engine: str = option(JUDGE, "Engine that runs the blasts: gas (gas dynamics), event or pymunk.")
+    engine: str = option(JUDGE, ENGINE_HELP)
     cell_m: float | None = option(None, CELL_HELP)
     cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
     export: Path | None = option(

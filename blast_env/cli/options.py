@@ -9,10 +9,15 @@ import typer
 from blast_env.cli.cluster import CLUSTER_HELP
 from blast_env.cli.command import FOLDER, Command, option
 from blast_env.cli.output import check_json, resume_with_cache
+from blast_env.engines.table import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.envs.arguments import ResetOptions
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 
 SCENARIO_HELP: Final = "Bundled name, or a scenario file."
+ENGINE_HELP: Final = (
+    f"Engine: {', '.join(ENGINE_NAMES)}. {JUDGE} is gas dynamics, "
+    f"{' and '.join(CALIBRATED_ENGINES)} are the paper's particles."
+)
 CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.5."
 CVAR_HELP: Final = "0.8: the mean of the worst 20 %, beside or instead of that of all."
 

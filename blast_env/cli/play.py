@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from blast_env.cli.command import Command, argument, option
-from blast_env.cli.options import SCENARIO_HELP
+from blast_env.cli.options import ENGINE_HELP, SCENARIO_HELP
 from blast_env.cli.output import print_line
 from blast_env.engines import find_engine
 from blast_env.geometry import layout_counts
@@ -17,7 +17,7 @@ class PlayCommand(Command):
     scenario: str = argument(SCENARIO_HELP, default="courtyard")
     seed: int = option(0, "Of the first episode.", min=0)
     threat: str = option("visible", "visible or hidden: whether you see the charge.")
-    engine: str = option("event", "event or pymunk (particles), or gas (gas dynamics).")
+    engine: str = option("event", ENGINE_HELP)
     film: bool = option(True, "Show the blast.")
 
     def __call__(self) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from blast_env.cli.command import argument, option, options_of
-from blast_env.cli.options import CELL_HELP, SCENARIO_HELP, ChargeOptions, JsonOptions
+from blast_env.cli.options import CELL_HELP, ENGINE_HELP, SCENARIO_HELP, ChargeOptions, JsonOptions
 from blast_env.cli.output import (
     make_table,
     print_json,
@@ -51,7 +51,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
     scenario: str = argument(SCENARIO_HELP)
     layout: Path | None = option(None, "JSON file with the barrier's [row, column] cells.")
     seed: int = option(0, "Decides charge, fan and air.", min=0)
-    engine: str = option("pymunk", "pymunk or event (particles), or gas (gas dynamics).")
+    engine: str = option("pymunk", ENGINE_HELP)
     stand_off_m: float | None = option(None, "Distance from charge to facade, m (free_field).")
     film: Path | None = option(None, "Write a film: .mp4 or .gif.", writes=(".mp4", ".gif"))
     excel: Path | None = option(None, "Write a workbook: .xlsx.", writes=(".xlsx",))

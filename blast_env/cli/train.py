@@ -8,7 +8,7 @@ import numpy as np
 
 from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option, options_of
-from blast_env.cli.options import CELL_HELP, ClusterOptions
+from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions
 from blast_env.cli.output import print_line, progress_bar
 from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
 from blast_env.errors import BlastEnvError, import_extra
@@ -56,7 +56,7 @@ class TrainCommand(ClusterOptions):
         None, "visible or hidden: whether the agent sees the charge.", show_default="visible"
     )
     engine: str | None = option(
-        None, "Engine that runs the blasts; surrogate: guesses instead.", show_default="event"
+        None, f"{ENGINE_HELP} surrogate guesses them.", show_default="event"
     )
     cell_m: float | None = option(None, CELL_HELP)
     observation: str | None = option(

@@ -18,6 +18,7 @@ from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
 from blast_env.cli.command import LazyCommand
 from blast_env.cli.tables import ResultTable
+from blast_env.engines import ENGINE_NAMES, find_engine
 from blast_env.physics.event.engine import EventRun
 from blast_env.physics.pymunk.engine import PymunkRun
 from blast_env.scenario import LayoutFile, load_layout
@@ -63,6 +64,17 @@ def test_the_list_of_commands_says_what_each_says_first_of_itself(name: str) -> 
     """The list is shown without importing the commands, and so keeps their first sentences."""
     command = commands()[name]
     assert (command.loaded.help or "").partition("\n\n")[0].replace("\n", " ") == command.help
+
+
+@pytest.mark.parametrize("name", ["simulate", "evaluate", "play", "train"])
+def test_help_names_every_engine_and_what_each_can_be_told(name: str) -> None:
+    """Both come from the engines: a new one, or a new setting of one, is seen."""
+    options = commands()[name].loaded.params
+    helps = {each.name: str(getattr(each, "help", "")) for each in options}
+    for engine in ENGINE_NAMES:
+        assert engine in helps["engine"]
+        for setting in find_engine(engine).options if name != "play" else ():
+            assert helps[setting.name].startswith(setting.help.rstrip("."))
 
 
 # Tables.
