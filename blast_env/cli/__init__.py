@@ -36,8 +36,8 @@ class _Commands(LazyGroup):
             "Search for the layout with the least impulse on the protected structures.",
         ),
         "bench": (
-            "blast_env.cli.bench:bench",
-            "Time blasts on all engines and against other codes, and measure the memory.",
+            "blast_env.cli.bench:BenchCommand",
+            "Time blasts and the environment on this machine, and measure the memory.",
         ),
         "train": (
             "blast_env.cli.train:TrainCommand",

@@ -1,269 +1,116 @@
-"""`blast-env bench`: how fast blasts are on this machine."""
+"""`blast-env bench`: how fast blasts and the environment are on this machine."""
 
-from importlib.util import find_spec
-from math import log
-from pathlib import Path
-from typing import Annotated, Final
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
 
-import typer
-from rich.table import Table
-
-from blast_env.cli.output import make_table, print_line, result_console, user_errors
-from blast_env.physics.gas.benchmark import measure
+from blast_env.benchmark import BlastCost, blast_cost, crowd, environment_cost, hardware
+from blast_env.cli.command import Command, option
+from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.engines import ENGINE_NAMES, find_engine
+from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario, load_scenario
-from blast_env.scenario.build_scene import build_scene
-from blast_env.studies.benchmark.engines import (
-    BenchmarkScene,
-    benchmark_scenes,
-    hardware,
-    measure_engines,
-    measure_memory_mb,
-    measure_speed,
-)
-from blast_env.studies.benchmark.environment import (
-    FRAME_BALLS,
-    measure_environment,
-    measure_frame_ms,
-)
-from blast_env.studies.benchmark.gas import (
-    beside_foam,
-    beside_pyclaw,
-    gas_blasts,
-    measure_crowd,
-)
-from blast_env.studies.benchmark.parallel import measure_fleets, measure_threads
+from blast_env.units import MS_PER_S
 
-_MANY_BALLS: Final = {
-    "air": {"spacing_units": 1.38, "radius_units": 0.5},
-    "stepping": {"time_limit_s": 0.005},
-}
-_ENGINE_HEADERS: Final = (
+_BLAST_HEADERS: Final = (
     "scenario",
-    "balls",
-    "pymunk (ms)",
-    "5 % step",
-    "pymunk at it (ms)",
-    "event (ms)",
-    "ratio",
-    "at the 5 % step",
-    "target",
-)
-_THREAD_HEADERS: Final = (
-    "scenario",
-    "blasts",
-    "1 thread (blasts/s)",
-    "threads (blasts/s)",
-    "ratio",
-)
-_PYMUNK_HEADERS: Final = (
-    "scenario",
-    "balls",
+    "engine",
+    "simulated (ms)",
     "steps",
-    "blasts/s",
-    "ns per ball and step",
-    "time / pymunk alone",
-    "time / pymunk alone, same balls",
+    "CPU (ms)",
+    "blasts per CPU s",
+    "million cell updates per CPU s",
+    "memory (MB)",
 )
+_CROWD_HEADERS: Final = ("scenario", "engine", "1 process", "processes", "ratio")
 _ENVIRONMENT_HEADERS: Final = (
     "scenario",
     "engine",
-    "episode (ms)",
-    "outside engine",
-    "outside physics",
-    "reset (ms)",
-    "mask (ms)",
-    "observation (ms)",
-)
-_GAS_HEADERS: Final = (
-    "cell (m)",
-    "cells",
     "steps",
-    "CPU s",
-    "blasts per CPU s",
-    "million cell updates per CPU s",
+    "episode (ms)",
+    "placing (ms)",
+    "blast and reward (ms)",
+    "steps/s in processes",
 )
-_FLEET_HEADERS: Final = ("environments", "processes", "steps/s", "blasts/s")
 
 
-def bench(
-    repeats: Annotated[int, typer.Option(min=1, help="Runs of each; medians are shown.")] = 5,
-    scenario: Annotated[
-        str | None, typer.Option(help="Time only this scenario: bundled name, or a file.")
-    ] = None,
-    threads: Annotated[
-        int, typer.Option(min=1, help="Threads of `simulate_many`; 1: do not measure them.")
-    ] = 2,
-    memory: Annotated[bool, typer.Option(help="Also measure the memory of a large blast.")] = True,
-    environment: Annotated[bool, typer.Option(help="Also time `BlastBarrier-v0`.")] = True,
-    particles: Annotated[bool, typer.Option(help="Time the particle engines.")] = True,
-    gas: Annotated[bool, typer.Option(help="Time gas dynamics.")] = True,
-    pyclaw_python: Annotated[
-        Path | None, typer.Option(help="An interpreter that has clawpack, to time it beside gas.")
-    ] = None,
-) -> None:
-    """Time blasts on all engines and against other codes, and measure the memory."""
-    with user_errors():
-        scenes = benchmark_scenes()
-        if scenario is not None:
-            scenes = (BenchmarkScene(scenario, load_scenario(scenario)),)
+@dataclass(frozen=True, kw_only=True)
+class BenchCommand(Command):
+    """Time blasts and the environment on this machine, and measure the memory.
+
+    Processor times are medians of one core; times by the clock need idle cores.
+    """
+
+    scenario: tuple[str, ...] = option(
+        (), "Bundled name, or a scenario file; may be given several times; else courtyard."
+    )
+    engine: tuple[str, ...] = option((), "Engine; may be given several times; else all of them.")
+    repeats: int = option(5, "Blasts or episodes of each; medians are shown.", min=1)
+    processes: int = option(2, "Processes that run blasts at once; 1: do not time them.", min=1)
+    memory: bool = option(True, "Also measure the memory of a process that runs a blast.")
+    environment: bool = option(True, "Also time `BlastBarrier-v0`.")
+
+    def __call__(self) -> None:
+        """Print the tables."""
+        scenarios = [load_scenario(each) for each in self.scenario or ("courtyard",)]
+        engines = [find_engine(each).name for each in self.engine or ENGINE_NAMES]
         print_line(hardware())
-        if gas:
-            _print_gas(threads, pyclaw_python)
-        if not particles:
-            return
-        result_console().print(_engine_table(scenes, repeats))
-        print_line(
-            "5 % step: the longest at which pymunk's loads are within 5 % of those of the event "
-            "engine, as `python -m studies.engines` finds.\nRatio: time of pymunk over "
-            "time of the event engine.\n"
-        )
-        if threads > 1:
-            result_console().print(_thread_table(scenes, threads, repeats))
-            print_line("by the clock: needs as many idle cores as threads.\n")
-        result_console().print(_pymunk_table(scenes, repeats))
-        print_line(
-            "pymunk alone: no handler, no recording, no shrinking; every ball stays and is "
-            "stepped to the end.\nSame balls: the balls that leave our blast leave there too."
-        )
-        if memory:
-            many = load_scenario("free_field").at_stand_off(60.0)
-            many = many.with_simulation(overrides=_MANY_BALLS)
-            balls = len(build_scene(many).balls)
-            print_line(f"peak memory with {balls:,} balls: {measure_memory_mb(many):.0f} MB")
-        if environment and find_spec("pygame") is not None:
-            frame_ms = measure_frame_ms(load_scenario(scenario or "courtyard"), repeats)
-            print_line(f"a frame with {FRAME_BALLS:,} balls: {frame_ms:.1f} ms; target 20 ms")
-        if environment:
-            _print_environment(load_scenario(scenario or "courtyard"), repeats)
+        pairs = [(scenario, engine) for scenario in scenarios for engine in engines]
+        costs = []
+        with progress_bar("blasts") as progress:
+            for scenario, engine in pairs:
+                costs.append(blast_cost(scenario, engine, self.repeats, memory=self.memory))
+                progress(len(costs) / len(pairs))
+        self._print_blasts(costs)
+        if self.processes > 1:
+            self._print_crowds(pairs, costs)
+        if self.environment:
+            self._print_environments(pairs)
 
-
-def _print_gas(threads: int, pyclaw_python: Path | None) -> None:
-    """Time a blast of gas dynamics by cells, threads and processes, and beside other codes."""
-    blasts = gas_blasts()
-    table = make_table("gas dynamics: 40 x 30 x 12 m, 60 ms, one thread", _GAS_HEADERS)
-    for cell_m, cost in blasts.items():
-        table.add_row(
-            f"{cell_m:g}",
-            f"{cost.cells:,}",
-            f"{cost.steps:,}",
-            f"{cost.cpu_s:.2f}",
-            f"{1.0 / cost.cpu_s:.2f}",
-            f"{1e-6 * cost.updates_per_cpu_s:.1f}",
-        )
-    result_console().print(table)
-    coarse, fine = blasts.values()
-    power = log(fine.cpu_s / coarse.cpu_s) / log(fine.cells / coarse.cells)
-    print_line(f"CPU time grows with the power {power:.2f} of the number of cells")
-    if threads > 1:
-        one_s, more_s = (measure(threads=count).clock_s for count in (1, threads))
-        crowd = measure_crowd(threads)
-        print_line(
-            f"by the clock, which needs as many idle cores: {threads} threads {one_s / more_s:.2f} "
-            f"times as fast as one, {threads} processes {crowd.ratio:.2f} times the blasts of one"
-        )
-        print_line(f"memory of a process: {crowd.process_bytes / 2**20:.0f} MiB")
-    others = {
-        "PyClaw": None if pyclaw_python is None else beside_pyclaw(pyclaw_python),
-        "rhoCentralFoam": beside_foam(),
-    }
-    for name, found in others.items():
-        if found is None:
-            hint = " (--pyclaw-python)" if name == "PyClaw" else ""
-            print_line(f"{name}: not installed{hint}")
-        else:
-            print_line(
-                f"{name}, {found.scene}: {1e-6 * found.theirs_per_s:.2f} million cell updates a "
-                f"CPU second, gas {1e-6 * found.ours_per_s:.1f}"
+    def _print_blasts(self, costs: Sequence[BlastCost]) -> None:
+        table = make_table(f"a blast: medians of {self.repeats} seeds", _BLAST_HEADERS, 2)
+        for each in costs:
+            updates = each.cell_updates
+            table.add_row(
+                each.scenario,
+                each.engine,
+                f"{MS_PER_S * each.simulated_s:.0f}",
+                f"{each.steps:,}",
+                f"{MS_PER_S * each.cpu_s:.1f}",
+                f"{1.0 / each.cpu_s:.2f}",
+                "-" if updates is None else f"{1e-6 * updates / each.cpu_s:.1f}",
+                "-" if each.memory_mb is None else f"{each.memory_mb:.0f}",
             )
-    print_line("")
+        result_console().print(table)
 
+    def _print_crowds(
+        self, pairs: Sequence[tuple[Scenario, str]], costs: Sequence[BlastCost]
+    ) -> None:
+        title = f"blasts a second by the clock, in one process and in {self.processes}"
+        table = make_table(title, _CROWD_HEADERS, 2)
+        for (scenario, engine), cost in zip(pairs, costs, strict=True):
+            found = crowd(scenario, engine, cost.cpu_s, self.processes)
+            rates = (f"{each:.2f}" for each in (found.alone_per_s, found.together_per_s))
+            table.add_row(scenario.name, engine, *rates, f"{found.ratio:.2f}")
+        result_console().print(table)
 
-def _engine_table(scenes: tuple[BenchmarkScene, ...], repeats: int) -> Table:
-    """Time both engines on the scenes."""
-    table = make_table(
-        f"both engines: processor time of a blast, medians of {repeats} seeds", _ENGINE_HEADERS
-    )
-    for scene in scenes:
-        figures = measure_engines(scene, repeats)
-        close_s, close_ratio = figures.close_pymunk_s, figures.close_ratio
-        table.add_row(
-            scene.name,
-            f"{figures.balls:,}",
-            f"{1e3 * figures.pymunk_s:.0f}",
-            "-" if close_s is None else f"{scene.close_step_radii:g} radii",
-            "-" if close_s is None else f"{1e3 * close_s:.0f}",
-            f"{1e3 * figures.event_s:.1f}",
-            f"{figures.ratio:.1f}",
-            "-" if close_ratio is None else f"{close_ratio:.1f}",
-            "-" if scene.least_ratio is None else f"{scene.least_ratio:g}",
-        )
-    return table
-
-
-def _thread_table(scenes: tuple[BenchmarkScene, ...], threads: int, repeats: int) -> Table:
-    """Time the event engine in one thread and in several."""
-    title = f"event engine, simulate_many in {threads} threads: the fastest of {repeats} runs"
-    table = make_table(title, _THREAD_HEADERS)
-    for scene in scenes:
-        figures = measure_threads(scene.scenario, threads, repeats)
-        table.add_row(
-            scene.name,
-            f"{figures.blasts:,}",
-            f"{figures.blasts / figures.one_thread_s:.1f}",
-            f"{figures.blasts / figures.all_threads_s:.1f}",
-            f"{figures.scaling:.2f}",
-        )
-    return table
-
-
-def _pymunk_table(scenes: tuple[BenchmarkScene, ...], repeats: int) -> Table:
-    """Time pymunk with our rules against pymunk alone on the scenes."""
-    table = make_table(
-        f"pymunk: processor time, medians of {repeats} runs, building the space included",
-        _PYMUNK_HEADERS,
-    )
-    for scene in scenes:
-        speed = measure_speed(scene.scenario, scene.name, repeats)
-        table.add_row(
-            speed.name,
-            f"{speed.balls:,}",
-            f"{speed.steps:,}",
-            f"{1.0 / speed.blast_s:.2f}",
-            f"{speed.per_particle_step_ns:.0f}",
-            f"{speed.ratio_all_balls:.2f}",
-            f"{speed.ratio_same_balls:.2f}",
-        )
-    return table
-
-
-def _print_environment(scenario: Scenario, repeats: int) -> None:
-    """Time the environment on a scenario: its parts, and in several processes."""
-    name = scenario.name
-    if scenario.build_zone is None or scenario.calibration is None:
-        print_line(f"BlastBarrier-v0: needs a build zone and a calibration, {name} lacks one")
-        return
-    figures = measure_environment(scenario, repeats)
-    table = make_table(
-        f"BlastBarrier-v0: processor time, medians of {repeats} episodes of random placements",
-        _ENVIRONMENT_HEADERS,
-        text_columns=2,
-    )
-    table.add_row(
-        name,
-        figures.engine,
-        f"{figures.episode_ms:.1f}",
-        f"{100.0 * figures.outside_engine:.1f} %",
-        f"{100.0 * figures.outside_physics:.1f} %",
-        *(f"{ms:.3f}" for ms in (figures.reset_ms, figures.mask_ms, figures.observation_ms)),
-    )
-    result_console().print(table)
-    print_line("physics: the engine, and laying out the scenes of the blasts.\n")
-    fleets = make_table(f"{name}: by the clock, {repeats} episodes each", _FLEET_HEADERS)
-    for fleet in measure_fleets(scenario, repeats):
-        fleets.add_row(
-            fleet.name,
-            str(fleet.processes),
-            f"{fleet.steps_per_s:,.0f}",
-            f"{fleet.blasts_per_s:,.1f}",
-        )
-    result_console().print(fleets)
+    def _print_environments(self, pairs: Sequence[tuple[Scenario, str]]) -> None:
+        title = f"BlastBarrier-v0: random placements, medians of {self.repeats} episodes"
+        table, left_out = make_table(title, _ENVIRONMENT_HEADERS, 2), []
+        for scenario, engine in pairs:
+            try:
+                cost = environment_cost(scenario, engine, self.repeats, self.processes)
+            except BlastEnvError as error:
+                left_out.append(f"{scenario.name}, {engine}: no environment: {error}")
+                continue
+            times_s = (cost.episode_s, cost.placing_s, cost.blast_s)
+            table.add_row(
+                scenario.name,
+                engine,
+                str(cost.steps),
+                *(f"{MS_PER_S * each:.1f}" for each in times_s),
+                f"{cost.vector_steps_per_s:,.0f}",
+            )
+        result_console().print(table)
+        for line in left_out:
+            print_line(line)

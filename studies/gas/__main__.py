@@ -5,7 +5,6 @@ from functools import partial
 from itertools import pairwise
 from math import cbrt, isnan
 from pathlib import Path
-from time import process_time
 from typing import Annotated, Final
 
 import numpy as np
@@ -197,30 +196,6 @@ def handover(
         ]
     print_line(markdown_table(("radius (m)", f"impulse (Pa s) at {until:g} s"), rows))
     print_line(f"the engine's own radius is {own_m:.3g} m")
-
-
-@app.command()
-def cost(
-    scenarios: Annotated[list[str], typer.Argument(help="Bundled names or paths.")],
-    cell: Cell = 0.5,
-) -> None:
-    """Print what a blast of each scenario costs on the empty site: CPU time, steps, updates."""
-    with user_errors():
-        blasts = [GasBlast(name, engine=GasEngine(cell_m=cell)) for name in scenarios]
-        for blast in blasts[:1]:  # so that all is compiled
-            blast.engine.start_on(blast.site).advance(0.01)
-        rows = []
-        for name, blast in zip(scenarios, blasts, strict=True):
-            began = process_time()
-            run = blast.run().run
-            cells = " x ".join(map(str, run.grid.shape))
-            updates = f"{1e-6 * run.solver.cell_updates:.0f}"
-            spent = f"{process_time() - began:.2f}"
-            rows.append(
-                (name, cells, f"{MS_PER_S * run.time_s:.0f}", f"{run.steps}", updates, spent)
-            )
-    headers = ("scenario", "cells", "ms", "steps", "million cell updates", "CPU s")
-    print_line(markdown_table(headers, rows))
 
 
 @app.command()

@@ -58,7 +58,7 @@ _ELSEWHERE: Final = {
     "blast_env/response/plate_table.py: "
     "Path(__file__).with_name('data').joinpath(_NAME).write_text": "makes the package's own table",
     "blast_env/cluster.py: connect": "to a cluster",
-    "blast_env/studies/gas/pyclaw_worker.py": "runs without this package, in a scratch folder",
+    "studies/other_codes/pyclaw_worker.py": "runs without this package, in a scratch folder",
     "agents/blast_agents/training/train.py: configure": "TensorBoard's; train tells its errors",
     "agents/blast_agents/training/self_labelling.py: configure": "likewise",
     "agents/blast_agents/training/recorder.py: self.logger.dump": "likewise",

@@ -18,7 +18,6 @@ from blast_env.calibration.model import load_calibration
 from blast_env.cli import app
 from blast_env.physics.pymunk.engine import PymunkRun
 from blast_env.rendering import film
-from blast_env.studies.benchmark import parallel
 from tests.scenarios import BALLISTIC_COURTYARD
 
 COMMANDS = (
@@ -180,18 +179,6 @@ def test_validate_reports_all_problems_of_all_files(tmp_path: Path) -> None:
     assert "site.widht_m: unknown key, did you mean 'width_m'?" in output
     assert "build_zone.stock: is -1, must be at least 1" in output
     assert run("validate", "courtyard").exit_code == 0
-
-
-def test_bench_prints_the_hardware_and_the_ratios(
-    sparse: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(sparse.parent)
-    monkeypatch.setattr(parallel, "_LOT_S", 0.2)
-    options = ("--scenario", sparse.name, "--no-memory", "--no-environment", "--no-gas")
-    result = run("bench", "--repeats", "1", *options)
-    assert result.exit_code == 0, result.output
-    for words in ("cores", "pymunk 7", sparse.name, "blasts/s", "time / pymunk alone"):
-        assert words in result.stdout
 
 
 def calibrate(*arguments: str, out: Path) -> Result:

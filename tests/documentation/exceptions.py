@@ -385,7 +385,12 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --layout layout.json --export layout.dxf": "--seeds 2",
     # docs/studies
     "python -m studies.engines": "--seeds 3 --scene courtyard",
-    "blast-env bench --repeats 7 --no-environment --no-gas": "--repeats 1 --no-memory",
+    "blast-env bench --repeats 3": (
+        "--engine event --repeats 1 --processes 1 --no-memory --no-environment"
+    ),
+    "blast-env bench --engine gas --processes 1 --no-environment --scenario visitor_entrance"
+    " --scenario control_room --scenario school_and_clinic --scenario hotel_forecourt"
+    " --scenario shopping_street --scenario courtyard": "--repeats 1 --no-memory",
     "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
     "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,
     "blast-env train --scenario courtyard --threat hidden --steps 40960"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.studies.gas import openfoam, pyclaw
-from blast_env.studies.gas.histories import Histories, histories_figure
+from studies.other_codes import openfoam, pyclaw
+from studies.other_codes.histories import Histories, histories_figure
 
 
 def test_impulse_counts_what_is_above_still_air_only() -> None:

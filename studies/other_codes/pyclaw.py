@@ -21,7 +21,7 @@ from blast_env.physics.gas.grid import FaceKind, GasGrid
 from blast_env.physics.gas.probes import Gauges
 from blast_env.physics.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA, GasSolver
 from blast_env.physics.gas.state import GAMMA
-from blast_env.studies.gas.histories import Histories
+from studies.other_codes.histories import Histories
 
 GAUGES_M: Final = MappingProxyType(
     {

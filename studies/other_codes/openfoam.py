@@ -28,7 +28,7 @@ from blast_env.physics.gas.probes import Gauges
 from blast_env.physics.gas.solver import AIR_PRESSURE_PA, GasSolver
 from blast_env.physics.gas.source import Explosive, GasCharge, set_charge
 from blast_env.physics.gas.state import GAMMA
-from blast_env.studies.gas.histories import Histories
+from studies.other_codes.histories import Histories
 
 PROGRAMS: Final = ("blockMesh", "topoSet", "subsetMesh", "rhoCentralFoam")
 BALLOON: Final = Explosive(1630.0, 4.52e6, 0.0, 1.0, 2.0)

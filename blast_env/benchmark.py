@@ -1,0 +1,265 @@
+"""How fast blasts and the environment are on this machine: what `blast-env bench` measures.
+
+Processor times are of one core, whatever else runs beside; times by the clock need idle cores.
+"""
+
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from math import ceil
+from multiprocessing import get_context
+from pathlib import Path
+from statistics import median
+from time import perf_counter, process_time
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.engines import simulate
+from blast_env.runner import run_all
+from blast_env.scenario import Scenario
+
+ENV_ID: Final = "BlastBarrier-v0"
+
+_LOT_S: Final = 3.0
+"""How long one process is to have work: shorter lots measure how processes begin."""
+
+_PACKAGES: Final = ("numpy", "numba", "pymunk")
+
+
+@dataclass(frozen=True)
+class BlastCost:
+    """What one blast costs, from scenario to result.
+
+    Attributes:
+        scenario: Name of the scenario.
+        engine: Name of the engine.
+        simulated_s: Time until the end of the blast.
+        steps: Steps, or events, of the engine.
+        cpu_s: Processor time of a blast, median over the seeds.
+        cell_updates: Cells times steps, of engines that have cells.
+        memory_mb: Peak memory of a fresh process that runs one; None: not measured.
+    """
+
+    scenario: str
+    engine: str
+    simulated_s: float
+    steps: int
+    cpu_s: float
+    cell_updates: int | None
+    memory_mb: float | None = None
+
+
+def blast_cost(scenario: Scenario, engine: str, repeats: int, *, memory: bool = True) -> BlastCost:
+    """Time blasts of a scenario without a barrier.
+
+    Args:
+        scenario: The scenario.
+        engine: Name of the engine.
+        repeats: Number of blasts; their seeds are 0 and up.
+        memory: Whether to measure the memory, too, in a process of its own.
+    """
+    run = partial(simulate, scenario, engine=engine)
+    result: Any = run(seed=0)  # compiles what is not on disk yet
+    times_s = []
+    for seed in range(repeats):
+        began = process_time()
+        run(seed=seed)
+        times_s.append(process_time() - began)
+    return BlastCost(
+        scenario=scenario.name,
+        engine=engine,
+        simulated_s=result.time_s,
+        steps=result.steps,
+        cpu_s=median(times_s),
+        cell_updates=result.run_record.get("cell updates"),
+        memory_mb=peak_memory_mb(scenario, engine) if memory else None,
+    )
+
+
+def peak_memory_mb(scenario: Scenario, engine: str) -> float:
+    """Return the peak memory, MB, of a fresh process that runs a blast."""
+    with get_context("spawn").Pool(1) as pool:
+        return pool.apply(_peak_memory_mb, (scenario, engine))
+
+
+def _peak_memory_mb(scenario: Scenario, engine: str) -> float:
+    simulate(scenario, engine=engine)
+    try:
+        # Linux hands the maximum of getrusage on from the process that started this one.
+        status = Path("/proc/self/status").read_text(encoding="utf-8")
+        return 1024.0 * int(status.split("VmHWM:")[1].split()[0]) / 1e6
+    except (OSError, IndexError):
+        import resource  # not on Windows
+
+        kilobytes = 1 if platform.system() == "Darwin" else 1024
+        return kilobytes * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """The same blasts in one process and in several at once, by the clock.
+
+    Attributes:
+        processes: How many.
+        alone_per_s: Blasts a second of one process.
+        together_per_s: Blasts a second of all.
+    """
+
+    processes: int
+    alone_per_s: float
+    together_per_s: float
+
+    @property
+    def ratio(self) -> float:
+        """How many times the blasts of one process they run."""
+        return self.together_per_s / self.alone_per_s
+
+
+def crowd(scenario: Scenario, engine: str, cpu_s: float, processes: int) -> Crowd:
+    """Run lots of blasts in one worker process, then in several at once.
+
+    Args:
+        scenario: The scenario.
+        engine: Name of the engine.
+        cpu_s: About how long one blast takes.
+        processes: How many.
+    """
+    lot = max(2, ceil(_LOT_S / cpu_s))
+    rates = []
+    for count in (1, processes):
+        run_all(partial(_blasts, scenario, engine, 1), range(count), processes)  # all is loaded
+        began = perf_counter()
+        run_all(partial(_blasts, scenario, engine, lot), range(count), processes)
+        rates.append(count * lot / (perf_counter() - began))
+    return Crowd(processes, *rates)
+
+
+def _blasts(scenario: Scenario, engine: str, count: int, first_seed: int) -> None:
+    for seed in range(count):
+        simulate(scenario, seed=count * first_seed + seed, engine=engine)
+
+
+@dataclass(frozen=True)
+class EnvironmentCost:
+    """What an episode of random legal placements costs; medians of processor times.
+
+    Attributes:
+        engine: Name of the engine.
+        episode_s: The whole episode.
+        blast_s: Its last step, with the blasts and the reward.
+        steps: Steps of an episode.
+        vector_steps_per_s: Steps a second, by the clock, of all environments in processes.
+        environments: How many those are.
+    """
+
+    engine: str
+    episode_s: float
+    blast_s: float
+    steps: int
+    vector_steps_per_s: float
+    environments: int
+
+    @property
+    def placing_s(self) -> float:
+        """`reset`, masks, observations and placements of an episode: all but its last step."""
+        return self.episode_s - self.blast_s
+
+
+def environment_cost(
+    scenario: Scenario, engine: str, episodes: int, environments: int
+) -> EnvironmentCost:
+    """Time the environment in one process, and in a vector of processes.
+
+    Args:
+        scenario: The scenario; it needs a build zone, and a calibration where the engine does.
+        engine: Name of the engine.
+        episodes: Episodes that are timed; one more comes before them.
+        environments: Processes of the vector.
+
+    Raises:
+        BlastEnvError: If the environment cannot be made of the scenario.
+    """
+    env = gym.make(ENV_ID, scenario=scenario, engine=engine)
+    rng = np.random.default_rng(0)
+    _episode(env, rng, 0)
+    played = [_episode(env, rng, seed) for seed in range(1, episodes + 1)]
+    env.close()
+    whole_s, blast_s, steps = zip(*played, strict=True)
+    return EnvironmentCost(
+        engine=engine,
+        episode_s=median(whole_s),
+        blast_s=median(blast_s),
+        steps=round(median(steps)),
+        vector_steps_per_s=_vector_steps_per_s(scenario, engine, episodes, environments),
+        environments=environments,
+    )
+
+
+def _episode(
+    env: gym.Env[Any, Any], rng: np.random.Generator, seed: int
+) -> tuple[float, float, int]:
+    """Return the time of an episode, that of its last step, and its steps."""
+    began, steps, ended = process_time(), 0, False
+    _, info = env.reset(seed=seed)
+    last_s = began
+    while not ended:
+        action = random_action(info["action_mask"], rng)
+        last_s = process_time()
+        _, _, ended, _, info = env.step(action)
+        steps += 1
+    now_s = process_time()
+    return now_s - began, now_s - last_s, steps
+
+
+def random_action(mask: FloatArray | NDArray[Any], rng: np.random.Generator) -> int:
+    """Return a random legal placement; the last action, which finishes, if there is none."""
+    free = np.flatnonzero(mask[:-1])
+    return int(rng.choice(free)) if len(free) else len(mask) - 1
+
+
+def _vector_steps_per_s(scenario: Scenario, engine: str, episodes: int, count: int) -> float:
+    make = partial(gym.make, ENV_ID, scenario=scenario, engine=engine)
+    mode = AutoresetMode.SAME_STEP
+    envs = AsyncVectorEnv([make] * count, context="spawn", autoreset_mode=mode)
+    rng = np.random.default_rng(0)
+    try:
+        envs.reset(seed=0)
+        _play(envs, rng, 1)
+        began = perf_counter()
+        return _play(envs, rng, episodes) / (perf_counter() - began)
+    finally:
+        envs.close()
+
+
+def _play(envs: AsyncVectorEnv, rng: np.random.Generator, episodes: int) -> int:
+    """Return the steps of all until each environment has ended so many episodes."""
+    ended, steps = np.zeros(envs.num_envs, dtype=np.int64), 0
+    while ended.min() < episodes:
+        masks: Sequence[NDArray[Any]] = envs.call("action_masks")
+        _, _, over, _, _ = envs.step(np.array([random_action(mask, rng) for mask in masks]))
+        ended += over
+        steps += envs.num_envs
+    return steps
+
+
+def hardware() -> str:
+    """Return the processor, the number of cores and the versions that decide the speed."""
+    packages = ", ".join(f"{name} {version(name)}" for name in _PACKAGES)
+    return f"{_processor()}, {os.cpu_count()} cores, Python {platform.python_version()}, {packages}"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    models = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    return next(models, platform.processor() or platform.machine())

@@ -1,1 +1,0 @@
-"""Studies of the model that commands run: benchmark, calibration, pressure, shielding."""

@@ -1,1 +1,0 @@
-"""How fast the engines and the environment are."""

@@ -1,1 +1,0 @@
-"""Other codes: they run what `blast-env bench --gas` times them by."""
