@@ -62,13 +62,13 @@ class ScaledImpulse(NamedTuple):
 Amount = Annotated[float, Field(ge=0.0)]
 
 
-class Section(BaseModel):
+class CalibrationSection(BaseModel):
     """Base of the parts of a calibration file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class ReferenceSection(Section):
+class ReferenceSection(CalibrationSection):
     """What the law was fitted to.
 
     Attributes:
@@ -84,7 +84,7 @@ class ReferenceSection(Section):
     charge_kg: float | None = None
 
 
-class MetricsSection(Section):
+class MetricsSection(CalibrationSection):
     """How well the law agrees with the reference (`FitMetrics`), rmse in psi*s."""
 
     mape_percent: float
@@ -93,7 +93,7 @@ class MetricsSection(Section):
     leave_one_out_mape_percent: float
 
 
-class Calibration(Section):
+class Calibration(CalibrationSection):
     """A law from simulated impulse to psi*s, and everything that it depends on.
 
     Attributes:

@@ -36,7 +36,7 @@ NEIGHBOUR_DISTANCE_M: Final = 2.0
 
 
 @dataclass(frozen=True)
-class Ground:
+class SiteGround:
     """Where things lie on a site, m.
 
     Attributes:
@@ -52,15 +52,15 @@ class Ground:
     neighbour: Rectangle | None
 
 
-def draw_ground(draws: Draws, ranges: SiteRanges) -> Ground:
+def draw_ground(draws: Draws, ranges: SiteRanges) -> SiteGround:
     """Draw where things lie."""
     threat = _draw_threat(draws, ranges)
     building = _draw_building(draws, ranges, threat)
     zone = _draw_zone(draws, ranges, threat, building)
     neighbour = None
     if draws.happens(ranges.neighbour_probability):
-        neighbour = _draw_neighbour(draws, ranges, Ground(threat, building, zone, None))
-    return Ground(threat, building, zone, neighbour)
+        neighbour = _draw_neighbour(draws, ranges, SiteGround(threat, building, zone, None))
+    return SiteGround(threat, building, zone, neighbour)
 
 
 def _draw_threat(draws: Draws, ranges: SiteRanges) -> Rectangle:
@@ -95,7 +95,7 @@ def _draw_zone(
     return Rectangle.from_corner((left, bottom), (side_m, side_m))
 
 
-def _draw_neighbour(draws: Draws, ranges: SiteRanges, ground: Ground) -> Rectangle | None:
+def _draw_neighbour(draws: Draws, ranges: SiteRanges, ground: SiteGround) -> Rectangle | None:
     """Draw a building beside or before the protected one, outside the zone, if there is room."""
     size_m = (draws.length_m(ranges.neighbour_side_m), draws.length_m(ranges.neighbour_side_m))
     area = Rectangle(MARGIN_M, MARGIN_M, ground.building.right, ranges.side_m - MARGIN_M)
@@ -122,7 +122,7 @@ HYDRANT_SIDE_M: Final = 1.5
 """Side of the square around a hydrant that must stay free."""
 
 
-def draw_build_zone(draws: Draws, ranges: SiteRanges, ground: Ground) -> BuildZone:
+def draw_build_zone(draws: Draws, ranges: SiteRanges, ground: SiteGround) -> BuildZone:
     """Draw the conditions of the build zone."""
     stock = draws.count(ranges.stock)
     clearance_m = draws.length_m(ranges.clearance_m)
@@ -148,7 +148,7 @@ def draw_build_zone(draws: Draws, ranges: SiteRanges, ground: Ground) -> BuildZo
     )
 
 
-def _draw_keep_outs(draws: Draws, ranges: SiteRanges, ground: Ground) -> tuple[KeepOut, ...]:
+def _draw_keep_outs(draws: Draws, ranges: SiteRanges, ground: SiteGround) -> tuple[KeepOut, ...]:
     keep_outs: list[KeepOut] = []
     if draws.happens(ranges.path_probability):
         keep_outs += _draw_path(draws, ranges, ground)
@@ -165,7 +165,7 @@ def _draw_keep_outs(draws: Draws, ranges: SiteRanges, ground: Ground) -> tuple[K
     return tuple(keep_outs)
 
 
-def _draw_path(draws: Draws, ranges: SiteRanges, ground: Ground) -> list[KeepOut]:
+def _draw_path(draws: Draws, ranges: SiteRanges, ground: SiteGround) -> list[KeepOut]:
     """Draw the path to the door through the zone; none if no door leads there."""
     zone, building = ground.zone, ground.building
     width_m = draws.length_m(ranges.path_width_m)
@@ -183,7 +183,7 @@ def _draw_path(draws: Draws, ranges: SiteRanges, ground: Ground) -> list[KeepOut
     ]
 
 
-def _draw_access_way(draws: Draws, ranges: SiteRanges, ground: Ground) -> AccessWay:
+def _draw_access_way(draws: Draws, ranges: SiteRanges, ground: SiteGround) -> AccessWay:
     """Draw a way along the facade, or, where the building leaves it room, one towards it."""
     along = draws.happens(0.5) or ground.zone.overlaps(ground.building)
     between: Literal["left_right", "bottom_top"] = "bottom_top" if along else "left_right"
@@ -206,7 +206,7 @@ def _draw_duct(draws: Draws, ranges: SiteRanges, zone: Rectangle) -> CostArea:
     )
 
 
-def _yard(ground: Ground) -> Rectangle:
+def _yard(ground: SiteGround) -> Rectangle:
     """Return the part of the zone before the building."""
     zone = ground.zone
     return Rectangle(zone.left, zone.bottom, min(zone.right, ground.building.left), zone.top)
@@ -346,7 +346,7 @@ def _structure(name: str, rectangle: Rectangle) -> ModularObstacleSection:
     )
 
 
-def _description(ground: Ground, side: str) -> str:
+def _description(ground: SiteGround, side: str) -> str:
     building, threat = ground.building, ground.threat
     return (
         f"A generated site: a building with a facade of {building.top - building.bottom:g} m,"

@@ -200,7 +200,7 @@ _BETWEEN_M: Final = 2.0
 STOREY_M: Final = 3.0
 
 
-class Plan(NamedTuple):
+class ItemSitePlan(NamedTuple):
     """Where things lie on a site, m.
 
     Attributes:
@@ -258,7 +258,7 @@ def draw_item_site(rng: np.random.Generator, ranges: ItemSiteRanges, name: str) 
     return turned(Scenario.from_document(document, name), quarter_turns)
 
 
-def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> Plan:
+def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> ItemSitePlan:
     middle_m = ranges.side_m / 2.0 + draws.length_m(ranges.shift_m)
     front_m = _ROAD_M + draws.length_m(ranges.stand_off_m)
     rows = 2 if draws.happens(ranges.second_probability) else 1
@@ -282,10 +282,10 @@ def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> Plan:
     low = on_grid(middles - ranges.zone_side_m / 2.0)
     low = min(max(low, 0.0), ranges.side_m - ranges.zone_side_m)
     zone = Rectangle.from_corner((left, low), (ranges.zone_side_m,) * 2)
-    return Plan(tuple(buildings), zone, front_m, on_grid(middle_m))
+    return ItemSitePlan(tuple(buildings), zone, front_m, on_grid(middle_m))
 
 
-def _place(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> dict[str, Any]:
+def _place(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> dict[str, Any]:
     """Return a stretch of road, or a parking area, on which the charge is hidden."""
     length_m = draws.length_m(ranges.road_length_m)
     bottom = on_grid(plan.middle_m - length_m / 2.0)
@@ -298,7 +298,7 @@ def _place(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> dict[str, Any]:
     return {"kind": "segment", **ends, **mass}
 
 
-def _vehicle(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> dict[str, Any]:
+def _vehicle(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> dict[str, Any]:
     """Return a vehicle that enters on the left and drives up to the kerb before the buildings."""
     width_m = draws.length_m(ranges.vehicle_width_m)
     court_m = draws.length_m(ranges.forecourt_m)
@@ -316,7 +316,7 @@ def _vehicle(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> dict[str, Any]
     }
 
 
-def _structures(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> list[dict[str, Any]]:
+def _structures(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> list[dict[str, Any]]:
     """Return the protected buildings, and a shed where it has room."""
     structures: list[dict[str, Any]] = []
     for number, building in enumerate(plan.buildings):
@@ -346,7 +346,9 @@ def _block(name: str, rectangle: Rectangle) -> dict[str, Any]:
     }
 
 
-def _zone(draws: Draws, ranges: ItemSiteRanges, plan: Plan, has_vehicle: bool) -> dict[str, Any]:
+def _zone(
+    draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan, has_vehicle: bool
+) -> dict[str, Any]:
     """Return the build zone with its conditions, catalogue and budget."""
     zone = plan.zone
     keep_outs = _keep_outs(draws, ranges, plan)
@@ -399,7 +401,7 @@ def _items(draws: Draws, ranges: ItemSiteRanges, has_vehicle: bool) -> list[dict
     return items
 
 
-def _keep_outs(draws: Draws, ranges: ItemSiteRanges, plan: Plan) -> list[dict[str, Any]]:
+def _keep_outs(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> list[dict[str, Any]]:
     """Return a path to the door and trees, within the zone before the buildings."""
     zone, building = plan.zone, plan.buildings[0]
     yard = Rectangle(zone.left, zone.bottom, min(zone.right, plan.front_m), zone.top)

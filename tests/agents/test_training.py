@@ -14,7 +14,7 @@ import torch
 import yaml
 from blast_agents.training import resume, train
 from blast_agents.training.checkpoint import Checkpoint, Weights
-from blast_agents.training.recorder import Progress, learning_curve
+from blast_agents.training.recorder import TrainingProgress, learning_curve
 from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunFolder, read_rows
 from blast_agents.training.train import TrainingResult
 
@@ -110,7 +110,7 @@ def test_the_learning_curve_tells_blasts_from_guesses(
 ) -> None:
     configuration = RunFolder(finished).configuration()
     settings = configuration.settings.model_copy(update={"engine": engine})
-    progress = Progress(
+    progress = TrainingProgress(
         Checkpoint.load(finished / "checkpoint.pt").counters,
         read_rows(finished / "rollouts.csv", RolloutRow),
         read_rows(finished / "evaluations.csv", EvaluationRow),

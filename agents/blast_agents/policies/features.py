@@ -356,7 +356,7 @@ CELL_FEATURES: Final = (*StaticCellFeatures._fields, *ChangingCellFeatures._fiel
 """Names of the features of a cell, in their order."""
 
 
-class SiteMeasures(NamedTuple):
+class SiteFeatures(NamedTuple):
     """What there is to say of charge and structures, of the order of 1, (batch, 1) each.
 
     Attributes:
@@ -377,7 +377,7 @@ class SiteMeasures(NamedTuple):
 
 
 SITE_FEATURES: Final = (
-    *SiteMeasures._fields,
+    *SiteFeatures._fields,
     "open_facade",
     *SHARES,
     *(f"hidden_{bearing}" for bearing in range(BEARINGS)),
@@ -445,7 +445,7 @@ class ZoneGeometry(NamedTuple):
         bearings: On which bearings the cells are seen.
         cells: Features of each cell (batch, cells, features), those of `StaticCellFeatures`.
         cost: Cost of a module, from 0 to 1 (batch, cells).
-        site: Features of the whole (batch, features), those of `SiteMeasures`.
+        site: Features of the whole (batch, features), those of `SiteFeatures`.
     """
 
     row: Tensor
@@ -535,12 +535,12 @@ class ZoneGeometry(NamedTuple):
         return ZoneView(cells.view(*barrier.shape, -1), barrier, free, torch.cat(site, dim=1))
 
 
-def _measures(planes: Planes, likely: Tensor, target: Spread) -> SiteMeasures:
+def _measures(planes: Planes, likely: Tensor, target: Spread) -> SiteFeatures:
     """Return what there is to say of charge and structures."""
     charge = Spread.of(likely)
     line = LinesOfSight.between(charge.x[:, None], charge.y[:, None], target)
     along_x, along_y = line.along_x, line.along_y
-    return SiteMeasures(
+    return SiteFeatures(
         distance=line.distance / (2.0 * _LENGTH),
         half_facade=target.half_width(-along_y, along_x).clamp(min=1.0) / _LENGTH,
         half_depth=target.half_width(along_x, along_y) / _LENGTH,

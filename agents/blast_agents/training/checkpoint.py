@@ -51,7 +51,7 @@ class Counters:
 
 
 @dataclass(frozen=True)
-class Label:
+class CaseLabel:
     """The best layout of a case that self-labelling knows so far.
 
     Attributes:
@@ -65,7 +65,7 @@ class Label:
     unprotected: tuple[float, ...]
 
 
-_LABELS: Final = TypeAdapter(tuple[Label, ...])
+_LABELS: Final = TypeAdapter(tuple[CaseLabel, ...])
 
 
 class Checkpoint(BaseModel):
@@ -96,7 +96,7 @@ class Checkpoint(BaseModel):
     best_policy: dict[str, torch.Tensor]
     rollouts: tuple[RolloutRow, ...] = ()
     evaluations: tuple[EvaluationRow, ...] = ()
-    labels: tuple[Label, ...] = ()
+    labels: tuple[CaseLabel, ...] = ()
 
     @classmethod
     def of_start(

@@ -15,7 +15,7 @@ from stable_baselines3.common.utils import set_random_seed
 from blast_agents.surrogate.engine import is_surrogate
 from blast_agents.training.agent import Model, Policy, TrainedAgent
 from blast_agents.training.cases import Selection
-from blast_agents.training.checkpoint import Checkpoint, Counters, Label, Weights
+from blast_agents.training.checkpoint import CaseLabel, Checkpoint, Counters, Weights
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import (
     EvaluationRow,
@@ -36,7 +36,7 @@ with render_extra():
 
 
 @dataclass
-class Progress:
+class TrainingProgress:
     """What a run has come to so far.
 
     Attributes:
@@ -52,7 +52,7 @@ class Progress:
     best_policy: Weights = field(default_factory=dict)
 
     @classmethod
-    def of(cls, checkpoint: Checkpoint) -> "Progress":
+    def of(cls, checkpoint: Checkpoint) -> "TrainingProgress":
         """Return what a run has come to at a checkpoint."""
         return cls(
             checkpoint.counters,
@@ -77,7 +77,7 @@ class Progress:
         return row
 
     def checkpoint(
-        self, configuration: RunConfiguration, policy: Policy, labels: tuple[Label, ...] = ()
+        self, configuration: RunConfiguration, policy: Policy, labels: tuple[CaseLabel, ...] = ()
     ) -> Checkpoint:
         """Return the checkpoint of the run as it is now."""
         return Checkpoint(
@@ -101,7 +101,7 @@ class Progress:
         write_rows(folder.evaluations, EvaluationRow, self.evaluations)
 
 
-class Recorder(BaseCallback):
+class TrainingRecorder(BaseCallback):
     """Makes each rollout a unit of its own, and writes down what it brought.
 
     A rollout begins with fresh episodes and with seeds that follow from the seed of the run and
@@ -123,7 +123,7 @@ class Recorder(BaseCallback):
         configuration: RunConfiguration,
         scenario: Scenario,
         selection: Selection,
-        progress: Progress,
+        progress: TrainingProgress,
         show: Callable[[float], None],
     ) -> None:
         super().__init__()
@@ -252,7 +252,7 @@ _HELD_OUT: Final = "#D55E00"
 _BEST: Final = "#000000"
 
 
-def learning_curve(progress: Progress, configuration: RunConfiguration) -> Figure:
+def learning_curve(progress: TrainingProgress, configuration: RunConfiguration) -> Figure:
     """Return the reduction in training and on held-out threats over the blasts, or guesses, spent.
 
     Args:
@@ -277,7 +277,9 @@ def learning_curve(progress: Progress, configuration: RunConfiguration) -> Figur
     return figure
 
 
-def save_learning_curve(progress: Progress, configuration: RunConfiguration, path: Path) -> Path:
+def save_learning_curve(
+    progress: TrainingProgress, configuration: RunConfiguration, path: Path
+) -> Path:
     """Save the figure.
 
     Returns:
@@ -289,7 +291,7 @@ def save_learning_curve(progress: Progress, configuration: RunConfiguration, pat
     return save_figure(learning_curve(progress, configuration), path)
 
 
-def _draw(axes: Axes, progress: Progress) -> None:
+def _draw(axes: Axes, progress: TrainingProgress) -> None:
     rollouts, evaluations = progress.rollouts, progress.evaluations
     axes.plot(
         [row.blasts for row in rollouts],

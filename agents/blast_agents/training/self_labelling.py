@@ -30,9 +30,9 @@ from blast_agents.search.by_rule import layouts_by_rule
 from blast_agents.search.moves import Moves, legal_part
 from blast_agents.training.agent import Policy, TrainedAgent, as_tensor, policy_for
 from blast_agents.training.cases import Selection, training_cases
-from blast_agents.training.checkpoint import Checkpoint, Label
+from blast_agents.training.checkpoint import CaseLabel, Checkpoint
 from blast_agents.training.hyperparameters import schedule
-from blast_agents.training.recorder import Progress
+from blast_agents.training.recorder import TrainingProgress
 from blast_agents.training.run_folder import RolloutRow, RunConfiguration, RunFolder
 from blast_env.engines import Engine
 from blast_env.envs.observations import OBSERVATIONS, EpisodeObservation, Observable
@@ -305,7 +305,7 @@ class Lessons:
     """
 
     cases: tuple[Case, ...]
-    labels: list[Label] = field(default_factory=list)
+    labels: list[CaseLabel] = field(default_factory=list)
 
     def reduction(self, index: int) -> float:
         """Return by which share a case's label lowers the load; 0 where nothing arrives."""
@@ -325,7 +325,7 @@ class Lessons:
         ]
         whole = slice(None)
         bare = judge.loads([(case, ()) for case in self.cases], whole)
-        self.labels = [Label((), each, each) for each in bare]
+        self.labels = [CaseLabel((), each, each) for each in bare]
         return self.improve(judge, range(len(self.cases)), by_rule)
 
     def improve(
@@ -396,7 +396,7 @@ class SelfLabelling:
     lessons: Lessons
     judge: Judge
     selection: Selection
-    progress: Progress
+    progress: TrainingProgress
     logger: Logger
     uncounted: int = 0
 
@@ -408,7 +408,7 @@ class SelfLabelling:
         source: ScenarioSource,
         selection: Selection,
         checkpoint: Checkpoint,
-        progress: Progress,
+        progress: TrainingProgress,
     ) -> "SelfLabelling":
         """Return the training as it was at a checkpoint.
 

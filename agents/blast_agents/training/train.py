@@ -15,7 +15,7 @@ from blast_agents.training.cases import Selection
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.environments import make_environments, training_source
 from blast_agents.training.hyperparameters import SELF_LABELLING, AnyHyperparameters
-from blast_agents.training.recorder import Progress, Recorder, save_learning_curve
+from blast_agents.training.recorder import TrainingProgress, TrainingRecorder, save_learning_curve
 from blast_agents.training.run_folder import (
     RunConfiguration,
     RunFolder,
@@ -42,7 +42,7 @@ class TrainingResult:
 
     folder: RunFolder
     configuration: RunConfiguration
-    progress: Progress
+    progress: TrainingProgress
 
 
 def train(
@@ -157,7 +157,7 @@ class _Run:
 
 def _run(job: _Run, checkpoint: Checkpoint, show: Callable[[float], None]) -> TrainingResult:
     """Train from a checkpoint to the end."""
-    settings, so_far = job.configuration.settings, Progress.of(checkpoint)
+    settings, so_far = job.configuration.settings, TrainingProgress.of(checkpoint)
     so_far.write_tables(job.folder)  # a killed run may not have come to it
     if so_far.counters.steps < settings.steps:
         learn = _learn_from_own_best if settings.algorithm == SELF_LABELLING else _learn_by_acting
@@ -178,7 +178,7 @@ def _run(job: _Run, checkpoint: Checkpoint, show: Callable[[float], None]) -> Tr
 
 
 def _learn_from_own_best(
-    job: _Run, so_far: Progress, checkpoint: Checkpoint, show: Callable[[float], None]
+    job: _Run, so_far: TrainingProgress, checkpoint: Checkpoint, show: Callable[[float], None]
 ) -> None:
     """Train by self-labelling, from a checkpoint on."""
     training = SelfLabelling.of(
@@ -190,7 +190,7 @@ def _learn_from_own_best(
 
 
 def _learn_by_acting(
-    job: _Run, so_far: Progress, checkpoint: Checkpoint, show: Callable[[float], None]
+    job: _Run, so_far: TrainingProgress, checkpoint: Checkpoint, show: Callable[[float], None]
 ) -> None:
     """Train by PPO or MaskablePPO, from a checkpoint on."""
     environments = make_environments(job.configuration, job.source)
@@ -204,7 +204,7 @@ def _learn_by_acting(
 
 def _learn(
     job: _Run,
-    so_far: Progress,
+    so_far: TrainingProgress,
     checkpoint: Checkpoint,
     environments: VecEnv,
     show: Callable[[float], None],
@@ -219,7 +219,9 @@ def _learn(
         model.num_timesteps = checkpoint.counters.steps
         model._n_updates = checkpoint.counters.updates
     scenario = job.source.representative
-    recorder = Recorder(job.folder, job.configuration, scenario, job.selection, so_far, show)
+    recorder = TrainingRecorder(
+        job.folder, job.configuration, scenario, job.selection, so_far, show
+    )
     recorder.algorithm = model
     model.set_logger(configure(str(job.folder.tensorboard), ["tensorboard"]))
     left = settings.steps - so_far.counters.steps
