@@ -54,6 +54,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 default_role = "code"  # docstrings write `name` for code
+napoleon_include_init_with_doc = True
 napoleon_use_ivar = True
 
 PUBLIC: Final = (

@@ -49,123 +49,44 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     """Barriers are placed one by one to shield a structure; then a charge goes off.
 
     ## Description
-    A site has structures, some of them protected, places where a charge may be, and a build zone
-    with a stock of barrier modules. One module after the other is put on a cell of the zone. When
-    the stock is used up, or the agent has enough, the charge goes off, and the less impulse the
-    protected structures take, the better the layout was. The zone's conditions (keep-outs,
-    clearance, budget, an access way that must stay open) are those of the scenario file. Where the
-    zone has a catalogue, pieces of its items are placed instead of single modules: walls of a
-    length, a height and a price, turned or not.
+    A site has structures, some of them protected, places where a charge may be, and a build zone.
+    Each action puts a barrier module, or a piece of the zone's catalogue, on a cell of the zone.
+    When the agent has finished, or the stock is used up, the charge goes off. The less impulse the
+    protected structures take, the better the layout is. The scenario says which layouts are legal.
 
     ## Action space
-    `Discrete(rows * columns + 1)`: action `row * columns + column` places a module on that cell
-    of the build zone (row 0 at the bottom, column 0 on the left); the last action finishes.
-    Which actions are legal (to finish always is) say `info["action_mask"]`, int8 as
-    `action_space.sample(mask=...)` wants it, and `action_masks()`, bool as MaskablePPO does.
-    `explain(cell)` says in a sentence why a cell is not available.
-
-    With a catalogue, `Discrete(variants * rows * columns + 1)`: a variant is an item in one
-    orientation, item by item, not turned before turned, and its lower left cell is what the
-    action names. `placement.catalogue` translates: `element(action)`, `action(piece)`,
-    `variants`. `explain` takes a piece (`blast_env.scenario.Piece`).
+    `Discrete(variants * rows * columns + 1)`. A variant is an item of the catalogue in one
+    orientation; without a catalogue there is one, a module of 0.5 m. Cells count row by row from
+    the lower left corner of the zone. The last action finishes. `action_masks()` and
+    `info["action_mask"]` say which actions are legal; `explain(element)` says why one is not.
 
     ## Observation space
-    By the argument `observation`:
-
-    - `"grid"`: `Box(0, 1, (9, rows, columns), float32)`, planes over the site with one square a
-      module of 0.5 m; channel by channel in `blast_env.envs.observations.GridObservation`;
-    - `"image"`: `Box(0, 255, (height, width, 9), uint8)`, the same planes as an image, 255 for 1,
-      large enough for image policies such as stable-baselines3's `CnnPolicy`
-      (`ImageObservation`);
-    - `"grid_with_load"`: a tenth plane, the load on each module of the structures without a
-      barrier (`GridWithLoadObservation`), for four more blasts a charge;
-    - `"features"`: `Box(0, 1, (features,), float32)`, a flat vector, value by value in
-      `blast_env.envs.observations.FeaturesObservation`.
-
-    With a catalogue each of them shows more: heights, the items with what is left of them, and
-    which piece may be placed where. Those planes and values come last.
+    `observation="grid"`: `Box(0, 1, (planes, rows, columns), float32)`, planes over the site.
+    `"image"`: the same as `uint8`. `"grid_with_load"`: one plane more, the load without a barrier.
+    `"features"`: a flat vector. `blast_env.envs.observations` lists all planes and values.
 
     ## Rewards
-    The rewards of an episode add up to minus the impulse on the protected structures, -I, and the
-    cost of illegal actions. A step's reward is the sum of terms, all in psi s and in
-    `info["reward_terms"]`:
-
-    - `impulse`: over an episode, minus the calibrated impulse per area of the protected
-      structures, times their weights, added up. Where the scenario's objective counts peaks, the
-      term is `peak` (psi), and where it counts both, `load` (no unit). `reward="terminal"` pays it
-      when the charge goes off. With `"incremental"` the first step pays -I(no barrier) (with the
-      option `layout`, of that layout), and a module earns I(before) - I(after) at once; the sum
-      over an episode is the same (not if it is discounted), for a set of blasts a module.
-    - `deposit`, with `"terminal"`: the first step pays -2 I(no barrier), which comes back when
-      the charge goes off.
-    - `illegal_actions`: an illegal action changes nothing, is counted in
-      `info["illegal_actions"]`, and costs `illegal_action_cost`.
-
-    A time limit (`gymnasium.make(..., max_episode_steps=)`, `TimeLimit`) may cut an episode off
-    before the charge goes off. That never pays better than to finish with the same modules: with
-    `"incremental"` it pays the same, with `"terminal"` the deposit is lost.
+    An episode's rewards add up to minus the impulse on the protected structures (psi s, by weight)
+    and the cost of illegal actions. `info["reward_terms"]` has the terms: `impulse` (`peak` in psi
+    or `load` without a unit, where the scenario's objective counts these), `deposit` and
+    `illegal_actions`. `reward="terminal"` pays when the charge goes off. Its first step pays a
+    deposit of twice the impulse without a barrier, which comes back at the end: to be cut off by a
+    time limit never pays. `"incremental"` pays each module what it takes off, at once.
 
     ## Starting state
-    No module stands. The scenario's distribution gives position and mass of the charge:
-    `threat="visible"` draws one, which the observation shows; `threat="hidden"` draws `threats` of
-    them, the observation shows only where charges may be, and the impulse is that of one layout
-    against all, as their mean, CVaR or worst (`risk`). Each charge goes off `realisations` times,
-    with other seeds of fan and air; the impulse is the mean. Charges and seeds follow from the seed
-    of `reset` alone, so that with one seed all layouts meet the same blasts.
-
-    The charge of a vehicle is the exception: it goes off at the worst place that the layout lets
-    the vehicle reach, without a barrier at the worst place of the empty site; of several threats of
-    one vehicle the second is at its second worst place, and so on. Nothing is drawn, and nothing is
-    hidden but what the layout decides. With `"charge_position_m"` no vehicle brings the charge.
-
-    Options of `reset`: `"charge_position_m"`, (x, y) of every charge; `"tnt_kg"`, the mass of
-    every charge; `"charge_height_m"`, the height of its centre above the ground (the particle
-    engines know no height); `"layout"`, cells that hold a module, or pieces, from the start;
-    `"blast_seed"`, the seed of the first blast, the others have the following ones.
+    No module stands. `threat="visible"` draws one charge and shows it; `"hidden"` draws `threats`
+    charges and shows where charges may be. A vehicle brings its charge to the worst place that the
+    layout leaves it. Everything follows from the seed of `reset`. Options of `reset`:
+    `charge_position_m`, `tnt_kg`, `charge_height_m`, `layout`, `blast_seed`.
 
     ## Episode end
     Terminated when the agent finishes, when nothing more can be placed, or after
-    `illegal_action_limit` illegal actions. Never truncated by itself.
-
-    ## Information
-    Always `action_mask` and `illegal_actions`; after a step `reward_terms`; at the end
-    `impulse_psi_s`, `impulse_pa_s` and `impulse_sim` (simulation units), as the reward counts
-    them; `unprotected_impulse_pa_s`, the same blasts without a barrier; with gas dynamics `peak_pa`
-    and `unprotected_peak_pa`, the largest overpressures; `reduction`, the share
-    that the layout takes off what counts (NaN if nothing arrives without a barrier); `layout`,
-    `scenario_hash`, `charges` (position, kg TNT, height; a vehicle's where the layout let it come)
-    and `blast_seeds` (a tuple a charge) to repeat the blasts; `calibration` and
-    `calibration_in_range`; `blasts`, `cache_hits` (loads that needed no blast) and
-    `cache_hit_rate`, their share, counted since the environment was made.
+    `illegal_action_limit` illegal actions. Never truncated by itself. At the end `info` has the
+    impulses with and without the barrier, `reduction`, `layout`, `charges`, `blast_seeds`,
+    `scenario_hash`, `calibration`, and how many blasts were run.
 
     ## Arguments
-    - `scenario`: bundled name, path of a scenario file, a `Scenario` or its plain data; or
-      `"sites"`, which draws a generated site at every `reset`, or any other `ScenarioSource`
-      (`blast_env.envs.strategies`).
-    - `reward`: `"terminal"`, `"incremental"`, or a `Reward` (`blast_env.envs.strategies`).
-    - `observation`: see above, or an `Observation` (`blast_env.envs.observations`).
-    - `threat`: `"visible"`, `"hidden"`, or a `ThreatModel` (`blast_env.envs.strategies`).
-    - `threats`: how many charges are drawn when they are hidden; 16 unless given.
-    - `realisations`: blasts for each charge; 2 unless given, and 1 where charges are hidden, since
-      these differ anyway.
-    - `risk`: `"mean"`, `"cvar"`, `"worst"`, or a `Risk` (`blast_env.statistics`); as the scenario's
-      objective says unless given.
-    - `cvar_level`: the worst share 1 - `cvar_level` of the charges makes the CVaR.
-    - `illegal_action_cost`: in the unit of the reward; 0.001 (psi s: 6.9 Pa s) unless given.
-    - `illegal_action_limit`: illegal actions that end the episode; 100 unless given.
-    - `engine`: name of an engine, or an engine. `"event"` and `"pymunk"` run the particle model:
-      for studying it, for learning methods cheaply, for a first look. `"gas"` (id
-      `BlastBarrierGas-v0`) is what a decision can rest on: three dimensions, loads without a
-      calibration, one realisation a charge since there is no noise, a second or more a blast;
-      `impulse_sim` is NaN there.
-    - `cell_m`: side of the cells of gas dynamics; 0.5 m unless given.
-    - `cache`: where blasts are remembered beside the memory of the environment: a folder, which
-      other processes and later runs may use too, or a cache (`blast_env.evaluation.store`).
-    - `render_mode`: `None`, `"human"`, `"rgb_array"` or `"ansi"`.
-    - `show_blast`: whether an episode goes on after the charge has gone off, for as many steps as
-      the film of the blast has frames (some 250), whatever the actions: for a window, and for
-      `gymnasium.wrappers.RecordVideo`. The reward is paid before.
-
+    Those of `__init__`, below.
     >>> import gymnasium as gym, blast_env
     >>> env = gym.make("BlastBarrier-v0", threat="visible", realisations=2)
     >>> observation, info = env.reset(seed=0, options={"charge_position_m": (5.0, 15.0)})
@@ -176,42 +97,15 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     >>> for row in (10, 12, 14, 16, 22, 24, 26, 28):
     ...     for cell in ((row, 0), (row + 1, 0)):
     ...         observation, reward, ended, _, info = env.step(cell[0] * 16 + cell[1])
-    >>> ended, info["reward_terms"]["impulse"] == -info["impulse_psi_s"]
-    (True, True)
-    >>> 0.0 < info["reduction"] < 1.0
-    True
+    >>> ended, info["reward_terms"]["impulse"] == -info["impulse_psi_s"], info["reduction"] > 0.0
+    (True, True, True)
 
     ## Version history
     - v0: first version.
 
     ## Notes
-    From seed to seed the impulse with one layout scatters by 8 to 11 % of that without a barrier,
-    and the reduction by 6 to 7 percentage points; hidden charges differ much more. The spread
-    between random layouts of scattered modules (in brackets: of straight walls) over the scatter
-    of comparisons on the same blasts, by the number of blasts averaged, each of another charge
-    where charges are hidden:
-
-    | scenario, charge | 1 | 2 | 4 | 8 | 16 |
-    |---|---|---|---|---|---|
-    | courtyard, visible | 2.7 (3.5) | 3.8 (5.0) | 5.3 (7.0) | 7.5 (10) | 11 (14) |
-    | perimeter_gate, visible | 3.4 (3.6) | 4.8 (5.2) | 6.7 (7.3) | 9.5 (10) | 13 (15) |
-    | street_junction, visible | 2.9 (3.9) | 4.0 (5.5) | 5.7 (7.7) | 8.1 (11) | 11 (15) |
-    | courtyard, hidden | 0.9 (1.0) | 1.3 (1.4) | 1.9 (2.0) | 2.6 (2.9) | 3.7 (4.0) |
-    | perimeter_gate, hidden | 0.8 (1.1) | 1.2 (1.6) | 1.7 (2.2) | 2.4 (3.1) | 3.3 (4.4) |
-    | street_junction, hidden | 0.7 (0.6) | 1.0 (0.9) | 1.4 (1.2) | 1.9 (1.8) | 2.8 (2.5) |
-
-    (`python -m studies.noise reward --layouts 12 --charges 12 --seeds 4`.) Hence 2 realisations
-    of a visible charge and 16 hidden charges: the spread is then twice the scatter or more.
-
-    An episode costs `threats * realisations` blasts, and as many without a barrier.
-
-    The largest impulse with any of 144 random layouts, whole and unfinished, was 1.37 times that
-    without a barrier, blast by blast (`python -m studies.noise deposit`): hence the deposit.
-
-    Two-dimensional: nothing flies over a wall. The calibration holds for the distances and the
-    charge mass that it was made for (`calibration_in_range`) and for a facade in the open; how far
-    behind a barrier it can be believed, docs/engineers/validity.md says. The sum of impulses
-    over several protected structures is a score, not a load.
+    The engine decides what a result is good for. The particle model knows no heights, overrates
+    walls and is noisy; `"gas"` is three-dimensional, and statements about protection rest on it.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (Gymnasium's declaration)
@@ -238,6 +132,38 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         render_mode: str | None = None,
         show_blast: bool = False,
     ) -> None:
+        """Make an environment; `gymnasium.make` hands its keywords over to this.
+
+        Args:
+            scenario: Bundled name, path of a scenario file, a `Scenario` or its plain data; or
+                `"sites"`, which draws a generated site at every `reset`, or any `ScenarioSource`.
+            reward: `"terminal"`, `"incremental"`, or a `Reward`.
+            observation: `"grid"`, `"image"`, `"grid_with_load"` (four more blasts a charge),
+                `"features"`, or an `Observation`.
+            threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
+            threats: How many charges are drawn when they are hidden; 16 unless given.
+            realisations: Blasts for each charge; 2 unless given. It is 1 where charges are hidden,
+                since these differ anyway, and for engines without noise.
+            risk: `"mean"`, `"cvar"`, `"worst"`, or a `Risk`, which gets loads in SI units; as the
+                scenario's objective says unless given.
+            cvar_level: The worst share 1 - `cvar_level` of the charges makes the CVaR.
+            illegal_action_cost: In the unit of the reward; 0.001 psi s are 6.9 Pa s.
+            illegal_action_limit: Illegal actions that end the episode.
+            engine: Name of an engine, or an engine. `"event"` and `"pymunk"` run the particle
+                model: for studying it, for learning methods cheaply, for a first look. `"gas"` is
+                what a decision can rest on: no calibration, one realisation a charge, a second or
+                more a blast; `impulse_sim` is NaN there. `"surrogate"` guesses gas dynamics.
+            cell_m: Side of the cells of gas dynamics; 0.5 m unless given.
+            cache: Where blasts are remembered beside the memory of the environment: a folder,
+                which other processes and later runs may use too, or a `BlastCache`.
+            render_mode: `None`, `"human"`, `"rgb_array"` or `"ansi"`.
+            show_blast: Whether an episode goes on after the charge has gone off, for as many steps
+                as the film of the blast has frames (some 250), whatever the actions: for a window,
+                and for `gymnasium.wrappers.RecordVideo`. The reward is paid before.
+
+        Raises:
+            BlastEnvError: If an argument is of no use; the message names it and its bounds.
+        """
         found = find_engine(engine, cell_m)
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])

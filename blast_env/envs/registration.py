@@ -4,8 +4,7 @@ from typing import Final
 
 import gymnasium as gym
 
-from blast_env.scenario import bundled_scenarios
-from blast_env.sites import ITEM_SITES, SITES
+from blast_env.bundled import ITEM_SITES, SITES, bundled_scenarios
 
 BARRIER_ENTRY_POINT: Final = "blast_env.envs.barrier_env:BlastBarrierEnv"
 

@@ -1,5 +1,6 @@
 """Scenario files: models, validation, loading and saving."""
 
+from blast_env.bundled import bundled_scenarios
 from blast_env.geometry import Cell, Element, Layout, Piece
 from blast_env.physics.scene import Charge
 from blast_env.scenario.access_way import AccessWay
@@ -8,7 +9,6 @@ from blast_env.scenario.catalogue import Catalogue, Item, PlacedModule
 from blast_env.scenario.files import (
     AnyScenario,
     ScenarioField,
-    bundled_scenarios,
     find_problems,
     find_scenario,
     load_scenario,

@@ -7,6 +7,7 @@ from typing import Any, Final, Self, overload
 
 import tomli_w
 
+from blast_env.bundled import SCENARIO_SUFFIX, bundled_scenarios, scenario_folder
 from blast_env.documents import DocumentError, parse_toml, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
@@ -14,12 +15,7 @@ from blast_env.scenario.models import Scenario
 from blast_env.scenario.problems import Problem, ScenarioError, unknown_name
 from blast_env.values import path_of
 
-SUFFIX: Final = ".toml"
-
-
-def bundled_scenarios() -> tuple[str, ...]:
-    """Return the names of the scenarios that come with the package."""
-    return tuple(sorted(path.stem for path in _bundled_folder().glob(f"*{SUFFIX}")))
+SUFFIX: Final = SCENARIO_SUFFIX
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
@@ -156,13 +152,6 @@ def scenario_hash(scenario: AnyScenario) -> str:
     return find_scenario(scenario).content_hash
 
 
-def _bundled_folder() -> Path:
-    """Return the folder of the bundled scenarios: inside the package, or beside it."""
-    package = Path(__file__).resolve().parents[1]
-    installed = package / "scenarios"
-    return installed if installed.is_dir() else package.parent / "scenarios"
-
-
 def _located(name_or_path: str | Path) -> Path:
     """Return the path of the file that a name or path stands for."""
     try:
@@ -173,7 +162,7 @@ def _located(name_or_path: str | Path) -> Path:
     if path.name == str(name_or_path) and not path.suffix:
         known = bundled_scenarios()
         if path.name in known:
-            return _bundled_folder() / f"{path.name}{SUFFIX}"
+            return scenario_folder() / f"{path.name}{SUFFIX}"
         if not is_folder:
             message = unknown_name("bundled scenario", path.name, known)
             raise ScenarioError(path.name, [Problem("", message)])

@@ -1,5 +1,6 @@
 """Generated sites: varied, valid, worth solving, and all of one size."""
 
+from blast_env.bundled import ITEM_SITES, SITES
 from blast_env.sites.criterion import (
     Objection,
     SiteCriterion,
@@ -13,8 +14,6 @@ from blast_env.sites.ranges import SiteRanges
 from blast_env.sites.source import (
     FAMILIES,
     HELD_OUT_SITES,
-    ITEM_SITES,
-    SITES,
     SiteSource,
     training_sites,
 )

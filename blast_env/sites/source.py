@@ -8,17 +8,12 @@ from typing import Final
 
 import numpy as np
 
+from blast_env.bundled import ITEM_SITES, SITES
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
 from blast_env.sites.criterion import SiteCriterion
 from blast_env.sites.generate import MOST_SEED, RANGES, AnyRanges, generate_site
 from blast_env.sites.item_sites import ItemSiteRanges
-
-SITES: Final = "sites"
-"""Name of the generated sites to train on, where an environment asks for a scenario."""
-
-ITEM_SITES: Final = "item_sites"
-"""Name of the generated sites with heights, catalogues and vehicles, likewise."""
 
 FAMILIES: Final[Mapping[str, AnyRanges]] = MappingProxyType(
     {SITES: RANGES, ITEM_SITES: ItemSiteRanges()}

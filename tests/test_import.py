@@ -1,0 +1,63 @@
+"""`import blast_env` is light, and what it offers is there when it is asked for."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import blast_env
+
+HEAVY = ("joblib", "numba", "pandas", "pyarrow", "pydantic", "pymunk", "scipy", "torch")
+"""What takes a hundredth of a second or more to import, beside Gymnasium and NumPy."""
+
+
+def modules_after(statement: str) -> set[str]:
+    """Return what is imported in a fresh process after a statement."""
+    code = f"import sys\n{statement}\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_the_package_imports_nothing_heavy() -> None:
+    """Whoever imports it to have the environments registered waits for Gymnasium alone."""
+    modules = modules_after("import blast_env")
+    assert modules.isdisjoint(HEAVY)
+    own = {name for name in modules if name.split(".")[0] == "blast_env"}
+    assert own == {
+        "blast_env",
+        "blast_env.bundled",
+        "blast_env.envs",
+        "blast_env.envs.registration",
+        "blast_env.provenance",
+    }
+
+
+def test_engines_import_neither_pandas_nor_numba_before_a_blast() -> None:
+    statement = "import blast_env\nblast_env.GasResult, blast_env.simulate"
+    assert modules_after(statement).isdisjoint({"numba", "pandas", "pymunk", "scipy"})
+
+
+@pytest.mark.parametrize("name", blast_env.__all__)
+def test_every_public_name_is_there(name: str) -> None:
+    assert getattr(blast_env, name) is not None
+    assert name in dir(blast_env)
+
+
+def test_type_checkers_see_the_same_names() -> None:
+    tree = ast.parse(Path(blast_env.__file__).read_text(encoding="utf-8"))
+    typed = {
+        alias.name
+        for node in tree.body
+        if isinstance(node, ast.If)
+        for each in node.body
+        if isinstance(each, ast.ImportFrom)
+        for alias in each.names
+    }
+    assert typed == set(blast_env._PLACES) == set(blast_env.__all__) - {"bundled_scenarios"}
+
+
+def test_another_name_is_an_error_as_of_any_module() -> None:
+    with pytest.raises(AttributeError, match="module 'blast_env' has no attribute 'explode'"):
+        blast_env.explode  # noqa: B018
