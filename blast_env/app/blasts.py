@@ -45,7 +45,11 @@ from blast_env.rendering.frames import FramePainter
 from blast_env.rendering.gas import Quantity, facades, full_load
 from blast_env.rendering.ground_map import ground_map, ground_recorders, map_levels
 from blast_env.rendering.pressure_film import record_planes, scale_end_kpa
-from blast_env.rendering.pressure_frames import PressurePainter, default_section
+from blast_env.rendering.pressure_frames import (
+    PressurePainter,
+    PressureShot,
+    default_section,
+)
 from blast_env.rendering.style import render_extra
 from blast_env.runner import share_of
 from blast_env.scenario import AnyCharge, Scenario, load_scenario
@@ -65,6 +69,7 @@ _MORE_FRAMES: Final = 16
 _FILM_PX: Final = 640
 _PLAN_HEIGHT_M: Final = 1.5
 _MOST_POINTS: Final = 600  # of a gauge's history
+_LEAST_SHOWN: Final = 0.05  # of the end of a film's scale
 _QUALITY: Final = 82
 
 Tell = Callable[[float], None]
@@ -75,7 +80,7 @@ class Scale(Kept):
 
     Attributes:
         film_kpa: End of the films' scale.
-        until_s: When the films end, so that all show the same moments.
+        until_s: When the films end, so that all show the same moments: when no more is to be seen.
         levels: Contours of the maps, by quantity.
         walls: Ends of the walls' scales, by structure and quantity.
     """
@@ -225,7 +230,7 @@ def _gas(
     result = shot.result
     bare_charge = charge_against(scenario, (), charge)
     bare_key = blast_key(scenario.content_hash, (), bare_charge, task.engine)
-    scale = _scale(result, Path(task.blasts) / bare_key / _SCALE)
+    scale = _scale(shot, Path(task.blasts) / bare_key / _SCALE)
     if not layout:
         write_kept(scale, folder / _SCALE)
     painter = PressurePainter([shot], scale.film_kpa, _FILM_PX)
@@ -242,21 +247,31 @@ def _gas(
     }
 
 
-def _scale(result: GasResult, kept: Path) -> Scale:
+def _scale(shot: PressureShot, kept: Path) -> Scale:
     """Return the scale that was kept with the blast without a barrier; this one's without it."""
     try:
         return Scale.model_validate_json(read_text(kept, MOST_BYTES))
     except ValueError:
+        result = shot.result
         names = _facades_of(result)
+        film_kpa = scale_end_kpa([result])
         return Scale(
-            film_kpa=scale_end_kpa([result]),
-            until_s=result.time_s,
+            film_kpa=film_kpa,
+            until_s=_last_seen_s(shot, film_kpa),
             levels={each: map_levels(result, each) for each in _QUANTITIES},
             walls={
                 name: {each: full_load(result, name, each) for each in _QUANTITIES}
                 for name in names
             },
         )
+
+
+def _last_seen_s(shot: PressureShot, film_kpa: float) -> float:
+    """Return when the last overpressure is gone that the colours of a film show."""
+    least_pa = _LEAST_SHOWN * film_kpa * PA_PER_KPA
+    frames = shot.planes[0].frames
+    seen = [each.time_s for each in frames if np.nanmax(each.overpressure_pa) >= least_pa]
+    return seen[-1] if seen else shot.result.time_s
 
 
 def _facades_of(result: GasResult) -> list[str]:

@@ -13,6 +13,7 @@ from blast_env.app.edits import Kind, Thing
 from blast_env.app.session import Session
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Element, Layout, Rectangle
+from blast_env.response.facade import STOREY_M
 from blast_env.scenario import Scenario, ScenarioError
 from blast_env.scenario.sections import PointM
 from blast_env.units import MODULE_SIDE_M
@@ -82,6 +83,7 @@ class Editor:
         tool: What the mouse does.
         item: Name of what is placed.
         turned: Whether it is turned.
+        new_height_m: Height of a structure that is drawn; `None` for as high as the air.
         selected: What is selected.
         cursor: The cell that the keyboard is at; `None` before it was used.
         ghost: What would stand where the mouse is.
@@ -93,6 +95,7 @@ class Editor:
     tool: Tool = Tool.SELECT
     item: str = ""
     turned: bool = False
+    new_height_m: float | None = STOREY_M
     selected: Thing | None = None
     cursor: Cell | None = None
     ghost: Ghost | None = None
@@ -344,7 +347,9 @@ class Editor:
                 stroke.made, stroke.thing = edits.with_charge_area(scenario, (x0, y0), (x1, y1))
             else:
                 kind = _DRAWN[self.tool]
-                stroke.made, stroke.thing = edits.added(scenario, kind, (x0, y0), (x1, y1))
+                stroke.made, stroke.thing = edits.added(
+                    scenario, kind, (x0, y0), (x1, y1), self.new_height_m
+                )
         except BlastEnvError as error:
             stroke.made = None
             self.ghost = Ghost(box, reason_of(error), line)

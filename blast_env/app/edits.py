@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
+from blast_env.response.facade import STOREY_M
 from blast_env.scenario import (
     SCHEMA_VERSION,
     AnySource,
@@ -282,11 +283,18 @@ def removed(scenario: Scenario, thing: Thing) -> Scenario:
     return changed(scenario, edit)
 
 
-def added(scenario: Scenario, kind: Kind, start_m: PointM, end_m: PointM) -> tuple[Scenario, Thing]:
+def added(
+    scenario: Scenario,
+    kind: Kind,
+    start_m: PointM,
+    end_m: PointM,
+    height_m: float | None = STOREY_M,
+) -> tuple[Scenario, Thing]:
     """Return the scenario with one thing more, drawn from one place to another, on the grid.
 
     A charge is a point where both places are the same, else a line; see `with_charge_area` for an
-    area. A build zone takes the place of the one there is, and keeps what holds in it.
+    area. A build zone takes the place of the one there is, and keeps what holds in it. A structure
+    is `height_m` high, a storey unless said otherwise; `None` for as high as the air.
 
     Raises:
         ScenarioError: If it cannot be there.
@@ -300,7 +308,7 @@ def added(scenario: Scenario, kind: Kind, start_m: PointM, end_m: PointM) -> tup
         _plain(max(start[1], end[1])),
     )
     section = {
-        Kind.STRUCTURE: lambda: _structure(scenario, area),
+        Kind.STRUCTURE: lambda: _structure(scenario, area, height_m),
         Kind.CHARGE: lambda: _charge(scenario, start, end),
         Kind.KEEP_OUT: lambda: {**_sized(area), "reason": "must stay free"},
         Kind.COST_AREA: lambda: {
@@ -368,7 +376,7 @@ def _own(document: Document, thing: Thing) -> Document:
     return own
 
 
-def _structure(scenario: Scenario, area: Rectangle) -> Document:
+def _structure(scenario: Scenario, area: Rectangle, height_m: float | None) -> Document:
     names = {each.name for each in scenario.structures}
     number = next(n for n in range(1, 200) if f"structure{n}" not in names)
     return {
@@ -378,6 +386,7 @@ def _structure(scenario: Scenario, area: Rectangle) -> Document:
         "rows": max(round((area.top - area.bottom) / MODULE_SIDE_M), 1),
         "columns": max(round((area.right - area.left) / MODULE_SIDE_M), 1),
         "protected": not any(each.protected for each in scenario.structures),
+        **({} if height_m is None else {"height_m": height_m}),
     }
 
 

@@ -10,6 +10,7 @@ import html
 import re
 import secrets
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
@@ -32,6 +33,8 @@ MOST_SECONDS: Final = 120.0
 
 TOKEN: Final = "token"
 """Name of the token in the printed address."""
+
+_GONE_S: Final = 0.1
 
 _TOKEN_BYTES: Final = 32
 _EVERYWHERE: Final = ("0.0.0.0", "::", "")
@@ -258,30 +261,34 @@ class Guard:
 
     async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let the application answer; content may arrive for a while, but not forever."""
-        begun = gone = False
+        begun = False
 
         async def noted(message: Message) -> None:
             nonlocal begun
             begun = True
             await send(message)
 
-        async def heard() -> Message:
-            nonlocal gone
-            message = await receive()
-            gone = gone or message["type"] == "http.disconnect"
-            return message
-
         try:
             async with asyncio.timeout(self._most_s if scope["method"] == "POST" else None):
-                await self.app(scope, heard, noted)
+                await self.app(scope, receive, noted)
         except TimeoutError:
             if not begun:
                 words = f"the content took more than {self._most_s:g} s to arrive"
                 await _refused(408, words)(scope, receive, send)
         except RuntimeError:
             # Starlette misses an answer to a browser that was closed before it had one.
-            if begun or not gone:
+            if begun or not await _is_gone(receive):
                 raise
+
+
+async def _is_gone(receive: Receive) -> bool:
+    """Return whether the browser has hung up."""
+    with suppress(TimeoutError):
+        async with asyncio.timeout(_GONE_S):
+            while (await receive())["type"] != "http.disconnect":
+                pass
+            return True
+    return False
 
 
 _WITHOUT_TOKEN: Final = (

@@ -12,6 +12,9 @@ from blast_env.scenario import AnyCharge, Scenario
 from blast_env.scenario.vehicles import source_of
 from blast_env.sites import Visibility, visibility_layout
 
+PACKAGED: Final = "the package's proposal"
+"""What `blast-env propose` gives: weights or a surrogate, the best rule where neither can."""
+
 SIGHT_LINES: Final = "most sight lines cut"
 
 METHODS: Final = ("genetic", "annealing", "greedy", "random")
@@ -19,11 +22,11 @@ METHODS: Final = ("genetic", "annealing", "greedy", "random")
 
 
 def proposers(scenario: Scenario) -> tuple[str, ...]:
-    """Return the names of the rules that propose a layout at once; none without a build zone."""
+    """Return the names of what proposes a layout, the best first; none without a build zone."""
     if scenario.build_zone is None:
         return ()
     against_vehicles = VEHICLE_RULES if scenario.vehicles else ()
-    return (*rules_for(scenario), SIGHT_LINES, *against_vehicles)
+    return (PACKAGED, *rules_for(scenario), SIGHT_LINES, *against_vehicles)
 
 
 def proposed(name: str, scenario: Scenario, charges: Sequence[AnyCharge]) -> Layout:

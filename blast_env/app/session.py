@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from blast_env.app import placing
+from blast_env.app.cost import BlastCost, cost_of_blast
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
@@ -27,7 +28,7 @@ from blast_env.app.work import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
-from blast_env.scenario import Scenario
+from blast_env.scenario import AnyCharge, Scenario
 from blast_env.scenario.build_scene import charge_against
 
 BARE = "no barrier"
@@ -68,7 +69,7 @@ class Session:
     work: WorkFolder
     workers: Workers
     history: History
-    engine: Engine = field(default_factory=Engine)
+    engine: Engine = field(default_factory=lambda: Engine(name="gas", cell_m=0.5))
     threats: tuple[str, ...] = ()
     view: str = "Plan"
     _listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
@@ -188,6 +189,7 @@ class Session:
             threats=self._threats_as_data(),
             proposer=proposer,
             is_run=is_run,
+            cache=str(self.work.cache),
         )
         return self._begin(task, f"proposal: {Path(proposer).name if is_run else proposer}")
 
@@ -280,6 +282,28 @@ class Session:
 
     def _threats_as_data(self) -> tuple[ThreatOf, ...]:
         return tuple(ThreatOf.of(each.name, each.charge) for each in self.chosen_threats())
+
+    def cost(self, slots: Iterable[int]) -> tuple[BlastCost, ...]:
+        """Return what the blasts of layouts cost that are not there yet; nothing with particles."""
+        if not self.engine.is_gas:
+            return ()
+        keys: dict[str, AnyCharge] = {}
+        for threat in self.chosen_threats():
+            for layout in ((), *(self.design.layouts[each] for each in slots)):
+                keys[self.key(layout, threat)] = threat.charge
+        there = self.folder.blasts_there()
+        return tuple(self._cost(charge) for key, charge in keys.items() if key not in there)
+
+    def cost_of_search(self, budget: int) -> tuple[BlastCost, ...]:
+        """Return what the blasts of a search cost; nothing with particles."""
+        charges = [each.charge for each in self.chosen_threats()]
+        if not self.engine.is_gas or not charges:
+            return ()
+        costs = [self._cost(each) for each in charges]
+        return tuple(costs[k % len(costs)] for k in range(max(budget, 0)))
+
+    def _cost(self, charge: AnyCharge) -> BlastCost:
+        return cost_of_blast(self.scenario, charge, self.engine.cell_m or 0.5)
 
     # Results.
 

@@ -7,7 +7,7 @@ Whatever takes long tells how far it has come through a `Teller`, and may be int
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from time import monotonic
+from time import monotonic, time
 from typing import Final
 
 from blast_agents.search import (
@@ -15,10 +15,12 @@ from blast_agents.search import (
     Progress,
     find_search_method,
 )
+from blast_agents.search.by_rule import BestRuleSearch
+from blast_agents.surrogate import SurrogateAgent, packaged_surrogate
 
 from blast_env.app import placing
 from blast_env.app.blasts import run_blasts, warm_engines
-from blast_env.app.offers import proposed
+from blast_env.app.offers import PACKAGED, proposed
 from blast_env.app.work import (
     BlastTask,
     FilmTask,
@@ -31,11 +33,13 @@ from blast_env.app.work import (
     scenario_of,
     write_status,
 )
-from blast_env.engines import find_engine
+from blast_env.engines import JUDGE, find_engine
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.geometry import Layout
 from blast_env.scenario import Scenario
+from blast_env.sites import FAMILIES
 
+_MOST_RULES: Final = 20
 _LEAST_PAUSE_S: Final = 0.1
 _REALISATIONS: Final = 8  # of the particle model, divided among the charges
 
@@ -49,7 +53,8 @@ class Teller:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._status = read_status(folder).model_copy(update={"state": "running"})
+        changes = {"state": "running", "began_s": time()}
+        self._status = read_status(folder).model_copy(update=changes)
         self._told_s = 0.0
         self.tell()
 
@@ -116,7 +121,26 @@ def _proposed(task: ProposalTask, scenario: Scenario) -> Layout:
 
         agent = load_agent(task.proposer)
         return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None))
+    if task.proposer == PACKAGED:
+        return _packaged(task, scenario)
     return proposed(task.proposer, scenario, known)
+
+
+def _packaged(task: ProposalTask, scenario: Scenario) -> Layout:
+    """Return what the package proposes: its weights, its surrogate, or the best rule by gas."""
+    from blast_agents.training.packaged import packaged_agent  # torch takes seconds to import
+
+    known = [each.charge for each in task.threats]
+    charge = known[0] if len(known) == 1 else None
+    found = packaged_agent(scenario, "hidden" if charge is None else "visible")
+    if found is not None and found[1].scenario not in FAMILIES:
+        return tuple(found[0].propose(scenario, charge))
+    if scenario.zone.items:
+        return tuple(SurrogateAgent(packaged_surrogate()).propose(scenario, charge))
+    case = Case(scenario, tuple(Threat(each, SeedRange.SEARCH.value.start) for each in known))
+    problem = LayoutProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache or None), case)
+    method = BestRuleSearch()
+    return tuple(method.search(problem, _MOST_RULES * len(known), 0, lambda _: None).layout)
 
 
 def _search(task: SearchTask, teller: Teller) -> None:

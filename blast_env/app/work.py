@@ -15,6 +15,8 @@ from blast_env.scenario import AnyCharge, Scenario, VehicleCharge, VehicleSource
 TASK: Final = "task.json"
 STATUS: Final = "status.json"
 
+_LEAST_SHARE: Final = 0.05  # before that nobody knows
+
 State = Literal["waiting", "running", "done", "failed", "stopped"]
 
 
@@ -106,6 +108,7 @@ class ProposalTask(Kept):
         threats: As for `SearchTask`.
         proposer: Name of a rule, or the folder of a trained agent's run.
         is_run: Whether it is a folder.
+        cache: Folder for the loads of blasts, where some are needed.
     """
 
     kind: Literal["proposal"] = "proposal"
@@ -113,6 +116,7 @@ class ProposalTask(Kept):
     threats: tuple[ThreatOf, ...]
     proposer: str
     is_run: bool = False
+    cache: str = ""
 
 
 class FilmTask(Kept):
@@ -172,6 +176,7 @@ class Status(Kept):
         text: What is going on, or what came of it, or what is wrong.
         layout: The best layout so far, or the one that is proposed; `None` without one.
         file: A file that was made.
+        began_s: When it began, seconds since 1970; 0 for not yet.
     """
 
     state: State = "waiting"
@@ -180,6 +185,13 @@ class Status(Kept):
     text: str = ""
     layout: tuple[tuple[Any, ...], ...] | None = None
     file: str | None = None
+    began_s: float = 0.0
+
+    def left_s(self, now_s: float) -> float | None:
+        """Return how long it still takes, if it goes on as until now; `None` if that is unknown."""
+        if self.state != "running" or self.share < _LEAST_SHARE or not self.began_s:
+            return None
+        return (now_s - self.began_s) * (1.0 - self.share) / self.share
 
     @property
     def is_over(self) -> bool:

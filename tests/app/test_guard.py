@@ -246,14 +246,14 @@ def test_content_is_bounded_in_time() -> None:
 
 
 def test_a_browser_that_is_closed_before_it_has_an_answer_is_no_fault() -> None:
-    async def app(_: Scope, receive: Receive, __: Send) -> None:
-        await receive()
+    async def app(_: Scope, __: Receive, ___: Send) -> None:
         raise RuntimeError("No response returned.")
 
     async def gone() -> Message:
         return {"type": "http.disconnect"}
 
     async def there() -> Message:
+        await asyncio.sleep(0.01)
         return {"type": "http.request", "body": b"", "more_body": False}
 
     assert through(app, gone) == []

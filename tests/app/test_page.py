@@ -16,6 +16,7 @@ from nicegui.elements.upload_files import SmallFileUpload
 from nicegui.testing import User
 from nicegui.testing.user_simulation import user_simulation
 
+from blast_env.app import offers
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
 from blast_env.app.page import uploads
@@ -126,6 +127,7 @@ def test_the_reason_is_said_while_the_mouse_is_there(tmp_path: Path) -> None:
 def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, BALLISTIC_COURTYARD)
+        session.engine = Engine()
         session.put("layout", session.design.with_layout(CELLS))
         user.find(marker="blast").click()
         await user.should_see("layout A")
@@ -135,6 +137,10 @@ def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
         assert {row["engine"] for row in table.rows} == {"particles (first look)"}
         await user.open(f"/design/{session.folder.design_id}")  # a reload comes back to the results
         assert next(iter(user.find(kind=ui.tabs).elements)).value == "Results"
+        selects = user.find(kind=ui.select).elements
+        (proposer,) = (each for each in selects if each.props["label"] == "by")
+        assert next(iter(proposer.options)) == f"rule {offers.PACKAGED}"
+        proposer.value = "rule wall near the charge"
         user.find(marker="propose").click()
         await user.should_see("take it")
         user.find("take it").click()

@@ -76,24 +76,21 @@ class DesignPage:
         self._results.refresh()
 
     def _header(self) -> None:
-        with (
-            ui.header()
-            .classes("items-center gap-1 q-py-none q-px-md")
-            .style("height: 48px; background: #1e3a4c")
-        ):
-            ui.label("blast-env").style("font-weight: 600; font-size: 16px")
+        with ui.header().classes("be-header items-center gap-1 q-py-none q-px-md"):
+            ui.label("blast-env").classes("be-title")
             self._title = ui.label().classes("q-ml-md")
             FilesMenu(self.session, self.refresh)
             self._undo = ui.button("Undo", icon="undo", on_click=self.session.undo)
             self._redo = ui.button("Redo", icon="redo", on_click=self.session.redo)
             for button, words in ((self._undo, "Ctrl+Z"), (self._redo, "Ctrl+Y")):
                 button.props("flat dense no-caps color=white").tooltip(words)
-            self._last = ui.label().style("font-size: 12.5px; opacity: 0.85")
-            ui.space()
-            ui.label("kept at every step").style("font-size: 12.5px; opacity: 0.85")
+            self._last = ui.label().classes("be-wide").style("font-size: 12.5px; opacity: 0.85")
+            ui.space().classes("be-wide")
+            kept = ui.label("kept at every step").classes("be-wide")
+            kept.style("font-size: 12.5px; opacity: 0.85")
             ui.button("Keys", icon="keyboard", on_click=_show_keys).props(
                 "flat dense no-caps color=white"
-            )
+            ).classes("be-wide")
 
     def _commands(self) -> dict[str, Callable[[], None]]:
         return {

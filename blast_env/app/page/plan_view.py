@@ -62,6 +62,18 @@ class PlanView:
                 button = ui.button(words, icon=icon, on_click=lambda _, t=tool: self.choose(t))
                 button.props("dense flat no-caps size=sm").tooltip(f"{words} (key {key.upper()})")
                 self._buttons[tool] = button
+            self._height = ui.number(
+                "its height (m)",
+                value=self._editor.new_height_m,
+                min=0.5,
+                step=0.5,
+                on_change=lambda event: self._take_height(event.value),
+            )
+            self._height.props("dense outlined").classes("w-32")
+            self._height.tooltip("of a structure that is drawn; empty: as high as the air")
+        ui.label("To draw, take a larger screen: here one looks, blasts and compares.").classes(
+            "be-quiet be-narrow"
+        )
         self._image = ui.interactive_image(
             size=(WIDTH_PX, HEIGHT_PX),
             events=["mousedown", "mousemove", "mouseup", "mouseleave"],
@@ -93,6 +105,9 @@ class PlanView:
         self._editor.choose(tool)
         self._after()
 
+    def _take_height(self, height_m: float | None) -> None:
+        self._editor.new_height_m = height_m
+
     def fit(self) -> None:
         """Show the whole site."""
         self._view = View.of(self._editor.session.scenario, WIDTH_PX, HEIGHT_PX)
@@ -110,6 +125,7 @@ class PlanView:
                 remove="" if tool is editor.tool else "be-tool-on",
             )
             button.props(f"aria-pressed={'true' if tool is editor.tool else 'false'}")
+        self._height.visible = editor.tool is Tool.STRUCTURE
         self._draw()
         self._say("")
 

@@ -52,7 +52,7 @@ class ResultsView:
         self._build()
 
     def _build(self) -> None:
-        with ui.row().classes("w-full items-center gap-2 no-wrap"):
+        with ui.row().classes("be-choices w-full items-center gap-2"):
             self._pictures = ui.select([_FILM], value=_FILM, label="picture")
             self._pictures.on_value_change(lambda e: self._choose(e.value))
             self._threats = ui.select([], label="threat")

@@ -23,17 +23,13 @@ class StartPage:
 
     def __init__(self, sessions: Sessions, message: str = "") -> None:
         self._sessions = sessions
-        with (
-            ui.header()
-            .classes("items-center q-py-none q-px-md")
-            .style("height: 48px; background: #1e3a4c")
-        ):
-            ui.label("blast-env").style("font-weight: 600; font-size: 16px")
+        with ui.header().classes("be-header items-center q-py-none q-px-md"):
+            ui.label("blast-env").classes("be-title")
             ui.label("where should barriers stand?").classes("q-ml-md")
-        with ui.row().classes("w-full no-wrap gap-4 q-pa-md items-start"):
-            with ui.column().classes("be-side").style("flex: 1; min-height: 400px"):
+        with ui.row().classes("be-start w-full gap-4 q-pa-md items-start"):
+            with ui.column().classes("be-side"):
                 self._begin(message)
-            with ui.column().classes("be-side").style("flex: 1; min-height: 400px"):
+            with ui.column().classes("be-side"):
                 self._designs()
 
     def _begin(self, message: str) -> None:
@@ -41,10 +37,10 @@ class StartPage:
             ui.label(message).classes("be-refused")
         ui.label("Begin with a site").classes("be-head")
         for name in bundled_scenarios():
-            with ui.row().classes("w-full items-center no-wrap"):
+            with ui.row().classes("be-site w-full items-center"):
                 button = ui.button(name, icon="add", on_click=lambda _, n=name: self._bundled(n))
                 button.props("no-caps dense outline").classes("w-44 shrink-0")
-                ui.label(load_scenario(name).description).classes("be-quiet")
+                ui.label(load_scenario(name).description).classes("be-quiet be-what")
         ui.separator()
         with ui.row().classes("items-center gap-2"):
             self._seed = ui.number("seed", value=0, min=0, step=1, format="%d")

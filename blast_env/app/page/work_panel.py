@@ -4,14 +4,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from time import time
 from typing import Final
 
 from nicegui import ui
 
 from blast_env.app import placing
+from blast_env.app.cost import cost_words, time_words
 from blast_env.app.design import SLOTS
 from blast_env.app.editor import Editor, Tool
-from blast_env.app.offers import METHODS, proposers
+from blast_env.app.offers import METHODS, PACKAGED, proposers
 from blast_env.app.records import Engine
 from blast_env.app.session import Session
 from blast_env.app.threats import threats_of
@@ -20,9 +22,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
 
 _ENGINES: Final = {
-    "particles": "particles: a first look",
     "gas 0.5": "gas, cells of 0.5 m",
-    "gas 0.25": "gas, cells of 0.25 m (slow)",
+    "gas 0.25": "gas, cells of 0.25 m (16 times as long)",
+    "particles": "particles: a first look",
 }
 _SHOWN_JOBS: Final = 8
 _STATES: Final = {
@@ -41,12 +43,14 @@ class _Card:
     Attributes:
         folder: The work.
         status: How far it has come.
+        words: The state in a word, and how long it still takes.
         bar: That as a bar, until it is over.
         text: What is going on.
     """
 
     folder: Path
     status: Status
+    words: ui.label | None = None
     bar: ui.linear_progress | None = None
     text: ui.label | None = None
 
@@ -57,6 +61,10 @@ class _Card:
     def show(self, status: Status) -> None:
         """Show how far it has come now."""
         self.status = status
+        if self.words is not None:
+            left_s = status.left_s(time())
+            left = "" if left_s is None else f", {time_words(left_s)} left"
+            self.words.text = _STATES[status.state][1] + left
         if self.bar is not None:
             self.bar.value = status.share
             self.bar.props(f'aria-label="{status.share:.0%} of {status.title}"')
@@ -127,7 +135,7 @@ class WorkPanel:
         self._palette = ui.select(
             {}, label="what is placed", on_change=lambda e: self._item(e.value)
         )
-        self._palette.props("dense outlined options-dense").classes("w-full")
+        self._palette.props("dense outlined options-dense").classes("w-full be-whole")
         self._turned = ui.switch("turned (key R)", on_change=lambda e: self.turn(e.value))
 
     def _build_blast(self) -> None:
@@ -140,13 +148,14 @@ class WorkPanel:
             every = ui.button("all", on_click=self.blast_all).props("dense outline no-caps")
             every.tooltip("blast every layout that is not empty")
         self._engine = ui.select(
-            _ENGINES, value="particles", label="engine", on_change=lambda e: self._use(e.value)
+            _ENGINES, value="gas 0.5", label="engine", on_change=lambda e: self._use(e.value)
         )
         self._threats = ui.select(
             [], label="threats", multiple=True, on_change=lambda e: self._against(e.value)
         )
         for element in (self._engine, self._threats):
-            element.props("dense outlined options-dense").classes("w-full")
+            element.props("dense outlined options-dense").classes("w-full be-whole")
+        self._cost = ui.label().classes("be-quiet").props('aria-live="polite"')
 
     def _build_proposal(self) -> None:
         ui.separator()
@@ -157,12 +166,15 @@ class WorkPanel:
             propose.props("dense no-caps").mark("propose")
         with ui.row().classes("w-full no-wrap gap-1"):
             self._proposer = ui.select([], label="by")
-            self._proposer.props("dense outlined options-dense").classes("grow")
-            self._budget = ui.number("blasts", value=100, min=1, step=50, format="%d")
+            self._proposer.props("dense outlined options-dense").classes("grow be-whole")
+            self._budget = ui.number("blasts", value=50, min=1, step=50, format="%d")
             self._budget.props("dense outlined").classes("w-20")
         self._budget.bind_enabled_from(
             self._proposer, "value", lambda value: str(value).startswith("search")
         )
+        self._search_cost = ui.label().classes("be-quiet")
+        for element in (self._proposer, self._budget):
+            element.on_value_change(lambda: self._say_cost_of_search())
 
     # What it does.
 
@@ -284,12 +296,27 @@ class WorkPanel:
         engine = session.engine
         self._engine.value = f"gas {engine.cell_m:g}" if engine.is_gas else "particles"
         self._filling = False
+        gas = engine.is_gas
+        self._cost.text = (
+            cost_words(session.cost([design.active]), with_films=True) if gas else "a few seconds"
+        )
+        self._say_cost_of_search()
+
+    def _say_cost_of_search(self) -> None:
+        costs = []
+        if str(self._proposer.value).startswith("search"):
+            costs = [*self._session.cost_of_search(int(self._budget.value or 0))]
+        self._search_cost.visible = bool(costs)
+        if costs:
+            self._search_cost.text = cost_words(costs)
 
     def _offer_proposals(self, scenario: Scenario) -> None:
         """Offer the rules for a site, agents and searches; what was chosen stays if it can."""
-        offers = {f"rule {each}": each for each in proposers(scenario)}
+        rules = proposers(scenario)
+        offers = {f"rule {each}": each for each in rules if each == PACKAGED}
         offers |= {f"run {name}": f"agent of {name}" for name in self._runs}
         offers |= {f"search {each}": f"search: {each}" for each in METHODS}
+        offers |= {f"rule {each}": f"rule: {each}" for each in rules if each != PACKAGED}
         chosen = self._proposer.value
         self._proposer.set_options(offers, value=chosen if chosen in offers else next(iter(offers)))
 
@@ -318,7 +345,7 @@ class WorkPanel:
                 ui.icon(icon, size="18px", color="red-9" if status.state == "failed" else "blue-9")
                 ui.label(status.title).style("font-weight: 600; font-size: 13px")
                 ui.space()
-                ui.label(words).classes("be-quiet")
+                card.words = ui.label(words).classes("be-quiet")
             if not status.is_over:
                 card.bar = ui.linear_progress(status.share, show_value=False, size="8px")
             if _says(status):

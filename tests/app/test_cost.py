@@ -1,0 +1,71 @@
+"""What work costs, told before it begins."""
+
+from pathlib import Path
+
+import pytest
+
+from blast_env.app.cost import BlastCost, cost_of_blast, cost_words, time_words
+from blast_env.app.folder import WorkFolder
+from blast_env.app.records import RECORD, Engine
+from blast_env.app.session import Sessions
+from blast_env.app.threats import threats_of
+from blast_env.app.work import Status
+from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.scenario import load_scenario
+from tests.app.here import Here
+from tests.gas_sites import WALL, hut
+from tests.vehicle_sites import gate_site
+
+
+def test_steps_are_about_those_of_a_blast() -> None:
+    """Within a third; of the seconds a clock would have to say."""
+    scenario = load_scenario("visitor_entrance")
+    charge = threats_of(scenario)[0].charge
+    told = cost_of_blast(scenario, charge, 0.5)
+    run = GasBlast(scenario, (), 0, GasEngine(), charge).run()
+    assert told.steps == pytest.approx(run.steps, rel=0.33)
+    assert told.cells == pytest.approx(run.run.solver.state[0].size, rel=0.01)
+
+
+def test_half_the_cells_cost_sixteen_times_as_much_inside() -> None:
+    scenario = load_scenario("courtyard")
+    charge = threats_of(scenario)[0].charge
+    coarse, fine = (cost_of_blast(scenario, charge, cell_m) for cell_m in (0.5, 0.25))
+    assert 8.0 < fine.seconds / coarse.seconds < 16.0  # the skirt does not grow as much
+    assert fine.memory_bytes > coarse.memory_bytes
+
+
+def test_a_vehicle_costs_something_too() -> None:
+    site = gate_site()
+    assert cost_of_blast(site, threats_of(site)[0].charge, 0.5).steps > 50
+
+
+def test_only_what_is_not_there_is_counted(tmp_path: Path) -> None:
+    session = Sessions(WorkFolder(tmp_path), Here()).new(hut(), "begin")
+    session.put("wall", session.design.with_layout(WALL))
+    assert len(session.cost([0])) == 2  # and no barrier
+    (threat,) = session.chosen_threats()
+    there = session.folder.blast_of(session.key((), threat))
+    there.mkdir()
+    (there / RECORD).touch()
+    assert len(session.cost([0])) == 1
+    assert len(session.cost_of_search(50)) == 50
+    session.engine = Engine()
+    assert session.cost([0]) == session.cost_of_search(50) == ()
+
+
+def test_words() -> None:
+    cost = BlastCost(cells=2_000_000, steps=750, memory_bytes=0.5e9)
+    assert cost_words([cost]) == "a blast of gas: about 30 s on a free core, 0.5 GB"
+    assert "50 blasts of gas: about 25 min" in cost_words([cost] * 50)
+    assert "nothing to run" in cost_words([])
+    assert [time_words(each) for each in (0.2, 7.1, 44.0, 600.0, 7200.0)] == [
+        *("1 s", "8 s", "45 s", "10 min", "2.0 h"),
+    ]
+
+
+def test_what_is_left_follows_from_what_is_done() -> None:
+    running = Status(state="running", share=0.25, began_s=100.0)
+    assert running.left_s(110.0) == pytest.approx(30.0)
+    assert running.model_copy(update={"share": 0.01}).left_s(110.0) is None
+    assert running.model_copy(update={"state": "done"}).left_s(110.0) is None
