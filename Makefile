@@ -33,10 +33,11 @@ quick: $(STAMP)
 test-browser: compiled
 	$(BIN)/pytest tests/app/browser
 
-# Thousands of wrong files of every format that is read, kills at steps on the disk, full devices,
-# and strangers at the page; an hour on one core.
+# Thousands of wrong files of every format that is read, files made to take long or much, kills at
+# steps on the disk, full devices, and strangers at the page; an hour on one core.
 attack: $(STAMP)
 	$(BIN)/python -m tests.attack.run files
+	$(BIN)/python -m tests.attack.run made
 	$(BIN)/python -m tests.attack.run kills
 	$(BIN)/python -m tests.attack.run disks
 	$(BIN)/python -m tests.attack.run web

@@ -1,7 +1,8 @@
 """Reading drawings: what is drawn on each layer of a DXF file."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import islice
 from math import isclose
 from pathlib import Path
@@ -10,16 +11,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from blast_env.errors import BlastEnvError, import_extra, suggestion
+from blast_env.errors import BlastEnvError, import_extra, suggestion, value_text
 from blast_env.importing.site_map import (
     MOST_COORDINATE,
     MOST_FEATURES,
+    MOST_POINTS,
     DrawingCoordinates,
     MapFeature,
     SiteMap,
     checked_file,
     errors_of,
     too_many,
+    too_many_points,
 )
 
 with import_extra("maps", "maps and drawings"):
@@ -27,10 +30,14 @@ with import_extra("maps", "maps and drawings"):
     from ezdxf.disassemble import recursive_decompose
     from ezdxf.document import Drawing
     from ezdxf.entities.dxfentity import DXFEntity
+    from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.mtext import MText
+    from ezdxf.entities.polyline import Polyline
+    from ezdxf.entities.spline import Spline
     from ezdxf.entities.text import Text
     from ezdxf.filemanagement import readfile
     from ezdxf.lldxf.const import DXFError
+    from ezdxf.math import Vec2, Vec3
     from ezdxf.path import make_path
     from shapely.geometry import LineString, Point, Polygon
 
@@ -48,6 +55,14 @@ _CODES: Final = {
     units.KM: "km",
     units.DM: "dm",
 }
+MOST_LINES: Final = 2_000_000
+"""Of the file: each number of an entity is one, and one says what it is."""
+
+MOST_ENTITIES: Final = 50_000
+"""Of a drawing once its blocks are taken apart."""
+
+_MOST_NESTED: Final = 50
+_MOST_TEXT: Final = 1000
 _SAG_M: Final = 0.02  # of arcs made straight
 _LEAST_SAG: Final = 1e-9  # of the largest coordinate: rounding must not ask for ever more points
 
@@ -66,8 +81,12 @@ def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
         BlastEnvError: If it cannot be read, or nobody says its unit.
     """
     skipped: Counter[str] = Counter()
+    lines = checked_file(path).read_bytes().count(b"\n")
+    if lines > MOST_LINES:
+        raise BlastEnvError(f"{path}: has {lines:,} lines, must have at most {MOST_LINES:,}")
     with errors_of("ezdxf", path, "DXF"):
-        document = readfile(checked_file(path))
+        document = readfile(path)
+        _Unfolded(path, document).check()
         metres = _metres_per_unit(path, document, unit)
         features = tuple(
             islice(_features(path, document, _SAG_M / metres, metres, skipped), MOST_FEATURES + 1)
@@ -79,6 +98,88 @@ def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
         for kind, count in skipped.items()
     )
     return SiteMap(path, DrawingCoordinates(metres), features, notes)
+
+
+@dataclass(frozen=True)
+class _Unfolded:
+    """How many entities there are once all blocks are taken apart, counted without doing so.
+
+    Attributes:
+        path: The file.
+        document: What is in it.
+        counts: Entities of the blocks that are counted already, by their names in small letters.
+    """
+
+    path: Path
+    document: Drawing
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def check(self) -> None:
+        """Refuse a drawing that unfolds to too much, or has a number beyond all bounds.
+
+        Raises:
+            BlastEnvError: If there are too many, or blocks in blocks too deeply, or in themselves.
+        """
+        count = self._count(self.document.modelspace(), ())
+        if count > MOST_ENTITIES:
+            raise BlastEnvError(
+                f"{self.path}: has {count:,} entities once its blocks are taken apart, must have "
+                f"at most {MOST_ENTITIES:,}"
+            )
+
+    def _count(self, entities: Iterable[DXFEntity], above: tuple[str, ...]) -> int:
+        """Return how many entities there are, with those of the blocks that they stand for."""
+        total = 0
+        for entity in entities:
+            self._check_numbers(entity)
+            total += 1
+            name, times = _block_of(entity)
+            block = self.document.blocks.get(name) if name else None
+            if block is None:
+                continue
+            if name in above or len(above) == _MOST_NESTED:
+                raise BlastEnvError(
+                    f"{self.path}: the block {value_text(name)} lies in itself, or in more than "
+                    f"{_MOST_NESTED} others, must do neither"
+                )
+            if name not in self.counts:
+                self.counts[name] = self._count(block, (*above, name))
+            total += times * (1 + self.counts[name])
+        return total
+
+    def _check_numbers(self, entity: DXFEntity) -> None:
+        for number in _numbers(entity):
+            if not abs(number) <= MOST_COORDINATE:
+                raise BlastEnvError(
+                    f"{self.path}: {entity.dxftype()} {entity.dxf.get('handle')}: has the number "
+                    f"{number:g}, must be within {MOST_COORDINATE:g}"
+                )
+
+
+def _block_of(entity: DXFEntity) -> tuple[str, int]:
+    """Return the block that an entity stands for, if any, and how often."""
+    if entity.dxftype() == "INSERT":
+        times = max(entity.dxf.row_count, 1) * max(entity.dxf.column_count, 1)
+        return str(entity.dxf.get("name", "")).lower(), times
+    if entity.dxftype() == "DIMENSION":
+        return str(entity.dxf.get("geometry", "")).lower(), 1
+    return "", 0
+
+
+def _numbers(entity: DXFEntity) -> Iterator[float]:
+    """Yield the numbers of an entity: coordinates, angles, bulges, factors, knots."""
+    for value in entity.dxf.all_existing_dxf_attribs().values():
+        if isinstance(value, float):
+            yield value
+        elif isinstance(value, Vec2 | Vec3):
+            yield from (float(each) for each in value)
+    if isinstance(entity, LWPolyline):
+        yield from np.ravel(entity.lwpoints.values).tolist()
+    elif isinstance(entity, Polyline):
+        for vertex in entity.vertices:
+            yield from _numbers(vertex)
+    elif isinstance(entity, Spline):
+        yield from (*entity.knots, *entity.weights)
 
 
 def _metres_per_unit(path: Path, document: Drawing, unit: str | None) -> float:
@@ -105,8 +206,8 @@ def _features(
     path: Path, document: Drawing, sag: float, metres: float, skipped: Counter[str]
 ) -> Iterator[MapFeature]:
     """Yield what is drawn; `skipped` counts what has no line."""
-    entities = recursive_decompose(document.modelspace())
-    for number, entity in enumerate(islice(entities, 10 * MOST_FEATURES)):
+    left = MOST_POINTS
+    for number, entity in enumerate(recursive_decompose(document.modelspace())):
         tags: dict[str, str | float | bool] = {"layer": str(entity.dxf.get("layer", "0"))}
         handle = entity.dxf.get("handle") or f"no. {number}"
         place = f"{entity.dxftype()} {handle} on the layer {tags['layer']}"
@@ -116,11 +217,13 @@ def _features(
         if entity.dxftype() == "POINT":
             yield MapFeature(Point(entity.dxf.location.x, entity.dxf.location.y), tags, place)
             continue
-        thickness_m = metres * abs(entity.dxf.get("thickness", 0.0) or 0.0)
+        has_thickness = entity.dxf.is_supported("thickness")
+        thickness_m = metres * abs(entity.dxf.get("thickness", 0.0)) if has_thickness else 0.0
         if thickness_m > 0.0:
             tags["height"] = thickness_m
-        places = _places(path, place, entity, sag, skipped)
+        places = _places(path, place, entity, sag, skipped, left)
         if places is not None:
+            left -= len(places)
             is_outline = len(places) > 3 and _closes(places)
             geometry = Polygon(places) if is_outline else LineString(places)
             yield MapFeature(geometry, tags, place)
@@ -128,8 +231,10 @@ def _features(
 
 def _text(entity: Text | MText, tags: dict[str, str | float | bool], place: str) -> MapFeature:
     """Return the middle of a text as a point."""
-    words = entity.plain_text()
     insert = entity.dxf.insert
+    if isinstance(entity, MText):
+        entity.text = entity.text[:_MOST_TEXT]
+    words = entity.plain_text()[:_MOST_TEXT]
     if isinstance(entity, Text):
         _, first, second = entity.get_placement()
         insert = first if second is None else second
@@ -138,9 +243,13 @@ def _text(entity: Text | MText, tags: dict[str, str | float | bool], place: str)
 
 
 def _places(
-    path: Path, place: str, entity: DXFEntity, sag: float, skipped: Counter[str]
+    path: Path, place: str, entity: DXFEntity, sag: float, skipped: Counter[str], most: int
 ) -> list[tuple[float, float]] | None:
-    """Return the points of a line, its arcs made straight; `None` for what has no line."""
+    """Return the points of a line, its arcs made straight; `None` for what has no line.
+
+    Raises:
+        BlastEnvError: If there are more than `most` of them, or a coordinate is too large.
+    """
     try:
         line = make_path(entity)
     except (TypeError, ValueError, DXFError):
@@ -153,7 +262,10 @@ def _places(
             f"{path}: {place}: has, or its arcs have, the coordinate {largest:g}, "
             f"must be within {MOST_COORDINATE:g}"
         )
-    points: list[Any] = list(line.flattening(max(sag, _LEAST_SAG * largest)))
+    straight = line.flattening(max(sag, _LEAST_SAG * largest))
+    points: list[Any] = list(islice(straight, most + 1))
+    if len(points) > most:
+        raise too_many_points(path)
     return [(float(point.x), float(point.y)) for point in points] if len(points) > 1 else None
 
 

@@ -1,14 +1,21 @@
 """Reading extracts of OpenStreetMap: XML (`.osm`) and PBF (`.osm.pbf`), offline."""
 
+import bz2
+import gzip
+import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from types import MappingProxyType
+from typing import IO, Any, Final
 
-from blast_env.errors import import_extra
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.files import scratch_folder, write_atomically
 from blast_env.importing.site_map import (
     MOST_FEATURES,
+    MOST_POINTS,
     MapCoordinates,
     MapFeature,
     SiteMap,
@@ -16,6 +23,7 @@ from blast_env.importing.site_map import (
     checked_file,
     errors_of,
     too_many,
+    too_many_points,
 )
 
 with import_extra("maps", "maps and drawings"):
@@ -25,6 +33,14 @@ with import_extra("maps", "maps and drawings"):
     from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 
 SUFFIXES: Final = (".osm", ".pbf", ".osm.bz2", ".osm.gz")
+
+MOST_UNPACKED_BYTES: Final = 100_000_000
+"""Of a packed file, once it is unpacked."""
+
+_PACKED: Final[Mapping[str, Callable[[Path, str], Any]]] = MappingProxyType(
+    {".gz": gzip.open, ".bz2": bz2.open}
+)
+_PART_BYTES: Final = 2**20
 
 _WGS84: Final = "EPSG:4326"
 _CUT: Final = "ways of which the extract does not have all nodes, which were left out"
@@ -40,13 +56,50 @@ def read_osm(path: Path) -> SiteMap:
     Raises:
         BlastEnvError: If it cannot be read.
     """
-    features, skipped = [], _Skipped()
-    with errors_of("osmium", path, "OpenStreetMap data"):
-        for feature in _features(checked_file(path), skipped):
+    features, skipped, points = [], _Skipped(), 0
+    with _unpacked(checked_file(path)) as plain, errors_of("osmium", path, "OpenStreetMap data"):
+        for feature in _features(plain, skipped):
             features.append(feature)
+            points += int(shapely.get_num_coordinates(feature.geometry))
             if len(features) > MOST_FEATURES:
                 raise too_many(path)
+            if points > MOST_POINTS:
+                raise too_many_points(path)
     return SiteMap(path, MapCoordinates(_WGS84), tuple(features), skipped.notes)
+
+
+@contextmanager
+def _unpacked(path: Path) -> Iterator[Path]:
+    """Give the file that a packed one holds, or the file itself if it is none.
+
+    Raises:
+        BlastEnvError: If it cannot be unpacked, or would be too large.
+    """
+    opened = next((way for end, way in _PACKED.items() if path.name.lower().endswith(end)), None)
+    if opened is None:
+        yield path
+        return
+    with scratch_folder() as folder:
+        plain = folder / "unpacked.osm"
+        try:
+            with opened(path, "rb") as packed, write_atomically(plain, durable=False) as target:
+                _copy(packed, target, path)
+        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise BlastEnvError(f"{path}: cannot be unpacked: {error}") from error
+        yield plain
+
+
+def _copy(packed: IO[bytes], target: Path, path: Path) -> None:
+    size = 0
+    with target.open("wb") as file:
+        while part := packed.read(_PART_BYTES):
+            size += len(part)
+            if size > MOST_UNPACKED_BYTES:
+                raise BlastEnvError(
+                    f"{path}: unfolds to more than {MOST_UNPACKED_BYTES:,} bytes, must unfold to "
+                    "at most that many: cut a smaller extract"
+                )
+            file.write(part)
 
 
 @dataclass

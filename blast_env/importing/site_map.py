@@ -21,7 +21,7 @@ MOST_BYTES: Final = 50_000_000
 MOST_FEATURES: Final = 100_000
 """Outlines and lines that are taken from a file."""
 
-MOST_POINTS: Final = 2_000_000
+MOST_POINTS: Final = 500_000
 """Points of all of them."""
 
 MOST_COORDINATE: Final = 1e12
@@ -103,10 +103,7 @@ class SiteMap:
             )
         points = shapely.get_num_coordinates(geometries)
         if points.sum() > MOST_POINTS:
-            raise BlastEnvError(
-                f"{self.path}: has {points.sum():,} points, must have at most {MOST_POINTS:,}: "
-                "cut a smaller extract"
-            )
+            raise too_many_points(self.path)
 
 
 def checked_file(path: Path) -> Path:
@@ -147,10 +144,18 @@ def errors_of(package: str, path: Path, kind: str) -> Iterator[None]:
     except Exception as error:
         frames = (frame for frame, _ in walk_tb(error.__traceback__))
         modules = {str(frame.f_globals.get("__name__")).partition(".")[0] for frame in frames}
-        if isinstance(error, BlastEnvError) or package not in modules:
+        if isinstance(error, BlastEnvError | MemoryError) or package not in modules:
             raise
         what = shortened(" ".join(str(error).split()) or type(error).__name__, 300)
         raise BlastEnvError(f"{path}: cannot be read as {kind}: {what}") from error
+
+
+def too_many_points(path: Path) -> BlastEnvError:
+    """Return the error of a file whose outlines and lines have more points than are taken."""
+    return BlastEnvError(
+        f"{path}: has more than {MOST_POINTS:,} points, must have at most that many: cut a smaller "
+        "extract"
+    )
 
 
 def too_many(path: Path) -> BlastEnvError:

@@ -9,8 +9,9 @@ from typing import Any, Final, TypeVar
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from blast_env.arrays import BoolArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell, Rectangle
+from blast_env.geometry import Rectangle, stacked_runs
 from blast_env.physics.parameters import AirParameters, SimulationParameters
 from blast_env.physics.particles import lattice_capacity
 from blast_env.physics.presets import for_charge
@@ -30,7 +31,7 @@ from blast_env.scenario.sections import (
     Site,
     VehicleSource,
 )
-from blast_env.scenario.vehicles import Obstacles, VehicleGround
+from blast_env.scenario.vehicles import MOST_PLACES, Obstacles, VehicleGround, places_on
 from blast_env.scenario.versions import MAX_ITEMS
 from blast_env.scenario.zone import (
     TOLERANCE_M,
@@ -218,9 +219,18 @@ def _structure_problems(parts: Parts) -> Iterator[Problem]:
 
 def _charge_problems(parts: Parts) -> Iterator[Problem]:
     """Check that the charge, wherever it is, fits between the structures and the border."""
+    vehicles = sum(isinstance(source, VehicleSource) for source in parts.sources.values())
+    places = 0 if parts.site is None else vehicles * places_on(parts.site)
+    if places > MOST_PLACES:
+        yield Problem(
+            "charge",
+            f"has {vehicles} vehicles, whose charges may go off at {places:,} places of the site,"
+            f" must have at most {MOST_PLACES:,}",
+        )
     for index, source in parts.sources.items():
         if isinstance(source, VehicleSource):
-            yield from _vehicle_problems(parts, f"charge[{index}]", source)
+            if places <= MOST_PLACES:
+                yield from _vehicle_problems(parts, f"charge[{index}]", source)
         else:
             yield from _place_problems(parts, f"charge[{index}]", source)
         yield from _above_the_air(parts, f"charge[{index}].height_m", source.height_m)
@@ -323,28 +333,30 @@ def _stopping_problems(
 ) -> Iterator[Problem]:
     """Check that a barrier can keep a vehicle any further away than the empty site does."""
     cells = _stopping_cells(empty_zone(_surroundings(parts, zone)))
-    if not cells:
+    if not cells.any():
         yield Problem(key, "nothing can stop the vehicle: no item in stock stops vehicles")
         return
-    full = Obstacles(stops=tuple(zone.cell_rectangle_m(cell) for cell in cells))
+    # Cells side by side leave no gap: a rectangle of them stops a vehicle as they do.
+    full = Obstacles(stops=tuple(zone.cells_rectangle_m(*each) for each in stacked_runs(cells)))
     stand_off_m = ground.worst_places().stand_off_m
     if ground.worst_places(full).stand_off_m <= stand_off_m + TOLERANCE_M:
         message = (
             "nothing can stop the vehicle: even with something that stops it on each of the"
-            f" {len(cells)} cells where that can stand, it comes as near as {stand_off_m:g} m to a"
+            f" {cells.sum()} cells where that can stand, it comes as near as {stand_off_m:g} m to a"
             " protected structure"
         )
         yield Problem(key, message)
 
 
-def _stopping_cells(empty: EmptyZone) -> list[Cell]:
-    """Return the cells on which something can stand that stops vehicles."""
-    cells: set[Cell] = set()
+def _stopping_cells(empty: EmptyZone) -> BoolArray:
+    """Return the cells on which something can stand that stops vehicles (rows, columns)."""
+    cells = np.zeros_like(empty.usable)
+    rows, columns = cells.shape
     for variant, fits in zip(empty.catalogue.variants, empty.fits, strict=True):
         if variant.stops_vehicles and empty.catalogue.stocks[variant.item] > 0:
-            for row, column in np.argwhere(fits):
-                cells.update(variant.cells_at(int(row), int(column)))
-    return sorted(cells)
+            for up, right in variant.cells_at(0, 0):
+                cells[up:, right:] |= fits[: rows - up, : columns - right]
+    return cells
 
 
 def vehicle_ground(parts: Parts, source: VehicleSource) -> VehicleGround:

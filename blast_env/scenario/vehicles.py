@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Element, Rectangle
+from blast_env.geometry import Element, Rectangle, stacked_runs
 from blast_env.physics.scene import Charge, WallName
 from blast_env.scenario.sections import (
     AnySource,
@@ -46,6 +46,14 @@ _MOST_STEPS: Final = 1000
 
 _EQUAL_M: Final = 1e-6
 """Distances that differ by less are equal."""
+
+
+_SAME_M: Final = 1e-9
+"""Edges that differ by less are the same, as in `Rectangle.contains`."""
+
+
+MOST_PLACES: Final = 3_000_000
+"""Places of all vehicles at which their charges may go off: three vehicles on the largest site."""
 
 
 @dataclass(frozen=True)
@@ -186,6 +194,14 @@ class VehicleGround:
     def entry_stand_off_m(self) -> float:
         """How near to a protected structure it is when it has just entered."""
         return float(_nearest_wall(self.reach().starts_m, self.structures)[0].min())
+
+
+def places_on(site: Site) -> int:
+    """Return at how many places of a site a vehicle's charge may go off, obstacles aside."""
+    along_x, along_y = (
+        _steps(side_m) // _step(_steps(side_m)) for side_m in (site.width_m, site.height_m)
+    )
+    return along_x * along_y
 
 
 def squares_of(site: Site) -> tuple[int, int]:
@@ -359,12 +375,16 @@ def _cuts(edges: Sequence[int], half: int, end: int) -> NDArray[np.int64]:
         half: Half of the width.
         end: Where the site ends.
     """
-    module = _steps(MODULE_SIDE_M)
-    step = module * ceil(end / module / _MOST_STEPS)
     last = max(end - half, half)
-    regular = np.arange(half, last + 1, step, dtype=np.int64)
+    regular = np.arange(half, last + 1, _step(end), dtype=np.int64)
     cuts = np.concatenate((regular, np.array([*edges, half, last], dtype=np.int64)))
     return np.unique(cuts[(cuts >= half) & (cuts <= last)])
+
+
+def _step(end: int) -> int:
+    """Return how far apart regular places of the charge are on a site that ends there."""
+    module = _steps(MODULE_SIDE_M)
+    return module * ceil(end / module / _MOST_STEPS)
 
 
 def _between(cuts: NDArray[np.int64], low: int, high: int) -> slice:
@@ -387,18 +407,22 @@ def _outside(site: Rectangle, inside: Sequence[Rectangle]) -> Iterator[Rectangle
     """Yield rectangles that cover the site but for some of it; nothing if that is all of it."""
     if not inside:
         return
-    xs = sorted({site.left, site.right, *(x for each in inside for x in each[0::2])})
-    ys = sorted({site.bottom, site.top, *(y for each in inside for y in each[1::2])})
-    for bottom, top in pairwise(ys):
-        left = xs[0]
-        for low, high in pairwise(xs):
-            cell = Rectangle(low, bottom, high, top)
-            if any(each.contains(cell) for each in inside):
-                if low > left:
-                    yield Rectangle(left, bottom, low, top)
-                left = high
-        if xs[-1] > left:
-            yield Rectangle(left, bottom, xs[-1], top)
+    xs = np.unique([site.left, site.right, *(x for each in inside for x in each[0::2])])
+    ys = np.unique([site.bottom, site.top, *(y for each in inside for y in each[1::2])])
+    outside = np.ones((len(ys) - 1, len(xs) - 1), dtype=bool)
+    for left, bottom, right, top in inside:
+        first_x, first_y = (
+            np.searchsorted(xs, left - _SAME_M),
+            np.searchsorted(ys, bottom - _SAME_M),
+        )
+        after_x, after_y = (
+            np.searchsorted(cuts, high + _SAME_M, "right") - 1
+            for cuts, high in ((xs, right), (ys, top))
+        )
+        outside[first_y:after_y, first_x:after_x] = False
+    for row, (bottom, top) in enumerate(pairwise(ys.tolist())):
+        for _, first, _, count in stacked_runs(outside[row : row + 1]):
+            yield Rectangle(float(xs[first]), bottom, float(xs[first + count]), top)
 
 
 @dataclass(frozen=True)
@@ -492,22 +516,48 @@ def _nearest_wall(
         places_m: The places (places, 2).
         structures: Of them, the protected ones count.
     """
-    nearest_m, middle_m = np.full((2, len(places_m)), np.inf)
+    nearest_m, middle_m, most_m = np.full((3, len(places_m)), np.inf)
+    # Many places share few coordinates; so it is cheap to tell to which ones a structure is near.
+    x_m, column = np.unique(places_m[:, 0], return_inverse=True)
+    y_m, row = np.unique(places_m[:, 1], return_inverse=True)
+    protected = [each for each in structures if each.protected]
+
+    def least_m(structure: AnyStructure) -> FloatArray:
+        left, bottom, right, top = structure.rectangle_m
+        across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
+        along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
+        distances_m: FloatArray = np.sqrt((across_m**2)[column] + (along_m**2)[row])
+        return distances_m
+
+    for structure in protected:
+        left, bottom, right, top = structure.rectangle_m
+        # No wall is further away than this from what is nearest to it.
+        diagonal_m = hypot(right - left, top - bottom) + 2.0 * _EQUAL_M
+        np.minimum(most_m, least_m(structure) + diagonal_m, out=most_m)
+    for structure in protected:
+        near = np.flatnonzero(least_m(structure) <= most_m)
+        nearest_m[near], middle_m[near] = _nearer_wall(
+            places_m[near], structure, nearest_m[near], middle_m[near]
+        )
+    return nearest_m, middle_m
+
+
+def _nearer_wall(
+    places_m: FloatArray, structure: AnyStructure, nearest_m: FloatArray, middle_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return `_nearest_wall` of what was nearest so far, and of one more structure."""
     x_m, y_m = places_m.T
-    for structure in structures:
-        if not structure.protected:
-            continue
-        for left, bottom, right, top in _walls(structure):
-            across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
-            along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
-            wall_m = np.hypot(across_m, along_m)
-            aside_m = np.hypot(x_m - (left + right) / 2.0, y_m - (bottom + top) / 2.0)
-            nearer = wall_m < nearest_m - _EQUAL_M
-            as_near = np.abs(wall_m - nearest_m) <= _EQUAL_M
-            middle_m = np.where(
-                nearer, aside_m, np.where(as_near, np.minimum(middle_m, aside_m), middle_m)
-            )
-            nearest_m = np.minimum(nearest_m, wall_m)
+    for left, bottom, right, top in _walls(structure):
+        across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
+        along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
+        wall_m = np.hypot(across_m, along_m)
+        aside_m = np.hypot(x_m - (left + right) / 2.0, y_m - (bottom + top) / 2.0)
+        nearer = wall_m < nearest_m - _EQUAL_M
+        as_near = np.abs(wall_m - nearest_m) <= _EQUAL_M
+        middle_m = np.where(
+            nearer, aside_m, np.where(as_near, np.minimum(middle_m, aside_m), middle_m)
+        )
+        nearest_m = np.minimum(nearest_m, wall_m)
     return nearest_m, middle_m
 
 

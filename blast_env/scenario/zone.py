@@ -176,9 +176,7 @@ class BuildZone(Section):
             LayoutError: If there is no such item, or it cannot be turned.
         """
         variant = self.catalogue.variant(element)
-        corner_m = self.cell_rectangle_m((element[0], element[1]))[:2]
-        size_m = (variant.columns * MODULE_SIDE_M, variant.rows * MODULE_SIDE_M)
-        return Rectangle.from_corner(corner_m, size_m)
+        return self.cells_rectangle_m(element[0], element[1], variant.rows, variant.columns)
 
     @property
     def rectangle_m(self) -> Rectangle:
@@ -216,6 +214,11 @@ class BuildZone(Section):
             self.corner_m[1] + row * MODULE_SIDE_M,
         )
         return Rectangle.from_corner(corner, (MODULE_SIDE_M, MODULE_SIDE_M))
+
+    def cells_rectangle_m(self, row: int, column: int, rows: int, columns: int) -> Rectangle:
+        """Return what a rectangle of cells covers, by its lower left cell."""
+        corner = self.cell_rectangle_m((row, column))[:2]
+        return Rectangle.from_corner(corner, (columns * MODULE_SIDE_M, rows * MODULE_SIDE_M))
 
     def cell_centre_m(self, cell: Cell) -> PointM:
         """Return the middle of the square that a cell covers."""

@@ -1,6 +1,7 @@
 """Checks of a build zone: its catalogue and its areas, and whether anything can be built in it."""
 
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 import numpy as np
 
@@ -18,12 +19,20 @@ from blast_env.scenario.zone import (
 )
 from blast_env.units import MODULE_SIDE_M
 
+MOST_PLACES: Final = 10_000_000
+"""Of all items, on each cell, turned or not: what is known of each takes some ten bytes."""
+
 
 def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
     """Yield what is wrong with a build zone, its areas and what stands around it."""
     zone = surroundings.zone
     yield from _area_problems(zone)
     yield from _key_problems(zone)
+    places = zone.rows * zone.columns * len(zone.catalogue.variants)
+    if places > MOST_PLACES:
+        message = f"make {places:,} places of pieces in the zone, must make at most {MOST_PLACES:,}"
+        yield Problem("build_zone.items", message)
+        return
     cells = empty_zone(surroundings)
     if zone.items:
         yield from _item_problems(zone, cells)

@@ -3,6 +3,7 @@
 import gzip
 import json
 import math
+import resource
 import sys
 from bz2 import compress as bzip2
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -54,13 +55,18 @@ def _numbered(form: str, count: int) -> str:
     return "".join(form.format(number) for number in range(count))
 
 
-def _vehicle(size: float) -> bytes:
+def _vehicles(size: float, count: int = 1) -> bytes:
     entry = "[[charge.entries]]\nstart_m = [0.0, 10.0]\nend_m = [0.0, 90.0]\n"
-    vehicle = f'[[charge]]\nkind = "vehicle"\ntnt_kg = 1.0\nwidth_m = 2.0\n{entry}'
+    ground = "".join(
+        f"[[charge.drivable]]\ncorner_m = [{n}.0, {n}.0]\nsize_m = [{size - 2 * n}, 0.1]\n"
+        for n in range(99)
+    )
+    ground += f"[[charge.drivable]]\ncorner_m = [0.0, 0.0]\nsize_m = [{size}, {size}]\n"
+    vehicle = f'[[charge]]\nkind = "vehicle"\ntnt_kg = 1.0\nwidth_m = 2.0\n{entry}{ground}'
     zone = "[build_zone]\ncorner_m = [10.0, 0.0]\nrows = 1000\ncolumns = 1000\nstock = 9\n"
     houses = [_house(n, 600.0 + 10 * n, 4, 900.0) for n in range(100)]
     text = _HEADER.format(size=size).partition("[[charge]]")[0]
-    return (text + vehicle + zone + "\n".join(houses)).encode()
+    return (text + vehicle * count + zone + "\n".join(houses)).encode()
 
 
 def _zone_items() -> bytes:
@@ -68,7 +74,7 @@ def _zone_items() -> bytes:
         '[[build_zone.items]]\nname = "i{}"\ncost = 1.0\nlength_modules = {}\nheight_m = 2.0\n'
         "stock = 5\nstops_vehicles = true\n"
     )
-    items = "".join(item.format(number, number + 1) for number in range(50))
+    items = "".join(item.format(number, number + 1) for number in range(20))
     way = '[build_zone.access_way]\nwidth_m = 3.5\nbetween = "left_right"\n'
     zone = "[build_zone]\ncorner_m = [10.0, 0.0]\nrows = 1000\ncolumns = 1000\nstock = 9\n"
     return _toml((zone, way, items, _house(0, 900.0)), 1000.0)
@@ -136,11 +142,16 @@ def _zigzag(points: int) -> list[tuple[float, float]]:
     return [(100.0 * (i % 2), 100.0 * i / points) for i in range(points)]
 
 
+def _modern(kind: str, marker: str) -> str:
+    return f"0\n{kind}\n100\nAcDbEntity\n8\nB\n100\n{marker}\n"
+
+
 def _dxf(entities: str, blocks: str = "") -> bytes:
+    header = "0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1015\n0\nENDSEC\n"
     section = f"0\nSECTION\n2\nBLOCKS\n{blocks}0\nENDSEC\n" if blocks else ""
     house = "".join(f"10\n{x}\n20\n{y}\n" for x, y in _square(20.0, 20.0, 8.0))
-    drawn = f"0\nLWPOLYLINE\n8\nB\n90\n4\n70\n1\n{house}{entities}"
-    return f"{section}0\nSECTION\n2\nENTITIES\n{drawn}0\nENDSEC\n0\nEOF\n".encode()
+    drawn = f"{_modern('LWPOLYLINE', 'AcDbPolyline')}90\n4\n70\n1\n{house}{entities}"
+    return f"{header}{section}0\nSECTION\n2\nENTITIES\n{drawn}0\nENDSEC\n0\nEOF\n".encode()
 
 
 def _block(name: str, content: str) -> str:
@@ -173,7 +184,7 @@ def _minsert() -> bytes:
 
 def _bulges(bulge: str) -> bytes:
     points = "".join(f"10\n{x}\n20\n{y}\n42\n{bulge}\n" for x, y in _square(0.0, 0.0, 9.0))
-    return _dxf(f"0\nLWPOLYLINE\n8\nB\n90\n4\n70\n1\n{points}")
+    return _dxf(f"{_modern('LWPOLYLINE', 'AcDbPolyline')}90\n4\n70\n1\n{points}")
 
 
 def _arc(start: str, end: str, radius: str = "5.0") -> bytes:
@@ -183,14 +194,14 @@ def _arc(start: str, end: str, radius: str = "5.0") -> bytes:
 def _mtext(code: str, size: int = 5_000_000) -> bytes:
     piece = (code * (249 // len(code) + 1))[:249]
     lines = "".join(f"3\n{piece}\n" for _ in range(size // 252))
-    return _dxf(f"0\nMTEXT\n8\nB\n10\n22.0\n20\n22.0\n40\n1.0\n{lines}1\nend\n")
+    return _dxf(f"{_modern('MTEXT', 'AcDbMText')}10\n22.0\n20\n22.0\n40\n1.0\n{lines}1\nend\n")
 
 
 def _texts_in_outlines(count: int) -> bytes:
     def one(i: int) -> str:
         ring = "".join(f"10\n{x}\n20\n{y}\n" for x, y in _square(0.01 * i, 0.0, 50.0))
         text = f"0\nTEXT\n8\nB\n10\n{40 + 0.001 * i}\n20\n2.0\n40\n1.0\n1\nname {i}\n"
-        return f"0\nLWPOLYLINE\n8\nB\n90\n4\n70\n1\n{ring}{text}"
+        return f"{_modern('LWPOLYLINE', 'AcDbPolyline')}90\n4\n70\n1\n{ring}{text}"
 
     return _dxf("".join(one(i) for i in range(count)))
 
@@ -198,7 +209,8 @@ def _texts_in_outlines(count: int) -> bytes:
 def _spline(count: int) -> bytes:
     knots = "".join(f"40\n{i}.0\n" for i in range(count + 4))
     points = "".join(f"10\n{100 * (i % 2)}.0\n20\n{i}.0\n30\n0.0\n" for i in range(count))
-    return _dxf(f"0\nSPLINE\n8\nB\n70\n8\n71\n3\n72\n{count + 4}\n73\n{count}\n{knots}{points}")
+    head = f"{_modern('SPLINE', 'AcDbSpline')}70\n8\n71\n3\n72\n{count + 4}\n73\n{count}\n"
+    return _dxf(head + knots + points)
 
 
 def _osm(body: str, header: str = "") -> str:
@@ -279,8 +291,9 @@ FAMILIES: Final[Mapping[str, Maker]] = MappingProxyType(
         "400,000 empty arrays.toml": lambda: f"a = [{_repeated('[],')}]".encode(),
         "a number of 900,000 digits.toml": lambda: b"a = " + b"1" * 900_000,
         "a number of 900,000 digits and lines.toml": lambda: b"a = 0." + b"1_" * 450_000,
-        "100 vehicles on 2 km.toml": lambda: _vehicle(2000.0),
-        "50 items on 500 m.toml": _zone_items,
+        "a vehicle among 100 houses on 2 km.toml": lambda: _vehicles(2000.0),
+        "30 vehicles on 2 km.toml": lambda: _vehicles(2000.0, 30),
+        "20 items on 500 m.toml": _zone_items,
         "40,000 escaped quotes.json": lambda: _OPEN.encode(),
         "300,000 empty arrays.json": lambda: f"[{_repeated('[],')}[]]".encode(),
         "150,000 cells in one place.json": lambda: f"[{_repeated('[0,0],')}[0,0]]".encode(),
@@ -362,7 +375,8 @@ FAMILIES: Final[Mapping[str, Maker]] = MappingProxyType(
         "bulges of NaN.dxf": lambda: _bulges("nan"),
         "bulges of 1e-300.dxf": lambda: _bulges("1e-300"),
         "an ellipse of 1e300.dxf": lambda: _dxf(
-            "0\nELLIPSE\n8\nB\n10\n0.0\n20\n0.0\n11\n5.0\n21\n0.0\n40\n0.5\n41\n0.0\n42\n1e300\n"
+            _modern("ELLIPSE", "AcDbEllipse")
+            + "10\n0.0\n20\n0.0\n11\n5.0\n21\n0.0\n40\n0.5\n41\n0.0\n42\n1e300\n"
         ),
         "a spline of 20,000.dxf": lambda: _spline(20_000),
         "1,000 texts in 1,000 outlines.dxf": lambda: _texts_in_outlines(1000),
@@ -371,6 +385,18 @@ FAMILIES: Final[Mapping[str, Maker]] = MappingProxyType(
             _insert("L0", "41\n1e300\n42\n1e300\n"), _block("L0", _LINE)
         ),
         "40 MB of nothing.dxf": lambda: _dxf("0\nPOINT\n8\nX\n10\n0.0\n20\n0.0\n" * 1_500_000),
+        "200,000 points.dxf": lambda: _dxf("0\nPOINT\n8\nX\n10\n0.0\n20\n0.0\n" * 200_000),
+        "45,000 lines in blocks.dxf": lambda: _dxf(
+            _insert("L0", "70\n100\n71\n4\n44\n1.0\n45\n1.0\n"), _block("L0", _LINE * 110)
+        ),
+        "a line of 600,000 points.dxf": lambda: _dxf(
+            _modern("LWPOLYLINE", "AcDbPolyline") + "90\n4\n" + "10\n1\n20\n1\n" * 490_000
+        ),
+        "a chain of 900 blocks.dxf": lambda: _dxf(
+            _insert("L899"),
+            _block("L0", _LINE)
+            + "".join(_block(f"L{n}", _insert(f"L{n - 1}")) for n in range(1, 900)),
+        ),
         "19 MB that unfold to 20 GB.osm.gz": lambda: _packed_spaces(200),
         "nodes that unfold to 9 GB.osm.gz": lambda: _packed_nodes(300),
         "spaces that unfold to 1 GB.osm.bz2": lambda: bzip2(
@@ -409,5 +435,20 @@ def read(path: Path) -> str:
     return "read"
 
 
+def taken() -> tuple[float, int]:
+    """Return the processor time in s of this process and of its finished ones, and most memory."""
+    usages = [resource.getrusage(each) for each in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    time_s = sum(each.ru_utime + each.ru_stime for each in usages)
+    # Of this process not ru_maxrss, which counts what began it, too.
+    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    own_kb = next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:"))
+    return time_s, 1024 * max(own_kb, usages[1].ru_maxrss)
+
+
 if __name__ == "__main__":
-    print(read(Path(sys.argv[1])))
+    what, name, place = sys.argv[1:]
+    if what == "make":
+        Path(place).write_bytes(FAMILIES[name]())
+    else:
+        outcome = read(Path(place)).partition(":")[0]
+        print(json.dumps([outcome, *taken()]))

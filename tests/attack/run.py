@@ -1,7 +1,10 @@
 """A long attack on everything that reads and writes files: `make attack`."""
 
+import json
 import resource
 import signal
+import subprocess
+import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -21,6 +24,7 @@ from blast_env.errors import BlastEnvError
 from tests.attack.disks import outcome_after_full_device, size_of, small_device
 from tests.attack.formats import FORMATS, Format
 from tests.attack.kills import JOBS, outcome_after_kill, steps_and_outcome
+from tests.attack.made import FAMILIES, suffix_of
 from tests.attack.mutants import mutants
 from tests.attack.web import ATTACKS, attempts_of, victim
 
@@ -49,6 +53,9 @@ class Limits:
 
 _LIMITS: Final = Limits()
 _MOST_BYTES: Final = 2**32  # of all together
+_MADE_TIME_S: Final = 10.0
+_MADE_BYTES: Final = 500_000_000
+_MADE_STOP_S: Final = 120.0  # on the clock
 
 
 @dataclass
@@ -205,6 +212,64 @@ def files(
                 print(f"    {problem}: {kept}")
             failed += outcome.failed
     raise typer.Exit(1 if failed else 0)
+
+
+@app.command()
+def made(
+    only: Annotated[str, typer.Option(help="Files with this in their names.")] = "",
+) -> None:
+    """Read files that were made on purpose to take long or much; print what they took."""
+    failed = 0
+    print("| file | size, MB | outcome | processor time, s | memory, MB |")
+    print("|---|---|---|---|---|")
+    for name in FAMILIES:
+        if only not in name:
+            continue
+        with TemporaryDirectory() as folder:
+            found = read_made(name, Path(folder))
+        cells = (name, f"{found.size / 1e6:.1f}", found.outcome)
+        print(f"| {' | '.join(cells)} | {found.time_s:.1f} | {found.peak_bytes / 1e6:.0f} |")
+        failed += not found.is_within
+    raise typer.Exit(1 if failed else 0)
+
+
+@dataclass(frozen=True)
+class MadeOutcome:
+    """What became of a file that was made on purpose.
+
+    Attributes:
+        size: Of the file, in bytes.
+        outcome: A word.
+        time_s: Processor time of all processes that read it, their start included.
+        peak_bytes: Most memory of one of them.
+    """
+
+    size: int
+    outcome: str
+    time_s: float
+    peak_bytes: int
+
+    @property
+    def is_within(self) -> bool:
+        """Whether it was read or refused, and took no more than it may."""
+        fine = self.outcome in ("read", "refused")
+        return fine and self.time_s <= _MADE_TIME_S and self.peak_bytes <= _MADE_BYTES
+
+
+def read_made(name: str, folder: Path) -> MadeOutcome:
+    """Make a file and read it, each in a process of its own."""
+    path = folder / f"made{suffix_of(name)}"
+    program = [sys.executable, "-m", "tests.attack.made"]
+    subprocess.run([*program, "make", name, str(path)], check=True)
+    reader = [*program, "read", name, str(path)]
+    size = path.stat().st_size
+    try:
+        done = subprocess.run(reader, capture_output=True, timeout=_MADE_STOP_S, check=False)
+    except subprocess.TimeoutExpired:
+        return MadeOutcome(size, "stopped", _MADE_STOP_S, 0)
+    if done.returncode != 0:
+        return MadeOutcome(size, "failed", 0.0, 0)
+    return MadeOutcome(size, *json.loads(done.stdout))
 
 
 @app.command()

@@ -78,7 +78,7 @@ def test_large_files_are_refused_before_they_are_read(
         )
     monkeypatch.setattr(geojson, "MOST_FEATURES", 1000)
     monkeypatch.setattr(site_map, "MOST_POINTS", 10)
-    assert "points, must have at most 10" in error_of(BLOCK)
+    assert "than 10 points, must have at most that many" in error_of(BLOCK)
 
 
 @pytest.mark.parametrize(
