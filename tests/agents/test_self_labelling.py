@@ -308,7 +308,7 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
         ({"engine": "surrogat"}, "did you mean 'surrogate'"),
         ({"engine": "surrogate", "cell_m": 0.5}, "engine 'surrogate' has no cells"),
         ({"engine": "none.json"}, "none.json: there is no such file"),
-        ({"evaluation_engine": "surrogate"}, "known: event, gas, pymunk"),
+        ({"evaluation_engine": "surrogate"}, "must be an engine that runs blasts"),
     ],
 )
 def test_what_it_cannot_do_is_refused_before_anything_is_written(

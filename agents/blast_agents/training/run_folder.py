@@ -141,8 +141,14 @@ class TrainingSettings(BaseModel):
 
         Raises:
             UnknownNameError: If there is no engine of that name.
+            BlastEnvError: If it guesses: weights are chosen by blasts.
         """
         if self.evaluation_engine is not None:
+            if is_surrogate(self.evaluation_engine):
+                raise BlastEnvError(
+                    f"evaluation_engine is {self.evaluation_engine!r}, must be an engine that runs "
+                    "blasts: a surrogate guesses them"
+                )
             return find_engine(self.evaluation_engine)
         return self.real_engine
 
