@@ -31,6 +31,10 @@ class _Commands(LazyGroup):
             "blast_env.cli.evaluate:EvaluateCommand",
             "Compare layouts with no barrier, both exposed to the same threats.",
         ),
+        "assess": (
+            "blast_env.cli.assess:AssessCommand",
+            "Say what charges do to the buildings: panes, panels, level of protection.",
+        ),
         "search": (
             "blast_env.cli.search:search",
             "Search for the layout with the least impulse on the protected structures.",

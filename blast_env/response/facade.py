@@ -218,16 +218,17 @@ class FacadeResponse:
     def level_of_protection(self) -> LevelOfProtection:
         """Level of protection of the building: what its worst component allows.
 
-        A condition of glazing counts as the level that GSA gives it: no fragments high, fragments
-        within 3 m on the floor medium, low on the panel low, high on the panel very low.
+        Of glazing its hazard counts, in the words of GSA's table 8-1: none and unbroken high, none
+        and broken medium, very low (3a) low, low (3b) very low, more below standards. That these
+        hazards go with those levels of UFC 4-010-01 is an assumption on the safe side.
         """
         by_glass = {
             GlazingCondition.NO_BREAK: LevelOfProtection.HIGH,
-            GlazingCondition.RETAINED: LevelOfProtection.HIGH,
-            GlazingCondition.WITHIN_1_M: LevelOfProtection.HIGH,
-            GlazingCondition.WITHIN_3_M: LevelOfProtection.MEDIUM,
-            GlazingCondition.LOW_ON_PANEL: LevelOfProtection.LOW,
-            GlazingCondition.HIGH_ON_PANEL: LevelOfProtection.VERY_LOW,
+            GlazingCondition.RETAINED: LevelOfProtection.MEDIUM,
+            GlazingCondition.WITHIN_1_M: LevelOfProtection.LOW,
+            GlazingCondition.WITHIN_3_M: LevelOfProtection.VERY_LOW,
+            GlazingCondition.LOW_ON_PANEL: LevelOfProtection.BELOW_STANDARDS,
+            GlazingCondition.HIGH_ON_PANEL: LevelOfProtection.BELOW_STANDARDS,
         }
         return min(by_glass[self.worst_condition], level_of_protection(self.worst_damage))
 

@@ -87,9 +87,9 @@ def test_windows_and_walls_of_a_building_decide_together() -> None:
     assert found.panes == 4
     assert 2.0 < found.broken_panes <= 4.0
     assert found.worst_condition is GlazingCondition.HIGH_ON_PANEL
-    assert found.level_of_protection is LevelOfProtection.VERY_LOW
+    assert found.level_of_protection is LevelOfProtection.BELOW_STANDARDS
     held = respond(bays[1:], time_s, np.tile(history, (2, 1)))
-    assert held.level_of_protection > LevelOfProtection.VERY_LOW
+    assert held.level_of_protection is LevelOfProtection.MEDIUM
     calm = respond(bays, time_s, np.zeros((3, 2)))
     assert calm.broken_panes == 0.0
     assert calm.level_of_protection is LevelOfProtection.HIGH

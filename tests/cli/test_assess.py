@@ -1,0 +1,51 @@
+"""`blast-env assess`: the verdict, what better glass brings, and what is refused."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import blast_env
+from blast_env.cli import app
+from blast_env.scenario import Scenario
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    document = blast_env.load_scenario("control_room").model_dump(mode="json")
+    document["structures"][0]["facade"] = {
+        "glazing": "window_annealed_6",
+        "wall": "concrete_200",
+    }
+    document["charge"] = document["charge"][:1]
+    document["name"] = "glazed_room"
+    path = tmp_path_factory.mktemp("assess") / "glazed.toml"
+    blast_env.save_scenario(Scenario.from_document(document, "test"), path)
+    return path
+
+
+def run(*words: str | Path) -> str:
+    done = CliRunner().invoke(app, ["assess", *map(str, words)])
+    assert done.exit_code in (0, 2), done.output
+    return done.output
+
+
+@pytest.mark.slow
+def test_the_verdict_comes_first_and_better_glass_may_turn_it(site: Path, tmp_path: Path) -> None:
+    """1 kg at 8.5 m: annealed glass flies 3 m, laminated glass stays in its frame."""
+    picture = tmp_path / "facade.png"
+    output = run(site, "--tnt-kg", "1", "--target", "medium", "--picture", picture)
+    assert output.startswith("glazed_room, no barrier: FAILS level 'medium' under 1 charges")
+    rows = {line.split()[0]: line for line in output.splitlines() if line.startswith("window")}
+    assert rows["window_annealed_6"].endswith("no")
+    assert rows["window_laminated_6"].endswith("yes")
+    assert picture.stat().st_size > 10_000
+
+
+def test_a_site_without_facades() -> None:
+    output = run("control_room")
+    assert "no structure has a facade with bays" in output
+
+
+def test_a_level_that_does_not_exist(site: Path) -> None:
+    assert "did you mean 'medium'" in run(site, "--target", "meduim")
