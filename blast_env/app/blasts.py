@@ -40,7 +40,7 @@ from blast_env.geometry import Layout
 from blast_env.provenance import versions
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.figures import save_figure
-from blast_env.rendering.film import largest_load, paint_at, plan_film
+from blast_env.rendering.film import paint_at, plan_film, scale_end
 from blast_env.rendering.frames import FramePainter
 from blast_env.rendering.gas import Quantity, facades, full_load
 from blast_env.rendering.ground_map import ground_map, ground_recorders, map_levels
@@ -167,7 +167,7 @@ def _particles(
     painter = FramePainter(
         blast,
         width_px=_FILM_PX,
-        full_impulse=largest_load(bare, unit),
+        full_impulse=scale_end([bare], unit),
         unit=unit.with_loads_of(blast.run().load_unit) if layout else unit,
     )
     plan = plan_film(bare)

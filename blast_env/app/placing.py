@@ -4,7 +4,7 @@ The single place of the page that knows what the elements of a layout are; wheth
 somewhere is for `Placement` to say.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from blast_env.errors import LayoutError
@@ -30,20 +30,6 @@ class Placeable(NamedTuple):
     label: str
     can_turn: bool
     left: int
-
-
-class Solid(NamedTuple):
-    """What an element of a layout looks like.
-
-    Attributes:
-        rectangle_m: What it covers.
-        height_m: Its height; `None` is as high as the air.
-        name: Name of its item; empty for a single module.
-    """
-
-    rectangle_m: Rectangle
-    height_m: float | None
-    name: str
 
 
 def plain(layout: Iterable[Element]) -> PlainLayout:
@@ -124,16 +110,6 @@ def rectangle_of(scenario: Scenario, new: Element) -> Rectangle:
 def moved_to(old: Element, cell: Cell) -> Element:
     """Return an element with its lower left cell somewhere else."""
     return old._replace(row=cell[0], column=cell[1]) if isinstance(old, Piece) else cell
-
-
-def solids(scenario: Scenario, layout: Layout) -> Iterator[Solid]:
-    """Yield what the elements of a layout look like, in their order."""
-    if scenario.build_zone is None:
-        return
-    catalogue = scenario.build_zone.catalogue
-    for each in layout:
-        variant = catalogue.variant(each)
-        yield Solid(rectangle_of(scenario, each), variant.height_m, variant.name)
 
 
 def reason_against(scenario: Scenario, layout: Layout, new: Element) -> str | None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from math import floor, inf
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
@@ -19,7 +20,7 @@ from blast_env.files import write_atomically
 from blast_env.physics.engine import BlastRun
 from blast_env.plan import PAGE
 from blast_env.rendering.canvas import Frame
-from blast_env.rendering.frames import SIMULATION_UNITS, FramePainter
+from blast_env.rendering.frames import FramePainter
 from blast_env.rendering.style import nice_load, nice_numbers, render_extra, shown_until_s
 from blast_env.units import MS_PER_S
 from blast_env.values import path_of
@@ -218,7 +219,7 @@ Progress = Callable[[float], None]
 _SHORTEST_S, _USUAL_S, _LONGEST_S = 8.0, 10.0, 12.0
 
 
-_SHARE_OF_FIRST_RUN = 0.2  # of the progress
+_SHARE_OF_FIRST_RUNS: Final = 0.2  # of the progress
 
 
 _MOST_FRAMES = 15_000
@@ -305,13 +306,35 @@ def plan_until(
     return plan
 
 
+@dataclass(frozen=True, eq=False)
+class FilmPanel:
+    """One blast of a film.
+
+    Attributes:
+        blast: The blast.
+        title: Heading of its part of the frame; the usual one of a blast unless given.
+    """
+
+    blast: Blast
+    title: str | None = None
+
+    @property
+    def subtitle(self) -> str | None:
+        """The line under a heading of its own: short, because a part of a frame is narrow."""
+        if self.title is None:
+            return None
+        charge = self.blast.scene.charge
+        x_m, y_m = charge.position_m
+        return f"{charge.tnt_kg:g} kg TNT at ({x_m:.1f} m, {y_m:.1f} m), seed {self.blast.seed}"
+
+
 def write_film(
     blast: Blast,
     path: str | Path,
     frames_per_s: float = 25.0,
     slow_motion: float | None = None,
     width_px: int = 960,
-    progress: Progress | None = None,
+    progress: Progress = lambda _: None,
     full_impulse: float | None = None,
 ) -> BlastResult:
     """Write a film of a blast; return what happened in it.
@@ -336,21 +359,8 @@ def write_film(
         BlastEnvError: If the suffix is another one, an argument is out of bounds or the file
             cannot be written; nothing is left behind then, nor after Ctrl-C.
     """
-    suffix = known_suffix(path)
-    tell = progress or _tell_nobody
-    with write_atomically(path) as temporary:
-        result = blast.run(lambda share: tell(_SHARE_OF_FIRST_RUN * share))
-        plan = plan_film(result, frames_per_s, slow_motion)
-        if suffix == ".gif":
-            plan, width_px = for_gif(plan, width_px)
-        unit = result.load_unit
-        if full_impulse is None:
-            full_impulse = largest_load(result, unit)
-        even_px = width_px - width_px % 2
-        painter = FramePainter(blast, width_px=even_px, full_impulse=full_impulse, unit=unit)
-        with open_film(suffix, temporary, plan, blast.scenario.name, _comment(plan, blast)) as film:
-            _draw(blast.start(), painter, plan, film, tell)
-    tell(1.0)
+    options = (frames_per_s, slow_motion, width_px, progress)
+    (result,) = _write((FilmPanel(blast),), path, *options, full_impulse)
     return result
 
 
@@ -367,20 +377,6 @@ def known_suffix(path: str | Path) -> str:
             f"must be {' or '.join(SUFFIXES)}"
         )
     return suffix.lower()
-
-
-def _tell_nobody(share: float) -> None:
-    """Take the progress of a film that nobody waits for."""
-
-
-def _draw(
-    run: BlastRun, painter: FramePainter, plan: FilmPlan, film: FilmFile, progress: Progress
-) -> None:
-    for frame in range(plan.frame_count):
-        time_s = plan.time_s(frame)
-        film.append(paint_at(run, painter, time_s, plan.real_time_factor))
-        drawn = (frame + 1) / plan.frame_count
-        progress(_SHARE_OF_FIRST_RUN + (1.0 - _SHARE_OF_FIRST_RUN) * drawn)
 
 
 def paint_at(run: BlastRun, painter: FramePainter, time_s: float, note: str) -> Frame:
@@ -414,11 +410,12 @@ def open_film(suffix: str, path: Path, plan: FilmPlan, title: str, comment: str)
     return Mp4File(path, plan.frames_per_s, title, comment)
 
 
-def _comment(plan: FilmPlan, blast: Blast) -> str:
-    scenario = blast.scenario
+def _comment(plan: FilmPlan, panels: Sequence[FilmPanel]) -> str:
+    blasts = [panel.blast for panel in panels]
+    shown = dict.fromkeys(f"{blast.scenario.name}, seed {blast.seed}" for blast in blasts)
     return (
-        f"{scenario.name}, seed {blast.seed}, {plan.real_time_factor}, "
-        f"{plan.end_s * MS_PER_S:.4g} ms of simulated time, scenario {scenario.content_hash}"
+        f"{'; '.join(shown)}, {plan.real_time_factor}, {plan.end_s * MS_PER_S:.4g} ms of "
+        f"simulated time, scenario {blasts[-1].scenario.content_hash}"
     )
 
 
@@ -442,45 +439,25 @@ def _usual_slow_motion(end_s: float) -> float:
     return min(factors, key=lambda factor: abs(factor * end_s - _USUAL_S))
 
 
-def largest_load(result: BlastResult, unit: LoadUnit = SIMULATION_UNITS) -> float | None:
-    """Return the largest load of a protected module, of any one if these have none, or None.
+def scale_end(results: Sequence[BlastResult], unit: LoadUnit) -> float | None:
+    """Return the impulse of a module at the end of the colours of some blasts, if there is any.
 
-    It is rounded up to few digits in the unit.
+    It is the largest load of theirs, rounded up to few digits in the unit.
     """
+    largest = max(map(_largest_load, results))
+    return nice_load(unit, largest) if largest > 0.0 else None
+
+
+def _largest_load(result: BlastResult) -> float:
+    """Return the largest load of a protected module, of any one if these have none."""
     for obstacles in (
         [obstacle for obstacle in result.obstacles if obstacle.protected],
         list(result.obstacles),
     ):
         loads = [part.impulse for obstacle in obstacles for part in obstacle.parts]
         if max(loads, default=0.0) > 0.0:
-            return nice_load(unit, max(loads))
-    return None
-
-
-_SUFFIX: Final = ".mp4"
-
-
-_SHARE_OF_FIRST_RUNS: Final = 0.2  # of the progress
-
-
-@dataclass(frozen=True, eq=False)
-class FilmPanel:
-    """One blast of the film.
-
-    Attributes:
-        blast: The blast.
-        title: Heading of its part of the frame.
-    """
-
-    blast: Blast
-    title: str
-
-    @property
-    def subtitle(self) -> str:
-        """The line under the heading: short, because half a frame is narrow."""
-        charge = self.blast.scene.charge
-        x_m, y_m = charge.position_m
-        return f"{charge.tnt_kg:g} kg TNT at ({x_m:.1f} m, {y_m:.1f} m), seed {self.blast.seed}"
+            return max(loads)
+    return 0.0
 
 
 def write_side_by_side(
@@ -489,7 +466,7 @@ def write_side_by_side(
     frames_per_s: float = 25.0,
     slow_motion: float | None = None,
     width_px: int = 1600,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Progress = lambda _: None,
 ) -> tuple[BlastResult, ...]:
     """Write a film of blasts side by side; return what happened in each.
 
@@ -511,15 +488,31 @@ def write_side_by_side(
     """
     if len(panels) < 2:
         raise BlastEnvError(f"panels: there are {len(panels)}, must be at least 2")
-    if path_of(path).suffix.lower() != _SUFFIX:
-        raise BlastEnvError(f"{path}: suffix is {path_of(path).suffix!r}, must be {_SUFFIX!r}")
+    if path_of(path).suffix.lower() != ".mp4":
+        raise BlastEnvError(f"{path}: suffix is {path_of(path).suffix!r}, must be '.mp4'")
+    return _write(panels, path, frames_per_s, slow_motion, width_px, progress)
+
+
+def _write(
+    panels: Sequence[FilmPanel],
+    path: str | Path,
+    frames_per_s: float,
+    slow_motion: float | None,
+    width_px: int,
+    progress: Progress,
+    full_impulse: float | None = None,
+) -> tuple[BlastResult, ...]:
+    """Write a film of blasts; see `write_film` and `write_side_by_side`."""
+    suffix = known_suffix(path)
     with write_atomically(path) as temporary:
         results = tuple(_first_runs(panels, progress))
-        plan = _common_plan(results, frames_per_s, slow_motion)
-        painters = _painters(panels, results, width_px // len(panels))
-        title = " | ".join(panel.title for panel in panels)
-        comment = f"{plan.real_time_factor}; {'; '.join(panel.subtitle for panel in panels)}"
-        with Mp4File(temporary, plan.frames_per_s, title, comment) as film:
+        plans = [plan_film(result, frames_per_s, slow_motion) for result in results]
+        plan = max(plans, key=lambda each: each.end_s)
+        if suffix == ".gif":
+            plan, width_px = for_gif(plan, width_px)
+        painters = _painters(panels, results, width_px // len(panels), full_impulse)
+        title = " | ".join(panel.title or panel.blast.scenario.name for panel in panels)
+        with open_film(suffix, temporary, plan, title, _comment(plan, panels)) as film:
             for number, frame in enumerate(_frames(panels, painters, plan), start=1):
                 film.append(frame)
                 drawn = number / plan.frame_count
@@ -527,30 +520,26 @@ def write_side_by_side(
     return results
 
 
-def _first_runs(
-    panels: Sequence[FilmPanel], progress: Callable[[float], None]
-) -> Iterator[BlastResult]:
-    for number, panel in enumerate(panels, start=1):
-        yield panel.blast.run()
-        progress(_SHARE_OF_FIRST_RUNS * number / len(panels))
+def _first_runs(panels: Sequence[FilmPanel], progress: Progress) -> Iterator[BlastResult]:
+    part = _SHARE_OF_FIRST_RUNS / len(panels)
+    for number, panel in enumerate(panels):
+        yield panel.blast.run(partial(_tell_part, progress, part * number, part))
 
 
-def _common_plan(
-    results: Sequence[BlastResult], frames_per_s: float, slow_motion: float | None
-) -> FilmPlan:
-    """Return the plan of the blast that takes longest."""
-    plans = (plan_film(result, frames_per_s, slow_motion) for result in results)
-    return max(plans, key=lambda plan: plan.end_s)
+def _tell_part(progress: Progress, before: float, part: float, share: float) -> None:
+    progress(before + part * share)
 
 
 def _painters(
-    panels: Sequence[FilmPanel], results: Sequence[BlastResult], width_px: int
+    panels: Sequence[FilmPanel],
+    results: Sequence[BlastResult],
+    width_px: int,
+    full_impulse: float | None,
 ) -> list[FramePainter]:
     """Return a painter a panel, all with the colours of the largest load on what is protected."""
-    loads = [largest_load(result) or 0.0 for result in results]
-    largest = max(loads)
-    unit = results[loads.index(largest)].load_unit  # one scale for all, so that they compare
-    full_impulse = nice_load(unit, largest) if largest > 0.0 else None
+    unit = max(results, key=_largest_load).load_unit  # one scale for all, so that they compare
+    if full_impulse is None:
+        full_impulse = scale_end(results, unit)
     return [
         FramePainter(
             panel.blast,

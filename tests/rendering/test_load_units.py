@@ -9,7 +9,7 @@ from blast_env.calibration import LoadUnit
 from blast_env.calibration.model import seen_width_m
 from blast_env.engines import BlastResult
 from blast_env.rendering.figures import common_scale, heat_map, impulse_over_time
-from blast_env.rendering.film import largest_load
+from blast_env.rendering.film import scale_end
 from blast_env.rendering.frames import ONE_SEED, FramePainter
 from blast_env.rendering.style import nice_ceiling
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
@@ -77,7 +77,7 @@ def test_maps_without_and_with_a_barrier_have_one_scale_in_pa_s(
 
 def test_the_scale_of_a_film_ends_at_a_nice_number_of_pa_s(bare: BlastResult) -> None:
     unit = bare.load_unit
-    full = largest_load(bare, unit)
+    full = scale_end([bare], unit)
     assert full is not None
     assert unit.factor * full == pytest.approx(nice_ceiling(unit.factor * full))
 
