@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import blast_env.plan
-from blast_env.app.plan import View, plan_svg
+from blast_env.app.plan import PixelView, plan_svg
 from blast_env.export import LayoutPlan
 from blast_env.export.dxf import drawing
 from blast_env.export.files import feature_collection
@@ -59,7 +59,7 @@ def test_a_new_condition_of_the_zone_is_in_all_pictures_and_drawings() -> None:
     assert tuple(np.array(COLOUR) / 255.0) in fills
     frame = PlacingPainter(site, site.charge).paint(Placement.empty(site))
     assert (frame == COLOUR).all(axis=2).sum() > 1000
-    svg = plan_svg(View.of(site, 600, 400), site, (), None)
+    svg = plan_svg(PixelView.of(site, 600, 400), site, (), None)
     assert 'fill="#0102fa"' in svg
     plan = LayoutPlan(site, ())
     (outline,) = drawing(plan).modelspace().query('LWPOLYLINE[layer=="SOFT_GROUND"]')
@@ -99,7 +99,7 @@ def test_no_label_of_a_crowded_site_lies_on_another_in_a_figure() -> None:
 
 def test_no_label_of_a_crowded_site_lies_on_another_on_the_page() -> None:
     site = office_park()
-    svg = plan_svg(View.of(site, 900, 640), site, (), None)
+    svg = plan_svg(PixelView.of(site, 900, 640), site, (), None)
     found = re.findall(r'<text x="(\S+)" y="(\S+)" font-size="(\d+)"[^>]*>([^<]*)<', svg)
     boxes = []
     for x, y, size, text in found:

@@ -30,7 +30,7 @@ _PROCESS_BYTES: Final = 450e6
 
 
 @dataclass(frozen=True)
-class BlastCost:
+class CostGuess:
     """What one blast costs, about.
 
     Attributes:
@@ -49,7 +49,7 @@ class BlastCost:
         return self.cells * self.steps / _CELLS_PER_S
 
 
-def cost_of_blast(scenario: Scenario, charge: AnyCharge, cell_m: float) -> BlastCost:
+def cost_of_blast(scenario: Scenario, charge: AnyCharge, cell_m: float) -> CostGuess:
     """Return what a blast by gas dynamics costs, about; nothing is built for it."""
     settings = GasSettings(cell_m=cell_m)
     site = scenario.site
@@ -74,14 +74,14 @@ def cost_of_blast(scenario: Scenario, charge: AnyCharge, cell_m: float) -> Blast
         default=dist((0.0, 0.0), sides_m[:2]),
     )
     time_s = _SETTLED_S * cbrt(tnt_kg) + far_m / _FRONT_M_S
-    return BlastCost(
+    return CostGuess(
         cells=int(np.prod(grid.array_shape)),
         steps=ceil(time_s / (_STEP_S_PER_M * cell_m)),
         memory_bytes=_PROCESS_BYTES + 2.0 * state_bytes(grid, "single", with_fuel=True),
     )
 
 
-def cost_words(costs: Sequence[BlastCost], with_films: bool = False) -> str:
+def cost_words(costs: Sequence[CostGuess], with_films: bool = False) -> str:
     """Return what some blasts cost one after the other, for people.
 
     Args:

@@ -100,7 +100,7 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Step:
+class DesignStep:
     """A design and what made it."""
 
     label: str
@@ -117,9 +117,9 @@ class History:
         future: What was undone, what comes next first.
     """
 
-    present: Step
-    past: tuple[Step, ...] = ()
-    future: tuple[Step, ...] = ()
+    present: DesignStep
+    past: tuple[DesignStep, ...] = ()
+    future: tuple[DesignStep, ...] = ()
 
     @property
     def design(self) -> Design:
@@ -131,7 +131,7 @@ class History:
         if design == self.design:
             return self
         past = (*self.past, self.present)[-MOST_STEPS:]
-        return History(Step(label, design), past)
+        return History(DesignStep(label, design), past)
 
     def showing(self, active: int) -> "History":
         """Return the history with another layout before the user: no step, nothing to undo."""
@@ -154,7 +154,7 @@ class History:
         """Return the history as plain data, each site in it once."""
         sites: list[dict[str, Any]] = []
 
-        def of_step(step: Step) -> dict[str, Any]:
+        def of_step(step: DesignStep) -> dict[str, Any]:
             record = step.design.record()
             site = record["scenario"]
             if site not in sites:
@@ -176,9 +176,9 @@ class History:
             BlastEnvError: If it is none; the message says why.
         """
 
-        def step_of(part: Mapping[str, Any]) -> Step:
+        def step_of(part: Mapping[str, Any]) -> DesignStep:
             whole = {**part, "scenario": record["sites"][part["scenario"]]}
-            return Step(str(part["label"]), Design.from_record(whole, source))
+            return DesignStep(str(part["label"]), Design.from_record(whole, source))
 
         try:
             return cls(

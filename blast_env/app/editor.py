@@ -9,7 +9,7 @@ from enum import StrEnum
 from typing import Final
 
 from blast_env.app import edits, placing
-from blast_env.app.edits import Kind, Thing
+from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.session import Session
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Element, Layout, Rectangle
@@ -34,11 +34,11 @@ class Tool(StrEnum):
 
 
 _DRAWN: Final = {
-    Tool.STRUCTURE: Kind.STRUCTURE,
-    Tool.ZONE: Kind.ZONE,
-    Tool.KEEP_OUT: Kind.KEEP_OUT,
-    Tool.CHARGE: Kind.CHARGE,
-    Tool.GAUGE: Kind.GAUGE,
+    Tool.STRUCTURE: ThingKind.STRUCTURE,
+    Tool.ZONE: ThingKind.ZONE,
+    Tool.KEEP_OUT: ThingKind.KEEP_OUT,
+    Tool.CHARGE: ThingKind.CHARGE,
+    Tool.GAUGE: ThingKind.GAUGE,
 }
 
 _HANDLE_M: Final = 0.6  # how near to the upper right corner one takes hold of the size
@@ -70,7 +70,7 @@ class _Stroke:
     sizes: bool = False
     lifted: Element | None = None
     made: Scenario | None = None
-    thing: Thing | None = None
+    thing: SiteThing | None = None
     changed: int = 0
 
 
@@ -96,7 +96,7 @@ class Editor:
     item: str = ""
     turned: bool = False
     new_height_m: float | None = STOREY_M
-    selected: Thing | None = None
+    selected: SiteThing | None = None
     cursor: Cell | None = None
     ghost: Ghost | None = None
     pending: Layout | None = None
@@ -253,7 +253,7 @@ class Editor:
             self.selected = None
             return
         own = self.selected
-        fixed = (Kind.GAUGE, Kind.ITEM)
+        fixed = (ThingKind.GAUGE, ThingKind.ITEM)
         if own is not None and edits.has(scenario, own) and own.kind not in fixed:
             box = edits.rectangle_of(scenario, own)
             near = max(abs(x_m - box.right), abs(y_m - box.top)) <= _HANDLE_M

@@ -28,7 +28,7 @@ Document = dict[str, Any]
 _HALF: Final = MODULE_SIDE_M / 2.0
 
 
-class Kind(StrEnum):
+class ThingKind(StrEnum):
     """What can be selected on a site."""
 
     SITE = "site"
@@ -41,26 +41,26 @@ class Kind(StrEnum):
     ITEM = "item"
 
 
-class Thing(NamedTuple):
+class SiteThing(NamedTuple):
     """One thing on a site: what it is, and its number among its kind."""
 
-    kind: Kind
+    kind: ThingKind
     number: int = 0
 
 
-_PATHS: Final[Mapping[Kind, tuple[str, ...]]] = {
-    Kind.SITE: ("site",),
-    Kind.ZONE: ("build_zone",),
-    Kind.STRUCTURE: ("structures",),
-    Kind.CHARGE: ("charge",),
-    Kind.KEEP_OUT: ("build_zone", "keep_outs"),
-    Kind.COST_AREA: ("build_zone", "cost_areas"),
-    Kind.GAUGE: ("gauges",),
-    Kind.ITEM: ("build_zone", "items"),
+_PATHS: Final[Mapping[ThingKind, tuple[str, ...]]] = {
+    ThingKind.SITE: ("site",),
+    ThingKind.ZONE: ("build_zone",),
+    ThingKind.STRUCTURE: ("structures",),
+    ThingKind.CHARGE: ("charge",),
+    ThingKind.KEEP_OUT: ("build_zone", "keep_outs"),
+    ThingKind.COST_AREA: ("build_zone", "cost_areas"),
+    ThingKind.GAUGE: ("gauges",),
+    ThingKind.ITEM: ("build_zone", "items"),
 }
 """Where each kind is in a scenario file."""
 
-_SINGLE: Final = (Kind.SITE, Kind.ZONE)
+_SINGLE: Final = (ThingKind.SITE, ThingKind.ZONE)
 
 
 def snapped(value_m: float) -> float:
@@ -86,33 +86,36 @@ def changed(scenario: Scenario, edit: Callable[[Document], None]) -> Scenario:
     return Scenario.from_document(document, scenario.name)
 
 
-def things(scenario: Scenario) -> Iterator[tuple[Thing, str]]:
+def things(scenario: Scenario) -> Iterator[tuple[SiteThing, str]]:
     """Yield everything on the site with what people call it."""
-    yield Thing(Kind.SITE), f"site, {scenario.site.width_m:g} x {scenario.site.height_m:g} m"
+    yield (
+        SiteThing(ThingKind.SITE),
+        f"site, {scenario.site.width_m:g} x {scenario.site.height_m:g} m",
+    )
     for index, structure in enumerate(scenario.structures):
         protected = ", protected" if structure.protected else ""
-        yield Thing(Kind.STRUCTURE, index), f"{structure.name}{protected}"
+        yield SiteThing(ThingKind.STRUCTURE, index), f"{structure.name}{protected}"
     for index, source in enumerate(scenario.charge):
-        yield Thing(Kind.CHARGE, index), f"charge {index + 1}, {source.tnt_kg:g} kg"
+        yield SiteThing(ThingKind.CHARGE, index), f"charge {index + 1}, {source.tnt_kg:g} kg"
     zone = scenario.build_zone
     if zone is not None:
-        yield Thing(Kind.ZONE), "build zone"
+        yield SiteThing(ThingKind.ZONE), "build zone"
         for index, area in enumerate(zone.keep_outs):
-            yield Thing(Kind.KEEP_OUT, index), f"keep-out: {area.reason}"
+            yield SiteThing(ThingKind.KEEP_OUT, index), f"keep-out: {area.reason}"
         for index, cost_area in enumerate(zone.cost_areas):
-            yield Thing(Kind.COST_AREA, index), f"cost area: {cost_area.reason}"
+            yield SiteThing(ThingKind.COST_AREA, index), f"cost area: {cost_area.reason}"
         for index, item in enumerate(zone.items):
-            yield Thing(Kind.ITEM, index), f"item of the catalogue: {item.name}"
+            yield SiteThing(ThingKind.ITEM, index), f"item of the catalogue: {item.name}"
     for index, gauge in enumerate(scenario.gauges):
-        yield Thing(Kind.GAUGE, index), f"gauge {gauge.name}"
+        yield SiteThing(ThingKind.GAUGE, index), f"gauge {gauge.name}"
 
 
-def has(scenario: Scenario, thing: Thing) -> bool:
+def has(scenario: Scenario, thing: SiteThing) -> bool:
     """Return whether a thing is (still) there."""
     return any(each == thing for each, _ in things(scenario))
 
 
-def rectangle_of(scenario: Scenario, thing: Thing) -> Rectangle:
+def rectangle_of(scenario: Scenario, thing: SiteThing) -> Rectangle:
     """Return the smallest rectangle around a thing; of a point, one without extent.
 
     An item of the catalogue is nowhere, or everywhere in the build zone: that is its rectangle.
@@ -123,23 +126,23 @@ def rectangle_of(scenario: Scenario, thing: Thing) -> Rectangle:
     if not has(scenario, thing):
         raise BlastEnvError(f"{scenario.name} has no {thing.kind} {thing.number}")
     kind, number = thing
-    if kind is Kind.SITE:
+    if kind is ThingKind.SITE:
         return scenario.site.rectangle_m
-    if kind is Kind.STRUCTURE:
+    if kind is ThingKind.STRUCTURE:
         return scenario.structures[number].rectangle_m
-    if kind is Kind.CHARGE:
+    if kind is ThingKind.CHARGE:
         return source_bounds_m(scenario.charge[number])
-    if kind is Kind.GAUGE:
+    if kind is ThingKind.GAUGE:
         x_m, y_m, _ = scenario.gauges[number].position_m
         return Rectangle(x_m, y_m, x_m, y_m)
-    if kind is Kind.KEEP_OUT:
+    if kind is ThingKind.KEEP_OUT:
         return scenario.zone.keep_outs[number].rectangle_m
-    if kind is Kind.COST_AREA:
+    if kind is ThingKind.COST_AREA:
         return scenario.zone.cost_areas[number].rectangle_m
     return scenario.zone.rectangle_m
 
 
-def thing_at(scenario: Scenario, x_m: float, y_m: float, reach_m: float) -> Thing | None:
+def thing_at(scenario: Scenario, x_m: float, y_m: float, reach_m: float) -> SiteThing | None:
     """Return what is at a place, what is drawn on top first; the site itself is nothing.
 
     Args:
@@ -149,19 +152,22 @@ def thing_at(scenario: Scenario, x_m: float, y_m: float, reach_m: float) -> Thin
         reach_m: How far beside a point or a line one may point.
     """
     for kind, grown_m in (
-        (Kind.GAUGE, reach_m),
-        (Kind.CHARGE, reach_m),
-        (Kind.STRUCTURE, 0.0),
-        (Kind.KEEP_OUT, 0.0),
-        (Kind.COST_AREA, 0.0),
-        (Kind.ZONE, 0.0),
+        (ThingKind.GAUGE, reach_m),
+        (ThingKind.CHARGE, reach_m),
+        (ThingKind.STRUCTURE, 0.0),
+        (ThingKind.KEEP_OUT, 0.0),
+        (ThingKind.COST_AREA, 0.0),
+        (ThingKind.ZONE, 0.0),
     ):
         own = [each for each, _ in things(scenario) if each.kind is kind]
         for thing in reversed(own):
             left, bottom, right, top = rectangle_of(scenario, thing).grown(grown_m)
             if not (left <= x_m <= right and bottom <= y_m <= top):
                 continue
-            if kind is Kind.CHARGE and _beside(scenario.charge[thing.number], x_m, y_m) > reach_m:
+            if (
+                kind is ThingKind.CHARGE
+                and _beside(scenario.charge[thing.number], x_m, y_m) > reach_m
+            ):
                 continue
             return thing
     return None
@@ -183,16 +189,16 @@ def _from_line_m(line_m: tuple[PointM, PointM], x_m: float, y_m: float) -> float
     return hypot(x_m - x0 - share * (x1 - x0), y_m - y0 - share * (y1 - y0))
 
 
-def moved(scenario: Scenario, thing: Thing, by_m: PointM) -> Scenario:
+def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
     """Return the scenario with a thing moved by about so much, onto the grid.
 
     Raises:
         ScenarioError: If it cannot be there.
     """
-    if thing.kind in (Kind.SITE, Kind.ITEM):
+    if thing.kind in (ThingKind.SITE, ThingKind.ITEM):
         return scenario
     corner = rectangle_of(scenario, thing)
-    shift = _HALF if thing.kind is Kind.GAUGE else 0.0  # gauges are in the middle of cells
+    shift = _HALF if thing.kind is ThingKind.GAUGE else 0.0  # gauges are in the middle of cells
     step = [
         snapped(start + by - shift) + shift - start
         for start, by in zip((corner.left, corner.bottom), by_m, strict=True)
@@ -208,7 +214,7 @@ def moved(scenario: Scenario, thing: Thing, by_m: PointM) -> Scenario:
     return changed(scenario, edit)
 
 
-def resized(scenario: Scenario, thing: Thing, corner_m: PointM) -> Scenario:
+def resized(scenario: Scenario, thing: SiteThing, corner_m: PointM) -> Scenario:
     """Return the scenario with the upper right corner of a thing at another place of the grid.
 
     Of a line it is the end that goes there; what has no extent stays as it is.
@@ -223,7 +229,7 @@ def resized(scenario: Scenario, thing: Thing, corner_m: PointM) -> Scenario:
 
     def edit(document: Document) -> None:
         own = _own(document, thing)
-        if thing.kind is Kind.SITE:
+        if thing.kind is ThingKind.SITE:
             own.update(width_m=_plain(width_m), height_m=_plain(height_m))
         elif "side_modules" in own:
             own["side_modules"] = max(rows, columns)
@@ -237,7 +243,7 @@ def resized(scenario: Scenario, thing: Thing, corner_m: PointM) -> Scenario:
     return changed(scenario, edit)
 
 
-def with_values(scenario: Scenario, thing: Thing | None, values: Mapping[str, Any]) -> Scenario:
+def with_values(scenario: Scenario, thing: SiteThing | None, values: Mapping[str, Any]) -> Scenario:
     """Return the scenario with other values of a thing.
 
     Args:
@@ -260,14 +266,14 @@ def with_values(scenario: Scenario, thing: Thing | None, values: Mapping[str, An
     return changed(scenario, edit)
 
 
-def removed(scenario: Scenario, thing: Thing) -> Scenario:
+def removed(scenario: Scenario, thing: SiteThing) -> Scenario:
     """Return the scenario without a thing.
 
     Raises:
         ScenarioError: If there must be one: the last charge, the last protected structure.
         BlastEnvError: If it is the site.
     """
-    if thing.kind is Kind.SITE:
+    if thing.kind is ThingKind.SITE:
         raise BlastEnvError("the site itself cannot be taken away: open another one")
 
     def edit(document: Document) -> None:
@@ -285,11 +291,11 @@ def removed(scenario: Scenario, thing: Thing) -> Scenario:
 
 def added(
     scenario: Scenario,
-    kind: Kind,
+    kind: ThingKind,
     start_m: PointM,
     end_m: PointM,
     height_m: float | None = STOREY_M,
-) -> tuple[Scenario, Thing]:
+) -> tuple[Scenario, SiteThing]:
     """Return the scenario with one thing more, drawn from one place to another, on the grid.
 
     A charge is a point where both places are the same, else a line; see `with_charge_area` for an
@@ -308,10 +314,10 @@ def added(
         _plain(max(start[1], end[1])),
     )
     section = {
-        Kind.STRUCTURE: lambda: _structure(scenario, area, height_m),
-        Kind.CHARGE: lambda: _charge(scenario, start, end),
-        Kind.KEEP_OUT: lambda: {**_sized(area), "reason": "must stay free"},
-        Kind.COST_AREA: lambda: {
+        ThingKind.STRUCTURE: lambda: _structure(scenario, area, height_m),
+        ThingKind.CHARGE: lambda: _charge(scenario, start, end),
+        ThingKind.KEEP_OUT: lambda: {**_sized(area), "reason": "must stay free"},
+        ThingKind.COST_AREA: lambda: {
             **_sized(area),
             "reason": "costly ground",
             **(
@@ -320,9 +326,9 @@ def added(
                 else {"module_cost": 2.0 * scenario.zone.module_cost}
             ),
         },
-        Kind.ITEM: lambda: _item(scenario),
-        Kind.GAUGE: lambda: _gauge(scenario, start_m),
-        Kind.ZONE: lambda: _zone(scenario, area),
+        ThingKind.ITEM: lambda: _item(scenario),
+        ThingKind.GAUGE: lambda: _gauge(scenario, start_m),
+        ThingKind.ZONE: lambda: _zone(scenario, area),
     }[kind]()
 
     def edit(document: Document) -> None:
@@ -330,19 +336,21 @@ def added(
         table = document
         for part in above:
             table = table[part]
-        if kind is Kind.ZONE:
+        if kind is ThingKind.ZONE:
             table[key] = {**table.get(key, {}), **section}
         else:
             table[key] = [*table.get(key, []), section]
 
-    if kind in (Kind.KEEP_OUT, Kind.COST_AREA, Kind.ITEM):
+    if kind in (ThingKind.KEEP_OUT, ThingKind.COST_AREA, ThingKind.ITEM):
         _ = scenario.zone  # refuses a site without one
     after = changed(scenario, edit)
     last = max(each.number for each, _ in things(after) if each.kind is kind)
-    return after, Thing(kind, last)
+    return after, SiteThing(kind, last)
 
 
-def with_charge_area(scenario: Scenario, start_m: PointM, end_m: PointM) -> tuple[Scenario, Thing]:
+def with_charge_area(
+    scenario: Scenario, start_m: PointM, end_m: PointM
+) -> tuple[Scenario, SiteThing]:
     """Return the scenario with one more charge, anywhere in a rectangle.
 
     Raises:
@@ -353,7 +361,7 @@ def with_charge_area(scenario: Scenario, start_m: PointM, end_m: PointM) -> tupl
     area = Rectangle(_plain(left), _plain(bottom), _plain(right), _plain(top))
     section = {"kind": "rectangle", "tnt_kg": _usual_tnt_kg(scenario), **_sized(area)}
     after = changed(scenario, lambda document: document["charge"].append(section))
-    return after, Thing(Kind.CHARGE, len(after.charge) - 1)
+    return after, SiteThing(ThingKind.CHARGE, len(after.charge) - 1)
 
 
 def _fit_catalogue(document: Document) -> None:
@@ -367,7 +375,7 @@ def _fit_catalogue(document: Document) -> None:
         del zone["stock"]
 
 
-def _own(document: Document, thing: Thing) -> Document:
+def _own(document: Document, thing: SiteThing) -> Document:
     """Return the part of a document that is a thing's."""
     table: Any = document
     for part in _PATHS[thing.kind]:

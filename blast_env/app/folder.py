@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field
 
-from blast_env.app.design import Design, History, Step
+from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.records import MOST_BYTES, RECORD, BlastRecord, Kept, check_key, read_record
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
@@ -168,7 +168,7 @@ class WorkFolder:
         folder = DesignFolder(self._designs / secrets.token_hex(6))
         for path in (folder.path, folder.jobs, folder.blasts):
             make_folder(path)
-        folder.save(History(Step(label, Design(scenario))))
+        folder.save(History(DesignStep(label, Design(scenario))))
         return folder
 
     def open(self, design_id: str) -> DesignFolder:

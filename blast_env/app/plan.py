@@ -11,7 +11,7 @@ import numpy as np
 
 from blast_env.app import edits
 from blast_env.app.editor import Ghost
-from blast_env.app.edits import Kind, Thing
+from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.geometry import Cell, Layout, Rectangle
 from blast_env.labels import Wanted, labels_of, leader, settle, solid
 from blast_env.physics.structure import Colour
@@ -52,7 +52,7 @@ def _hex(colour: Colour) -> str:
 
 
 @dataclass(frozen=True)
-class View:
+class PixelView:
     """What part of a site is seen in how many pixels.
 
     Attributes:
@@ -70,7 +70,7 @@ class View:
     height_px: int
 
     @classmethod
-    def of(cls, scenario: Scenario, width_px: int, height_px: int) -> "View":
+    def of(cls, scenario: Scenario, width_px: int, height_px: int) -> "PixelView":
         """Return the view of a whole site."""
         site = scenario.site
         scale = (1.0 - 2.0 * _MARGIN) * min(width_px / site.width_m, height_px / site.height_m)
@@ -89,7 +89,7 @@ class View:
         up_px = self.height_px - y_px
         return self.left_m + x_px / self.pixels_per_m, self.bottom_m + up_px / self.pixels_per_m
 
-    def zoomed(self, factor: float, at_m: PointM | None = None) -> "View":
+    def zoomed(self, factor: float, at_m: PointM | None = None) -> "PixelView":
         """Return the view nearer by a factor, with a place, the middle unless given, kept."""
         x_m, y_m = at_m or self.metres(self.width_px / 2.0, self.height_px / 2.0)
         scale = min(max(self.pixels_per_m * factor, 0.1), _MOST_ZOOM)
@@ -101,7 +101,7 @@ class View:
             pixels_per_m=scale,
         )
 
-    def panned(self, across: float, up: float) -> "View":
+    def panned(self, across: float, up: float) -> "PixelView":
         """Return the view moved by shares of what is seen."""
         return replace(
             self,
@@ -116,7 +116,9 @@ class View:
         return left, top, round(right - left, 2), round(bottom - top, 2)
 
 
-def plan_svg(view: View, scenario: Scenario, layout: Layout, selected: Thing | None) -> str:
+def plan_svg(
+    view: PixelView, scenario: Scenario, layout: Layout, selected: SiteThing | None
+) -> str:
     """Return what stands on a site; `overlay_svg` goes on top of it."""
     features = in_order((*site_features(scenario, layout), *vehicle_features(scenario, layout)))
     return "".join(
@@ -139,7 +141,9 @@ def _named(feature: Feature) -> Feature:
     return replace(feature, label=feature.name) if is_zone else feature
 
 
-def overlay_svg(view: View, scenario: Scenario, ghost: Ghost | None, cursor: Cell | None) -> str:
+def overlay_svg(
+    view: PixelView, scenario: Scenario, ghost: Ghost | None, cursor: Cell | None
+) -> str:
     """Return what is on the move: what would stand where, and where the keyboard is."""
     parts = []
     if cursor is not None and scenario.build_zone is not None:
@@ -160,7 +164,7 @@ _BLOCKED: Final = (
 # Features.
 
 
-def draw_features(view: View, features: Iterable[Feature]) -> Iterator[str]:
+def draw_features(view: PixelView, features: Iterable[Feature]) -> Iterator[str]:
     """Yield the features by their geometry and their look; areas of a kind are one figure."""
     for (kind, colour, corners), group in groupby(
         features, key=lambda each: (each.kind, each.colour, min(len(each.places_m), 3))
@@ -222,7 +226,7 @@ def _sign(look: Look, x: float, y: float) -> str:
     )
 
 
-def _names(view: View, features: Sequence[Feature]) -> Iterator[str]:
+def _names(view: PixelView, features: Sequence[Feature]) -> Iterator[str]:
     """Yield the labels of features, so that none covers another."""
 
     def box(feature: Feature) -> Rectangle:  # pixels, y upwards
@@ -263,7 +267,7 @@ def _names(view: View, features: Sequence[Feature]) -> Iterator[str]:
 
 
 def _rectangle(
-    view: View,
+    view: PixelView,
     rectangle_m: Rectangle,
     fill: str,
     stroke: str = "none",
@@ -290,7 +294,7 @@ def _text(
     )
 
 
-def _lines(view: View, scenario: Scenario) -> Iterator[str]:
+def _lines(view: PixelView, scenario: Scenario) -> Iterator[str]:
     """Yield lines at round distances."""
     site = scenario.site.rectangle_m
     steps = (1.0, 5.0, 10.0, 50.0, 100.0)
@@ -306,7 +310,7 @@ def _lines(view: View, scenario: Scenario) -> Iterator[str]:
     yield f'<path d="{path}" stroke="#e3e7ec" stroke-width="1" fill="none"></path>'
 
 
-def _cells(view: View, scenario: Scenario, layout: Layout) -> Iterator[str]:
+def _cells(view: PixelView, scenario: Scenario, layout: Layout) -> Iterator[str]:
     """Yield which cells of the build zone may take something."""
     zone = scenario.build_zone
     if zone is None:
@@ -319,7 +323,7 @@ def _cells(view: View, scenario: Scenario, layout: Layout) -> Iterator[str]:
         yield from _cell_lines(view, zone.rectangle_m)
 
 
-def _cell_lines(view: View, zone_m: Rectangle) -> Iterator[str]:
+def _cell_lines(view: PixelView, zone_m: Rectangle) -> Iterator[str]:
     left, top, across, down = view.box(zone_m)
     pitch = MODULE_SIDE_M * view.pixels_per_m
     lines = [f"M{left + k * pitch:.2f} {top}v{down}" for k in range(1, round(across / pitch))]
@@ -336,15 +340,15 @@ def _star(x: float, y: float, colour: str) -> str:
     return f'<polygon points="{" ".join(points)}" fill="{colour}" stroke="white"></polygon>'
 
 
-def _selection(view: View, scenario: Scenario, selected: Thing | None) -> Iterator[str]:
+def _selection(view: PixelView, scenario: Scenario, selected: SiteThing | None) -> Iterator[str]:
     if (
         selected is None
         or not edits.has(scenario, selected)
-        or selected.kind in (Kind.SITE, Kind.ITEM)
+        or selected.kind in (ThingKind.SITE, ThingKind.ITEM)
     ):
         return
     box = edits.rectangle_of(scenario, selected)
-    grown = 0.6 if selected.kind in (Kind.CHARGE, Kind.GAUGE) else 0.0
+    grown = 0.6 if selected.kind in (ThingKind.CHARGE, ThingKind.GAUGE) else 0.0
     yield _rectangle(view, box.grown(grown), "none", _SELECTED, 3.0, dash="5 3")
     if grown == 0.0:
         x, y = view.pixel(box.right, box.top)
@@ -354,7 +358,7 @@ def _selection(view: View, scenario: Scenario, selected: Thing | None) -> Iterat
         )
 
 
-def _scale_bar(view: View) -> Iterator[str]:
+def _scale_bar(view: PixelView) -> Iterator[str]:
     lengths = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
     fitting = [each for each in lengths if each * view.pixels_per_m <= 0.2 * view.width_px]
     length_m = fitting[-1] if fitting else lengths[0]
@@ -364,7 +368,7 @@ def _scale_bar(view: View) -> Iterator[str]:
     yield f"</path>{_text(x + width / 2.0, y - 8.0, f'{length_m:g} m', ink, 12)}"
 
 
-def _ghost(view: View, ghost: Ghost) -> list[str]:
+def _ghost(view: PixelView, ghost: Ghost) -> list[str]:
     colour = _REFUSED if ghost.reason else _FITS
     dash = "4 3" if ghost.reason else ""
     parts = []
@@ -401,7 +405,7 @@ def _ghost(view: View, ghost: Ghost) -> list[str]:
 _LINE: Final = 48  # characters of a reason on a line
 
 
-def _wrapped(view: View, x_px: float, y_px: float, text: str) -> list[str]:
+def _wrapped(view: PixelView, x_px: float, y_px: float, text: str) -> list[str]:
     """Return a reason in lines that stay in the picture."""
     lines: list[str] = []
     for word in text.split():
@@ -419,7 +423,7 @@ def _wrapped(view: View, x_px: float, y_px: float, text: str) -> list[str]:
     ]
 
 
-def words_of_place(view: View, x_m: float, y_m: float) -> str:
+def words_of_place(view: PixelView, x_m: float, y_m: float) -> str:
     """Return a place in words: as exact as a pixel is."""
     digits = 1 if view.pixels_per_m >= 5.0 else 0
     return f"x {floor(x_m * 10.0) / 10.0:.{digits}f} m, y {floor(y_m * 10.0) / 10.0:.{digits}f} m"

@@ -39,7 +39,7 @@ class Kept(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
 
-class Engine(Kept):
+class EngineRecord(Kept):
     """The engine of a blast.
 
     Attributes:
@@ -126,7 +126,7 @@ class BlastRecord(Kept):
 
     key: str
     threat: str
-    engine: Engine
+    engine: EngineRecord
     layout: tuple[tuple[Any, ...], ...]
     loads: tuple[Load, ...]
     notes: tuple[str, ...] = ()
@@ -174,7 +174,7 @@ def read_film(folder: Path) -> Film | None:
         return None
 
 
-def blast_key(scenario_hash: str, layout: Layout, charge: Charge, engine: Engine) -> str:
+def blast_key(scenario_hash: str, layout: Layout, charge: Charge, engine: EngineRecord) -> str:
     """Return by what a blast is found again: all that its result depends on."""
     depends = (
         scenario_hash,
@@ -213,7 +213,7 @@ class Row(Kept):
 
 
 @dataclass(frozen=True)
-class Judge:
+class LoadJudge:
     """Says what counts of the loads on a site, as rewards, searches and reports do.
 
     Attributes:
@@ -265,7 +265,7 @@ def comparison(
         bare: The blast without a barrier, by the name of the threat.
         scenario: The site.
     """
-    judge = Judge(scenario)
+    judge = LoadJudge(scenario)
     rows = []
     for name, cost, record in records:
         unprotected = {load.structure: load for load in _loads_of(bare.get(record.threat))}
@@ -290,7 +290,9 @@ def comparison(
     return rows + list(_all_threats(records, judge))
 
 
-def _all_threats(records: Sequence[tuple[str, float, BlastRecord]], judge: Judge) -> Iterator[Row]:
+def _all_threats(
+    records: Sequence[tuple[str, float, BlastRecord]], judge: LoadJudge
+) -> Iterator[Row]:
     """Yield what the loads of all threats come to, for layouts that met all of them."""
     threats = dict.fromkeys(record.threat for _, _, record in records)
     if len(threats) < 2:

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from blast_env.app import placing
-from blast_env.app.cost import BlastCost, cost_of_blast
+from blast_env.app.cost import CostGuess, cost_of_blast
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
-from blast_env.app.records import BlastRecord, Engine, Row, blast_key, comparison
+from blast_env.app.records import BlastRecord, EngineRecord, Row, blast_key, comparison
 from blast_env.app.threats import NamedThreat, threats_of, usual_threats
 from blast_env.app.work import (
     BlastTask,
@@ -69,7 +69,7 @@ class Session:
     work: WorkFolder
     workers: Workers
     history: History
-    engine: Engine = field(default_factory=lambda: Engine(name="gas", cell_m=0.5))
+    engine: EngineRecord = field(default_factory=lambda: EngineRecord(name="gas", cell_m=0.5))
     threats: tuple[str, ...] = ()
     view: str = "Plan"
     _listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
@@ -283,7 +283,7 @@ class Session:
     def _threats_as_data(self) -> tuple[ThreatOf, ...]:
         return tuple(ThreatOf.of(each.name, each.charge) for each in self.chosen_threats())
 
-    def cost(self, slots: Iterable[int]) -> tuple[BlastCost, ...]:
+    def cost(self, slots: Iterable[int]) -> tuple[CostGuess, ...]:
         """Return what the blasts of layouts cost that are not there yet; nothing with particles."""
         if not self.engine.is_gas:
             return ()
@@ -294,7 +294,7 @@ class Session:
         there = self.folder.blasts_there()
         return tuple(self._cost(charge) for key, charge in keys.items() if key not in there)
 
-    def cost_of_search(self, budget: int) -> tuple[BlastCost, ...]:
+    def cost_of_search(self, budget: int) -> tuple[CostGuess, ...]:
         """Return what the blasts of a search cost; nothing with particles."""
         charges = [each.charge for each in self.chosen_threats()]
         if not self.engine.is_gas or not charges:
@@ -302,7 +302,7 @@ class Session:
         costs = [self._cost(each) for each in charges]
         return tuple(costs[k % len(costs)] for k in range(max(budget, 0)))
 
-    def _cost(self, charge: AnyCharge) -> BlastCost:
+    def _cost(self, charge: AnyCharge) -> CostGuess:
         return cost_of_blast(self.scenario, charge, self.engine.cell_m or 0.5)
 
     # Results.

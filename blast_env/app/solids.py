@@ -16,7 +16,7 @@ _SIGN_M: Final = 0.6
 _SEE_THROUGH: Final = 0.45
 
 
-class Box(NamedTuple):
+class SolidBox(NamedTuple):
     """A box.
 
     Attributes:
@@ -34,7 +34,7 @@ class Box(NamedTuple):
     name: str
 
 
-def boxes(scenario: Scenario, layout: Layout) -> Iterator[Box]:
+def boxes(scenario: Scenario, layout: Layout) -> Iterator[SolidBox]:
     """Yield a site with what stands on it; what has no height goes up to the air, see-through."""
     for feature in site_features(scenario, layout):
         bounds_m = feature.bounds_m
@@ -48,7 +48,7 @@ def boxes(scenario: Scenario, layout: Layout) -> Iterator[Box]:
             yield from _place(feature)
 
 
-def _standing(feature: Feature, air_m: float) -> Box:
+def _standing(feature: Feature, air_m: float) -> SolidBox:
     height_m = feature.properties.get("height_m")
     known = isinstance(height_m, float)
     colour = feature.colour if feature.kind is Kinds.BARRIER else feature.kind.look.line
@@ -58,7 +58,7 @@ def _standing(feature: Feature, air_m: float) -> Box:
     return _box(feature.bounds_m, 0.0, top_m, colour or EXPLOSIVE, opacity, name)
 
 
-def _place(feature: Feature) -> Iterator[Box]:
+def _place(feature: Feature) -> Iterator[SolidBox]:
     """Yield where a charge may be, or a gauge: a point, a line along an axis, an area."""
     low_m, colour = feature.above_ground_m, feature.kind.look.line or EXPLOSIVE
     name, bounds_m = feature.label or feature.name, feature.bounds_m
@@ -77,7 +77,7 @@ def _place(feature: Feature) -> Iterator[Box]:
 
 def _box(
     rectangle_m: Rectangle, low_m: float, high_m: float, colour: Colour, opacity: float, name: str
-) -> Box:
+) -> SolidBox:
     x_m, y_m = rectangle_m.centre
     size_m = (
         rectangle_m.right - rectangle_m.left,
@@ -85,4 +85,4 @@ def _box(
         high_m - low_m,
     )
     middle_m = (x_m, y_m, (low_m + high_m) / 2.0)
-    return Box(middle_m, size_m, "#{:02x}{:02x}{:02x}".format(*colour), opacity, name)
+    return SolidBox(middle_m, size_m, "#{:02x}{:02x}{:02x}".format(*colour), opacity, name)

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, TypeAdapter
 
-from blast_env.app.records import MOST_BYTES, Engine, Kept
+from blast_env.app.records import MOST_BYTES, EngineRecord, Kept
 from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
@@ -72,7 +72,7 @@ class BlastTask(Kept):
     scenario: dict[str, Any]
     layout: tuple[tuple[Any, ...], ...]
     threats: tuple[ThreatOf, ...]
-    engine: Engine
+    engine: EngineRecord
     blasts: str
     cache: str
 
@@ -95,7 +95,7 @@ class SearchTask(Kept):
     threats: tuple[ThreatOf, ...]
     method: str
     budget: int
-    engine: Engine
+    engine: EngineRecord
     cache: str
     begin_with: tuple[tuple[Any, ...], ...] = ()
 
@@ -134,7 +134,7 @@ class FilmTask(Kept):
     scenario: dict[str, Any]
     layout: tuple[tuple[Any, ...], ...]
     threat: ThreatOf
-    engine: Engine
+    engine: EngineRecord
     path: str
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from blast_env.app.cost import BlastCost, cost_of_blast, cost_words, time_words
+from blast_env.app.cost import CostGuess, cost_of_blast, cost_words, time_words
 from blast_env.app.folder import WorkFolder
-from blast_env.app.records import RECORD, Engine
+from blast_env.app.records import RECORD, EngineRecord
 from blast_env.app.session import Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
@@ -50,12 +50,12 @@ def test_only_what_is_not_there_is_counted(tmp_path: Path) -> None:
     (there / RECORD).touch()
     assert len(session.cost([0])) == 1
     assert len(session.cost_of_search(50)) == 50
-    session.engine = Engine()
+    session.engine = EngineRecord()
     assert session.cost([0]) == session.cost_of_search(50) == ()
 
 
 def test_words() -> None:
-    cost = BlastCost(cells=2_000_000, steps=750, memory_bytes=0.5e9)
+    cost = CostGuess(cells=2_000_000, steps=750, memory_bytes=0.5e9)
     assert cost_words([cost]) == "a blast of gas: about 30 s on a free core, 0.5 GB"
     assert "50 blasts of gas: about 25 min" in cost_words([cost] * 50)
     assert "nothing to run" in cost_words([])

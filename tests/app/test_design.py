@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.app import edits
-from blast_env.app.design import MOST_STEPS, Design, History, Step
-from blast_env.app.edits import Kind, Thing
+from blast_env.app.design import MOST_STEPS, Design, DesignStep, History
+from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.sources import imported_site
 from blast_env.errors import BlastEnvError, LayoutError
@@ -22,7 +22,7 @@ COURTYARD = load_scenario("courtyard")
 
 
 def begun() -> History:
-    return History(Step("begin", Design(hut())))
+    return History(DesignStep("begin", Design(hut())))
 
 
 def test_a_layout_that_is_not_legal_is_no_design() -> None:
@@ -38,7 +38,7 @@ def test_layouts_are_apart() -> None:
 def test_what_cannot_stand_on_a_changed_site_falls_away_with_its_reason() -> None:
     design = Design(COURTYARD).with_layout(((0, 0), (39, 0)))
     after, notes = design.with_scenario(
-        edits.added(COURTYARD, Kind.KEEP_OUT, (13.0, 5.0), (14.0, 6.0))[0]
+        edits.added(COURTYARD, ThingKind.KEEP_OUT, (13.0, 5.0), (14.0, 6.0))[0]
     )
     assert after.layouts[0] == ((39, 0),)
     assert notes == ("layout A: 1 taken away, since cell (0, 0) must stay empty: must stay free",)
@@ -52,7 +52,7 @@ def test_undo_and_redo_are_each_other_s_reverse(moves: list[str]) -> None:
     for number, move in enumerate(moves):
         if move in "+u":
             size = 2.0 + 0.5 * (number % 6)
-            site = edits.with_values(hut(), Thing(Kind.STRUCTURE), {"height_m": size})
+            site = edits.with_values(hut(), SiteThing(ThingKind.STRUCTURE), {"height_m": size})
             design = Design(site).with_layout(WALL if move == "+" else ())
             history = history.then(str(number), design)
             if design != states[at]:

@@ -6,10 +6,10 @@ import pytest
 
 from blast_env.app import edits, placing
 from blast_env.app.editor import Editor, Tool
-from blast_env.app.edits import Kind, Thing
+from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
-from blast_env.app.plan import View, overlay_svg, plan_svg
+from blast_env.app.plan import PixelView, overlay_svg, plan_svg
 from blast_env.app.session import Session
 from blast_env.app.solids import boxes
 from blast_env.geometry import Piece
@@ -50,7 +50,7 @@ def test_why_a_module_cannot_stand_is_shown_as_it_is_dragged(editor: Editor) -> 
     assert editor.move(14.2, 15.0)
     assert editor.ghost is not None
     assert "path from the road" in editor.ghost.reason
-    svg = overlay_svg(View.of(editor.scenario, 600, 450), editor.scenario, editor.ghost, None)
+    svg = overlay_svg(PixelView.of(editor.scenario, 600, 450), editor.scenario, editor.ghost, None)
     assert "must stay empty" in svg
     stroke(editor, (14.2, 15.0))
     assert not editor.session.design.layout
@@ -83,7 +83,7 @@ def test_a_module_is_moved_with_the_select_tool_and_erased_with_the_right_button
 def test_a_structure_is_dragged_and_sized_and_put_back_where_it_cannot_be(editor: Editor) -> None:
     stroke(editor, (28.0, 15.0), (29.1, 15.0), (30.1, 15.0))
     assert editor.session.scenario.structures[0].corner_m == (29.0, 10.0)
-    assert editor.selected == Thing(Kind.STRUCTURE)
+    assert editor.selected == SiteThing(ThingKind.STRUCTURE)
     stroke(editor, (33.0, 20.0), (35.0, 22.0))  # its upper right corner
     assert editor.session.scenario.structures[0].rows == 24
     before = editor.session.scenario
@@ -126,12 +126,12 @@ def test_the_keyboard_places_moves_and_deletes(editor: Editor) -> None:
     assert editor.session.design.layout == ((24, 8),)
     editor.toggle_at_cursor()
     assert not editor.session.design.layout
-    editor.selected = Thing(Kind.KEEP_OUT, 1)
+    editor.selected = SiteThing(ThingKind.KEEP_OUT, 1)
     editor.nudge(0.5, 0.0)
     assert editor.session.scenario.zone.keep_outs[1].corner_m == (18.5, 19.5)
     editor.delete()
     assert len(editor.session.scenario.zone.keep_outs) == 1
-    editor.selected = Thing(Kind.STRUCTURE)
+    editor.selected = SiteThing(ThingKind.STRUCTURE)
     editor.delete()
     assert "structures" in editor.message  # the last protected one
 
@@ -155,7 +155,7 @@ def test_leaving_the_plan_puts_everything_back(editor: Editor) -> None:
 
 
 def test_pixels_and_metres_are_each_other_s_reverse() -> None:
-    view = View.of(load_scenario("courtyard"), 680, 560).zoomed(1.7).panned(0.1, -0.2)
+    view = PixelView.of(load_scenario("courtyard"), 680, 560).zoomed(1.7).panned(0.1, -0.2)
     x_px, y_px = view.pixel(12.5, 7.0)
     assert view.metres(x_px, y_px) == pytest.approx((12.5, 7.0), abs=0.01)
     kept = view.zoomed(2.0, (12.5, 7.0))
@@ -166,15 +166,15 @@ def test_the_plan_says_nothing_that_a_browser_could_run() -> None:
     document = load_scenario("courtyard").model_dump(mode="json", exclude_none=True)
     document["build_zone"]["keep_outs"][0]["reason"] = "<script>alert(1)</script>"
     scenario = type(load_scenario("courtyard")).from_document(document, "x")
-    view = View.of(scenario, 600, 400)
-    svg = plan_svg(view, scenario, ((0, 0),), Thing(Kind.STRUCTURE))
+    view = PixelView.of(scenario, 600, 400)
+    svg = plan_svg(view, scenario, ((0, 0),), SiteThing(ThingKind.STRUCTURE))
     assert svg.count("building") == 1
     assert "<script" not in svg
 
 
 def test_the_plan_shows_where_a_vehicle_gets_to() -> None:
     site = gate_site()
-    view = View.of(site, 600, 400)
+    view = PixelView.of(site, 600, 400)
     bare, posts = (plan_svg(view, site, layout, None) for layout in ((), POSTS))
     assert "stand-off 1.0 m" in bare  # half of its width from the hut
     assert "stand-off 7.0 m" in posts
@@ -205,7 +205,7 @@ def test_pieces_of_a_catalogue_are_placed_turned_moved_and_kept(tmp_path: Path) 
     editor = on(tmp_path, "courtyard")
     editor.attempt(
         "catalogue",
-        lambda site: edits.with_values(site, Thing(Kind.ZONE), {"items": [CATALOGUE]}),
+        lambda site: edits.with_values(site, SiteThing(ThingKind.ZONE), {"items": [CATALOGUE]}),
     )
     assert [each.name for each in placing.palette(editor.scenario, ())] == ["t_wall"]
     editor.choose(Tool.PLACE)
@@ -225,7 +225,7 @@ def test_pieces_of_a_catalogue_are_placed_turned_moved_and_kept(tmp_path: Path) 
     assert kept == editor.session.history
     solids = {each.name: each.size_m for each in boxes(editor.scenario, editor.layout)}
     assert solids["t_wall"] in ((2.0, 0.5, 2.5), (0.5, 2.0, 2.5))
-    editor.selected = Thing(Kind.ITEM)
+    editor.selected = SiteThing(ThingKind.ITEM)
     editor.delete()  # of a catalogue nothing is left, and single modules are placed again
     assert not editor.session.design.layout
     assert "layout A: 2 taken away" in editor.message

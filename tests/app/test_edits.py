@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.app import edits
-from blast_env.app.edits import Kind, Thing
+from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario, ScenarioError, load_scenario
 from tests.gas_sites import hut
 
 COURTYARD = load_scenario("courtyard")
-BUILDING = Thing(Kind.STRUCTURE)
+BUILDING = SiteThing(ThingKind.STRUCTURE)
 OFFSETS = st.floats(-60.0, 60.0, allow_nan=False)
 
 
@@ -45,29 +45,29 @@ def test_a_move_and_its_reverse_give_the_same_site() -> None:
 
 
 def test_a_gauge_is_put_into_the_middle_of_a_cell_of_half_a_metre() -> None:
-    moved = edits.moved(hut(), Thing(Kind.GAUGE, 1), (-0.1, 1.1))
+    moved = edits.moved(hut(), SiteThing(ThingKind.GAUGE, 1), (-0.1, 1.1))
     assert moved.gauges[1].position_m == (9.0 - 0.25, 5.25, 0.25)
 
 
 def test_a_line_of_charges_moves_as_a_whole_and_ends_where_it_is_drawn_to() -> None:
-    moved = edits.moved(COURTYARD, Thing(Kind.CHARGE), (0.6, 0.0))
+    moved = edits.moved(COURTYARD, SiteThing(ThingKind.CHARGE), (0.6, 0.0))
     assert moved.charge[0].segment_m == ((5.5, 6.0), (5.5, 24.0))  # type: ignore[union-attr]
-    longer = edits.resized(COURTYARD, Thing(Kind.CHARGE), (6.1, 20.2))
+    longer = edits.resized(COURTYARD, SiteThing(ThingKind.CHARGE), (6.1, 20.2))
     assert longer.charge[0].segment_m == ((5.0, 6.0), (6.0, 20.0))  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(
     ("kind", "start", "end"),
     [
-        (Kind.STRUCTURE, (30.2, 2.1), (34.4, 4.9)),
-        (Kind.CHARGE, (2.0, 3.0), (2.0, 3.0)),
-        (Kind.CHARGE, (2.0, 3.0), (8.0, 3.0)),
-        (Kind.KEEP_OUT, (14.0, 20.0), (15.9, 21.1)),
-        (Kind.COST_AREA, (14.0, 20.0), (15.9, 21.1)),
-        (Kind.GAUGE, (24.1, 15.2), (24.1, 15.2)),
+        (ThingKind.STRUCTURE, (30.2, 2.1), (34.4, 4.9)),
+        (ThingKind.CHARGE, (2.0, 3.0), (2.0, 3.0)),
+        (ThingKind.CHARGE, (2.0, 3.0), (8.0, 3.0)),
+        (ThingKind.KEEP_OUT, (14.0, 20.0), (15.9, 21.1)),
+        (ThingKind.COST_AREA, (14.0, 20.0), (15.9, 21.1)),
+        (ThingKind.GAUGE, (24.1, 15.2), (24.1, 15.2)),
     ],
 )
-def test_what_is_drawn_can_be_taken_away_again(kind: Kind, start: Any, end: Any) -> None:
+def test_what_is_drawn_can_be_taken_away_again(kind: ThingKind, start: Any, end: Any) -> None:
     after, thing = edits.added(COURTYARD, kind, start, end)
     assert thing in {each for each, _ in edits.things(after)}
     assert after != COURTYARD
@@ -75,13 +75,13 @@ def test_what_is_drawn_can_be_taken_away_again(kind: Kind, start: Any, end: Any)
 
 
 def test_a_drawn_zone_keeps_what_holds_in_the_old_one() -> None:
-    after, _ = edits.added(COURTYARD, Kind.ZONE, (12.6, 4.0), (22.0, 26.4))
+    after, _ = edits.added(COURTYARD, ThingKind.ZONE, (12.6, 4.0), (22.0, 26.4))
     assert after.zone.corner_m == (12.5, 4.0)
     assert after.zone.shape == (45, 19)
     assert after.zone.keep_outs == COURTYARD.zone.keep_outs
-    bare = edits.removed(COURTYARD, Thing(Kind.ZONE))
+    bare = edits.removed(COURTYARD, SiteThing(ThingKind.ZONE))
     assert bare.build_zone is None
-    assert edits.added(bare, Kind.ZONE, (13.0, 5.0), (15.0, 7.0))[0].zone.stock == 4
+    assert edits.added(bare, ThingKind.ZONE, (13.0, 5.0), (15.0, 7.0))[0].zone.stock == 4
 
 
 def test_the_reason_is_that_of_the_library() -> None:
@@ -91,10 +91,13 @@ def test_the_reason_is_that_of_the_library() -> None:
         edits.with_values(COURTYARD, BUILDING, {"protected": False})
     with pytest.raises(BlastEnvError, match="no build zone"):
         edits.added(
-            edits.removed(COURTYARD, Thing(Kind.ZONE)), Kind.KEEP_OUT, (1.0, 1.0), (2.0, 2.0)
+            edits.removed(COURTYARD, SiteThing(ThingKind.ZONE)),
+            ThingKind.KEEP_OUT,
+            (1.0, 1.0),
+            (2.0, 2.0),
         )
     with pytest.raises(BlastEnvError, match="site itself"):
-        edits.removed(COURTYARD, Thing(Kind.SITE))
+        edits.removed(COURTYARD, SiteThing(ThingKind.SITE))
 
 
 def test_heights_come_and_go() -> None:
@@ -107,19 +110,19 @@ def test_heights_come_and_go() -> None:
     ("place", "expected"),
     [
         ((28.0, 15.0), BUILDING),
-        ((5.2, 10.0), Thing(Kind.CHARGE)),
-        ((14.0, 15.0), Thing(Kind.KEEP_OUT)),
-        ((14.0, 20.0), Thing(Kind.ZONE)),
+        ((5.2, 10.0), SiteThing(ThingKind.CHARGE)),
+        ((14.0, 15.0), SiteThing(ThingKind.KEEP_OUT)),
+        ((14.0, 20.0), SiteThing(ThingKind.ZONE)),
         ((38.0, 2.0), None),
     ],
 )
-def test_what_is_on_top_is_what_one_points_at(place: Any, expected: Thing | None) -> None:
+def test_what_is_on_top_is_what_one_points_at(place: Any, expected: SiteThing | None) -> None:
     assert edits.thing_at(COURTYARD, place[0], place[1], 0.5) == expected
 
 
 def test_a_square_stays_a_square() -> None:
     field = load_scenario("free_field")
-    thing = Thing(Kind.STRUCTURE)
+    thing = SiteThing(ThingKind.STRUCTURE)
     left, bottom = field.structures[0].corner_m
     larger = edits.resized(field, thing, (left + 6.0, bottom + 5.0))
     assert larger.structures[0].rows == larger.structures[0].columns == 12
@@ -131,4 +134,4 @@ def test_every_thing_has_a_rectangle() -> None:
         assert words
         assert scenario.site.rectangle_m.contains(edits.rectangle_of(scenario, thing))
     with pytest.raises(BlastEnvError, match="has no gauge 7"):
-        edits.rectangle_of(scenario, Thing(Kind.GAUGE, 7))
+        edits.rectangle_of(scenario, SiteThing(ThingKind.GAUGE, 7))

@@ -20,7 +20,7 @@ from blast_env.app import offers
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
 from blast_env.app.page import uploads
-from blast_env.app.records import Engine
+from blast_env.app.records import EngineRecord
 from blast_env.app.server import MOST_PAGES, add_pages
 from blast_env.app.session import Sessions
 from blast_env.app.work import read_status, write_status
@@ -127,7 +127,7 @@ def test_the_reason_is_said_while_the_mouse_is_there(tmp_path: Path) -> None:
 def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, BALLISTIC_COURTYARD)
-        session.engine = Engine()
+        session.engine = EngineRecord()
         session.put("layout", session.design.with_layout(CELLS))
         user.find(marker="blast").click()
         await user.should_see("layout A")
@@ -184,7 +184,7 @@ def test_a_report_is_followed_when_the_page_is_loaded_anew_and_fetched_at_the_en
 def test_gas_results_have_maps_walls_and_gauges(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
-        session.engine = Engine(name="gas", cell_m=0.5)
+        session.engine = EngineRecord(name="gas", cell_m=0.5)
         session.blast([1])  # an empty one: no barrier
         await user.should_see("Pa s on what is protected", retries=10)
         pictures = next(

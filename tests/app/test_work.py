@@ -15,7 +15,7 @@ from blast_env.app.design import SLOTS
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers, settle
 from blast_env.app.placing import plain
-from blast_env.app.records import BlastRecord, Engine, Load, blast_key, comparison, read_film
+from blast_env.app.records import BlastRecord, EngineRecord, Load, blast_key, comparison, read_film
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status, ThreatOf, read_status, write_status
@@ -37,7 +37,7 @@ CELLS: Layout = tuple((row, 0) for row in range(22, 32))
 def session_on(folder: Path, scenario: Scenario, workers: Workers | None = None) -> Session:
     """Return a session that works with particles, which take little time."""
     session = Sessions(WorkFolder(folder), workers or Here()).new(scenario, "begin")
-    session.engine = Engine()
+    session.engine = EngineRecord()
     return session
 
 
@@ -58,7 +58,7 @@ def particles(tmp_path_factory: pytest.TempPathFactory) -> Session:
 def gas(tmp_path_factory: pytest.TempPathFactory) -> Session:
     """The hut, blasted by gas with a wall."""
     session = session_on(tmp_path_factory.mktemp("gas"), hut())
-    session.engine = Engine(name="gas", cell_m=0.5)
+    session.engine = EngineRecord(name="gas", cell_m=0.5)
     session.put("wall", session.design.with_layout(WALL))
     session.blast([0])
     return session
@@ -124,7 +124,7 @@ def test_the_table_counts_what_the_site_s_objective_says() -> None:
         return BlastRecord(
             key="k",
             threat=threat,
-            engine=Engine(name="gas"),
+            engine=EngineRecord(name="gas"),
             layout=plain(layout),
             loads=tuple(loads),
             seconds=1.0,
@@ -205,14 +205,14 @@ def test_what_is_there_is_not_run_again(gas: Session) -> None:
 def test_keys_know_what_a_result_depends_on() -> None:
     charge = Charge((2.0, 4.0), 5.0)
     assert [each.charge for each in threats_of(hut())] == [charge]
-    scenario_hash, engine = hut().content_hash, Engine(name="gas")
+    scenario_hash, engine = hut().content_hash, EngineRecord(name="gas")
     key = blast_key(scenario_hash, WALL, charge, engine)
     assert key == blast_key(scenario_hash, WALL[::-1], charge, engine)
-    assert key == blast_key(scenario_hash, WALL, charge, Engine(name="gas", cell_m=0.5))
+    assert key == blast_key(scenario_hash, WALL, charge, EngineRecord(name="gas", cell_m=0.5))
     others = {
         blast_key(scenario_hash, WALL[:-1], charge, engine),
         blast_key(scenario_hash, WALL, charge._replace(tnt_kg=6.0), engine),
-        blast_key(scenario_hash, WALL, charge, Engine(name="gas", cell_m=0.25)),
+        blast_key(scenario_hash, WALL, charge, EngineRecord(name="gas", cell_m=0.25)),
         blast_key("0", WALL, charge, engine),
     }
     assert len(others | {key}) == 5
@@ -231,7 +231,7 @@ def test_a_proposal_can_be_taken(tmp_path: Path, proposer: str) -> None:
 
 def test_what_is_best_is_offered_first(tmp_path: Path) -> None:
     session = Sessions(WorkFolder(tmp_path), Here()).new(hut(), "begin")
-    assert session.engine == Engine(name="gas", cell_m=0.5)
+    assert session.engine == EngineRecord(name="gas", cell_m=0.5)
     assert offers.proposers(hut())[0] == offers.PACKAGED
     session.propose(offers.PACKAGED)  # modules: the best rule by gas
     status = state_of(session)
@@ -269,7 +269,7 @@ def test_a_site_too_large_for_memory_is_a_message(tmp_path: Path) -> None:
     document = hut().model_dump(mode="json", exclude_none=True)
     document["site"] = {"width_m": 2000.0, "height_m": 2000.0, "air_height_m": 2000.0}
     session = session_on(tmp_path, Scenario.from_document(document, "huge"))
-    session.engine = Engine(name="gas", cell_m=0.25)
+    session.engine = EngineRecord(name="gas", cell_m=0.25)
     session.blast([0])
     assert state_of(session).state == "failed"
     assert "would need" in state_of(session).text
@@ -310,7 +310,7 @@ def test_a_vehicle_is_where_the_layout_lets_it_come(tmp_path: Path) -> None:
     assert not set(VEHICLE_RULES) & set(offers.proposers(hut()))
     session.propose("line of posts")
     session.take(state_of(session), 0)
-    session.engine = Engine(name="gas", cell_m=0.5)
+    session.engine = EngineRecord(name="gas", cell_m=0.5)
     session.blast([0])
     assert state_of(session).state == "done", state_of(session).text
     bare, posts = (session.folder.record_of(each.key) for each in session.shown(nearest))

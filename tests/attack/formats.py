@@ -23,7 +23,7 @@ from blast_agents.training.run_folder import (
     write_rows,
 )
 
-from blast_env.app.design import Design, History, Step
+from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.folder import DesignFolder
 from blast_env.app.work import ReportTask, ThreatOf, read_task, write_task
 from blast_env.calibration.model import load_calibration, save_calibration
@@ -307,7 +307,7 @@ def _parquet(folder: Path) -> Format:
 
 def _design(folder: Path) -> Format:
     design = DesignFolder(folder)
-    history = History(Step("begin", Design(small_scenario())))
+    history = History(DesignStep("begin", Design(small_scenario())))
     history = history.then("layout", history.design.with_layout(((0, 0), (1, 0))))
     design.save(history)
     path = folder / "design.json"

@@ -26,7 +26,7 @@ from urllib.parse import quote
 
 from blast_env.app.folder import WorkFolder
 from blast_env.app.guard import HEADERS, MOST_BYTES, Entrance
-from blast_env.app.plan import View, plan_svg
+from blast_env.app.plan import PixelView, plan_svg
 from blast_env.app.server import MOST_PAGES
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario, load_scenario
@@ -572,7 +572,7 @@ def scripts(server: Victim) -> Iterator[Attempt]:
 
 
 def _plan_runs(scenario: Scenario) -> str:
-    found = runs(plan_svg(View.of(scenario, 600, 400), scenario, (), None))
+    found = runs(plan_svg(PixelView.of(scenario, 600, 400), scenario, (), None))
     return f"the plan runs {found}" if found else ""
 
 

@@ -7,7 +7,7 @@ from nicegui import ui
 
 from blast_env.app.editor import Editor
 from blast_env.app.page.files_menu import FilesMenu
-from blast_env.app.page.plan_view import PlanView, SolidView
+from blast_env.app.page.plan_view import PlanPanel, SolidView
 from blast_env.app.page.results_view import ResultsView
 from blast_env.app.page.site_panel import SitePanel
 from blast_env.app.page.work_panel import WorkPanel
@@ -40,7 +40,7 @@ class DesignPage:
                 ) as panels:
                     panels.props("keep-alive").style("background: transparent")
                     with ui.tab_panel("Plan").classes("p-0 gap-1"):
-                        self._plan = PlanView(self.editor, self.refresh, self._commands())
+                        self._plan = PlanPanel(self.editor, self.refresh, self._commands())
                     with ui.tab_panel("3-D").classes("p-0"):
                         self._solid = SolidView(self.editor)
                     with ui.tab_panel("Results").classes("p-0"):

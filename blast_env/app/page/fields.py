@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
-from blast_env.app.edits import Document, Kind, Thing, document_of
+from blast_env.app.edits import Document, SiteThing, ThingKind, document_of
 from blast_env.physics.scene import WALLS
 from blast_env.scenario import Scenario
 
@@ -36,13 +36,13 @@ _CORNER: Final = (
 )
 _SIZE: Final = (FormField("width (m)", "size_m", part=0), FormField("depth (m)", "size_m", part=1))
 
-_FIELDS: Final[Mapping[Kind, tuple[FormField, ...]]] = {
-    Kind.SITE: (
+_FIELDS: Final[Mapping[ThingKind, tuple[FormField, ...]]] = {
+    ThingKind.SITE: (
         FormField("width (m)", "width_m"),
         FormField("depth (m)", "height_m"),
         FormField("height of the air (m)", "air_height_m", optional=True),
     ),
-    Kind.ZONE: (
+    ThingKind.ZONE: (
         *_CORNER,
         FormField("rows", "rows", "integer"),
         FormField("columns", "columns", "integer"),
@@ -54,15 +54,15 @@ _FIELDS: Final[Mapping[Kind, tuple[FormField, ...]]] = {
         FormField("access way (m)", "width_m", optional=True, inside="access_way"),
         FormField("way between", "between", "side", optional=True, inside="access_way"),
     ),
-    Kind.KEEP_OUT: (FormField("reason", "reason", "text"), *_CORNER, *_SIZE),
-    Kind.COST_AREA: (
+    ThingKind.KEEP_OUT: (FormField("reason", "reason", "text"), *_CORNER, *_SIZE),
+    ThingKind.COST_AREA: (
         FormField("reason", "reason", "text"),
         FormField("cost of a module", "module_cost", optional=True),
         FormField("cost of items, times", "cost_factor", optional=True),
         *_CORNER,
         *_SIZE,
     ),
-    Kind.ITEM: (
+    ThingKind.ITEM: (
         FormField("name", "name", "text"),
         FormField("length (modules)", "length_modules", "integer"),
         FormField("thickness (modules)", "thickness_modules", "integer"),
@@ -72,7 +72,7 @@ _FIELDS: Final[Mapping[Kind, tuple[FormField, ...]]] = {
         FormField("may be turned", "rotatable", "switch"),
         FormField("stops vehicles", "stops_vehicles", "switch"),
     ),
-    Kind.GAUGE: (
+    ThingKind.GAUGE: (
         FormField("name", "name", "text"),
         FormField("x (m)", "position_m", part=0),
         FormField("y (m)", "position_m", part=1),
@@ -114,29 +114,29 @@ _LAST_OF_STRUCTURE: Final = (
 )
 
 
-def section_of(scenario: Scenario, thing: Thing) -> Document:
+def section_of(scenario: Scenario, thing: SiteThing) -> Document:
     """Return what the scenario's file says of a thing."""
     document = document_of(scenario)
-    tables: Mapping[Kind, Any] = {
-        Kind.SITE: [document["site"]],
-        Kind.ZONE: [document.get("build_zone", {})],
-        Kind.STRUCTURE: document["structures"],
-        Kind.CHARGE: document["charge"],
-        Kind.KEEP_OUT: document.get("build_zone", {}).get("keep_outs", []),
-        Kind.COST_AREA: document.get("build_zone", {}).get("cost_areas", []),
-        Kind.GAUGE: document.get("gauges", []),
-        Kind.ITEM: document.get("build_zone", {}).get("items", []),
+    tables: Mapping[ThingKind, Any] = {
+        ThingKind.SITE: [document["site"]],
+        ThingKind.ZONE: [document.get("build_zone", {})],
+        ThingKind.STRUCTURE: document["structures"],
+        ThingKind.CHARGE: document["charge"],
+        ThingKind.KEEP_OUT: document.get("build_zone", {}).get("keep_outs", []),
+        ThingKind.COST_AREA: document.get("build_zone", {}).get("cost_areas", []),
+        ThingKind.GAUGE: document.get("gauges", []),
+        ThingKind.ITEM: document.get("build_zone", {}).get("items", []),
     }
     section: Document = tables[thing.kind][thing.number]
     return section
 
 
-def fields_of(scenario: Scenario, thing: Thing) -> tuple[FormField, ...]:
+def fields_of(scenario: Scenario, thing: SiteThing) -> tuple[FormField, ...]:
     """Return what can be changed about a thing."""
     kind = section_of(scenario, thing).get("kind", "")
-    if thing.kind is Kind.CHARGE:
+    if thing.kind is ThingKind.CHARGE:
         return (*_OF_CHARGES, *_OF_CHARGE[kind])
-    if thing.kind is Kind.STRUCTURE:
+    if thing.kind is ThingKind.STRUCTURE:
         name = FormField("name", "name", "text")
         return (name, *_OF_STRUCTURE, *_OF_STRUCTURES[kind], *_LAST_OF_STRUCTURE)
     return _FIELDS[thing.kind]

@@ -6,7 +6,7 @@ from typing import Any, Final
 from nicegui import events, ui
 
 from blast_env.app.editor import Editor, Tool
-from blast_env.app.plan import View, overlay_svg, plan_svg, words_of_place
+from blast_env.app.plan import PixelView, overlay_svg, plan_svg, words_of_place
 from blast_env.app.solids import boxes
 
 WIDTH_PX, HEIGHT_PX = 680, 560
@@ -34,7 +34,7 @@ _ZOOM: Final = 1.25
 _RIGHT_BUTTON: Final = 2
 
 
-class PlanView:
+class PlanPanel:
     """The plan with its tools.
 
     Args:
@@ -49,7 +49,7 @@ class PlanView:
         self._editor = editor
         self._after = after
         self._commands = commands
-        self._view = View.of(editor.session.scenario, WIDTH_PX, HEIGHT_PX)
+        self._view = PixelView.of(editor.session.scenario, WIDTH_PX, HEIGHT_PX)
         self._site = editor.session.scenario.site
         self._buttons: dict[Tool, ui.button] = {}
         self._pan_from: tuple[float, float] | None = None
@@ -110,7 +110,7 @@ class PlanView:
 
     def fit(self) -> None:
         """Show the whole site."""
-        self._view = View.of(self._editor.session.scenario, WIDTH_PX, HEIGHT_PX)
+        self._view = PixelView.of(self._editor.session.scenario, WIDTH_PX, HEIGHT_PX)
         self.refresh()
 
     def refresh(self) -> None:
@@ -118,7 +118,7 @@ class PlanView:
         editor = self._editor
         if editor.session.scenario.site != self._site:
             self._site = editor.session.scenario.site
-            self._view = View.of(editor.session.scenario, WIDTH_PX, HEIGHT_PX)
+            self._view = PixelView.of(editor.session.scenario, WIDTH_PX, HEIGHT_PX)
         for tool, button in self._buttons.items():
             button.classes(
                 add="be-tool-on" if tool is editor.tool else "",

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from nicegui import ui
 
-from blast_env.app.records import BlastRecord, Judge, Row, read_film
+from blast_env.app.records import BlastRecord, LoadJudge, Row, read_film
 from blast_env.app.session import Session
 from blast_env.app.threats import NamedThreat
 from blast_env.scenario import ObjectiveSection
@@ -114,7 +114,7 @@ class ResultsView:
         self._show_cards(shown)
         self._show_chart(threats[self._threat])
         rows = session.comparison()
-        judge = Judge(session.scenario)
+        judge = LoadJudge(session.scenario)
         self._table.columns = _columns(judge.objective)
         self._table.rows = [_row(each, k) for k, each in enumerate(rows)]
         self._table.visible = bool(rows)
@@ -176,7 +176,7 @@ class ResultsView:
     def _summary(self, record: BlastRecord | None) -> str:
         if record is None or not record.loads:
             return "" if record is not None else "loads to come"
-        judge = Judge(self._session.scenario)
+        judge = LoadJudge(self._session.scenario)
         noun = "" if judge.objective.quantity == "impulse" else f"{judge.objective.noun} "
         return f"{noun}{judge.text(judge.together(record))} on what is protected"
 

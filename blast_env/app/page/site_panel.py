@@ -7,13 +7,13 @@ from nicegui import ui
 
 from blast_env.app import edits
 from blast_env.app.editor import Editor
-from blast_env.app.edits import Kind, Thing
+from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.page.fields import FormField, change_of, fields_of, section_of, value_of
 from blast_env.physics.scene import WALLS
 from blast_env.scenario import Scenario
 
 _SIDES: Final = {"left_right": "left and right", "bottom_top": "bottom and top"}
-_SITE: Final = Thing(Kind.SITE)
+_SITE: Final = SiteThing(ThingKind.SITE)
 
 
 class SitePanel:
@@ -131,14 +131,14 @@ class SitePanel:
         if self._filling or not event.value:
             return
         kind, _, number = str(event.value).rpartition(" ")
-        self._editor.selected = Thing(Kind(kind), int(number))
+        self._editor.selected = SiteThing(ThingKind(kind), int(number))
         self._after()
 
     def _add_item(self) -> None:
         editor = self._editor
 
         def add(site: Scenario) -> Scenario:
-            after, editor.selected = edits.added(site, Kind.ITEM, (0.0, 0.0), (0.0, 0.0))
+            after, editor.selected = edits.added(site, ThingKind.ITEM, (0.0, 0.0), (0.0, 0.0))
             return after
 
         editor.attempt("add an item", add)
@@ -149,5 +149,5 @@ class SitePanel:
         self._after()
 
 
-def _id(thing: Thing) -> str:
+def _id(thing: SiteThing) -> str:
     return f"{thing.kind} {thing.number}"

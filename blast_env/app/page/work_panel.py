@@ -14,7 +14,7 @@ from blast_env.app.cost import cost_words, time_words
 from blast_env.app.design import SLOTS
 from blast_env.app.editor import Editor, Tool
 from blast_env.app.offers import METHODS, PACKAGED, proposers
-from blast_env.app.records import Engine
+from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
@@ -218,9 +218,9 @@ class WorkPanel:
         if self._filling:
             return
         if name == "particles":
-            self._session.engine = Engine()
+            self._session.engine = EngineRecord()
         else:
-            self._session.engine = Engine(name="gas", cell_m=float(name.split()[1]))
+            self._session.engine = EngineRecord(name="gas", cell_m=float(name.split()[1]))
         self._after()
 
     def _against(self, names: Sequence[str]) -> None:

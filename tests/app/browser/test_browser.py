@@ -25,7 +25,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-from blast_env.app.plan import View
+from blast_env.app.plan import PixelView
 from blast_env.scenario import Scenario, load_scenario, save_scenario
 
 WIDTH, HEIGHT = 1280, 800
@@ -146,7 +146,7 @@ class Page:
         """Move the mouse over places of the site, its button down from the first to the last."""
         plan = self.driver.find_element(By.CSS_SELECTOR, ".be-plan")
         width, height = plan.rect["width"], plan.rect["height"]
-        view = View.of(scenario, 680, 560)
+        view = PixelView.of(scenario, 680, 560)
         actions = ActionChains(self.driver, duration=30)
         for number, place in enumerate(places):
             x_px, y_px = view.pixel(*place)
