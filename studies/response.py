@@ -67,12 +67,12 @@ def halved_peaks(impulse_pa_s: float = 60.0) -> Iterator[Row]:
 
 def main() -> None:
     """Print the tables."""
-    headers = ("annealed pane, least thickness", "E1300, kPa", "here, kPa", "ratio")
-    print_line(markdown_table(headers, non_factored_loads()))
-    headers = ("duration over period", "closed form", "here")
-    print_line("\n" + markdown_table(headers, load_factors()))
-    headers = ("annealed pane, 60 Pa s", "break, 8 kPa", "break, 4 kPa")
-    print_line("\n" + markdown_table(headers, halved_peaks()))
+    loads = ("annealed pane, least thickness", "E1300, kPa", "here, kPa", "ratio")
+    print_line(markdown_table(loads, non_factored_loads()))
+    factors = ("duration over period", "closed form", "here")
+    print_line("\n" + markdown_table(factors, load_factors()))
+    peaks = ("annealed pane, 60 Pa s", "break, 8 kPa", "break, 4 kPa")
+    print_line("\n" + markdown_table(peaks, halved_peaks()))
 
 
 if __name__ == "__main__":
