@@ -208,10 +208,9 @@ def item_origin(study: ItemStudy, result: ItemResult) -> str:
     scenario, engine = result.scenario, study.evaluator.engine
     layout, tried = result.best.layouts[0], min(result.effort.tried, len(result.places))
     return (
-        f"Engine `{engine.version}`, cells of 0.5 m, {result.effort.layouts} random layouts, "
-        f"{result.searched_blasts:,} blasts of a search at {tried} "
-        f"of the places, {result.effort.place_budget} for each place alone; scenario hash "
-        f"`{scenario.content_hash[:12]}`. The best found is of {pieces_text(layout)}."
+        f"Engine `{engine.version}`, scenario hash `{scenario.content_hash[:12]}`. "
+        f"{result.searched_blasts:,} blasts of a search at {tried} of the places.\n"
+        f"The best found is of {pieces_text(layout)}."
     )
 
 
@@ -327,12 +326,11 @@ def markdown_table_with_title(
 
 
 def markdown_verdict(criteria: Sequence[Criterion]) -> str:
-    """Return the verdict for the page."""
-    found = [
-        f"- {'met' if each.met else '**not met**'}: {each.text}; found: {each.finding}"
-        for each in criteria
+    """Return the verdict for the page, with the criteria that are not met."""
+    missed = [
+        f"- not met: {each.text}\n- found: {each.finding}" for each in criteria if not each.met
     ]
-    return "\n".join([verdict(criteria), "", *found])
+    return "\n".join([verdict(criteria), *([""] if missed else []), *missed])
 
 
 def read_page(path: Path) -> str:
