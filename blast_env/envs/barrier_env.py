@@ -61,9 +61,10 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     `info["action_mask"]` say which actions are legal; `explain(element)` says why one is not.
 
     ## Observation space
-    `observation="grid"`: `Box(0, 1, (planes, rows, columns), float32)`, planes over the site.
-    `"image"`: the same as `uint8`. `"grid_with_load"`: one plane more, the load without a barrier.
-    `"features"`: a flat vector. `blast_env.envs.observations` lists all planes and values.
+    `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
+    image policies. `"grid"`: the same as `Box(0, 1, (planes, rows, columns), float32)`, for own
+    networks. `"grid_with_load"`: one plane more, the load without a barrier. `"features"`: a flat
+    vector. `blast_env.envs.observations` lists all planes and values.
 
     ## Rewards
     An episode's rewards add up to minus the impulse on the protected structures (psi s, by weight)
@@ -91,7 +92,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     >>> env = gym.make("BlastBarrier-v0", threat="visible", realisations=2)
     >>> observation, info = env.reset(seed=0, options={"charge_position_m": (5.0, 15.0)})
     >>> observation.shape, env.action_space
-    ((9, 60, 80), Discrete(641))
+    ((60, 80, 9), Discrete(641))
     >>> env.unwrapped.explain((18, 3))
     'cell (18, 3) must stay empty: the path from the road to the door must stay open'
     >>> for row in (10, 12, 14, 16, 22, 24, 26, 28):
@@ -118,7 +119,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         self,
         scenario: AnyScenario | ScenarioSource = "courtyard",
         reward: str | Reward = "terminal",
-        observation: str | Observation = "grid",
+        observation: str | Observation = "image",
         threat: str | ThreatModel = "visible",
         threats: int | None = None,
         realisations: int | None = None,
@@ -138,7 +139,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             scenario: Bundled name, path of a scenario file, a `Scenario` or its plain data; or
                 `"sites"`, which draws a generated site at every `reset`, or any `ScenarioSource`.
             reward: `"terminal"`, `"incremental"`, or a `Reward`.
-            observation: `"grid"`, `"image"`, `"grid_with_load"` (four more blasts a charge),
+            observation: `"image"`, `"grid"`, `"grid_with_load"` (four more blasts a charge),
                 `"features"`, or an `Observation`.
             threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
             threats: How many charges are drawn when they are hidden; 16 unless given.

@@ -470,7 +470,7 @@ class GridObservation:
         scenario, zone = observable.scenario, observable.scenario.zone
         grid = SiteGrid.of(scenario.site)
         channels = self.channels_of(scenario, observable.shows_vehicles)
-        static = np.zeros((len(channels), grid.rows, grid.columns), dtype=np.float32)
+        static = np.zeros((len(channels), grid.rows, grid.columns), dtype=np.uint8)
         lattice = grid.lattice(zone.corner_m, zone.rows, zone.columns)
         vehicles = VehicleView.of(scenario, observable.sources)
         episode = GridEpisode(static, lattice, channels, vehicles)
@@ -528,19 +528,23 @@ class GridEpisode:
     """The planes of one episode.
 
     Attributes:
-        static: What does not change (channels, rows, columns); the rest is 0.
+        static: What does not change (channels, rows, columns), 255 for 1; the rest is 0.
         zone: Where the build zone lies on the grid.
         channels: Names of the planes.
         vehicles: The vehicles that may be seen.
     """
 
-    static: Plane
+    static: NDArray[np.uint8]
     zone: Lattice
     channels: tuple[str, ...]
     vehicles: VehicleView
 
     def observe(self, placement: Placement) -> Plane:
         """Return all planes for the modules placed so far, (channels, rows, columns)."""
+        return self.levels(placement).astype(np.float32) / _LEVELS
+
+    def levels(self, placement: Placement) -> NDArray[np.uint8]:
+        """Return the same as whole numbers, 255 for 1."""
         planes = self.static.copy()
         cells = np.stack((occupied_cells(placement), placement.free))
         self.show(planes, ("barrier", "free"), self.zone.plane(cells))
@@ -559,7 +563,7 @@ class GridEpisode:
         """Return the names of the planes of items or variants that end so, in their order."""
         return tuple(name for name in self.channels if name.endswith(ending))
 
-    def show(self, planes: Plane, names: Sequence[str], values: NDArray[Any]) -> None:
+    def show(self, planes: NDArray[np.uint8], names: Sequence[str], values: NDArray[Any]) -> None:
         """Set some of the planes to values from 0 to 1, in steps of 1/255; more counts as 1.
 
         Args:
@@ -569,7 +573,7 @@ class GridEpisode:
         """
         steps = np.rint(_LEVELS * np.minimum(values.astype(np.float32), np.float32(1.0)))
         shape = values.shape if values.ndim == 3 else (*values.shape, 1, 1)
-        planes[[self.channels.index(name) for name in names]] = (steps / _LEVELS).reshape(shape)
+        planes[[self.channels.index(name) for name in names]] = steps.reshape(shape)
 
 
 _LEVELS: Final = np.float32(255.0)
@@ -650,10 +654,10 @@ class ImageEpisode:
 
     def observe(self, placement: Placement) -> NDArray[np.uint8]:
         """Return the image for the modules placed so far, (height, width, channels)."""
-        planes = np.moveaxis(self.planes.observe(placement), 0, -1)
+        planes = np.moveaxis(self.planes.levels(placement), 0, -1)
         rows, columns, channels = planes.shape
         image = np.zeros((*self.size, channels), dtype=np.uint8)
-        image[:rows, :columns] = np.rint(_LEVELS * planes)
+        image[:rows, :columns] = planes
         return image
 
 

@@ -35,7 +35,9 @@ SHARE_GAIN = 10.0  # what the features of shares of the facade are multiplied by
 
 
 def environment(scenario: Scenario | str = "courtyard") -> BlastBarrierEnv:
-    env = gym.make("BlastBarrier-v0", scenario=scenario, engine="event").unwrapped
+    env = gym.make(
+        "BlastBarrier-v0", scenario=scenario, engine="event", observation="grid"
+    ).unwrapped
     assert isinstance(env, BlastBarrierEnv)
     return env
 
@@ -172,9 +174,9 @@ def test_what_modules_hide_is_what_lines_of_sight_say(seed: int) -> None:
         update={"structures": tuple(each for each in site.structures if each.protected)}
     )
     zone = bare_site.zone
-    env = gym.make("BlastBarrier-v0", scenario=bare_site, engine="event", threat="hidden")
-    planes, _ = env.reset(seed=0)
-    view = zone_view(torch.as_tensor(planes)[None], zone.rows, zone.columns, places=9)
+    planes = GridObservation().episode(Observable(bare_site, bare_site.charge))
+    seen = torch.as_tensor(planes.observe(Placement.empty(bare_site)))[None]
+    view = zone_view(seen, zone.rows, zone.columns, places=9)
     lines = Visibility.of(bare_site)
     expected = np.tensordot(lines.weight, lines.cut, axes=1) / lines.weight.sum()
     found = view.cells[0, :, :, CUT].numpy() / SHARE_GAIN

@@ -469,7 +469,8 @@ NOT_RUN: Final[dict[str, str]] = {
     ),
     "python -m rl_zoo3.train --algo ppo --env BlastBarrier-v0 --gym-packages blast_env"
     " -conf agents/blast_agents/hyperparameters/ppo.yml --vec-env subproc"
-    """ --env-kwargs 'engine:'"'"'event'"'"'' realisations:1""": "needs RL Zoo",
+    """ --env-kwargs 'engine:'"'"'event'"'"'' realisations:1"""
+    """ 'observation:'"'"'grid'"'"''""": "needs RL Zoo",
     "python -m rl_zoo3.enjoy --algo ppo --env BlastBarrier-v0 --gym-packages blast_env -f logs"
     " --stochastic": "needs RL Zoo",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",

@@ -5,15 +5,22 @@ from typing import Any
 import numpy as np
 import pytest
 
+from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation, GridWithLoadObservation
 from blast_env.evaluation.cases import draw_threats
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.scenario import Scenario
-from tests.envs.small import ThinEngine, make, restricted_scenario, small_document, small_scenario
+from tests.envs import small
+from tests.envs.small import ThinEngine, restricted_scenario, small_document, small_scenario
 
 CHANNEL = {name: index for index, name in enumerate(GridWithLoadObservation.channels)}
 FINISH = 40
 ZONE = np.s_[14:22, 14:19]  # where the build zone lies on the site, rows and columns
+
+
+def make(scenario: Scenario | None = None, **arguments: Any) -> BlastBarrierEnv:
+    """Return an environment that shows planes, unless another observation is asked for."""
+    return small.make(scenario, **({"observation": "grid"} | arguments))
 
 
 def plane(env: Any, name: str, *, action: int | None = None, **options: Any) -> np.ndarray:

@@ -35,7 +35,7 @@ def test_ppo(name: str) -> None:
 
 @pytest.mark.parametrize("name", BARRIER_IDS)
 def test_cnn_policy_takes_every_image_and_finds_its_channels(name: str) -> None:
-    env = gym.make(name, **arguments(name), observation="image")
+    env = gym.make(name, **arguments(name))
     model = PPO("CnnPolicy", env, policy_kwargs=_POLICY, **_SMALL).learn(_STEPS)
     assert env.observation_space.shape is not None
     height, width, channels = env.observation_space.shape
@@ -50,7 +50,7 @@ def test_cnn_policy_takes_every_image_and_finds_its_channels(name: str) -> None:
 
 @pytest.mark.parametrize("name", BARRIER_IDS)
 def test_a_network_of_ones_own_gets_the_planes_in_their_order(name: str) -> None:
-    env = gym.make(name, **arguments(name))
+    env = gym.make(name, **arguments(name), observation="grid")
     model = PPO("MlpPolicy", env, policy_kwargs=_POLICY, **_SMALL)
     assert model.observation_space == env.observation_space
 

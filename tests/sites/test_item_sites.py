@@ -96,7 +96,9 @@ def test_vehicles_come_near_and_can_be_kept_away(item_sites: tuple[Scenario, ...
 
 def test_an_environment_draws_sites_with_and_without_vehicles() -> None:
     source = SiteSource.training(ranges=RANGES)
-    env = gym.make("BlastBarrierItemSites-v0", engine=ThinEngine(), realisations=1).unwrapped
+    env = gym.make(
+        "BlastBarrierItemSites-v0", engine=ThinEngine(), realisations=1, observation="grid"
+    ).unwrapped
     assert isinstance(env, BlastBarrierEnv)
     assert env.task.source == source
     channels = GridObservation().channels_of(source.representative)
