@@ -13,12 +13,12 @@ from blast_agents.rules import wall_near_building
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.engines.gas import GasBlast
 from blast_env.rendering.pressure_film import write_pressure_film
-from blast_env.rendering.pressure_frames import Section
+from blast_env.rendering.pressure_frames import VerticalSection
 from blast_env.scenario import Charge, load_scenario
 
 SITE: Final = Path(__file__).parents[1] / "docs" / "data" / "depot.toml"
 CHARGE: Final = Charge((4.0, 11.0), 100.0)
-SECTION: Final = Section("y", 9.25)
+SECTION: Final = VerticalSection("y", 9.25)
 """Through the wall; at the charge there is the path that must stay open."""
 
 

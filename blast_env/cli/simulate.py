@@ -32,7 +32,7 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
 
     from blast_env.engines.gas import GasBlast, GasResult
     from blast_env.physics.gas.engine import Recorders
-    from blast_env.rendering.pressure_frames import Section
+    from blast_env.rendering.pressure_frames import VerticalSection
 
 _GAS_PANEL: Final = "Gas dynamics only"
 _PARTICLES_PANEL: Final = "Particles only"
@@ -442,7 +442,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         self.print_end(result, what, "steps", texts)
 
 
-def _section(text: str | None) -> "Section | None":
+def _section(text: str | None) -> "VerticalSection | None":
     """Return the section of `--film-section`.
 
     Raises:
@@ -452,7 +452,7 @@ def _section(text: str | None) -> "Section | None":
     if text is None:
         return None
     with import_extra("render", "pictures and films"):
-        from blast_env.rendering.pressure_frames import Section
+        from blast_env.rendering.pressure_frames import VerticalSection
 
     axis, _, number = text.partition("=")
     try:
@@ -460,7 +460,7 @@ def _section(text: str | None) -> "Section | None":
     except ValueError:
         at_m = nan
     if axis in ("x", "y") and isfinite(at_m):
-        return Section("x" if axis == "x" else "y", at_m)
+        return VerticalSection("x" if axis == "x" else "y", at_m)
     raise BlastEnvError(f"--film-section is {text!r}, must be x=M or y=M, e.g. x=12.5")
 
 

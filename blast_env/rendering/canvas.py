@@ -36,7 +36,7 @@ with render_extra():
 
 
 @dataclass(frozen=True)
-class View:
+class FrameView:
     """The site to scale, y upwards, in a frame whose y points down.
 
     Attributes:
@@ -248,7 +248,7 @@ def _draw_sign(feature: Feature, surface: pygame.Surface, place: pygame.Rect) ->
         _draw_place(surface, place.center, feature.kind.look, 0.5 * place.width)
 
 
-def draw_features(surface: pygame.Surface, view: View, features: Iterable[Feature]) -> None:
+def draw_features(surface: pygame.Surface, view: FrameView, features: Iterable[Feature]) -> None:
     """Draw features by their geometry and their look, in their order."""
     for feature in features:
         if len(feature.places_m) > 2:
@@ -396,7 +396,7 @@ class Sheet:
         width, height = site.right - site.left, site.top - site.bottom
         # Neither width nor height gets out of hand.
         scale = min(self.room_px / width, _MOST_HIGH * width_px / height)
-        self.view = View(site, (width_px - round(scale * width)) // 2, header_px, scale)
+        self.view = FrameView(site, (width_px - round(scale * width)) // 2, header_px, scale)
         self._footer_top_px = header_px + round(scale * height) + round(0.8 * self.margin_px)
         self.border = self.view.rectangle(site).inflate(6, 6)
 
@@ -460,7 +460,7 @@ _STAR_INNER = 0.38  # of the radius; as matplotlib's star
 
 
 def draw_obstacle(
-    surface: pygame.Surface, view: View, obstacle: ModularObstacle, full_impulse: float
+    surface: pygame.Surface, view: FrameView, obstacle: ModularObstacle, full_impulse: float
 ) -> None:
     """Draw the modules in the colours of their loads, and the outline that tells the role."""
     is_barrier = obstacle.cells is not None
@@ -494,7 +494,7 @@ def _wholes(barrier: ModularObstacle) -> list[Rectangle]:
 
 
 def _draw_module(
-    surface: pygame.Surface, view: View, part: ModularPart, full_impulse: float, grid: bool
+    surface: pygame.Surface, view: FrameView, part: ModularPart, full_impulse: float, grid: bool
 ) -> None:
     place = view.rectangle(part.rectangle)
     if part.destroyed:
@@ -514,7 +514,7 @@ _DASH_PX = 6.0
 _NAME_GAP_PX = 6.0
 
 
-def draw_grid(surface: pygame.Surface, view: View, zone_m: Rectangle) -> None:
+def draw_grid(surface: pygame.Surface, view: FrameView, zone_m: Rectangle) -> None:
     """Draw the cells of a build zone where they are large enough to be told apart."""
     whole, side_px = view.rectangle(zone_m.scaled(UNITS_PER_M)), view.pixels_per_m * MODULE_SIDE_M
     if side_px < _SMALLEST_GRID_PX:
@@ -538,7 +538,7 @@ def draw_star(surface: pygame.Surface, centre: Point, radius_px: float) -> None:
 
 
 def names_layer(
-    lettering: Lettering, view: View, features: Sequence[Feature], size_px: tuple[int, int]
+    lettering: Lettering, view: FrameView, features: Sequence[Feature], size_px: tuple[int, int]
 ) -> pygame.Surface:
     """Return the labels of features on a transparent ground, none of which covers another.
 

@@ -24,9 +24,9 @@ from blast_env.plan import (
 )
 from blast_env.rendering.canvas import (
     Frame,
+    FrameView,
     Sheet,
     Sign,
-    View,
     ball_sign,
     colour_bar,
     disc,
@@ -125,7 +125,7 @@ class FramePainter:
         return self._size_px
 
     @property
-    def view(self) -> View:
+    def view(self) -> FrameView:
         """The site in the frames."""
         return self._sheet.view
 

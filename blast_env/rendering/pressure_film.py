@@ -31,7 +31,7 @@ from blast_env.rendering.pressure_frames import (
     PlaneNow,
     PressurePainter,
     PressureShot,
-    Section,
+    VerticalSection,
     default_section,
 )
 from blast_env.rendering.site_plan import in_metres
@@ -53,7 +53,7 @@ def write_pressure_film(
     *,
     beside: GasBlast | None = None,
     height_m: float = PLAN_HEIGHT_M,
-    section: Section | None = None,
+    section: VerticalSection | None = None,
     full_kpa: float | None = None,
     frames_per_s: float = 25.0,
     slow_motion: float | None = None,
@@ -233,7 +233,7 @@ def scale_end_kpa(results: Sequence[GasResult]) -> float:
 def record_planes(
     blast: GasBlast,
     height_m: float,
-    section: Section,
+    section: VerticalSection,
     progress: Callable[[float], None] = lambda _: None,
     further: Recorders = lambda _: (),
 ) -> PressureShot:
@@ -264,7 +264,7 @@ def record_planes(
 
 
 def _cell_of(
-    grid: GasGrid, site: BlastSite, height_m: float, section: Section
+    grid: GasGrid, site: BlastSite, height_m: float, section: VerticalSection
 ) -> tuple[int, int, int]:
     """Return a cell that both planes go through.
 

@@ -74,7 +74,7 @@ _CUT: Final = (0, (6, 3, 1, 3))  # dashes and dots, points
 
 
 @dataclass(frozen=True)
-class Section:
+class VerticalSection:
     """A vertical section: the plane x = `at_m` or y = `at_m`.
 
     Attributes:
@@ -100,17 +100,17 @@ class Section:
         return "xy".index(self.axis)
 
 
-def default_section(site: BlastSite) -> Section:
+def default_section(site: BlastSite) -> VerticalSection:
     """Return the section through the charge that points to what is protected."""
     x_m, y_m = site.charge.position_m
     solids = [each for each in site.structures if each.cells is None]
     chosen = [each for each in solids if each.protected] or solids
     centres = [in_metres(each.rectangle).centre for each in chosen]
     if not centres:
-        return Section("y", y_m)
+        return VerticalSection("y", y_m)
     across = sum(abs(centre[0] - x_m) for centre in centres)
     along = sum(abs(centre[1] - y_m) for centre in centres)
-    return Section("y", y_m) if across >= along else Section("x", x_m)
+    return VerticalSection("y", y_m) if across >= along else VerticalSection("x", x_m)
 
 
 class Plane(Protocol):
@@ -164,7 +164,7 @@ class PressureShot:
     """
 
     result: GasResult
-    section: Section
+    section: VerticalSection
     opening: Opening
     planes: tuple[Plane, Plane]
 

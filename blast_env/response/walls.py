@@ -114,7 +114,7 @@ STEEL_LIMITS: Final = Limits((1.0, 3.0, 6.0, 10.0), (None, None, None, None), _A
 TIMBER_LIMITS: Final = Limits((1.0, 2.0, 3.0, 4.0), (None, None, None, None), _ASSUMED)
 
 
-class Section(Protocol):
+class PanelSection(Protocol):
     """What a panel is made of, per metre of width."""
 
     @property

@@ -33,8 +33,8 @@ from blast_env.rendering.pressure_film import record_planes, write_pressure_film
 from blast_env.rendering.pressure_frames import (
     PressurePainter,
     PressureShot,
-    Section,
     Smooth,
+    VerticalSection,
     default_section,
 )
 from blast_env.rendering.site_plan import draw_features, legend_of
@@ -42,7 +42,7 @@ from tests.catalogue_sites import WALL as PIECES
 from tests.catalogue_sites import yard
 from tests.gas_sites import WALL, hut
 
-HEIGHT_M, CUT = 0.75, Section("y", 4.25)
+HEIGHT_M, CUT = 0.75, VerticalSection("y", 4.25)
 
 
 @pytest.fixture(scope="module")
@@ -341,11 +341,11 @@ def test_the_blast_goes_out_from_the_charge(shots: list[PressureShot]) -> None:
 
 
 def test_the_section_points_to_what_is_protected(blast: GasBlast) -> None:
-    assert default_section(blast.site) == Section("y", 4.0)
+    assert default_section(blast.site) == VerticalSection("y", 4.0)
     north = replace(blast, scenario=hut(), charge=Charge((7.0, 1.0), 5.0))
-    assert default_section(north.site) == Section("x", 7.0)
+    assert default_section(north.site) == VerticalSection("x", 7.0)
     with pytest.raises(UnknownNameError, match="'z'"):
-        Section("z", 1.0)  # type: ignore[arg-type]
+        VerticalSection("z", 1.0)  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -365,7 +365,7 @@ def test_a_film_has_the_planned_frames(
         tmp_path / name,
         beside=short[0],
         height_m=HEIGHT_M,
-        section=Section("x", 4.25),
+        section=VerticalSection("x", 4.25),
         frames_per_s=10.0,
         slow_motion=100.0,
         width_px=640,
@@ -390,7 +390,7 @@ def test_a_film_has_the_planned_frames(
         ({"full_kpa": -1.0}, "full_kpa is -1, must be above 0"),
         ({"width_px": 100}, "width_px is 100, must be 480"),
         ({"height_m": 9.0}, "z = 9.0 m is outside the grid"),
-        ({"section": Section("y", 90.0)}, "y = 90.0 m is outside the grid"),
+        ({"section": VerticalSection("y", 90.0)}, "y = 90.0 m is outside the grid"),
         ({"path": "film.avi"}, "suffix '.avi'"),
     ],
 )
