@@ -35,7 +35,6 @@ from blast_env.evaluation.comparison import Assessment, Objective
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Placement, Scenario
-from blast_env.scenario.build_scene import charge_against
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
 
@@ -107,8 +106,8 @@ class Episode:
         self.illegal_actions += is_illegal
         transition = Transition(
             initial=self.initial,
-            before=before.layout,
-            after=self.placement.layout,
+            before=before.checked,
+            after=self.placement.checked,
             begins=not self.begun,
             ended=self.ended,
             objective=self.objective,
@@ -145,7 +144,7 @@ class Episode:
 
     def assess(self) -> tuple[Assessment, Assessment]:
         """Return what the layout is worth, and what no barrier is."""
-        return self.objective.assess(self.placement.layout), self.objective.assess(())
+        return self.objective.assess(self.placement.checked), self.objective.assess(())
 
     def information(self) -> dict[str, Any]:
         """Return what is told after every action and after `reset`."""
@@ -169,12 +168,10 @@ class Episode:
             **_peaks(protected, unprotected),
             "reduction": protected.reduction_from(unprotected),
             "layout": self.placement.layout,
-            "scenario_hash": self.observable.scenario.content_hash,
+            "scenario_hash": self.objective.evaluator.scenario_hash,
             "calibration": self.objective.evaluator.calibration_name,
             "calibration_in_range": protected.in_range,
-            "charges": tuple(
-                charge_against(case.scenario, self.placement.layout, each) for each in case.charges
-            ),
+            "charges": case.charges_against(self.placement.layout),
             "blast_seeds": tuple(
                 tuple(seeds[index :: len(case.charges)]) for index in range(len(case.charges))
             ),
@@ -260,7 +257,7 @@ class Task:
             observable=observable,
             objective=Objective(evaluator, self._case(scenario, charges, seeds)),
             observation=self.observation.episode(observable),
-            initial=placement.layout,
+            initial=placement.checked,
             placement=placement,
         )
 

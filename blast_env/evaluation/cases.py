@@ -62,7 +62,9 @@ class Threat:
         object.__setattr__(self, "charge", charge)
 
     def charge_against(self, scenario: AnyScenario, layout: Sequence[Element]) -> Charge:
-        """Return the charge where it goes off with a layout; see `build_scene.charge_against`."""
+        """Return the charge where it goes off with a layout; only a vehicle's depends on that."""
+        if not isinstance(self.charge, VehicleCharge):
+            return self.charge
         return charge_against(find_scenario(scenario), layout, self.charge)
 
 
@@ -193,6 +195,11 @@ class Case:
         """The charges, each as often as it was drawn."""
         count = max(len(self.threats) // self.realisations, 1)
         return tuple(threat.charge for threat in self.threats[:count])
+
+    def charges_against(self, layout: Sequence[Element]) -> tuple[Charge, ...]:
+        """Return the charges where they go off with a layout, each as often as it was drawn."""
+        threats = self.threats[: len(self.charges)]
+        return tuple(each.charge_against(self.scenario, layout) for each in threats)
 
     @property
     def is_mean(self) -> bool:

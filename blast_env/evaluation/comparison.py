@@ -87,7 +87,7 @@ class Objective:
         """
         key = tuple(sorted(layout))
         if key not in self._assessed:
-            loads, combined = self.loads(key), self.case.combined
+            loads, combined = self.loads(layout), self.case.combined
             counts = self.case.scenario.objective
             self._assessed[key] = Assessment(
                 impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),

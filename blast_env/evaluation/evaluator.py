@@ -83,6 +83,11 @@ class BlastEvaluator:
         )
 
     @property
+    def scenario_hash(self) -> str:
+        """Content hash of the scenario, computed once."""
+        return self._key_of_nothing.scenario_hash
+
+    @property
     def calibration_name(self) -> str:
         """Name of the calibration; `"none"` for engines without particles, which need none."""
         return "none" if self.calibration is None else self.calibration.name

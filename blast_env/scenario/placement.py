@@ -27,6 +27,18 @@ from blast_env.scenario.zone import (
 )
 
 
+class CheckedLayout(tuple[Element, ...]):
+    """A layout that keeps every condition of a build zone, and need not be checked again.
+
+    It is equal to the plain tuple. `Placement.checked` makes it.
+
+    Attributes:
+        scenario: The scenario that it was checked for.
+    """
+
+    scenario: Scenario
+
+
 @dataclass(frozen=True)
 class Placement:
     """A layout in the making: immutable, everything placed gives another placement.
@@ -70,6 +82,13 @@ class Placement:
         empty = cls.empty(scenario)
         whole = cls(empty.scenario, empty.catalogue.layout_from(layout))
         return whole if whole._is_sound else _placed_one_by_one(empty, whole.layout)
+
+    @property
+    def checked(self) -> CheckedLayout:
+        """The layout with the fact that it was checked: `of` and `place` let nothing else stand."""
+        layout = CheckedLayout(self.layout)
+        layout.scenario = self.scenario
+        return layout
 
     def place(self, element: Element) -> "Placement":
         """Return the placement with one more module or piece.
@@ -438,4 +457,6 @@ def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:
     Raises:
         LayoutError: As `Placement.of` does, if something cannot be placed.
     """
+    if isinstance(layout, CheckedLayout) and layout.scenario is scenario:
+        return layout
     return Placement.of(scenario, layout).layout

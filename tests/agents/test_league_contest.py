@@ -84,7 +84,7 @@ class Cheat:
         problem: LayoutProblem,
         budget: int,
         seed: int,
-        report: Report | None = None,  # noqa: ARG002
+        report: Report | None = None,
     ) -> SearchResult:
         layouts = tuple(islice(every_layout(problem), self.layouts))
         pairs = [(layout, threat) for layout in layouts for threat in problem.threats]

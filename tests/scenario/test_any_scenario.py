@@ -129,7 +129,7 @@ class _Nowhere:
     def propose(
         self,
         scenario: Scenario,
-        charge: AnyCharge | None = None,  # noqa: ARG002
+        charge: AnyCharge | None = None,
     ) -> tuple[tuple[int, int], ...]:
         assert isinstance(scenario, Scenario)
         return ()

@@ -1,0 +1,59 @@
+"""A fourth engine, as a user writes one: a formula instead of a blast."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import ClassVar
+
+import numpy as np
+
+from blast_env.engines import BlastLoads, Engine, StructureLoad
+from blast_env.geometry import Element
+from blast_env.scenario import AnyCharge, Scenario
+from blast_env.scenario.build_scene import charge_against
+
+
+@dataclass(frozen=True)
+class ShadeEngine(Engine):
+    """Each structure takes less, the farther it is and the more modules stand.
+
+    Attributes:
+        share: What is left of an impulse behind one module.
+    """
+
+    share: float = 0.9
+    name: str = "shade"
+    version: str = "shade 1"
+
+    title: ClassVar[str] = "Shade"
+    checked_for: ClassVar[str] = "what nobody has checked"
+
+    def loads(
+        self,
+        scenario: Scenario,
+        layout: Sequence[Element],
+        charge: AnyCharge,
+        seed: int,
+    ) -> BlastLoads:
+        """Return a load of 1,000 Pa s at 1 m, which falls with the distance of the centre."""
+        x_m, y_m = charge_against(scenario, layout, charge).position_m
+        loads = []
+        for each in scenario.structures:
+            left, bottom, right, top = each.rectangle_m
+            distance_m = hypot(0.5 * (left + right) - x_m, 0.5 * (bottom + top) - y_m)
+            loads.append(
+                StructureLoad(
+                    name=each.name,
+                    protected=each.protected,
+                    weight=each.weight,
+                    impulse_sim=np.nan,
+                    transferred_impulse_sim=np.nan,
+                    impulse_pa_s=1000.0 / distance_m * self.share ** len(layout),
+                    peak_pa=None,
+                    peak_weight=each.counted_peak_weight,
+                    in_range=False,
+                    notes=("a formula, not a blast",),
+                )
+            )
+        modules = [each.rows * each.columns for each in scenario.structures]
+        return BlastLoads(tuple(loads), np.repeat([each.impulse_pa_s for each in loads], modules))
