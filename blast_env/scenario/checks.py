@@ -355,7 +355,7 @@ def _stopping_cells(empty: EmptyZone) -> BoolArray:
     for variant, fits in zip(empty.catalogue.variants, empty.fits, strict=True):
         if variant.stops_vehicles and empty.catalogue.stocks[variant.item] > 0:
             for up, right in variant.cells_at(0, 0):
-                cells[up:, right:] |= fits[: rows - up, : columns - right]
+                cells[up:, right:] |= fits[: max(rows - up, 0), : max(columns - right, 0)]
     return cells
 
 
