@@ -120,7 +120,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
     for threat in task.threats:
         # Gas has its scale from the blast without a barrier; particles are looked at first.
         both = [(threat, ()), (threat, layout)]
-        work += both if task.engine.is_gas else both[::-1]
+        work += both[::-1] if task.engine.is_first_look else both
     work = list(dict.fromkeys(work))
     for number, (threat, cells) in enumerate(work):
         part = share_of(tell, number, len(work)) or tell
@@ -137,7 +137,7 @@ def _run_one(
         return
     make_folder(folder)
     began_s = perf_counter()
-    run = _gas if task.engine.is_gas else _particles
+    run = _particles if task.engine.is_first_look else _gas
     found = run(task, scenario, layout, threat.charge, folder, tell)
     record = BlastRecord(
         key=key,

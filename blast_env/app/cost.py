@@ -11,9 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.physics.gas.grid import GasGrid, layers_to
 from blast_env.physics.gas.settings import GasSettings
-from blast_env.physics.gas.solver import state_bytes
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 from blast_env.scenario.zone import source_bounds_m
 
@@ -26,6 +24,7 @@ _SETTLED_S: Final = 0.026
 _FRONT_M_S: Final = 390.0
 _CELLS_PER_S: Final = 50e6
 _DRAWING_S: Final = 2.5
+_BYTES_PER_CELL: Final = 60.0
 _PROCESS_BYTES: Final = 450e6
 
 
@@ -51,6 +50,9 @@ class CostGuess:
 
 def cost_of_blast(scenario: Scenario, charge: AnyCharge, cell_m: float) -> CostGuess:
     """Return what a blast by gas dynamics costs, about; nothing is built for it."""
+    # Here, because it imports Numba, and the page is there before anybody asks.
+    from blast_env.physics.gas.grid import GasGrid, layers_to
+
     settings = GasSettings(cell_m=cell_m)
     site = scenario.site
     margin = 2 * ceil(settings.margin_m / cell_m)
@@ -73,11 +75,12 @@ def cost_of_blast(scenario: Scenario, charge: AnyCharge, cell_m: float) -> CostG
         ),
         default=dist((0.0, 0.0), sides_m[:2]),
     )
+    cells = int(np.prod(grid.array_shape))
     time_s = _SETTLED_S * cbrt(tnt_kg) + far_m / _FRONT_M_S
     return CostGuess(
-        cells=int(np.prod(grid.array_shape)),
+        cells=cells,
         steps=ceil(time_s / (_STEP_S_PER_M * cell_m)),
-        memory_bytes=_PROCESS_BYTES + 2.0 * state_bytes(grid, "single", with_fuel=True),
+        memory_bytes=_PROCESS_BYTES + _BYTES_PER_CELL * cells,
     )
 
 

@@ -35,6 +35,7 @@ TOKEN: Final = "token"
 """Name of the token in the printed address."""
 
 _GONE_S: Final = 0.1
+_UNANSWERED: Final = "No response returned."
 
 _TOKEN_BYTES: Final = 32
 _EVERYWHERE: Final = ("0.0.0.0", "::", "")
@@ -275,9 +276,9 @@ class Guard:
             if not begun:
                 words = f"the content took more than {self._most_s:g} s to arrive"
                 await _refused(408, words)(scope, receive, send)
-        except RuntimeError:
+        except RuntimeError as error:
             # Starlette misses an answer to a browser that was closed before it had one.
-            if begun or not await _is_gone(receive):
+            if str(error) != _UNANSWERED or not await _is_gone(receive):
                 raise
 
 

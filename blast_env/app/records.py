@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from blast_env.documents import read_text
+from blast_env.engines.table import CALIBRATED_ENGINES
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
@@ -51,16 +52,16 @@ class EngineRecord(Kept):
     cell_m: float | None = None
 
     @property
-    def is_gas(self) -> bool:
-        """Whether it is gas dynamics."""
-        return self.name == "gas"
+    def is_first_look(self) -> bool:
+        """Whether it is quick and has noise, and a calibration turns what it says into loads."""
+        return self.name in CALIBRATED_ENGINES
 
     @property
     def label(self) -> str:
         """The engine in words, for people who have to know what a number rests on."""
-        if self.is_gas:
-            return f"gas, cells of {self.cell_m or 0.5:g} m"
-        return "particles (first look)"
+        if self.is_first_look:
+            return "particles (first look)"
+        return f"{self.name}, cells of {self.cell_m or 0.5:g} m"
 
 
 class Load(Kept):

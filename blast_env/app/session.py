@@ -285,7 +285,7 @@ class Session:
 
     def cost(self, slots: Iterable[int]) -> tuple[CostGuess, ...]:
         """Return what the blasts of layouts cost that are not there yet; nothing with particles."""
-        if not self.engine.is_gas:
+        if self.engine.is_first_look:
             return ()
         keys: dict[str, AnyCharge] = {}
         for threat in self.chosen_threats():
@@ -297,7 +297,7 @@ class Session:
     def cost_of_search(self, budget: int) -> tuple[CostGuess, ...]:
         """Return what the blasts of a search cost; nothing with particles."""
         charges = [each.charge for each in self.chosen_threats()]
-        if not self.engine.is_gas or not charges:
+        if self.engine.is_first_look or not charges:
             return ()
         costs = [self._cost(each) for each in charges]
         return tuple(costs[k % len(costs)] for k in range(max(budget, 0)))

@@ -182,7 +182,8 @@ def _search(task: SearchTask, teller: Teller) -> None:
 def practice_case(scenario: Scenario, task: SearchTask) -> Case:
     """Return what a search may spend its blasts on: the threats, again and again with particles."""
     charges = [each.charge for each in task.threats]
-    realisations = 1 if task.engine.is_gas else max(_REALISATIONS // len(charges), 1)
+    noisy = task.engine.is_first_look
+    realisations = max(_REALISATIONS // len(charges), 1) if noisy else 1
     first = SeedRange.SEARCH.seeds(0, realisations * len(charges))
     threats = [Threat(charges[k % len(charges)], seed) for k, seed in enumerate(first)]
     return Case(scenario, tuple(threats), realisations)
@@ -192,7 +193,7 @@ def _film(task: FilmTask, teller: Teller) -> None:
     scenario, charge = scenario_of(task.scenario), task.threat.charge
     layout, path = placing.layout_from(scenario, task.layout), Path(task.path)
     write: Callable[..., object]
-    if task.engine.is_gas:
+    if not task.engine.is_first_look:
         from blast_env.engines.gas import GasBlast
         from blast_env.rendering.pressure_film import write_pressure_film
 

@@ -22,10 +22,11 @@ from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
 
 _ENGINES: Final = {
-    "gas 0.5": "gas, cells of 0.5 m",
-    "gas 0.25": "gas, cells of 0.25 m (16 times as long)",
-    "particles": "particles: a first look",
+    "gas 0.5": (EngineRecord(name="gas", cell_m=0.5), "gas, cells of 0.5 m"),
+    "gas 0.25": (EngineRecord(name="gas", cell_m=0.25), "gas, cells of 0.25 m (16 times as long)"),
+    "particles": (EngineRecord(name="event"), "particles: a first look"),
 }
+"""The engines that are offered, the one that judges first."""
 _SHOWN_JOBS: Final = 8
 _STATES: Final = {
     "waiting": ("hourglass_empty", "waiting"),
@@ -148,7 +149,10 @@ class WorkPanel:
             every = ui.button("all", on_click=self.blast_all).props("dense outline no-caps")
             every.tooltip("blast every layout that is not empty")
         self._engine = ui.select(
-            _ENGINES, value="gas 0.5", label="engine", on_change=lambda e: self._use(e.value)
+            {name: words for name, (_, words) in _ENGINES.items()},
+            value="gas 0.5",
+            label="engine",
+            on_change=lambda e: self._use(e.value),
         )
         self._threats = ui.select(
             [], label="threats", multiple=True, on_change=lambda e: self._against(e.value)
@@ -217,10 +221,7 @@ class WorkPanel:
     def _use(self, name: str) -> None:
         if self._filling:
             return
-        if name == "particles":
-            self._session.engine = EngineRecord()
-        else:
-            self._session.engine = EngineRecord(name="gas", cell_m=float(name.split()[1]))
+        self._session.engine = _ENGINES[name][0]
         self._after()
 
     def _against(self, names: Sequence[str]) -> None:
@@ -294,12 +295,10 @@ class WorkPanel:
         known = [each.name for each in threats_of(design.scenario)]
         self._threats.set_options(known, value=list(session.threats))
         engine = session.engine
-        self._engine.value = f"gas {engine.cell_m:g}" if engine.is_gas else "particles"
+        self._engine.value = next(name for name, (each, _) in _ENGINES.items() if each == engine)
         self._filling = False
-        gas = engine.is_gas
-        self._cost.text = (
-            cost_words(session.cost([design.active]), with_films=True) if gas else "a few seconds"
-        )
+        self._cost.visible = not engine.is_first_look
+        self._cost.text = cost_words(session.cost([design.active]), with_films=True)
         self._say_cost_of_search()
 
     def _say_cost_of_search(self) -> None:

@@ -258,6 +258,7 @@ def test_place_blast_and_compare_by_particles(page: Page) -> None:
     page.drag(courtyard, *WALL_FAR)
     page.sees("8 of 16 modules")
 
+    page.choose("engine", "particles: a first look")
     page.button("all").click()
     page.until(lambda: len(page.all("img[data-film]")) == 3)
     page.until(lambda: len(page.all(".q-table tbody tr")) == 6)
@@ -290,7 +291,8 @@ def test_a_film_of_particles_comes_soon(page: Page) -> None:
     lines = []
     for name in ("visitor_entrance", "courtyard"):
         page.begin(name)
-        page.choose("by", "wall near the building")
+        page.choose("engine", "particles: a first look")
+        page.choose("by", "rule: wall near the building")
         page.button("Propose").click()
         page.button("take it").click()
         page.sees("last: proposal")
@@ -324,7 +326,6 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
     page.button("3-D").click()
     sleep(2.5)
     page.shoot("solid")
-    page.choose("engine", "gas, cells of 0.5 m")
     page.button("Blast").click()
     sleep(4.0)
     page.shoot("gas_running")
@@ -349,9 +350,10 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
 def test_search_stop_keep_save_and_lose_nothing(page: Page, server: Server, tmp_path: Path) -> None:
     page.begin("courtyard")
     address = page.driver.current_url.removeprefix(server.url)
+    page.choose("engine", "particles: a first look")
     page.choose("by", "search: random")
     budget = next(
-        each for each in page.all("input[type=number]") if each.get_attribute("value") == "100"
+        each for each in page.all("input[type=number]") if each.get_attribute("value") == "50"
     )
     budget.send_keys(Keys.CONTROL, "a")
     budget.send_keys("5000")
@@ -442,12 +444,11 @@ def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
     page.until(lambda: "/design/" in page.driver.current_url)
     page.until(lambda: page.all(".be-plan svg text"))
     reached("the site of the map")
-    page.choose("by", "wall near the building")
+    page.choose("by", "rule: wall near the building")
     page.button("Propose").click()
     page.button("take it").click()
     page.sees("8 of 8 modules")
     reached("a layout by rule")
-    page.choose("engine", "gas, cells of 0.5 m")
     page.button("Blast").click()
     page.until(lambda: len(page.all(".q-table tbody tr")) == 4, 300.0)
     page.shoot("map_verdict")
@@ -472,7 +473,6 @@ def test_a_site_too_large_for_gas_is_told_and_kept(page: Page, tmp_path: Path) -
     page.open()
     page.all("input[type=file]")[0].send_keys(str(tmp_path / "wide.toml"))
     page.until(lambda: "/design/" in page.driver.current_url)
-    page.choose("engine", "gas, cells of 0.5 m")
     page.button("Blast").click()
     page.sees("GiB, must be at most 8: take larger cells", 120.0)
     page.shoot("too_large")
@@ -483,6 +483,7 @@ def test_a_site_too_large_for_gas_is_told_and_kept(page: Page, tmp_path: Path) -
 def test_a_closed_tab_leaves_its_work_running(page: Page) -> None:
     page.begin("courtyard")
     address = page.driver.current_url
+    page.choose("engine", "particles: a first look")
     page.choose("by", "search: random")
     page.button("Propose").click()
     page.sees("search", 120.0)
@@ -493,7 +494,7 @@ def test_a_closed_tab_leaves_its_work_running(page: Page) -> None:
     page.driver.switch_to.window(second)
     sleep(2.0)
     page.driver.get(address)
-    page.sees("after 100 of 100", 300.0)
+    page.sees("after 50 of 50", 300.0)
     page.button("take it").click()
     page.sees("16 of 16 modules")
 
@@ -505,7 +506,7 @@ FORGOTTEN_S = 35.0
 def test_a_report_goes_on_while_its_page_is_loaded_anew(page: Page) -> None:
     """By hand, and by the browser itself when the server has forgotten its page."""
     page.begin("visitor_entrance")
-    page.choose("by", "wall near the building")
+    page.choose("by", "rule: wall near the building")
     page.button("Propose").click()
     page.button("take it").click()
     page.sees("last: proposal")
