@@ -62,9 +62,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
     ## Observation space
     `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
-    image policies. `"grid"`: the same as `Box(0, 1, (planes, rows, columns), float32)`, for own
-    networks. `"grid_with_load"`: one plane more, the load without a barrier. `"features"`: a flat
-    vector. `blast_env.envs.observations` lists all planes and values.
+    image policies. `"grid"`: the same as `Box(0, 1, (planes, rows, columns), float32)`, for
+    networks of your own. `"grid_with_load"`: one plane more, the load without a barrier.
+    `"features"`: a flat vector. `blast_env.envs.observations` lists all planes and values.
 
     ## Rewards
     An episode's rewards add up to minus the impulse on the protected structures (psi s, by weight)
