@@ -4,6 +4,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
+from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
@@ -178,13 +179,12 @@ def _workbook(path: str | Path, record: RunRecord, title: str) -> Iterator[Any]:
     # XlsxWriter's own scratch files would stay if it failed.
     with write_atomically(path) as temporary, scratch_folder() as scratch:
         options = {**_OPTIONS, "tmpdir": str(scratch), "use_zip64": True}
+        # In memory first: where a device is full, the archive would try again when it is collected.
+        content = BytesIO()
         try:
-            with (
-                temporary.open("wb") as file,
-                pd.ExcelWriter(
-                    file, engine="xlsxwriter", engine_kwargs={"options": options}
-                ) as writer,
-            ):
+            with pd.ExcelWriter(
+                content, engine="xlsxwriter", engine_kwargs={"options": options}
+            ) as writer:
                 writer.book.set_properties(
                     {
                         "title": title,
@@ -193,6 +193,7 @@ def _workbook(path: str | Path, record: RunRecord, title: str) -> Iterator[Any]:
                     }
                 )
                 yield writer
+            temporary.write_bytes(content.getbuffer())
         except (OSError, XlsxFileError) as error:
             raise BlastEnvError(f"{path}: cannot be written: {error}") from error
 

@@ -217,11 +217,17 @@ def _kind_problems(
             yield from problems_from(error, models[guess[0]], parts)
 
 
+_OF_A_KEY: Final = "[key]"
+"""What pydantic puts after a key that is itself wrong."""
+
+
 def _followed(model: type[BaseModel], location: KeyParts) -> tuple[KeyParts, Any]:
     """Return the keys of a pydantic location, without union tags, and the annotation there."""
     parts: list[str | int] = []
     annotation: Any = model
     for part in location:
+        if part == _OF_A_KEY:
+            break
         options = _options(annotation)
         if len(options) > 1:
             annotation = next(option for option in options if _has_tag(option, part))

@@ -14,8 +14,10 @@ from blast_env.journal import Journal
 from tests.attack.disks import file_size_limit
 from tests.attack.writers import WRITERS
 
-UNCLOSED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-"""XlsxWriter leaves its scratch files to the collector when it fails."""
+UNCLOSED = pytest.mark.filterwarnings(
+    r"ignore:Exception ignored in. <_io\.FileIO:pytest.PytestUnraisableExceptionWarning"
+)
+"""XlsxWriter leaves its scratch files to the collector when it fails; nothing else may complain."""
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -105,7 +105,7 @@ NEW_PATHS = COUNTING_PATHS + WORDS
 
 def test_new_keys_are_all_tried() -> None:
     listed = {(section, key) for section, keys in NEW_KEYS.items() for key in keys}
-    listed.remove(("build_zone", "items"))  # test_catalogue.py
+    listed -= {("build_zone", "items"), ("", "components"), ("structures", "facade")}  # own tests
     named = [[str(part) for part in path if isinstance(part, str)] for path in NEW_PATHS]
     assert listed == {(".".join(above), key) for *above, key in named}
 
