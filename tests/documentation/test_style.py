@@ -10,14 +10,10 @@ from tests.documentation.style import MOST_CHARACTERS, MOST_WORDS, faults, sente
 NOT_YET: Final = frozenset(
     {
         "docs/howto/app.md",
-        "docs/howto/importing.md",
         "docs/howto/reliability.md",
-        "docs/reference/scenario_format.md",
-        "docs/researchers/how_agents_learn.md",
         "docs/researchers/league.md",
         "docs/researchers/libraries.md",
         "docs/researchers/search.md",
-        "docs/researchers/sites.md",
         "docs/researchers/surrogate.md",
         "docs/researchers/training.md",
     }
