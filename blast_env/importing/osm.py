@@ -82,24 +82,27 @@ def _unpacked(path: Path) -> Iterator[Path]:
     with scratch_folder() as folder:
         plain = folder / "unpacked.osm"
         try:
-            with opened(path, "rb") as packed, write_atomically(plain, durable=False) as target:
-                _copy(packed, target, path)
+            with (
+                opened(path, "rb") as packed,
+                write_atomically(plain, durable=False) as target,
+                target.open("wb") as file,
+            ):
+                _copy(packed, file, path)
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
             raise BlastEnvError(f"{path}: cannot be unpacked: {error}") from error
         yield plain
 
 
-def _copy(packed: IO[bytes], target: Path, path: Path) -> None:
+def _copy(packed: IO[bytes], plain: IO[bytes], path: Path) -> None:
     size = 0
-    with target.open("wb") as file:
-        while part := packed.read(_PART_BYTES):
-            size += len(part)
-            if size > MOST_UNPACKED_BYTES:
-                raise BlastEnvError(
-                    f"{path}: unfolds to more than {MOST_UNPACKED_BYTES:,} bytes, must unfold to "
-                    "at most that many: cut a smaller extract"
-                )
-            file.write(part)
+    while part := packed.read(_PART_BYTES):
+        size += len(part)
+        if size > MOST_UNPACKED_BYTES:
+            raise BlastEnvError(
+                f"{path}: unfolds to more than {MOST_UNPACKED_BYTES:,} bytes, must unfold to "
+                "at most that many: cut a smaller extract"
+            )
+        plain.write(part)
 
 
 @dataclass
