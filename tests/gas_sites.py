@@ -43,3 +43,17 @@ def site_document(**changes: Any) -> dict[str, Any]:
 def hut(**changes: Any) -> Scenario:
     """Return the site, with other sections where some are given."""
     return Scenario.from_document(site_document(**changes), "hut")
+
+
+def glazed_hut() -> Scenario:
+    """Return the site, its hut with small windows in brick walls."""
+    document = site_document()
+    pane = {"width_m": 0.8, "height_m": 0.6, "thickness_mm": 3.78}
+    window = {"kind": "glazing", "title": "small window", "source": "made for tests", **pane}
+    document["components"] = {"small_window": window}
+    document["structures"][0]["facade"] = {
+        "bay_m": 1.0,
+        "glazing": "small_window",
+        "wall": "brick_215",
+    }
+    return Scenario.from_document(document, "glazed_hut")

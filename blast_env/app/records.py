@@ -17,6 +17,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.statistics import reductions
 from blast_env.units import PA_PER_KPA
@@ -109,6 +110,26 @@ class Picture(Kept):
     label: str
 
 
+class Verdict(Kept):
+    """What a blast does to a building with a facade.
+
+    Attributes:
+        building: Its name.
+        level: Level of protection that it reaches, from 0, below standards, to 4, high.
+        panes: Panes that it has.
+        broken: Panes that are expected to break.
+        condition: Performance condition of its worst pane, GSA.
+        damage: Damage of its worst wall panel.
+    """
+
+    building: str
+    level: int
+    panes: int
+    broken: float
+    condition: str
+    damage: str
+
+
 class BlastRecord(Kept):
     """What is kept of a blast.
 
@@ -121,6 +142,7 @@ class BlastRecord(Kept):
         notes: What there is to say about it.
         pictures: Pictures beside the film.
         waves: Histories of the gauges.
+        verdicts: What becomes of the buildings with facades.
         seconds: How long it took.
         repeat: All that is needed to run it again.
     """
@@ -133,6 +155,7 @@ class BlastRecord(Kept):
     notes: tuple[str, ...] = ()
     pictures: tuple[Picture, ...] = ()
     waves: tuple[Wave, ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
     seconds: float
     repeat: dict[str, Any]
 
@@ -211,6 +234,59 @@ class Row(Kept):
     cost: str
     reduction: str
     engine: str
+
+
+class VerdictRow(Kept):
+    """A row of the table of buildings: a layout under a threat, or the worst of all threats.
+
+    Attributes:
+        layout: Name of the layout, or "no barrier".
+        threat: Name of the threat, or "worst of" so many.
+        building: Name of the building.
+        level: Level of protection that it reaches.
+        panes: How many panes are expected to break, of how many.
+        condition: Performance condition of the worst pane, GSA.
+        damage: Damage of the worst wall panel.
+    """
+
+    layout: str
+    threat: str
+    building: str
+    level: str
+    panes: str
+    condition: str
+    damage: str
+
+
+def verdict_rows(records: Sequence[tuple[str, BlastRecord]]) -> list[VerdictRow]:
+    """Return what becomes of the buildings, the worst of all threats first where there are more.
+
+    Args:
+        records: Name of the layout, and the blast.
+    """
+    found: dict[tuple[str, str], list[tuple[str, Verdict]]] = {}
+    for name, record in records:
+        for verdict in record.verdicts:
+            found.setdefault((name, verdict.building), []).append((record.threat, verdict))
+    rows = []
+    for (name, _), own in found.items():
+        if len(own) > 1:
+            worst = max((each for _, each in own), key=lambda each: (-each.level, each.broken))
+            rows.append(_verdict_row(name, f"worst of {len(own)}", worst))
+        rows += [_verdict_row(name, threat, each) for threat, each in own]
+    return rows
+
+
+def _verdict_row(layout: str, threat: str, verdict: Verdict) -> VerdictRow:
+    return VerdictRow(
+        layout=layout,
+        threat=threat,
+        building=verdict.building,
+        level=LevelOfProtection(verdict.level).label,
+        panes=f"{verdict.broken:.1f} of {verdict.panes}" if verdict.panes else _DASH,
+        condition=verdict.condition if verdict.panes else _DASH,
+        damage=verdict.damage,
+    )
 
 
 @dataclass(frozen=True)

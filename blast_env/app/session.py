@@ -14,7 +14,15 @@ from blast_env.app.cost import CostGuess, cost_of_blast
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
-from blast_env.app.records import BlastRecord, EngineRecord, Row, blast_key, comparison
+from blast_env.app.records import (
+    BlastRecord,
+    EngineRecord,
+    Row,
+    VerdictRow,
+    blast_key,
+    comparison,
+    verdict_rows,
+)
 from blast_env.app.threats import NamedThreat, threats_of, usual_threats
 from blast_env.app.work import (
     BlastTask,
@@ -338,6 +346,15 @@ class Session:
                     bare[record.threat] = record
                 records.append((each.name, placing.cost_of(self.scenario, each.layout), record))
         return comparison(records, bare, self.scenario)
+
+    def verdicts(self) -> list[VerdictRow]:
+        """Return what becomes of the buildings in all blasts of the design as it is now."""
+        found = (
+            (each.name, self.folder.record_of(each.key))
+            for threat in self.chosen_threats()
+            for each in self.shown(threat)
+        )
+        return verdict_rows([(name, record) for name, record in found if record is not None])
 
     def waves(self, threat: NamedThreat) -> Sequence[tuple[str, BlastRecord]]:
         """Return the blasts with gauges under a threat, by the names of the layouts."""

@@ -122,7 +122,6 @@ def consequences(
         )
     if not engine.has_peaks:
         raise BlastEnvError(f"engine {engine.name!r} knows no overpressure: must be 'gas'")
-    names = {each.name: each.building or each.name for each in found.structures}
     responses: list[BuildingResponse] = []
     every = list(charges)
     for number, charge in enumerate(every, start=1):
@@ -131,15 +130,23 @@ def consequences(
         if loads is None:
             raise BlastEnvError(f"engine {engine.name!r} records no bays: must be 'gas'")
         where = charge_against(found, layout, charge)
-        responses += _by_building(loads.response, names, where)
+        responses += by_building(found, loads.response, where)
         if progress is not None:
             progress(number / len(every))
     return Consequences(tuple(responses))
 
 
-def _by_building(
-    facade: FacadeResponse, names: dict[str, str], charge: Charge
+def by_building(
+    scenario: Scenario, facade: FacadeResponse, charge: Charge
 ) -> list[BuildingResponse]:
+    """Return what a blast does to each building with a facade.
+
+    Args:
+        scenario: Says which structures are parts of one building.
+        facade: What became of all bays of the site.
+        charge: The charge where it went off.
+    """
+    names = {each.name: each.building or each.name for each in scenario.structures}
     owners = [names[each.bay.structure] for each in facade.bays]
     found = []
     for building in dict.fromkeys(owners):

@@ -222,6 +222,15 @@ def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
         user.find("height (m)").trigger("blur")
         assert session.scenario.structures[0].height_m == 3.5
         await user.should_see("must be at least 0.5")
+        windows = next(
+            each for each in user.find(kind=ui.select).elements if each.props["label"] == "windows"
+        )
+        windows.value = "window_annealed_6"
+        facade = session.scenario.structures[0].facade
+        assert facade is not None
+        assert facade.glazing == "window_annealed_6"
+        windows.value = None
+        assert session.scenario.structures[0].facade is None
 
     play(tmp_path, story)
 

@@ -15,19 +15,29 @@ from blast_env.app.design import SLOTS
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers, settle
 from blast_env.app.placing import plain
-from blast_env.app.records import BlastRecord, EngineRecord, Load, blast_key, comparison, read_film
+from blast_env.app.records import (
+    BlastRecord,
+    EngineRecord,
+    Load,
+    blast_key,
+    comparison,
+    read_film,
+    verdict_rows,
+)
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status, ThreatOf, read_status, write_status
+from blast_env.engines import find_engine
 from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation.consequences import consequences
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.reporting import StudyOptions
 from blast_env.scenario import Scenario, load_scenario
 from tests.app.here import Here
-from tests.gas_sites import WALL, hut
+from tests.gas_sites import WALL, glazed_hut, hut
 from tests.scenarios import BALLISTIC_COURTYARD
 from tests.vehicle_sites import gate_site, vehicle_document
 
@@ -56,8 +66,8 @@ def particles(tmp_path_factory: pytest.TempPathFactory) -> Session:
 
 @pytest.fixture(scope="module")
 def gas(tmp_path_factory: pytest.TempPathFactory) -> Session:
-    """The hut, blasted by gas with a wall."""
-    session = session_on(tmp_path_factory.mktemp("gas"), hut())
+    """The hut with windows, blasted by gas with a wall."""
+    session = session_on(tmp_path_factory.mktemp("gas"), glazed_hut())
     session.engine = EngineRecord(name="gas", cell_m=0.5)
     session.put("wall", session.design.with_layout(WALL))
     session.blast([0])
@@ -170,7 +180,7 @@ def test_an_edit_takes_results_away_and_undo_brings_them_back(particles: Session
 def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Session) -> None:
     assert state_of(gas).state == "done"
     (threat,) = gas.chosen_threats()
-    result = GasBlast(hut(), WALL).run()
+    result = GasBlast(glazed_hut(), WALL).run()
     record = gas.folder.record_of(gas.shown(threat)[1].key)
     assert record is not None
     load = next(each for each in record.loads if each.structure == "hut")
@@ -181,6 +191,7 @@ def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Sessi
     assert films[0] is not None
     assert films[0] == films[1]  # the same moments
     assert {each.label for each in record.pictures} == {
+        "damage of hut",
         "peak over the ground",
         "impulse over the ground",
         "peak on the walls of hut",
@@ -190,7 +201,34 @@ def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Sessi
     waves = {each.gauge: each for each in record.waves}
     assert waves["front"].peak_kpa == pytest.approx(max(waves["front"].overpressure_kpa), rel=0.02)
     assert [name for name, _ in gas.waves(threat)] == ["no barrier", "A"]
-    assert record.repeat["scenario hash"] == hut().content_hash
+    assert record.repeat["scenario hash"] == glazed_hut().content_hash
+
+
+def test_the_table_of_buildings_says_what_the_library_says(gas: Session) -> None:
+    (threat,) = gas.chosen_threats()
+    rows = gas.verdicts()
+    assert [(row.layout, row.threat, row.building) for row in rows] == [
+        ("no barrier", threat.name, "hut"),
+        ("A", threat.name, "hut"),
+    ]
+    found = consequences(glazed_hut(), WALL, [threat.charge], find_engine("gas"))
+    (facade,) = (each.facade for each in found.of("hut"))
+    assert rows[1].level == found.level("hut").label
+    assert rows[1].panes == f"{facade.broken_panes:.1f} of {facade.panes}"
+    assert rows[1].condition == facade.worst_condition.label
+    assert rows[1].damage == facade.worst_damage.name.lower()
+
+
+def test_of_several_threats_the_worst_comes_first(gas: Session) -> None:
+    (threat,) = gas.chosen_threats()
+    record = gas.folder.record_of(gas.shown(threat)[1].key)
+    assert record is not None
+    (verdict,) = record.verdicts
+    milder = verdict.model_copy(update={"level": 4, "broken": 0.0})
+    other = record.model_copy(update={"threat": "other", "verdicts": (milder,)})
+    rows = verdict_rows([("A", other), ("A", record)])
+    assert [row.threat for row in rows] == ["worst of 2", "other", threat.name]
+    assert rows[0].level == rows[2].level != rows[1].level == "high"
 
 
 def test_what_is_there_is_not_run_again(gas: Session) -> None:

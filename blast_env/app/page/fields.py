@@ -7,7 +7,7 @@ from blast_env.app.edits import Document, SiteThing, ThingKind, document_of
 from blast_env.physics.scene import WALLS
 from blast_env.scenario import Scenario
 
-Form = Literal["number", "integer", "text", "switch", "walls", "side"]
+Form = Literal["number", "integer", "text", "switch", "walls", "side", "glazing", "wall"]
 
 
 class FormField(NamedTuple):
@@ -111,6 +111,8 @@ _OF_STRUCTURES: Final[Mapping[str, tuple[FormField, ...]]] = {
 _LAST_OF_STRUCTURE: Final = (
     FormField("weight", "weight"),
     FormField("walls that count", "faces", "walls"),
+    FormField("windows", "glazing", "glazing", optional=True, inside="facade"),
+    FormField("wall panels", "wall", "wall", optional=True, inside="facade"),
 )
 
 
@@ -162,11 +164,12 @@ def change_of(section: Document, field: FormField, typed: Any) -> dict[str, Any]
     if not field.inside:
         return {field.key: value}
     table = {**(section.get(field.inside) or {}), field.key: value}
+    if field.inside == "facade":
+        table = {key: each for key, each in table.items() if each is not None}
+        return {field.inside: table if table.keys() & {"glazing", "wall"} else None}
     if value is None:
         return {field.inside: None}
-    if field.inside == "access_way":
-        table = {"width_m": 3.0, "between": "left_right"} | table
-    return {field.inside: table}
+    return {field.inside: {"width_m": 3.0, "between": "left_right"} | table}
 
 
 def _of_form(field: FormField, typed: Any) -> Any:

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from nicegui import ui
 
-from blast_env.app.records import BlastRecord, LoadJudge, Row, read_film
+from blast_env.app.records import BlastRecord, LoadJudge, Row, VerdictRow, read_film
 from blast_env.app.session import Session
 from blast_env.app.threats import NamedThreat
 from blast_env.scenario import ObjectiveSection
@@ -22,6 +22,15 @@ _COLUMNS: Final = (
     ("reduction", "reduction", "right"),
     ("cost", "cost", "right"),
     ("engine", "engine", "left"),
+)
+_VERDICT_COLUMNS: Final = (
+    ("layout", "layout", "left"),
+    ("threat", "threat", "left"),
+    ("building", "building", "left"),
+    ("level", "level of protection", "left"),
+    ("panes", "panes broken", "right"),
+    ("condition", "worst pane (GSA)", "left"),
+    ("damage", "worst wall panel", "left"),
 )
 # Okabe and Ito, with a dash each: no colour alone says which line is which.
 _LINES: Final = (
@@ -70,6 +79,16 @@ class ResultsView:
             self._bar = ui.html(_BAR, sanitize=False).classes("w-full")
             self._cards = ui.element("div").classes("be-cards")
             self._chart = ui.column().classes("w-full")
+            verdict_columns = [
+                {"name": name, "field": name, "label": label, "align": align}
+                for name, label, align in _VERDICT_COLUMNS
+            ]
+            self._verdicts = ui.table(columns=verdict_columns, rows=[], row_key="id")
+            self._verdicts.props("dense flat bordered").classes("w-full mt-2")
+            self._unglazed = ui.label(
+                "Whether windows break and walls fail is said of structures with windows or wall "
+                "panels: choose them on the left, and blast by gas."
+            ).classes("be-quiet")
             columns = _columns(self._session.scenario.objective)
             self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full mt-2")
             self._table.props("dense flat bordered")
@@ -113,6 +132,10 @@ class ResultsView:
         shown = [each for each in found if self._with_bare or each[0] != "no barrier"]
         self._show_cards(shown)
         self._show_chart(threats[self._threat])
+        verdicts = session.verdicts()
+        self._verdicts.rows = [_row(each, k) for k, each in enumerate(verdicts)]
+        self._verdicts.visible = bool(verdicts)
+        self._unglazed.visible = bool(found) and not verdicts
         rows = session.comparison()
         judge = LoadJudge(session.scenario)
         self._table.columns = _columns(judge.objective)
@@ -208,7 +231,7 @@ def _columns(objective: ObjectiveSection) -> list[dict[str, str]]:
     ]
 
 
-def _row(row: Row, number: int) -> dict[str, Any]:
+def _row(row: Row | VerdictRow, number: int) -> dict[str, Any]:
     return {"id": number, **row.model_dump()}
 
 

@@ -10,6 +10,7 @@ from blast_env.app.editor import Editor
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.page.fields import FormField, change_of, fields_of, section_of, value_of
 from blast_env.physics.scene import WALLS
+from blast_env.response.components import catalogue
 from blast_env.scenario import Scenario
 
 _SIDES: Final = {"left_right": "left and right", "bottom_top": "bottom and top"}
@@ -89,6 +90,9 @@ class SitePanel:
         elif field.form == "side":
             element = ui.select(_SIDES, label=field.label, clearable=True)
             element.on_value_change(lambda e: self._put(field, e.value))
+        elif field.form in ("glazing", "wall"):
+            element = ui.select(self._components(field.form), label=field.label, clearable=True)
+            element.on_value_change(lambda e: self._put(field, e.value))
         elif field.form == "text":
             element = ui.input(field.label)
         else:
@@ -99,9 +103,15 @@ class SitePanel:
             element.on("keydown.enter", lambda: self._put(field, element.value))
             element.on("change", lambda: self._put(field, element.value))
         if field.optional:
-            element.props('placeholder="by rule" clearable stack-label')
+            empty = "none" if field.inside == "facade" else "by rule"
+            element.props(f'placeholder="{empty}" clearable stack-label')
         element.props("dense outlined").classes("w-full")
         return element
+
+    def _components(self, kind: str) -> dict[str, str]:
+        """Return the components of a kind, with their titles."""
+        known = {**catalogue(), **self._editor.session.scenario.components}
+        return {name: each.title or name for name, each in known.items() if each.kind == kind}
 
     def _put(self, field: FormField, typed: Any) -> None:
         if self._filling:
