@@ -167,7 +167,7 @@ class ResultsView:
         self._cards.clear()
         self._bar.visible = self._what == _FILM and bool(found)
         self._cards.visible = self._what != _GAUGES
-        wide = self._what.endswith("walls") or " on the walls of " in self._what
+        wide = self._what.startswith("damage of ") or " on the walls of " in self._what
         columns = 1 if wide or self._large or len(found) == 1 else 2
         self._cards.style(f"grid-template-columns: repeat({columns}, minmax(0, 1fr))")
         with self._cards:
