@@ -197,8 +197,6 @@ def test_bad_input_is_named(bare: GasResult) -> None:
     with pytest.raises(BlastEnvError, match=r"cell_m is 0\.5, but engine 'event' has no cells"):
         evaluate_layout(HUT, WALL, engine="event", cell_m=0.5)
     with pytest.raises(BlastEnvError, match="inside a solid cell"):
-        GasEngine().start_on(
-            replace(bare.run.site, charge=Charge((7.0, 4.0), 5.0), charge_centre=(28.0, 16.0))
-        )
+        GasEngine().start_on(replace(bare.run.site, charge=Charge((7.0, 4.0), 5.0)))
     with pytest.raises(BlastEnvError, match=r"would need .* GiB, must be at most 8"):
         GasEngine(cell_m=0.5 / 64).start_on(bare.run.site)

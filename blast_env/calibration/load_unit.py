@@ -7,7 +7,7 @@ from typing import Final
 from blast_env.calibration.model import ScaledImpulse, seen_width_m
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import ModularObstacle
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M
 
 LOAD_LABEL: Final = "impulse per module (simulation units)"
 
@@ -60,7 +60,7 @@ class LoadUnit:
             for each in structures
             if each.impulse > 0.0
         }
-        width_m = seen_width_m(main.rectangle.scaled(1.0 / UNITS_PER_M), charge.position_m)
+        width_m = seen_width_m(main.rectangle_m, charge.position_m)
         factor = loads[main.name].factor * width_m / MODULE_SIDE_M
         return cls(factor, f"impulse per module (Pa s, calibrated on {main.name})", loads)
 

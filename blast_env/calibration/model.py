@@ -24,7 +24,7 @@ from blast_env.physics.particles import distance_to_rectangle
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import Scenario
-from blast_env.units import PA_PER_PSI, UNITS_PER_M
+from blast_env.units import PA_PER_PSI
 from blast_env.values import path_of
 
 SimulatedQuantity = Literal["impulse", "transferred_impulse"]
@@ -231,7 +231,7 @@ class Calibration(CalibrationSection):
             obstacle: The structure, after a blast.
             charge: The charge.
         """
-        footprint_m = obstacle.rectangle.scaled(1.0 / UNITS_PER_M)
+        footprint_m = obstacle.rectangle_m
         distance_m = float(distance_to_rectangle(np.array([charge.position_m]), footprint_m)[0])
         width_m = seen_width_m(footprint_m, charge.position_m)
         impulse_sim: float = getattr(obstacle, self.simulated)

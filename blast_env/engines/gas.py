@@ -31,12 +31,11 @@ from blast_env.physics.gas.settings import (
     GasSettings,
 )
 from blast_env.physics.scene import BlastSite
-from blast_env.physics.structure import module_name
 from blast_env.provenance import versions
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.scenario.build_scene import build_site, draw_threat
 from blast_env.tables import Column, as_types, table_of, texts
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
@@ -295,10 +294,7 @@ class GasResult:
         keys = ["structure", "module_id", "row", "column", "face"]
         groups = self.faces.groupby(keys, sort=False, observed=True)
         table = _means(groups, self._cell_area_m2).reset_index()
-        corners = {
-            outline.name: tuple(side / UNITS_PER_M for side in outline.corner)
-            for outline in self.run.site.structures
-        }
+        corners = {outline.name: outline.corner_m for outline in self.run.site.structures}
         left, bottom = (table["structure"].map(lambda name, k=k: corners[name][k]) for k in (0, 1))
         table["x_m"] = left + (table["column"] + 0.5) * MODULE_SIDE_M
         table["y_m"] = bottom + (table["row"] + 0.5) * MODULE_SIDE_M
@@ -539,10 +535,7 @@ class GasResult:
     def _module_ids(self) -> list[str]:
         table, outlines = self.run.table, self.run.site.structures
         return [
-            module_name(
-                outlines[structure].corner[0] / UNITS_PER_M + (column + 0.5) * MODULE_SIDE_M,
-                outlines[structure].corner[1] / UNITS_PER_M + (row + 0.5) * MODULE_SIDE_M,
-            )
+            outlines[structure].module_name(row, column)
             for structure, row, column in zip(table.structure, table.row, table.column, strict=True)
         ]
 

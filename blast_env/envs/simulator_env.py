@@ -18,10 +18,9 @@ from blast_env.geometry import Element
 from blast_env.physics.engine import BlastRun, EndReason
 from blast_env.physics.particles import CollisionType, lattice_capacity
 from blast_env.physics.scene import Charge
-from blast_env.physics.structure import BARRIER_NAME, ModularPart, module_name
+from blast_env.physics.structure import BARRIER_NAME, ModularPart
 from blast_env.scenario import AnyScenario, Scenario, check_layout, find_scenario
 from blast_env.scenario.build_scene import draw_threat
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 from blast_env.values import real_number
 
 if TYPE_CHECKING:  # drawing is an optional extra, and Numba takes half a second to import
@@ -245,10 +244,7 @@ class UnfoldingGas(Unfolding):
     def module_ids(self) -> tuple[str, ...]:
         """Names of the modules of the structures, as they are observed."""
         return tuple(
-            module_name(
-                outline.corner[0] / UNITS_PER_M + (column + 0.5) * MODULE_SIDE_M,
-                outline.corner[1] / UNITS_PER_M + (row + 0.5) * MODULE_SIDE_M,
-            )
+            outline.module_name(row, column)
             for outline in self.run.site.structures
             if outline.cells is None
             for row in range(outline.rows)

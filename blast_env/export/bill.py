@@ -11,7 +11,7 @@ from blast_env.plan import rounded_m
 from blast_env.provenance import package_version
 from blast_env.scenario import Placement
 from blast_env.tables import Column, as_types, table_of
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
@@ -81,10 +81,8 @@ def element_table(plan: LayoutPlan) -> "pd.DataFrame":
 
 def _module_rows(plan: LayoutPlan) -> Iterator[dict[str, object]]:
     for part in plan.modules:
-        corner_x_m, corner_y_m = rounded_m(
-            part.rectangle.left / UNITS_PER_M, part.rectangle.bottom / UNITS_PER_M
-        )
-        centre_x_m, centre_y_m = rounded_m(part.x / UNITS_PER_M, part.y / UNITS_PER_M)
+        corner_x_m, corner_y_m = rounded_m(part.rectangle_m.left, part.rectangle_m.bottom)
+        centre_x_m, centre_y_m = rounded_m(*part.centre_m)
         yield {
             "module_id": part.module_id,
             "row": part.row,

@@ -11,6 +11,7 @@ from blast_env.physics.collisions import CollisionLog
 from blast_env.physics.particles import distance_to_rectangle
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
+from blast_env.units import UNITS_PER_M
 
 
 class EndReason(StrEnum):
@@ -65,7 +66,8 @@ def can_reach(balls: BallStates, scene: Scene, within_s: float) -> bool:
     distance = np.full(len(balls), np.inf)
     for outline in scene.structures:
         if outline.cells is None:
-            to_this = distance_to_rectangle(balls.position, outline.rectangle)
+            rectangle = outline.rectangle_m.scaled(UNITS_PER_M)
+            to_this = distance_to_rectangle(balls.position, rectangle)
             distance = np.minimum(distance, to_this)
     reach = 2.0 * balls.speed * within_s
     return bool(((reach > 0.0) & (distance - balls.radius <= reach)).any())

@@ -10,8 +10,8 @@ import numpy as np
 from blast_env.geometry import Cell, Rectangle
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.particles import Balls
-from blast_env.physics.structure import ModularObstacle
-from blast_env.units import MODULE_SIDE_UNITS
+from blast_env.physics.structure import ModularObstacle, module_name
+from blast_env.units import MODULE_SIDE_M, UNITS_PER_M, in_units
 
 WallName = Literal["west", "east", "south", "north"]
 """A wall of a structure, by the side that it looks to: west is towards smaller x."""
@@ -39,21 +39,19 @@ class Gauge(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BlastSite:
-    """What stands where when a charge goes off: what every engine needs, in simulation units.
+    """What stands where when a charge goes off: what every engine needs.
 
     Attributes:
-        site: The simulated area.
-        charge_centre: Centre of the charge.
-        charge: The charge in metres and kilograms.
+        site_m: The simulated area.
+        charge: The charge.
         structures: The structures and, when there is one, the barrier; see `obstacles`.
-        gauges: Virtual gauges, in metres; the particle engines have none.
-        air_height_m: Height of the simulated air, metres; the particle engines know none.
+        gauges: Virtual gauges; the particle engines have none.
+        air_height_m: Height of the simulated air; the particle engines know none.
         build_zone: The whole build zone, as if full of modules, whatever the layout; `None`
             without one. For gas dynamics only.
     """
 
-    site: Rectangle
-    charge_centre: tuple[float, float]
+    site_m: Rectangle
     charge: Charge
     structures: tuple["StructureOutline", ...]
     gauges: tuple[Gauge, ...] = ()
@@ -67,7 +65,7 @@ class BlastSite:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene(BlastSite):
-    """The initial state of one blast of particles, in simulation units.
+    """The initial state of one blast of particles; what moves is in simulation units.
 
     Attributes:
         balls: All balls; air first, then the charge.
@@ -76,6 +74,16 @@ class Scene(BlastSite):
 
     balls: Balls
     parameters: SimulationParameters
+
+    @cached_property
+    def site(self) -> Rectangle:
+        """The simulated area, units."""
+        return self.site_m.scaled(UNITS_PER_M)
+
+    @cached_property
+    def charge_centre(self) -> tuple[float, float]:
+        """Centre of the charge, units."""
+        return in_units(self.charge.position_m)
 
     @cached_property
     def impulse_quantum(self) -> float:
@@ -103,18 +111,18 @@ class Block(NamedTuple):
 
     Attributes:
         name: Its name; empty for a single module.
-        rectangle: Its plan, units.
+        rectangle_m: Its plan.
         height_m: Its height; `None` is as high as the air.
     """
 
     name: str
-    rectangle: Rectangle
+    rectangle_m: Rectangle
     height_m: float | None
 
 
 @dataclass(frozen=True)
 class StructureOutline:
-    """What a structure is before any blast; attributes as in `ModularObstacle`.
+    """What a structure is before any blast, in metres; attributes as in `ModularObstacle`.
 
     Three more are for gas dynamics: `height_m`, `None` for as high as the air; `heights_m`, the
     heights of single cells, in the order of `cells`, where they are not all `height_m`; and
@@ -123,7 +131,7 @@ class StructureOutline:
 
     kind: type[ModularObstacle]
     name: str
-    corner: tuple[float, float]
+    corner_m: tuple[float, float]
     rows: int
     columns: int
     protected: bool
@@ -136,16 +144,23 @@ class StructureOutline:
     pieces: tuple[str, ...] | None = None
 
     @property
-    def rectangle(self) -> Rectangle:
-        """The rectangle of the whole grid, units."""
-        size = (self.columns * MODULE_SIDE_UNITS, self.rows * MODULE_SIDE_UNITS)
-        return Rectangle.from_corner(self.corner, size)
+    def rectangle_m(self) -> Rectangle:
+        """The rectangle of the whole grid."""
+        size_m = (self.columns * MODULE_SIDE_M, self.rows * MODULE_SIDE_M)
+        return Rectangle.from_corner(self.corner_m, size_m)
+
+    def module_name(self, row: int, column: int) -> str:
+        """Return the identifier of the module in a cell."""
+        left, bottom = self.corner_m
+        return module_name(
+            left + (column + 0.5) * MODULE_SIDE_M, bottom + (row + 0.5) * MODULE_SIDE_M
+        )
 
     @property
     def blocks(self) -> tuple[Block, ...]:
         """The whole structure; of a barrier its pieces, or its modules where it has none."""
         if self.cells is None:
-            return (Block(self.name, self.rectangle, self.height_m),)
+            return (Block(self.name, self.rectangle_m, self.height_m),)
         count = len(self.cells)
         heights_m = self.heights_m or (self.height_m,) * count
         pieces = self.pieces or ("",) * count
@@ -155,16 +170,16 @@ class StructureOutline:
         return tuple(
             Block(
                 key if isinstance(key, str) else "",
-                self._around([cell for cell, _ in group]),
+                self._around_m([cell for cell, _ in group]),
                 group[0][1],
             )
             for key, group in groups.items()
         )
 
-    def _around(self, cells: Sequence[Cell]) -> Rectangle:
-        """Return the rectangle that cells fill, units."""
+    def _around_m(self, cells: Sequence[Cell]) -> Rectangle:
+        """Return the rectangle that cells fill."""
         rows, columns = zip(*cells, strict=True)
-        side, (left, bottom) = MODULE_SIDE_UNITS, self.corner
+        side, (left, bottom) = MODULE_SIDE_M, self.corner_m
         return Rectangle(
             left + min(columns) * side,
             bottom + min(rows) * side,
@@ -176,7 +191,7 @@ class StructureOutline:
         """Return the obstacle with all its parts unloaded."""
         return self.kind(
             name=self.name,
-            corner=self.corner,
+            corner=in_units(self.corner_m),
             rows=self.rows,
             columns=self.columns,
             protected=self.protected,

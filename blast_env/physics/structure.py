@@ -163,13 +163,23 @@ class ModularPart:
     @property
     def module_id(self) -> str:
         """Identifier made from the position of the centre in metres, unique on a site."""
-        return module_name(self.x / UNITS_PER_M, self.y / UNITS_PER_M)
+        return module_name(*self.centre_m)
+
+    @property
+    def centre_m(self) -> tuple[float, float]:
+        """The centre."""
+        return self.x / UNITS_PER_M, self.y / UNITS_PER_M
 
     @property
     def rectangle(self) -> Rectangle:
         """The square, units."""
         half = MODULE_SIDE_UNITS / 2.0
         return Rectangle(self.x - half, self.y - half, self.x + half, self.y + half)
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The square."""
+        return self.rectangle.scaled(1.0 / UNITS_PER_M)
 
     @property
     def destroyed(self) -> bool:
@@ -253,6 +263,11 @@ class ModularObstacle:
         """The rectangle of the whole grid, units."""
         size = (self.columns * MODULE_SIDE_UNITS, self.rows * MODULE_SIDE_UNITS)
         return Rectangle.from_corner(self.corner, size)
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The rectangle of the whole grid."""
+        return self.rectangle.scaled(1.0 / UNITS_PER_M)
 
     @property
     def hits(self) -> int:

@@ -12,7 +12,6 @@ from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import ModularObstacle
 from blast_env.tables import Column, as_types, texts
-from blast_env.units import UNITS_PER_M
 
 Columns = tuple[Column, ...]
 
@@ -196,8 +195,7 @@ def module_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
             part.structure,
             part.row,
             part.column,
-            part.x / UNITS_PER_M,
-            part.y / UNITS_PER_M,
+            *part.centre_m,
             part.hits,
             part.impulse,
             part.transferred_impulse,

@@ -28,7 +28,7 @@ from blast_env.plan import (
     Look,
 )
 from blast_env.rendering.style import nice_floor, render_extra, short_number
-from blast_env.units import MODULE_SIDE_M, MODULE_SIDE_UNITS, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M
 
 with render_extra():
     import matplotlib
@@ -40,38 +40,34 @@ class FrameView:
     """The site to scale, y upwards, in a frame whose y points down.
 
     Attributes:
-        site: The simulated area, units.
+        site_m: The simulated area.
         left_px: Left border of the site in the frame.
         top_px: Upper border of the site in the frame.
-        pixels_per_unit: Scale.
+        pixels_per_m: Scale.
     """
 
-    site: Rectangle
+    site_m: Rectangle
     left_px: int
     top_px: int
-    pixels_per_unit: float
+    pixels_per_m: float
 
-    @property
-    def pixels_per_m(self) -> float:
-        """The scale in pixels per metre."""
-        return self.pixels_per_unit * UNITS_PER_M
-
-    def pixels(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the pixel coordinates (n, 2), x and y, of places in units (n, 2)."""
-        origin = np.array([self.site.left, self.site.top])
-        scale = np.array([self.pixels_per_unit, -self.pixels_per_unit])
-        pixels: NDArray[np.float64] = (position - origin) * scale + (self.left_px, self.top_px)
+    def pixels(self, places_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pixel coordinates (n, 2), x and y, of places (n, 2)."""
+        origin_m = np.array([self.site_m.left, self.site_m.top])
+        scale = np.array([self.pixels_per_m, -self.pixels_per_m])
+        pixels: NDArray[np.float64] = (places_m - origin_m) * scale + (self.left_px, self.top_px)
         return pixels
 
-    def pixel(self, x: float, y: float) -> tuple[int, int]:
-        """Return the pixel, x and y, that shows a place in units."""
-        across, down = np.floor(self.pixels(np.array([[x, y]])))[0].tolist()
+    def pixel(self, x_m: float, y_m: float) -> tuple[int, int]:
+        """Return the pixel, x and y, that shows a place."""
+        across, down = np.floor(self.pixels(np.array([[x_m, y_m]])))[0].tolist()
         return int(across), int(down)
 
-    def rectangle(self, rectangle: Rectangle) -> pygame.Rect:
-        """Return the pixels that show a rectangle in units; neighbours share no pixel."""
-        corners = np.array([[rectangle.left, rectangle.top], [rectangle.right, rectangle.bottom]])
-        (left, top), (right, bottom) = np.rint(self.pixels(corners)).astype(int).tolist()
+    def rectangle(self, rectangle_m: Rectangle) -> pygame.Rect:
+        """Return the pixels that show a rectangle; neighbours share no pixel."""
+        left_m, bottom_m, right_m, top_m = rectangle_m
+        corners_m = np.array([[left_m, top_m], [right_m, bottom_m]])
+        (left, top), (right, bottom) = np.rint(self.pixels(corners_m)).astype(int).tolist()
         return pygame.Rect(left, top, max(right - left, 1), max(bottom - top, 1))
 
 
@@ -252,9 +248,9 @@ def draw_features(surface: pygame.Surface, view: FrameView, features: Iterable[F
     """Draw features by their geometry and their look, in their order."""
     for feature in features:
         if len(feature.places_m) > 2:
-            _draw_area(surface, view.rectangle(feature.bounds_m.scaled(UNITS_PER_M)), feature)
+            _draw_area(surface, view.rectangle(feature.bounds_m), feature)
             continue
-        places = [view.pixel(x * UNITS_PER_M, y * UNITS_PER_M) for x, y in feature.places_m]
+        places = [view.pixel(*place) for place in feature.places_m]
         if len(places) == 2:
             _draw_line(surface, places[0], places[1], feature.kind.look)
         else:
@@ -381,7 +377,7 @@ class Sheet:
         BlastEnvError: If the width is out of bounds.
     """
 
-    def __init__(self, site: Rectangle, width_px: int) -> None:
+    def __init__(self, site_m: Rectangle, width_px: int) -> None:
         if not _NARROWEST_PX <= width_px <= _WIDEST_PX:
             raise BlastEnvError(f"width_px is {width_px}, must be {_NARROWEST_PX} to {_WIDEST_PX}")
         self.width_px = width_px
@@ -393,12 +389,12 @@ class Sheet:
         third = second + round(1.4 * self.small.size_px)
         self.line_tops_px = (first, second, third)
         header_px = third + round(1.6 * self.small.size_px) + self.margin_px // 3
-        width, height = site.right - site.left, site.top - site.bottom
+        width, height = site_m.right - site_m.left, site_m.top - site_m.bottom
         # Neither width nor height gets out of hand.
         scale = min(self.room_px / width, _MOST_HIGH * width_px / height)
-        self.view = FrameView(site, (width_px - round(scale * width)) // 2, header_px, scale)
+        self.view = FrameView(site_m, (width_px - round(scale * width)) // 2, header_px, scale)
         self._footer_top_px = header_px + round(scale * height) + round(0.8 * self.margin_px)
-        self.border = self.view.rectangle(site).inflate(6, 6)
+        self.border = self.view.rectangle(site_m).inflate(6, 6)
 
     @property
     def room_px(self) -> int:
@@ -427,7 +423,7 @@ class Sheet:
         for block, (left, top) in flow(signs, self.room_px, self.margin_px)[0]:
             ground.blit(block, (self.margin_px + left, self._footer_top_px + top))
         self.write(ground, lines, _HEADING_SHARE)
-        ground.fill(SITE, self.view.rectangle(self.view.site))
+        ground.fill(SITE, self.view.rectangle(self.view.site_m))
         return ground
 
     def write(
@@ -464,7 +460,7 @@ def draw_obstacle(
 ) -> None:
     """Draw the modules in the colours of their loads, and the outline that tells the role."""
     is_barrier = obstacle.cells is not None
-    grid = not is_barrier and view.pixels_per_unit * MODULE_SIDE_UNITS >= _SMALLEST_GRID_PX
+    grid = not is_barrier and view.pixels_per_m * MODULE_SIDE_M >= _SMALLEST_GRID_PX
     for part in obstacle.parts:
         _draw_module(surface, view, part, full_impulse, grid)
     if is_barrier:
@@ -473,7 +469,7 @@ def draw_obstacle(
             pygame.draw.rect(surface, BARRIER, place, 2 if min(place.size) >= 7 else 1)
         return
     width = 3 if obstacle.protected else 2
-    around = view.rectangle(obstacle.rectangle).inflate(2 * width - 2, 2 * width - 2)
+    around = view.rectangle(obstacle.rectangle_m).inflate(2 * width - 2, 2 * width - 2)
     pygame.draw.rect(surface, PROTECTED if obstacle.protected else STRUCTURE, around, width)
 
 
@@ -482,8 +478,8 @@ def _wholes(barrier: ModularObstacle) -> list[Rectangle]:
     wholes: dict[str, Rectangle] = {}
     for part in barrier.parts:
         name = part.piece or part.module_id
-        left, bottom, right, top = part.rectangle
-        known = wholes.get(name, part.rectangle)
+        left, bottom, right, top = part.rectangle_m
+        known = wholes.get(name, part.rectangle_m)
         wholes[name] = Rectangle(
             min(left, known.left),
             min(bottom, known.bottom),
@@ -496,7 +492,7 @@ def _wholes(barrier: ModularObstacle) -> list[Rectangle]:
 def _draw_module(
     surface: pygame.Surface, view: FrameView, part: ModularPart, full_impulse: float, grid: bool
 ) -> None:
-    place = view.rectangle(part.rectangle)
+    place = view.rectangle(part.rectangle_m)
     if part.destroyed:
         draw_destroyed(surface, place)
         return
@@ -516,7 +512,7 @@ _NAME_GAP_PX = 6.0
 
 def draw_grid(surface: pygame.Surface, view: FrameView, zone_m: Rectangle) -> None:
     """Draw the cells of a build zone where they are large enough to be told apart."""
-    whole, side_px = view.rectangle(zone_m.scaled(UNITS_PER_M)), view.pixels_per_m * MODULE_SIDE_M
+    whole, side_px = view.rectangle(zone_m), view.pixels_per_m * MODULE_SIDE_M
     if side_px < _SMALLEST_GRID_PX:
         return
     for x in np.rint(np.arange(whole.left, whole.right, side_px)).astype(int).tolist():
@@ -550,19 +546,19 @@ def names_layer(
     """
 
     def box(feature: Feature) -> Rectangle:  # y upwards
-        place = view.rectangle(feature.bounds_m.scaled(UNITS_PER_M))
+        place = view.rectangle(feature.bounds_m)
         grown = _SIGN_PX if len(feature.places_m) == 1 else 0.0
         return Rectangle(place.left, -place.bottom, place.right, -place.top).grown(grown)
 
     labels = labels_of(features)[::-1]
     plates = [_plate(lettering, label) for label in labels]
     # The outer modules alone bear loads: a name on the inner ones hides nothing.
-    ring = MODULE_SIDE_UNITS * view.pixels_per_unit
+    ring = MODULE_SIDE_M * view.pixels_per_m
     wanted = [
         Wanted(box(label.feature), plate.get_size(), box(label.feature).grown(-ring))
         for label, plate in zip(labels, plates, strict=True)
     ]
-    site = view.rectangle(view.site)
+    site = view.rectangle(view.site_m)
     within = Rectangle(site.left, -site.bottom, site.right, -site.top).grown(-_NAME_GAP_PX)
     places = settle(wanted, [box(each) for each in solid(features)], within, _NAME_GAP_PX)
     layer = empty_surface(*size_px)

@@ -31,7 +31,6 @@ from blast_env.rendering.site_plan import (
     draw_loads,
     draw_outline,
     draw_plan,
-    in_metres,
     legend_of,
     load_colours,
     write_heading,
@@ -314,7 +313,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
 def _draw_structure(axes: Axes, obstacle: ModularObstacle, scale: Normalize) -> None:
     draw_loads(axes, obstacle, scale, linewidth=0.4)
     draw_outline(axes, obstacle)
-    left, bottom, right, top = in_metres(obstacle.rectangle)
+    left, bottom, right, top = obstacle.rectangle_m
     axes.set(xlim=(left - 0.25, right + 0.25), ylim=(bottom - 0.25, top + 0.25), aspect="equal")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")

@@ -33,7 +33,6 @@ from blast_env.rendering.heat_map import LoadScale, common_scale, heat_map
 from blast_env.rendering.site_plan import (
     draw_outline,
     draw_site,
-    in_metres,
     rectangle_patch,
     write_heading,
     write_names,
@@ -70,7 +69,7 @@ _DETAIL_RADII = 4.5  # half the width of the detail, in radii of the charge
 
 def model_scheme(scene: Scene) -> Figure:
     """Return the initial state with its three parts numbered, the paper's Figure 1."""
-    site_m = in_metres(scene.site)
+    site_m = scene.site_m
     aspect = (site_m.right - site_m.left) / (site_m.top - site_m.bottom)
     plan_in = min(max(_PLAN_HEIGHT_IN * aspect, 4.0), 8.5) + 0.8
     figure = Figure(figsize=(plan_in + _DETAIL_IN, 6.8), layout=ConstrainedLayoutEngine(h_pad=0.08))
@@ -97,17 +96,15 @@ def _feature_of(outline: StructureOutline) -> Feature:
     """Return a structure as a feature whose label is its name; a barrier has none."""
     kind = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE
     if outline.cells is not None:
-        return area_feature(Kinds.BARRIER, in_metres(outline.rectangle), outline.name)
-    return replace(
-        area_feature(kind, in_metres(outline.rectangle), outline.name), label=outline.name
-    )
+        return area_feature(Kinds.BARRIER, outline.rectangle_m, outline.name)
+    return replace(area_feature(kind, outline.rectangle_m, outline.name), label=outline.name)
 
 
 def _draw_obstacles(axes: Axes, scene: Scene) -> None:
     for outline in scene.structures:
         is_barrier = outline.cells is not None
         modules = PatchCollection(
-            [rectangle_patch(in_metres(part.rectangle)) for part in outline.build().parts],
+            [rectangle_patch(part.rectangle_m) for part in outline.build().parts],
             facecolor=unit_interval(load_colour(0.0)),
             edgecolor=unit_interval(BARRIER if is_barrier else STRUCTURE),
             linewidth=0.8 if is_barrier else 0.3,
@@ -190,7 +187,7 @@ def _targets(scene: Scene, site_m: Rectangle) -> list[tuple[int, NDArray[np.floa
     targets = [(2, np.array(scene.charge.position_m))]
     for outline in _numbered_structures(scene):
         last = outline.build().parts[-1]
-        targets.append((3, np.array([last.x, last.y]) / UNITS_PER_M))
+        targets.append((3, np.array(last.centre_m)))
     is_air = scene.balls.kind == CollisionType.AirBall
     if is_air.any():
         air_m = scene.balls.position[is_air] / UNITS_PER_M
@@ -205,12 +202,12 @@ def _numbered_structures(scene: Scene) -> list[StructureOutline]:
     """Return the barrier and one structure that a line from above reaches past all others."""
     barrier = [outline for outline in scene.structures if outline.cells is not None]
     structures = [outline for outline in scene.structures if outline.cells is None]
-    structures.sort(key=lambda outline: (not outline.protected, -outline.rectangle.top))
+    structures.sort(key=lambda outline: (not outline.protected, -outline.rectangle_m.top))
     for outline in structures:
         last = outline.build().parts[-1]
-        line = ((last.x, last.y), (last.x, scene.site.top))
+        line = (last.centre_m, (last.centre_m[0], scene.site_m.top))
         others = (other for other in scene.structures if other is not outline)
-        if not any(other.rectangle.meets_segment(*line) for other in others):
+        if not any(other.rectangle_m.meets_segment(*line) for other in others):
             return [outline, *barrier]
     return [*structures[:1], *barrier]
 

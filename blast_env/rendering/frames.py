@@ -48,7 +48,7 @@ from blast_env.rendering.style import (
     nice_ceiling,
     render_extra,
 )
-from blast_env.units import MS_PER_S
+from blast_env.units import MS_PER_S, UNITS_PER_M
 
 with render_extra():
     import pygame
@@ -100,7 +100,7 @@ class FramePainter:
         self.full_impulse = full_impulse
         self._unit = unit
         self._scene = scene
-        self._sheet = Sheet(scene.site, width_px)
+        self._sheet = Sheet(scene.site_m, width_px)
         features = blast_features(blast.scenario, blast.layout, scene.charge)
         self._on_ground = without(features, Kinds.SITE, *STANDING)
         signs = self._signs()
@@ -194,10 +194,12 @@ class FramePainter:
 
     def _draw_balls(self, surface: pygame.Surface, balls: BallStates) -> None:
         """Draw the air, and the explosive balls over it."""
-        centres = self.view.pixels(balls.position)
-        radius_px = np.maximum(balls.radius * self.view.pixels_per_unit, _SMALLEST_RADIUS_PX)
+        centres = self.view.pixels(balls.position / UNITS_PER_M)
+        radius_px = np.maximum(
+            balls.radius / UNITS_PER_M * self.view.pixels_per_m, _SMALLEST_RADIUS_PX
+        )
         quarters = np.rint(4.0 * radius_px).astype(np.int64)
-        surface.set_clip(self.view.rectangle(self.view.site))
+        surface.set_clip(self.view.rectangle(self.view.site_m))
         for kind in (CollisionType.AirBall, CollisionType.ExplosionBall):
             of_kind = balls.kind == kind
             for size in np.unique(quarters[of_kind]).tolist():

@@ -20,12 +20,11 @@ from blast_env.geometry import layout_counts
 from blast_env.physics.scene import WALLS, StructureOutline, WallName
 from blast_env.plan import FAINT, QUIET_INK
 from blast_env.rendering.site_plan import (
-    in_metres,
     load_colours,
     write_heading,
 )
 from blast_env.rendering.style import nice_ceiling, number_on_axis, render_extra, unit_interval
-from blast_env.units import MS_PER_S, UNITS_PER_M
+from blast_env.units import MS_PER_S
 
 with render_extra():
     from matplotlib.axes import Axes
@@ -131,7 +130,7 @@ def check_comparable(blasts: Sequence[GasBlast]) -> None:
     """
     first = blasts[0]
     for blast in blasts[1:]:
-        if blast.site.site != first.site.site:
+        if blast.site.site_m != first.site.site_m:
             raise BlastEnvError("the blasts to be compared have different sites")
         if blast.threat != first.threat:
             raise BlastEnvError(
@@ -276,7 +275,7 @@ def _outline(result: GasResult, structure: str | None) -> StructureOutline:
 
 
 def _length_m(outline: StructureOutline, wall: WallName) -> float:
-    left, bottom, right, top = in_metres(outline.rectangle)
+    left, bottom, right, top = outline.rectangle_m
     return right - left if _LEFT_TO_RIGHT[wall][0] == "x" else top - bottom
 
 
@@ -287,7 +286,7 @@ def _wall(result: GasResult, outline: StructureOutline, wall: WallName, kind: Ki
     """
     cell_m = result.run.grid.cell_m
     axis = _LEFT_TO_RIGHT[wall][0]
-    low = outline.corner["xy".index(axis)] / UNITS_PER_M
+    low = outline.corner_m["xy".index(axis)]
     height_m = outline.height_m or result.run.site.air_height_m
     shape = (round(height_m / cell_m), round(_length_m(outline, wall) / cell_m))
     values = np.full(shape, np.nan)
@@ -308,7 +307,7 @@ def _draw_wall(
     height_m: float,
 ) -> None:
     axis, falls = _LEFT_TO_RIGHT[wall]
-    low = outline.corner["xy".index(axis)] / UNITS_PER_M
+    low = outline.corner_m["xy".index(axis)]
     high = low + _length_m(outline, wall)
     axes.imshow(
         values,

@@ -25,7 +25,6 @@ from blast_env.rendering.site_plan import (
     add_outline,
     draw_features,
     draw_plan,
-    in_metres,
     legend_of,
     write_heading,
     write_legend,
@@ -169,7 +168,7 @@ def _features(result: GasResult) -> tuple[Feature, ...]:
 
 
 def _map_size_in(site: BlastSite, count: int) -> tuple[float, float]:
-    width, height = site.site.right - site.site.left, site.site.top - site.site.bottom
+    width, height = site.site_m.right - site.site_m.left, site.site_m.top - site.site_m.bottom
     plan_in = _MAP_WIDTHS_IN[0 if count > 1 else 1]
     low, high = _MAP_HEIGHTS_IN
     return count * plan_in + 1.6, min(max(plan_in * height / width, low), high) + 1.7
@@ -177,7 +176,7 @@ def _map_size_in(site: BlastSite, count: int) -> tuple[float, float]:
 
 def _on_site(result: GasResult, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return x and y of the cells on the site, and the values there (nx,), (ny,), (nx, ny)."""
-    grid, site = result.run.grid, in_metres(result.run.site.site)
+    grid, site = result.run.grid, result.run.site.site_m
     x_m, y_m = grid.centres_m(0), grid.centres_m(1)
     across = (x_m > site.left) & (x_m < site.right)
     along = (y_m > site.bottom) & (y_m < site.top)
@@ -203,7 +202,7 @@ def _contour_levels(parts: Sequence[FloatArray]) -> list[float]:
 def _draw_ground(
     axes: Axes, result: GasResult, values: FloatArray, levels: Sequence[float], scale: Normalize
 ) -> None:
-    grid, site_m = result.run.grid, in_metres(result.run.site.site)
+    grid, site_m = result.run.grid, result.run.site.site_m
     features = _features(result)
     draw_plan(axes, [each for each in features if each.kind is Kinds.SITE])
     x_m, y_m, inside = _on_site(result, values)
@@ -249,7 +248,7 @@ def _taken_over(result: GasResult) -> Circle:
 
 def _write_levels(axes: Axes, lines: QuadContourSet, result: GasResult) -> None:
     """Write the numbers of contours, but not on the border, nor over what stands."""
-    grid, site = result.run.grid, in_metres(result.run.site.site)
+    grid, site = result.run.grid, result.run.site.site_m
     clear_m = _NUMBER_CLEAR * (site.right - site.left)
     solid = np.argwhere(grid.solid[:, :, 0])
     solid_m = np.array(grid.origin_m)[:2] + grid.cell_m * (solid + 0.5)

@@ -22,7 +22,6 @@ from blast_env.rendering.site_plan import (
     draw_loads,
     draw_outline,
     draw_plan,
-    in_metres,
     legend_of,
     load_colours,
     write_heading,
@@ -191,7 +190,7 @@ def _draw_panel(
     scale: LoadScale,
     room_in: tuple[float, float],
 ) -> None:
-    rectangle = in_metres(obstacle.rectangle)
+    rectangle = obstacle.rectangle_m
     draw_loads(axes, obstacle, scale.norm, 0.6, scale.unit.factor)
     draw_outline(axes, obstacle)
     reach = 0.25
@@ -222,7 +221,7 @@ def _write_numbers(axes: Axes, obstacle: ModularObstacle, scale: LoadScale, size
         if part.hits:
             load = scale.unit.factor * part.impulse
             dark = load > _DARK_SHARE * scale.full
-            centre = in_metres(part.rectangle).centre
+            centre = part.rectangle_m.centre
             number = axes.text(
                 *centre,
                 short_number(load),

@@ -44,7 +44,7 @@ from blast_env.rendering.frames import FramePainter
 from blast_env.rendering.style import nice_ceiling, render_extra
 from blast_env.scenario import AnySource, BuildZone, Placement, PointSource, Scenario, VehicleSource
 from blast_env.scenario.build_scene import build_site
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M
 
 with render_extra():
     import pygame
@@ -89,7 +89,7 @@ class PlacingPainter:
     ) -> None:
         self._scenario = scenario
         self._has_vehicles = any(isinstance(source, VehicleSource) for source in sources)
-        self._sheet = Sheet(build_site(scenario).site, width_px)
+        self._sheet = Sheet(build_site(scenario).site_m, width_px)
         self._view = self._sheet.view
         given = without(site_features(scenario), Kinds.SITE, Kinds.CHARGE_PLACE)
         self._features = (*given, *source_features(sources))
@@ -142,7 +142,7 @@ class PlacingPainter:
         zone = self._scenario.build_zone
         if zone is None:
             return None
-        left_px, bottom_px = self._view.rectangle(zone.rectangle_m.scaled(UNITS_PER_M)).bottomleft
+        left_px, bottom_px = self._view.rectangle(zone.rectangle_m).bottomleft
         side_px = MODULE_SIDE_M * self._view.pixels_per_m
         cell = floor((bottom_px - place_px[1]) / side_px), floor((place_px[0] - left_px) / side_px)
         return cell if _is_in(zone, cell) else None
@@ -152,9 +152,7 @@ class PlacingPainter:
         zone = placement.scenario.zone
         colour = PROTECTED if placement.explain(element) is None else EXPLOSIVE
         inside = [cell for cell in placement.catalogue.cells(element) if _is_in(zone, cell)]
-        places = [
-            self._view.rectangle(zone.cell_rectangle_m(cell).scaled(UNITS_PER_M)) for cell in inside
-        ]
+        places = [self._view.rectangle(zone.cell_rectangle_m(cell)) for cell in inside]
         if places:
             around = places[0].unionall(places[1:]).inflate(4, 4)
             pygame.draw.rect(surface, colour, around, 3)
@@ -179,10 +177,10 @@ class PlacingPainter:
 
     def _draw_cells(self, surface: pygame.Surface, zone: BuildZone, placement: Placement) -> None:
         """Draw which cells are free and which are not."""
-        whole = self._view.rectangle(zone.rectangle_m.scaled(UNITS_PER_M))
+        whole = self._view.rectangle(zone.rectangle_m)
         _draw_unavailable(surface, whole)
         for free_m in rectangles_of(placement.open_ground, zone.corner_m):
-            surface.fill(FREE, self._view.rectangle(free_m.scaled(UNITS_PER_M)))
+            surface.fill(FREE, self._view.rectangle(free_m))
         draw_grid(surface, self._view, zone.rectangle_m)
 
 

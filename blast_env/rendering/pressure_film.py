@@ -34,7 +34,6 @@ from blast_env.rendering.pressure_frames import (
     VerticalSection,
     default_section,
 )
-from blast_env.rendering.site_plan import in_metres
 from blast_env.rendering.style import nice_ceiling
 
 _EVERY_S: Final = 0.0002  # of 100 kg
@@ -200,7 +199,7 @@ def _free_field_peak_kpa(site: BlastSite) -> float:
 
 
 def _distance_m(site: BlastSite, outline: StructureOutline) -> float:
-    left, bottom, right, top = in_metres(outline.rectangle)
+    left, bottom, right, top = outline.rectangle_m
     x_m, y_m = site.charge.position_m
     across, along = max(left - x_m, x_m - right, 0.0), max(bottom - y_m, y_m - top, 0.0)
     return hypot(across, along)
@@ -271,6 +270,6 @@ def _cell_of(
     Raises:
         BlastEnvError: If a plane is outside the grid.
     """
-    place = [*in_metres(site.site).centre]
+    place = [*site.site_m.centre]
     place[section.normal] = section.at_m
     return grid.cell_at((place[0], place[1], height_m))

@@ -47,7 +47,6 @@ from blast_env.rendering.gas import (
 from blast_env.rendering.site_plan import (
     draw_charge,
     draw_features,
-    in_metres,
     legend_of,
     rectangle_patch,
 )
@@ -105,7 +104,7 @@ def default_section(site: BlastSite) -> VerticalSection:
     x_m, y_m = site.charge.position_m
     solids = [each for each in site.structures if each.cells is None]
     chosen = [each for each in solids if each.protected] or solids
-    centres = [in_metres(each.rectangle).centre for each in chosen]
+    centres = [each.rectangle_m.centre for each in chosen]
     if not centres:
         return VerticalSection("y", y_m)
     across = sum(abs(centre[0] - x_m) for centre in centres)
@@ -280,7 +279,7 @@ class PressurePainter:
         self.scale = AsinhNorm(_LINEAR_SHARE * full_kpa, -full_kpa, full_kpa)
         self._per_unit = 0.5 / float(np.arcsinh(1.0 / _LINEAR_SHARE))
         self._colours: Frame = colormaps[_COLOURS](np.arange(256), bytes=True)
-        site_m = in_metres(shots[0].result.run.site.site)
+        site_m = shots[0].result.run.site.site_m
         self._site_m = site_m
         self._high_m = shots[0].result.run.site.air_height_m
         along = 1 - shots[0].section.normal
@@ -602,7 +601,7 @@ def _solids(site: BlastSite) -> list[Feature]:
             kind, fill = Kinds.BARRIER, BARRIER
         else:
             kind, fill = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE, FAINT
-        feature = area_feature(kind, in_metres(outline.rectangle), outline.name)
+        feature = area_feature(kind, outline.rectangle_m, outline.name)
         found.append(replace(feature, fill=fill, words="barrier" if fill is BARRIER else ""))
     return found
 
@@ -610,5 +609,5 @@ def _solids(site: BlastSite) -> list[Feature]:
 def _parts(outline: StructureOutline) -> list[Rectangle]:
     """Return a structure's rectangle, or those of a barrier's modules, in metres."""
     if outline.cells is None:
-        return [in_metres(outline.rectangle)]
-    return [in_metres(part.rectangle) for part in outline.build().parts]
+        return [outline.rectangle_m]
+    return [part.rectangle_m for part in outline.build().parts]

@@ -24,7 +24,6 @@ from blast_env.plan import (
     area_feature,
 )
 from blast_env.rendering.style import render_extra, unit_interval
-from blast_env.units import UNITS_PER_M
 
 with render_extra():
     from matplotlib import patheffects
@@ -70,11 +69,6 @@ def load_colours() -> Colormap:
     colours = [unit_interval(colour) for colour in LoadColours()]
     colour_map = LinearSegmentedColormap.from_list("load", colours)
     return colour_map.with_extremes(bad=unit_interval(PAGE))
-
-
-def in_metres(rectangle: Rectangle) -> Rectangle:
-    """Return a rectangle in units as one in metres."""
-    return rectangle.scaled(1.0 / UNITS_PER_M)
 
 
 def rectangle_patch(rectangle: Rectangle) -> RectanglePatch:
@@ -243,7 +237,7 @@ def draw_outline(axes: Axes, obstacle: Obstacle, linewidth: float = 1.6) -> None
         colour = PROTECTED if obstacle.protected else STRUCTURE
         add_outline(
             axes,
-            in_metres(obstacle.rectangle),
+            obstacle.rectangle_m,
             edgecolor=unit_interval(colour),
             linewidth=1.5 * linewidth if obstacle.protected else linewidth,
             zorder=3,
@@ -275,7 +269,7 @@ def draw_loads(
     )
     is_barrier = obstacle.cells is not None
     modules = PatchCollection(
-        [rectangle_patch(in_metres(part.rectangle)) for part in obstacle.parts],
+        [rectangle_patch(part.rectangle_m) for part in obstacle.parts],
         cmap=load_colours(),
         norm=scale,
         edgecolor=unit_interval(BARRIER if is_barrier else STRUCTURE),
@@ -283,7 +277,7 @@ def draw_loads(
     )
     modules.set_array(impulse)
     axes.add_collection(modules)
-    destroyed = [in_metres(part.rectangle) for part in obstacle.parts if part.destroyed]
+    destroyed = [part.rectangle_m for part in obstacle.parts if part.destroyed]
     crosses = [
         line
         for left, bottom, right, top in destroyed

@@ -15,7 +15,7 @@ from blast_env.geometry import layout_counts
 from blast_env.physics.particles import CollisionType, distance_to_rectangle
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import Colour
-from blast_env.units import MODULE_SIDE_UNITS
+from blast_env.units import MODULE_SIDE_M
 
 
 @contextmanager
@@ -86,13 +86,13 @@ def free_flight_impulse(scene: Scene) -> float:
     explosive = balls.kind == CollisionType.ExplosionBall
     speed = (balls.velocity[explosive] ** 2).sum(axis=1) ** 0.5
     momentum = float((balls.mass[explosive] * speed).sum())
-    centre = balls.position[:1] * 0.0 + scene.charge_centre
-    distance = min(
-        float(distance_to_rectangle(centre, outline.rectangle)[0])
+    centre_m = np.array([scene.charge.position_m])
+    distance_m = min(
+        float(distance_to_rectangle(centre_m, outline.rectangle_m)[0])
         for outline in scene.structures
         if outline.cells is None
     )
-    share = min(MODULE_SIDE_UNITS / (2.0 * pi * max(distance, MODULE_SIDE_UNITS)), 1.0)
+    share = min(MODULE_SIDE_M / (2.0 * pi * max(distance_m, MODULE_SIDE_M)), 1.0)
     return momentum * share
 
 

@@ -34,7 +34,7 @@ from blast_env.scenario.vehicles import (
     obstacles_of,
 )
 from blast_env.scenario.zone import TOLERANCE_M, distance_m
-from blast_env.units import UNITS_PER_M
+from blast_env.units import UNITS_PER_M, in_units
 from blast_env.values import checked_seed
 
 
@@ -138,8 +138,7 @@ def build_site(
     if placement.layout:
         structures += (barrier_outline(scenario.zone, placement.layout),)
     return BlastSite(
-        site=scenario.site.rectangle_m.scaled(UNITS_PER_M),
-        charge_centre=(charge.position_m[0] * UNITS_PER_M, charge.position_m[1] * UNITS_PER_M),
+        site_m=scenario.site.rectangle_m,
         charge=charge,
         structures=structures,
         gauges=tuple(Gauge(each.name, each.position_m) for each in scenario.gauges),
@@ -174,18 +173,18 @@ def build_scene(
     _check_not_over_a_roof(scenario, base.charge)
     parameters = _parameters_for(scenario, base.charge)
     _, fan_rng, air_rng = random_streams(seed)
+    centre = in_units(base.charge.position_m)
     air = air_lattice(
         parameters.air,
-        base.site,
+        base.site_m.scaled(UNITS_PER_M),
         _solid_rectangles(base.structures),
-        base.charge_centre,
+        centre,
         parameters.explosive.offset_units + parameters.explosive.radius_units,
         air_rng,
     )
-    fan = explosion_fan(parameters.explosive, base.charge_centre, fan_rng)
+    fan = explosion_fan(parameters.explosive, centre, fan_rng)
     return Scene(
-        site=base.site,
-        charge_centre=base.charge_centre,
+        site_m=base.site_m,
         charge=base.charge,
         balls=Balls.concatenate((air, fan)),
         structures=base.structures,
@@ -238,11 +237,11 @@ def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
 
 
 def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]:
-    """Return rectangles that cover the modules: whole grids, and single cells of a barrier."""
+    """Return rectangles that cover the modules, units: grids, and single cells of a barrier."""
     rectangles: list[Rectangle] = []
     for outline in structures:
         if outline.cells is None:
-            rectangles.append(outline.rectangle)
+            rectangles.append(outline.rectangle_m.scaled(UNITS_PER_M))
         else:
             rectangles.extend(part.rectangle for part in outline.build().parts)
     return rectangles
@@ -253,7 +252,7 @@ def _outline(section: AnyStructure) -> StructureOutline:
     return StructureOutline(
         kind=ConcreteSquare if is_square else ModularObstacle,
         name=section.name,
-        corner=(section.corner_m[0] * UNITS_PER_M, section.corner_m[1] * UNITS_PER_M),
+        corner_m=section.corner_m,
         rows=section.rows,
         columns=section.columns,
         protected=section.protected,
@@ -280,7 +279,7 @@ def barrier_outline(zone: BuildZone, layout: Layout) -> StructureOutline:
     return StructureOutline(
         kind=ModularObstacle,
         name=BARRIER_NAME,
-        corner=(zone.corner_m[0] * UNITS_PER_M, zone.corner_m[1] * UNITS_PER_M),
+        corner_m=zone.corner_m,
         rows=zone.rows,
         columns=zone.columns,
         protected=False,

@@ -23,7 +23,6 @@ from blast_env.rendering.site_plan import (
     draw_loads,
     draw_outline,
     draw_site,
-    in_metres,
     legend_of,
     load_colours,
     rectangle_patch,
@@ -127,7 +126,7 @@ def _draw_plans(plans: Sequence[Axes], evaluation: LayoutEvaluation) -> None:
 def _draw_plan(
     axes: Axes, scenario: Scenario, scene: Scene, impulse: dict[str, float], scale: Normalize
 ) -> None:
-    draw_site(axes, in_metres(scene.site))
+    draw_site(axes, scene.site_m)
     if scenario.build_zone is not None:
         _draw_cells(axes, scenario, scenario.build_zone)
         draw_features(axes, _conditions(scenario))
@@ -140,7 +139,7 @@ def _draw_plan(
             draw_outline(axes, obstacle)
             continue
         colour = unit_interval(STRUCTURE if obstacle.cells is None else BARRIER)
-        parts = [rectangle_patch(in_metres(part.rectangle)) for part in obstacle.parts]
+        parts = [rectangle_patch(part.rectangle_m) for part in obstacle.parts]
         axes.add_collection(PatchCollection(parts, color=colour, linewidth=0.3, zorder=4))
     share = 1.0 / sum(source.weight for source in scenario.charge)
     for source in scenario.charge:

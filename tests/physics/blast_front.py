@@ -27,6 +27,7 @@ from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.scene import Charge, Scene, StructureOutline
 from blast_env.physics.structure import ModularObstacle
+from blast_env.units import UNITS_PER_M
 
 SPACING_UNITS: Final = 10.0
 
@@ -90,12 +91,11 @@ class FrontCase:
         air = air_lattice(parameters.air, site, [], centre, SPACING_UNITS + radius, rng)
         fan = explosion_fan(parameters.explosive, centre, rng)
         # A run ends when no structure can be reached: this one is in a corner.
-        far = StructureOutline(ModularObstacle, "far", (2.0, 2.0), 1, 1, True, 1.0, None, None)
+        far = StructureOutline(ModularObstacle, "far", (0.5, 0.5), 1, 1, True, 1.0, None, None)
         balls = Balls.concatenate((air, fan))
         return Scene(
-            site=site,
-            charge_centre=centre,
-            charge=Charge(centre, 100.0),
+            site_m=site.scaled(1.0 / UNITS_PER_M),
+            charge=Charge((side / 8.0, side / 8.0), 100.0),
             balls=balls,
             structures=(far,),
             parameters=parameters,

@@ -13,6 +13,7 @@ from blast_env.physics.parameters import SimulationParameters, with_overrides
 from blast_env.physics.particles import Balls, CollisionType
 from blast_env.physics.scene import Charge, Scene, StructureOutline
 from blast_env.physics.structure import ModularObstacle
+from blast_env.units import UNITS_PER_M
 
 EXPLOSIVE, AIR = CollisionType.ExplosionBall, CollisionType.AirBall
 KEEP_MASS: dict[str, object] = {"air_shrink": 1.0, "module_shrink": 1.0}
@@ -58,7 +59,7 @@ def wall(
     return StructureOutline(
         kind=ModularObstacle,
         name=name,
-        corner=corner,
+        corner_m=(corner[0] / UNITS_PER_M, corner[1] / UNITS_PER_M),
         rows=rows,
         columns=columns,
         protected=True,
@@ -76,8 +77,7 @@ def scene(
 ) -> Scene:
     """Return a scene with exactly these balls and structures."""
     return Scene(
-        site=Rectangle(0.0, 0.0, *size),
-        charge_centre=(size[0] / 2, size[1] / 2),
+        site_m=Rectangle(0.0, 0.0, *size).scaled(1.0 / UNITS_PER_M),
         charge=Charge((size[0] / 8, size[1] / 8), 100.0),
         balls=of_balls,
         structures=tuple(structures),

@@ -49,9 +49,11 @@ def blast(kind: str) -> Scene:
     settings = parameters(air=of_air, explosive=of_charge, contact=contact, stepping=stepping)
     rng = np.random.default_rng(11)
     facade, site = wall((46.0, 10.0), 20, 2, capacity=2000.0), Rectangle(0.0, 0.0, 64.0, 60.0)
-    air = air_lattice(settings.air, site, [facade.rectangle], (30.0, 30.0), 2.0, rng)
+    air = air_lattice(settings.air, site, [facade.build().rectangle], (30.0, 30.0), 2.0, rng)
     fan = explosion_fan(settings.explosive, (30.0, 30.0), rng)
-    return replace(scene(Balls.concatenate((air, fan)), [facade], settings), site=site)
+    return replace(
+        scene(Balls.concatenate((air, fan)), [facade], settings), site_m=site.scaled(0.25)
+    )
 
 
 @cache

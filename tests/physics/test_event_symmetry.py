@@ -49,7 +49,7 @@ def blast(turn: Turn | None, air: dict[str, object], contact: dict[str, object])
     rng = np.random.default_rng(5)
     corner, rows, columns = (20.0, -9.0), 10, 4
     cells = tuple((r, c) for r in range(rows) for c in range(columns) if (r, c) != (3, 0))
-    rectangle = wall(corner, rows, columns).rectangle
+    rectangle = wall(corner, rows, columns).build().rectangle
     lattice = air_lattice(of_parameters.air, SITE, [rectangle], (-7.3, 1.7), 2.0, rng)
     fan = explosion_fan(of_parameters.explosive, (-7.3, 1.7), rng)
     of_balls = Balls.concatenate((lattice, fan))
@@ -67,7 +67,7 @@ def blast(turn: Turn | None, air: dict[str, object], contact: dict[str, object])
         wall(tuple(corner), 1, 1, f"module {number}")
         for number, corner in enumerate(corners.tolist())
     ]
-    return replace(scene(of_balls, modules, of_parameters), site=SITE)
+    return replace(scene(of_balls, modules, of_parameters), site_m=SITE.scaled(0.25))
 
 
 def loads(obstacles: tuple[ModularObstacle, ...]) -> list[tuple[int, float, float]]:

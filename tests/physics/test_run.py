@@ -195,9 +195,11 @@ def test_a_mirrored_scene_gives_exactly_mirrored_loads(engine: ParticleEngine, s
     of_parameters = parameters(stepping={"time_limit_s": 0.1})
     right = wall((32.0, -10.0), 10, 4)
     site = Rectangle(-80.0, -50.0, 80.0, 50.0)
-    air = air_lattice(of_parameters.air, site, [right.rectangle], (0.0, 0.0), 2.0, rng)
+    air = air_lattice(of_parameters.air, site, [right.build().rectangle], (0.0, 0.0), 2.0, rng)
     fan = explosion_fan(of_parameters.explosive, (0.0, 0.0), rng)
-    plain = replace(scene(Balls.concatenate((air, fan)), [right], of_parameters, size), site=site)
+    plain = replace(
+        scene(Balls.concatenate((air, fan)), [right], of_parameters, size), site_m=site.scaled(0.25)
+    )
     mirrored = replace(
         plain,
         balls=replace(
@@ -205,7 +207,7 @@ def test_a_mirrored_scene_gives_exactly_mirrored_loads(engine: ParticleEngine, s
             position=plain.balls.position * (-1.0, 1.0),
             velocity=plain.balls.velocity * (-1.0, 1.0),
         ),
-        structures=(replace(right, corner=(-40.0, -10.0)),),
+        structures=(replace(right, corner_m=(-10.0, -2.5)),),
     )
     loads = []
     for of_scene in (plain, mirrored):

@@ -15,11 +15,11 @@ from blast_env.plan import BARRIER, BORDER, EXPLOSIVE, PROTECTED
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.frames import FramePainter, balls_at_start
 from blast_env.rendering.style import AIR
-from blast_env.units import MODULE_SIDE_UNITS
+from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
 
 
 def pixel_at(painter: FramePainter, frame: Frame, x: float, y: float) -> tuple[int, ...]:
-    across, down = painter.view.pixel(x, y)
+    across, down = painter.view.pixel(x / UNITS_PER_M, y / UNITS_PER_M)
     return tuple(int(channel) for channel in frame[down, across])
 
 
@@ -78,7 +78,7 @@ def test_small_balls_stay_visible(blast: Blast) -> None:
 def test_y_points_up_and_scales_are_equal(blast: Blast) -> None:
     view = FramePainter(blast).view
     left, low = view.pixel(0.0, 0.0)
-    right, high = view.pixel(80.0, 80.0)
+    right, high = view.pixel(20.0, 20.0)
     assert high < low
     assert right - left == pytest.approx(low - high, abs=1)
     assert right - left == pytest.approx(20.0 * view.pixels_per_m, abs=1)
@@ -87,7 +87,7 @@ def test_y_points_up_and_scales_are_equal(blast: Blast) -> None:
 def test_the_border_is_red_all_around(blast: Blast) -> None:
     painter = FramePainter(blast)
     frame = start_frame(painter, blast)
-    ring = painter.view.rectangle(blast.scene.site).inflate(2, 2)
+    ring = painter.view.rectangle(blast.scene.site_m).inflate(2, 2)
     for edge in (
         frame[ring.top, ring.left : ring.right],
         frame[ring.bottom - 1, ring.left : ring.right],
@@ -114,10 +114,10 @@ def test_protected_structures_and_barrier_modules_have_their_outlines(barrier_bl
     painter = FramePainter(barrier_blast)
     frame = start_frame(painter, barrier_blast)
     shelter, _, barrier = barrier_blast.scene.obstacles()
-    ring = painter.view.rectangle(shelter.rectangle).inflate(2, 2)
+    ring = painter.view.rectangle(shelter.rectangle_m).inflate(2, 2)
     assert (frame[ring.top : ring.bottom, ring.left] == PROTECTED).all()
     for part in barrier.parts:
-        place = painter.view.rectangle(part.rectangle)
+        place = painter.view.rectangle(part.rectangle_m)
         assert (frame[place.top, place.left : place.right] == BARRIER).all()
 
 
@@ -129,7 +129,7 @@ def test_a_destroyed_module_looks_different(blast: Blast) -> None:
     part.impulse, part.capacity = 1.0, 0.5
     broken = painter.paint(balls_at_start(blast.scene), obstacles, 0.0)
     changed = np.argwhere((whole != broken).any(axis=2))
-    place = painter.view.rectangle(part.rectangle)
+    place = painter.view.rectangle(part.rectangle_m)
     assert len(changed) > 0.5 * place.width * place.height
     changed = changed[changed[:, 0] >= painter.view.top_px]  # above, the load so far changes
     assert (changed.min(axis=0) >= (place.top, place.left)).all()
@@ -204,6 +204,6 @@ def test_module_squares_touch_without_a_gap(blast: Blast) -> None:
     for left, right in pairwise(parts[:6]):
         assert right.x - left.x == MODULE_SIDE_UNITS
         assert (
-            painter.view.rectangle(left.rectangle).right
-            == painter.view.rectangle(right.rectangle).left
+            painter.view.rectangle(left.rectangle_m).right
+            == painter.view.rectangle(right.rectangle_m).left
         )

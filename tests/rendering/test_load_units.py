@@ -12,7 +12,7 @@ from blast_env.rendering.figures import common_scale, heat_map, impulse_over_tim
 from blast_env.rendering.film import scale_end
 from blast_env.rendering.frames import ONE_SEED, FramePainter
 from blast_env.rendering.style import nice_ceiling
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M
 from tests.agents.search_cases import small_scenario
 
 WALL = ((1, 0), (2, 0))
@@ -46,9 +46,7 @@ def test_a_load_spread_evenly_over_the_seen_width_is_that_of_the_structure(
     unit = bare.load_unit
     (building,) = (each for each in bare.obstacles if each.protected)
     pa_s = bare.impulse(building.name).pa_s
-    width_m = seen_width_m(
-        building.rectangle.scaled(1.0 / UNITS_PER_M), bare.blast.scene.charge.position_m
-    )
+    width_m = seen_width_m(building.rectangle_m, bare.blast.scene.charge.position_m)
     each = building.impulse * MODULE_SIDE_M / width_m
     assert unit.factor * each == pytest.approx(pa_s)
     assert unit.of_structure(building) == f"{pa_s:,.0f} Pa s"

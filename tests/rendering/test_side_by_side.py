@@ -82,7 +82,7 @@ def test_the_barrier_is_in_its_own_half_alone(barrier_blast: Blast, both: Writte
     first = both.frames[0].astype(int)
     painter = FramePainter(barrier_blast, width_px=WIDTH_PX // 2)
     part = barrier_blast.scene.obstacles()[-1].parts[0]
-    across, down = painter.view.pixel(part.x, part.y)
+    across, down = painter.view.pixel(*part.centre_m)
     left, right = first[down, across], first[down, across + WIDTH_PX // 2]
     assert np.abs(left - right).max() > 8  # an unloaded module beside the colour of the ground
 

@@ -11,7 +11,7 @@ from blast_env.geometry import Rectangle
 from blast_env.physics.particles import Balls, CollisionType
 from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularPart, wall_surface
-from blast_env.units import MODULE_SIDE_UNITS
+from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
 
 RecordArray = NDArray[np.void]
 
@@ -380,8 +380,8 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
     loads = np.zeros(len(parts), dtype=LOAD)
     loads["first_hit_s"] = np.inf
     loads["capacity"] = [np.inf if part.capacity is None else part.capacity for part in parts]
-    structures = [outline.rectangle for outline in scene.structures if outline.cells is None]
-    targets = np.array(structures, dtype=np.float64).reshape(-1, 4)
+    structures = [each.rectangle_m for each in scene.structures if each.cells is None]
+    targets = UNITS_PER_M * np.array(structures, dtype=np.float64).reshape(-1, 4)
     progress = np.zeros(1, dtype=PROGRESS)[0]
     cells = _cells(scene.site, rules)
     surfaces, modules = np.empty(0, dtype=SURFACE), np.empty(0, dtype=np.int32)

@@ -31,7 +31,7 @@ from blast_env.physics.gas.source import (
     set_charge,
 )
 from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M
 
 _SOUND_M_S: Final = 340.0
 _MOST_BYTES: Final = 8 * 2**30
@@ -194,8 +194,8 @@ class GasRun:
 
 def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
     """Return the scaled distance of a structure's nearest point in plan, m/kg^(1/3)."""
-    distance = _distance_units(site.charge_centre, structure) / UNITS_PER_M
-    return hypot(distance, site.charge.height_m) / cbrt(site.charge.tnt_kg)
+    distance_m = _distance_m(site.charge.position_m, structure)
+    return hypot(distance_m, site.charge.height_m) / cbrt(site.charge.tnt_kg)
 
 
 def _grid(settings: GasSettings, site: BlastSite) -> tuple[GasGrid, NDArray[np.int64]]:
@@ -206,8 +206,8 @@ def _grid(settings: GasSettings, site: BlastSite) -> tuple[GasGrid, NDArray[np.i
     """
     cell_m = settings.cell_m
     margin = ceil(settings.margin_m / cell_m)
-    low = np.array([site.site.left, site.site.bottom]) / UNITS_PER_M
-    high = np.array([site.site.right, site.site.top]) / UNITS_PER_M
+    low = np.array([site.site_m.left, site.site_m.bottom])
+    high = np.array([site.site_m.right, site.site_m.top])
     plan = np.ceil(np.round((high - low) / cell_m, 9)).astype(int) + 2 * margin
     shape = (int(plan[0]), int(plan[1]), ceil(round(site.air_height_m / cell_m, 9)))
     origin = low - margin * cell_m
@@ -245,7 +245,7 @@ def _modules_at(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return row and column of the module at each column of cells (nx, ny), -1 for none."""
     x_m, y_m = grid.centres_m(0), grid.centres_m(1)
-    left, bottom = (coordinate / UNITS_PER_M for coordinate in outline.corner)
+    left, bottom = outline.corner_m
     column = np.floor((x_m - left) / MODULE_SIDE_M).astype(np.int64)[:, np.newaxis]
     row = np.floor((y_m - bottom) / MODULE_SIDE_M).astype(np.int64)[np.newaxis, :]
     here = (column >= 0) & (column < outline.columns) & (row >= 0) & (row < outline.rows)
@@ -301,8 +301,8 @@ def _way_m(charge: GasCharge, site: BlastSite, watched: Sequence[int]) -> float:
     """
     x_m, y_m, _ = charge.position_m
     corners = [
-        (x / UNITS_PER_M, y / UNITS_PER_M)
-        for left, bottom, right, top in (site.structures[k].rectangle for k in watched)
+        (x, y)
+        for left, bottom, right, top in (site.structures[k].rectangle_m for k in watched)
         for x in (left, right)
         for y in (bottom, top)
     ]
@@ -310,10 +310,10 @@ def _way_m(charge: GasCharge, site: BlastSite, watched: Sequence[int]) -> float:
     return max((hypot(x - x_m, y - y_m) for x, y in places), default=0.0)
 
 
-def _distance_units(point: tuple[float, float], outline: StructureOutline) -> float:
-    left, bottom, right, top = outline.rectangle
-    across = max(left - point[0], point[0] - right, 0.0)
-    along = max(bottom - point[1], point[1] - top, 0.0)
+def _distance_m(point_m: tuple[float, float], outline: StructureOutline) -> float:
+    left, bottom, right, top = outline.rectangle_m
+    across = max(left - point_m[0], point_m[0] - right, 0.0)
+    along = max(bottom - point_m[1], point_m[1] - top, 0.0)
     return hypot(across, along)
 
 

@@ -47,8 +47,7 @@ def test_mass_scales_the_opening() -> None:
 def test_gauges_nearer_than_the_first_obstacle_miss_nothing() -> None:
     """They had missed the front: it is laid onto the grid when it has already passed them."""
     site = BlastSite(
-        site=Rectangle(0.0, 0.0, 48.0, 40.0),
-        charge_centre=(8.0, 20.0),
+        site_m=Rectangle(0.0, 0.0, 12.0, 10.0),
         charge=Charge((2.0, 5.0), 5.0),
         structures=(),
         gauges=(Gauge("near", (5.25, 5.25, 0.25)),),
