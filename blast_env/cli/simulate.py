@@ -17,6 +17,7 @@ from blast_env.cli.output import (
     progress_bar,
     result_console,
 )
+from blast_env.cli.pieces import print_pieces
 from blast_env.cli.targets import PICTURES
 from blast_env.engines import Blast, BlastResult, Engine, find_engine
 from blast_env.engines.table import load_plugin
@@ -435,6 +436,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         charge = result.run.site.charge
         self.print_table(charge, f"{charge.height_m:g} m high", rows)
         _print_gauges(result.gauges)
+        print_pieces(result.pieces, "does the barrier stand")
         cells = " x ".join(str(count) for count in result.run.grid.shape)
         notes = dict.fromkeys(note for each in scaled.values() for note in _notes(each))
         texts = [f"outside what was checked (~): {note}" for note in notes]
@@ -519,6 +521,8 @@ def _record(
     }
     if not isinstance(result, BlastResult):
         content["gauges"] = _rows(result.gauges)
+        content["bays"] = _rows(result.bays)
+        content["pieces"] = _rows(result.pieces)
     if all_of_it:
         content["modules"] = _rows(result.modules)
     return content | {"files": [str(path) for path in written]}

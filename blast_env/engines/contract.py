@@ -38,7 +38,7 @@ class EngineOption:
     help: str
 
 
-class BlastOutcome(Protocol):
+class Result(Protocol):
     """What happened in a blast, whichever engine ran it."""
 
     @property
@@ -53,7 +53,7 @@ class BlastOutcome(Protocol):
 class RunnableBlast(Protocol):
     """One blast that can be run to its end."""
 
-    def run(self, progress: Callable[[float], None] | None = None) -> BlastOutcome:
+    def run(self, progress: Callable[[float], None] | None = None) -> Result:
         """Run the blast.
 
         Args:

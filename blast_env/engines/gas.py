@@ -21,6 +21,7 @@ from blast_env.calibration.model import ScaledImpulse
 from blast_env.engines.bays import BAY_COLUMNS, BayLoads
 from blast_env.engines.contract import Engine, EngineOption
 from blast_env.engines.loads import BlastLoads, StructureLoad
+from blast_env.engines.pieces import PIECE_COLUMNS, PieceLoads
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Element, layout_text
 from blast_env.physics.engine import EndReason
@@ -208,11 +209,14 @@ class GasBlast:
         bays = BayLoads.begin(run, self.scenario.bays)
         if bays.bays:
             run.record(bays.recorder)
+        pieces = PieceLoads.begin(run, self.scenario, self.layout)
+        if pieces is not None:
+            run.record(pieces.recorder)
         while run.end_reason is None:
             run.advance(run.time_s + run.limit_s / _PROGRESS_CALLS)
             if progress is not None:
                 progress(min(run.time_s / run.limit_s, 1.0))
-        return GasResult(self, run, bays)
+        return GasResult(self, run, bays, pieces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,11 +227,14 @@ class GasResult:
         blast: What was run.
         run: The run, at its end.
         bay_loads: Histories of the bays of facades; `None` where nobody recorded them.
+        piece_loads: Histories on both sides of the barrier's pieces; `None` where nobody recorded
+            them, or no piece has a height.
     """
 
     blast: GasBlast
     run: "GasRun"
     bay_loads: BayLoads | None = None
+    piece_loads: PieceLoads | None = None
 
     @property
     def engine_name(self) -> str:
@@ -383,6 +390,23 @@ class GasResult:
             raise UnknownNameError("bay", name, ())
         return self.bay_loads.history(name)
 
+    @cached_property
+    def pieces(self) -> "pd.DataFrame":
+        """One row a piece of the barrier: does it stand? See `PIECE_COLUMNS`."""
+        if self.piece_loads is None:
+            return table_of([], PIECE_COLUMNS)
+        return self.piece_loads.table(self.time_s)
+
+    def piece_history(self, name: str) -> "pd.DataFrame":
+        """Return the mean overpressures on the sides of a piece: `time_s`, `west_pa` and others.
+
+        Raises:
+            UnknownNameError: If there is no piece of that name with a height.
+        """
+        if self.piece_loads is None:
+            raise UnknownNameError("piece", name, ())
+        return self.piece_loads.history(name)
+
     def impulse(self, structure: str) -> ScaledImpulse:
         """Return the impulse of all positive phases, mean over the walls that count.
 
@@ -506,11 +530,15 @@ class GasResult:
         """
         from blast_env.recording.excel import SheetTable, write_tables
 
-        tables = (
+        tables = [
             SheetTable("Structures", self.structures, STRUCTURE_COLUMNS),
             SheetTable("Modules", self.modules, MODULE_COLUMNS),
             SheetTable("Gauges", self.gauges, GAUGE_COLUMNS),
-        )
+        ]
+        if len(self.bays):
+            tables.append(SheetTable("Bays", self.bays, BAY_COLUMNS))
+        if len(self.pieces):
+            tables.append(SheetTable("Pieces", self.pieces, PIECE_COLUMNS))
         return write_tables(self.run_record, tables, path)
 
     def to_parquet(self, path: str | Path) -> Path:

@@ -312,6 +312,17 @@ class BlastResult:
             f"engine {self.engine_name!r} knows no overpressure, so no response of bays: take 'gas'"
         )
 
+    @property
+    def pieces(self) -> "pd.DataFrame":
+        """There are none: particles have no pressure that could push a piece.
+
+        Raises:
+            BlastEnvError: Always; the message says what does.
+        """
+        raise BlastEnvError(
+            f"engine {self.engine_name!r} knows no overpressure, so no push on pieces: take 'gas'"
+        )
+
     @cached_property
     def calibration(self) -> Calibration:
         """The scenario's calibration.

@@ -21,6 +21,12 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 
+CONCRETE_KG_M3: Final = 2400.0
+"""Density of what a piece is made of, unless its mass is given."""
+
+FRICTION: Final = 0.5
+"""Coefficient of friction of a piece on the ground, unless given: an assumption."""
+
 _GRAVITY_M_S2: Final = 9.81
 _STEP_S: Final = 1e-4
 _AFTER_S: Final = 3.0
@@ -50,8 +56,39 @@ class RigidPiece:
     height_m: float
     base_m: float
     mass_kg_m: float
-    friction: float = 0.5
+    friction: float = FRICTION
     anchor_n_m: float = 0.0
+
+    @classmethod
+    def of_block(
+        cls,
+        length_m: float,
+        thickness_m: float,
+        height_m: float,
+        mass_kg: float | None = None,
+        base_width_m: float | None = None,
+        friction: float | None = None,
+        anchorage_n: float = 0.0,
+    ) -> "RigidPiece":
+        """Return a piece by its size; what is not given is that of a solid block of concrete.
+
+        Args:
+            length_m: Length, across the push.
+            thickness_m: Thickness, along the push.
+            height_m: Height.
+            mass_kg: Mass of the whole piece.
+            base_width_m: Width of its base; its thickness unless given.
+            friction: Coefficient of friction with the ground.
+            anchorage_n: Horizontal force that all its anchors hold together.
+        """
+        block_kg = CONCRETE_KG_M3 * length_m * thickness_m * height_m
+        return cls(
+            height_m,
+            thickness_m if base_width_m is None else base_width_m,
+            (block_kg if mass_kg is None else mass_kg) / length_m,
+            FRICTION if friction is None else friction,
+            anchorage_n / length_m,
+        )
 
     def __post_init__(self) -> None:
         """Check the values.

@@ -11,6 +11,11 @@ from pydantic import Field, StrictBool, StrictFloat
 
 from blast_env.scenario.sections import Count, Height, Section
 
+Mass = Annotated[StrictFloat, Field(gt=0.0, le=1e6)]
+BaseWidth = Annotated[StrictFloat, Field(gt=0.0, le=20.0)]
+Friction = Annotated[StrictFloat, Field(ge=0.0, le=2.0)]
+Anchorage = Annotated[StrictFloat, Field(ge=0.0, le=1e9)]
+
 _FILE: Final = "barriers.toml"
 
 
@@ -25,6 +30,9 @@ class StockBarrier(Section):
         cost: Relative cost of a piece: 1 is about a metre of concrete road barrier.
         rotatable: Whether it may be turned by a right angle.
         stops_vehicles: Whether no vehicle gets past it.
+        mass_kg: Mass of a piece; that of a block of concrete where it is not known.
+        base_width_m: Width of its base; its thickness where it is not known.
+        anchorage_n: Horizontal force that the anchors of a piece hold.
         source: Where the dimensions come from, in words.
     """
 
@@ -35,6 +43,9 @@ class StockBarrier(Section):
     cost: Annotated[StrictFloat, Field(gt=0.0)]
     rotatable: StrictBool
     stops_vehicles: StrictBool
+    mass_kg: Mass | None = None
+    base_width_m: BaseWidth | None = None
+    anchorage_n: Anchorage | None = None
     source: str
 
 

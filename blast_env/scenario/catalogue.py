@@ -11,13 +11,23 @@ from operator import index
 from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
-from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    model_serializer,
+    model_validator,
+)
 
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
 from blast_env.geometry import Cell, Element, Piece
-from blast_env.scenario.barriers import stock_barriers
+from blast_env.response.barriers import RigidPiece
+from blast_env.scenario.barriers import Anchorage, BaseWidth, Friction, Mass, stock_barriers
 from blast_env.scenario.problems import Problem, ScenarioError, unknown_name
 from blast_env.scenario.sections import FOR_PEOPLE, Count, Height, Name, Section
+from blast_env.units import MODULE_SIDE_M
 
 Cost = Annotated[StrictFloat, Field(gt=0.0, le=1e9)]
 
@@ -27,6 +37,9 @@ MOST_ITEMS: Final = 20
 
 
 _SIZE_KEYS: Final = ("length_modules", "thickness_modules", "height_m")
+
+RIGID_KEYS: Final = ("mass_kg", "base_width_m", "friction", "anchorage_n")
+"""Keys of an item that say whether it stands; no load depends on them."""
 
 
 class Item(Section):
@@ -45,6 +58,10 @@ class Item(Section):
         stock: How many pieces there are.
         rotatable: Whether it may be turned by a right angle.
         stops_vehicles: Whether no vehicle gets past it, over it or through it.
+        mass_kg: Mass of a piece; without it, that of a solid block of concrete.
+        base_width_m: Width of its base; without it, its thickness.
+        friction: Coefficient of friction with the ground; 0.5 without it.
+        anchorage_n: Horizontal force that the anchors of a piece hold; none without it.
         from_catalogue: Always `None`: what it stood for is in the others.
     """
 
@@ -57,6 +74,10 @@ class Item(Section):
     stock: Annotated[StrictInt, Field(ge=0, le=10_000)]
     rotatable: StrictBool = True
     stops_vehicles: StrictBool = True
+    mass_kg: Mass | None = None
+    base_width_m: BaseWidth | None = None
+    friction: Friction | None = None
+    anchorage_n: Anchorage | None = None
     from_catalogue: Annotated[str | None, Field(exclude=True)] = None
 
     @model_validator(mode="before")
@@ -82,6 +103,25 @@ class Item(Section):
                 [Problem(key, f"must be left out: {name!r} has {barrier[key]:g}") for key in fixed],
             )
         return {"name": name, **barrier, **own}
+
+    @model_serializer(mode="wrap")
+    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what is not said of mass, base, friction and anchors."""
+        dump: dict[str, Any] = handler(self)
+        return {key: dump[key] for key in dump if key not in RIGID_KEYS or dump[key] is not None}
+
+    @property
+    def rigid_piece(self) -> RigidPiece:
+        """A piece as a rigid body, per metre of its length."""
+        return RigidPiece.of_block(
+            MODULE_SIDE_M * self.length_modules,
+            MODULE_SIDE_M * self.thickness_modules,
+            self.height_m,
+            self.mass_kg,
+            self.base_width_m,
+            self.friction,
+            self.anchorage_n or 0.0,
+        )
 
     @property
     def orientations(self) -> tuple[bool, ...]:

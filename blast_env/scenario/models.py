@@ -27,6 +27,7 @@ from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.scene import Charge
 from blast_env.response.components import Component
 from blast_env.response.facade import FilledBay
+from blast_env.scenario.catalogue import RIGID_KEYS
 from blast_env.scenario.checks import (
     Parts,
     charge_radius_m,
@@ -212,8 +213,8 @@ class Scenario(Section):
         """SHA-256 of everything that affects a result: not of the words for people.
 
         Two scenarios that differ only in name, description, the reasons of areas, the names of
-        buildings, the place on a map, the order of keys or in how they arrive at the same
-        simulation parameters have the same hash.
+        buildings, what says whether barriers stand, the place on a map, the order of keys or in how
+        they arrive at the same simulation parameters have the same hash.
         """
         content = self.model_dump(mode="json", exclude=_NO_INFLUENCE)
         for structure in content["structures"]:
@@ -420,7 +421,8 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
     for area in (*content["keep_outs"], *content["cost_areas"]):
         del area["reason"]
     for item in content["items"]:
-        del item["description"]
+        for key in ("description", *RIGID_KEYS):
+            item.pop(key, None)
     if zone.access_way is not None and zone.access_way.gate is None:
         del content["access_way"]["gate"]
     for key in _LATER_KEYS:

@@ -19,6 +19,7 @@ from pydantic import (
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Cell, Element, Piece, Rectangle
+from blast_env.response.barriers import RigidPiece
 from blast_env.scenario.access_way import AccessWay, any_in_windows, counts_before
 from blast_env.scenario.catalogue import MOST_ITEMS, Catalogue, Cost, Item, PlacedModule, Variant
 from blast_env.scenario.sections import (
@@ -168,6 +169,21 @@ class BuildZone(Section):
         """Return what a piece is called in tables: its item and its centre in metres."""
         x_m, y_m = self.element_rectangle_m(piece).centre
         return f"{piece.item}_x{x_m:.3f}_y{y_m:.3f}"
+
+    def rigid_piece(self, element: Element) -> RigidPiece | None:
+        """Return a piece, or a module, as a rigid body.
+
+        `None` for what has no height of its own: it is as high as the air.
+
+        Raises:
+            LayoutError: If there is no such item, or it cannot be turned.
+        """
+        variant = self.catalogue.variant(element)
+        if not variant.height_m:
+            return None
+        if self.items:
+            return self.items[variant.item].rigid_piece
+        return RigidPiece.of_block(MODULE_SIDE_M, MODULE_SIDE_M, variant.height_m)
 
     def element_rectangle_m(self, element: Element) -> Rectangle:
         """Return the rectangle that a module or a piece covers.

@@ -168,6 +168,9 @@ class PatchHistories:
         patch: Which patch each of the solver's faces belongs to, -1 for none (faces,).
         count: Number of patches; each has at least one face.
 
+    Attributes:
+        faces: How many faces each patch has (patches,).
+
     Raises:
         BlastEnvError: If a patch has no face.
     """
@@ -175,8 +178,8 @@ class PatchHistories:
     def __init__(self, patch: NDArray[np.int64], count: int) -> None:
         self._members = np.flatnonzero(patch >= 0)
         self._patch = patch[self._members]
-        self._faces = np.bincount(self._patch, minlength=count)
-        if len(self._faces) != count or not self._faces.all():
+        self.faces = np.bincount(self._patch, minlength=count)
+        if len(self.faces) != count or not self.faces.all():
             raise BlastEnvError(f"{count} patches of wall: each must have a face of a cell")
         self._times: list[float] = []
         self._steps: list[float] = []
@@ -185,10 +188,10 @@ class PatchHistories:
     def record(self, solver: GasSolver, step_s: float) -> None:
         """Add a step: the mean over its time, in its middle."""
         over = solver.wall_pressure[self._members] - 1.0
-        sums = np.bincount(self._patch, weights=over, minlength=len(self._faces))
+        sums = np.bincount(self._patch, weights=over, minlength=len(self.faces))
         self._times.append(solver.time_s - 0.5 * step_s)
         self._steps.append(step_s)
-        self._history.append((solver.pressure_pa * sums / self._faces).astype(np.float32))
+        self._history.append((solver.pressure_pa * sums / self.faces).astype(np.float32))
 
     @property
     def time_s(self) -> NDArray[np.float64]:
@@ -203,7 +206,7 @@ class PatchHistories:
     @property
     def history_pa(self) -> NDArray[np.float32]:
         """Mean overpressures of the steps (patches, steps)."""
-        return np.array(self._history, dtype=np.float32).reshape(-1, len(self._faces)).T
+        return np.array(self._history, dtype=np.float32).reshape(-1, len(self.faces)).T
 
 
 class Gauges(LoadTable):
