@@ -34,7 +34,7 @@ WIDTHS_MODULES: Final = (20, 40, 80)
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ParameterPoint:
     """A point of the search.
 
     Attributes:
@@ -50,7 +50,7 @@ class Candidate:
     facade_modules: int
 
     @classmethod
-    def from_unit_cube(cls, point: np.ndarray) -> "Candidate":
+    def from_unit_cube(cls, point: np.ndarray) -> "ParameterPoint":
         """Return the candidate of a point in the unit cube: 6-14, 0.05-1 (log), 0.7-1."""
         facade = FACADES_MODULES[min(int(point[3] * len(FACADES_MODULES)), 1)]
         return cls(
@@ -112,7 +112,7 @@ def score(i_sim: np.ndarray) -> Score:
     )
 
 
-def measure(candidate: Candidate, seeds: int, processes: int) -> Score:
+def measure(candidate: ParameterPoint, seeds: int, processes: int) -> Score:
     """Run the blasts of a candidate and score it."""
     distances_m = tuple(paper_table().r_m)
     study = FreeFieldStudy(candidate.scenario(), distances_m, tuple(range(seeds)))
@@ -137,7 +137,7 @@ def search(
     column, and its impulses fall with distance as the paper's own do.
     """
     start, rng = perf_counter(), np.random.default_rng(0)
-    tried: list[tuple[np.ndarray, Candidate, Score]] = []
+    tried: list[tuple[np.ndarray, ParameterPoint, Score]] = []
     with user_errors(), running_on(cluster):
         make_folder(out.parent)
         points = list(qmc.Sobol(4, seed=1).random(candidates))
@@ -145,7 +145,7 @@ def search(
             if number >= candidates:
                 best = min(tried, key=lambda entry: entry[2].worst)[0]
                 points.append(np.clip(best + rng.normal(0.0, 0.08, 4) * (1, 1, 1, 0), 0.0, 0.999))
-            candidate = Candidate.from_unit_cube(points[number])
+            candidate = ParameterPoint.from_unit_cube(points[number])
             result = measure(candidate, seeds, processes)
             tried.append((points[number], candidate, result))
             print_line(f"{number:3d} {result.worst:6.2f} {candidate} {result}")

@@ -61,7 +61,7 @@ QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredSite:
     """What blasts say about a site.
 
     Attributes:
@@ -109,7 +109,7 @@ def measured(
     threats: int,
     engine: str,
     criterion: SiteCriterion | None = None,
-) -> Measured:
+) -> MeasuredSite:
     """Measure a site with blasts of charges drawn from where they may be."""
     rng = np.random.default_rng(0)
     lines = Visibility.of(site)
@@ -122,7 +122,7 @@ def measured(
     reduction = {
         layout: 1.0 - problem.load(layout) / bare for layout in (*layouts, *ruled.values())
     }
-    return Measured(
+    return MeasuredSite(
         accepted=(criterion or VisibilityCriterion()).objection(site) is None,
         shares=SiteMeasures.of(site),
         unprotected_pa_s=problem.evaluator.loads((), drawn[0]).protected_impulse_pa_s,
@@ -240,7 +240,7 @@ def print_time(seconds: Sequence[float], drawn: int) -> None:
     )
 
 
-def print_measured(results: Sequence[Measured]) -> None:
+def print_measured(results: Sequence[MeasuredSite]) -> None:
     """Print what blasts say about the sites that the criterion accepts."""
     reduction = np.array([each.reduction for each in results])
     columns = {
@@ -260,7 +260,7 @@ def print_measured(results: Sequence[Measured]) -> None:
         print_row(name, *(f"{value:.0f}" for value in np.quantile(values, QUANTILES)))
 
 
-def print_rules(results: Sequence[Measured]) -> None:
+def print_rules(results: Sequence[MeasuredSite]) -> None:
     """Print what each rule does, over sites with and without vehicles."""
     if not results:
         return
@@ -288,7 +288,7 @@ def print_rules(results: Sequence[Measured]) -> None:
             )
 
 
-def print_agreement(results: Sequence[Measured]) -> None:
+def print_agreement(results: Sequence[MeasuredSite]) -> None:
     """Print how far lines of sight and blasts agree."""
     cut = np.array([each.cut for each in results])
     reduction = np.array([each.reduction for each in results])

@@ -32,7 +32,7 @@ from blast_env.rendering.figures import save_figure
 from blast_env.rendering.gas import facades
 from blast_env.rendering.pressure_film import write_pressure_film
 from blast_env.rendering.site_picture import site_picture
-from studies.demo_comparison import HEADERS, Comparison
+from studies.demo_comparison import HEADERS, AgentComparison
 
 AGENT: Final = "trained agent"
 
@@ -91,7 +91,7 @@ def main() -> None:
         demonstrate(DemoSettings())
 
 
-def demonstrate(settings: DemoSettings) -> Comparison:
+def demonstrate(settings: DemoSettings) -> AgentComparison:
     """Train, compare, film; print a table and the paths.
 
     Returns:
@@ -181,7 +181,7 @@ def clear(run: Path) -> None:
             raise BlastEnvError(f"{run}: cannot be removed: {error.strerror or error}") from error
 
 
-def compare_methods(settings: DemoSettings, trained: TrainingResult) -> Comparison:
+def compare_methods(settings: DemoSettings, trained: TrainingResult) -> AgentComparison:
     """Hold the best weights of the training against the other methods, on unseen threats."""
     scenario = trained.folder.scenario(trained.configuration)
     agent = replace(TrainedRun.load(settings.run).entry, name=AGENT)
@@ -192,10 +192,10 @@ def compare_methods(settings: DemoSettings, trained: TrainingResult) -> Comparis
         trained.configuration.settings.engine,
     )
     with progress_bar(f"{settings.threats} unseen threats") as progress:
-        return Comparison(contest.play(settings.processes, progress))
+        return AgentComparison(contest.play(settings.processes, progress))
 
 
-def print_comparison(comparison: Comparison) -> None:
+def print_comparison(comparison: AgentComparison) -> None:
     """Print a row a method: mean impulse, reduction, time to propose a layout."""
     cases = comparison.standings.track.cases
     table = make_table(
@@ -209,7 +209,7 @@ def print_comparison(comparison: Comparison) -> None:
     result_console().print(table)
 
 
-def write_pictures(settings: DemoSettings, comparison: Comparison) -> list[Path]:
+def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[Path]:
     """Film a blast without barrier and with the agent's layout; write the layout and the loads.
 
     Args:

@@ -22,7 +22,7 @@ HEADERS: Final = (
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class AgentComparison:
     """The trained agent against the other entries.
 
     Attributes:

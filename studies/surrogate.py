@@ -197,7 +197,7 @@ def _rms(of_folds: Sequence[Errors]) -> float:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class LayoutsJudged:
     """What layouts do against one charge, by gas dynamics; shares of the load without a barrier.
 
     Attributes:
@@ -215,7 +215,7 @@ class Verdict:
 
 def verdict(
     agent: SurrogateAgent, evaluator: BlastEvaluator, threat: Threat, processes: int = 1
-) -> Verdict:
+) -> LayoutsJudged:
     """Judge what the surrogate proposes against a charge, and the rules' layouts."""
     scenario = evaluator.scenario
     began_s = perf_counter()
@@ -225,7 +225,7 @@ def verdict(
     bare, guessed = Guesses.of(agent.surrogate, case).loads([(), proposed])
     rules = layouts_by_rule(scenario, threat.charge)
     reduction, *ruled = reductions_of(evaluator, case, [proposed, *rules.values()], processes)
-    return Verdict(
+    return LayoutsJudged(
         reduction=reduction,
         promised=float(1.0 - guessed / bare),
         rules=dict(zip(rules, ruled, strict=True)),
@@ -233,7 +233,7 @@ def verdict(
     )
 
 
-def _verdict_row(name: str, found: list[Verdict]) -> tuple[str, ...]:
+def _verdict_row(name: str, found: list[LayoutsJudged]) -> tuple[str, ...]:
     names = set.intersection(*(set(each.rules) for each in found))
     single = max(names, key=lambda rule: fmean(each.rules[rule] for each in found))
     percent = (

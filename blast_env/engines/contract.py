@@ -38,7 +38,7 @@ class EngineOption:
     help: str
 
 
-class Result(Protocol):
+class BlastOutcome(Protocol):
     """What happened in a blast, whichever engine ran it."""
 
     @property
@@ -53,7 +53,7 @@ class Result(Protocol):
 class RunnableBlast(Protocol):
     """One blast that can be run to its end."""
 
-    def run(self, progress: Callable[[float], None] | None = None) -> Result:
+    def run(self, progress: Callable[[float], None] | None = None) -> BlastOutcome:
         """Run the blast.
 
         Args:

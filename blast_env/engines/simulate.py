@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Literal, overload
 
-from blast_env.engines.contract import Engine, Result
+from blast_env.engines.contract import BlastOutcome, Engine
 from blast_env.engines.particles import Blast, BlastResult
 from blast_env.engines.table import find_engine
 from blast_env.errors import BlastEnvError
@@ -47,7 +47,7 @@ def simulate(
     charge: AnyCharge | None = None,
     progress: Callable[[float], None] | None = None,
     cell_m: float | None = None,
-) -> Result:
+) -> BlastOutcome:
     """Run a blast to its end.
 
     The result is a pure function of the arguments, to the last bit and in any process.

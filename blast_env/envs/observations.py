@@ -357,6 +357,7 @@ def _covered(
 # ---- Planes.
 
 STRUCTURE_HEIGHT: Final = "structure_height"
+BARRIER_HEIGHT: Final = "barrier_height"
 EMPTY_REACH: Final = "reach_without_barrier"
 REACH: Final = "reach"
 
@@ -373,7 +374,7 @@ def item_channels(catalogue: Catalogue) -> tuple[str, ...]:
     )
     variants = [f"{each.name}:turned" if each.turned else each.name for each in catalogue.variants]
     legal = tuple(f"{name}:legal" for name in variants)
-    return STRUCTURE_HEIGHT, *heights, *costs, "barrier_height", "stops_vehicles", *left, *legal
+    return STRUCTURE_HEIGHT, *heights, *costs, BARRIER_HEIGHT, "stops_vehicles", *left, *legal
 
 
 def vehicle_channels(shown: bool) -> tuple[str, ...]:
@@ -550,9 +551,9 @@ class GridEpisode:
         self.show(planes, ("barrier", "free"), self.zone.plane(cells))
         shares = np.array(stock_shares(placement))
         self.show(planes, ("stock_share", "stock", "budget_share"), shares)
-        if placement.catalogue.has_items:
+        if BARRIER_HEIGHT in self.channels:
             left, on_cells = items_placed(placement)
-            names = ("barrier_height", "stops_vehicles", *self.ending(":legal"))
+            names = (BARRIER_HEIGHT, "stops_vehicles", *self.ending(":legal"))
             self.show(planes, names, self.zone.plane(on_cells))
             self.show(planes, self.ending(":left"), left)
         if REACH in self.channels:

@@ -32,7 +32,7 @@ from blast_env.rendering.site_plan import (
     write_names,
 )
 from blast_env.rendering.style import count_of, render_extra, unit_interval
-from blast_env.reporting.loads import Measured, Target
+from blast_env.reporting.loads import MeasuredBlast, ReportedBuilding
 from blast_env.reporting.outcomes import FrontPoint, ItemWorth, Outcome
 from blast_env.reporting.threats import NamedCharge
 from blast_env.reporting.units import UnitSystem
@@ -125,7 +125,9 @@ def kinds(units: UnitSystem) -> dict[str, Kind]:
     }
 
 
-def blast_pictures(bare: Measured, walled: Measured, units: UnitSystem) -> tuple[Picture, ...]:
+def blast_pictures(
+    bare: MeasuredBlast, walled: MeasuredBlast, units: UnitSystem
+) -> tuple[Picture, ...]:
     """Return the facades of what is protected, unfolded, and the histories on it."""
     pictures: list[Picture] = []
     for target in walled.targets:
@@ -139,7 +141,7 @@ def blast_pictures(bare: Measured, walled: Measured, units: UnitSystem) -> tuple
     return tuple(pictures)
 
 
-def _shown_parts(measured: Measured, target: Target) -> list[str]:
+def _shown_parts(measured: MeasuredBlast, target: ReportedBuilding) -> list[str]:
     """Return the structures of a building that have most of its walls."""
     faces = measured.result.faces
     counts = [
@@ -150,7 +152,9 @@ def _shown_parts(measured: Measured, target: Target) -> list[str]:
     return shown[:_MOST_FACADES]
 
 
-def _history(bare: Measured, walled: Measured, target: Target, units: UnitSystem) -> Picture:
+def _history(
+    bare: MeasuredBlast, walled: MeasuredBlast, target: ReportedBuilding, units: UnitSystem
+) -> Picture:
     """Return the mean overpressure on the most loaded wall over time, without and with."""
     wall = bare.loads[target.name].wall
     figure = Figure(figsize=(_WIDTH_IN, 3.2), layout="constrained")

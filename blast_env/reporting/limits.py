@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.reporting.loads import Target, TargetLoad
+from blast_env.reporting.loads import ReportedBuilding, TargetLoad
 from blast_env.reporting.units import UnitSystem
 
 
@@ -57,7 +57,7 @@ class Limit:
         return load.wall_impulse_pa_s <= self.impulse_pa_s and load.peak_pa <= self.peak_pa
 
 
-def check_limits(limits: Sequence[Limit], targets: Sequence[Target]) -> None:
+def check_limits(limits: Sequence[Limit], targets: Sequence[ReportedBuilding]) -> None:
     """Refuse limits of buildings that do not exist, or two of one.
 
     Raises:

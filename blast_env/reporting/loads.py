@@ -19,7 +19,7 @@ from blast_env.scenario import AnyStructure, Scenario
 
 
 @dataclass(frozen=True)
-class Target:
+class ReportedBuilding:
     """A building: one structure, or those that make it together.
 
     Attributes:
@@ -55,12 +55,12 @@ class Target:
         return Rectangle(float(low[0]), float(low[1]), float(high[2]), float(high[3]))
 
 
-def targets_of(scenario: Scenario) -> tuple[Target, ...]:
+def targets_of(scenario: Scenario) -> tuple[ReportedBuilding, ...]:
     """Return the buildings of a scenario, protected ones first."""
     together: dict[str, list[AnyStructure]] = {}
     for structure in scenario.structures:
         together.setdefault(structure.building or structure.name, []).append(structure)
-    targets = [Target(name, tuple(parts)) for name, parts in together.items()]
+    targets = [ReportedBuilding(name, tuple(parts)) for name, parts in together.items()]
     return tuple(sorted(targets, key=lambda each: not each.protected))
 
 
@@ -71,7 +71,7 @@ class WallHistories:
         targets: The buildings.
     """
 
-    def __init__(self, targets: Sequence[Target]) -> None:
+    def __init__(self, targets: Sequence[ReportedBuilding]) -> None:
         self._targets = tuple(targets)
         self._members: dict[tuple[str, WallName], NDArray[np.int64]] | None = None
         self._times: list[float] = []
@@ -144,7 +144,7 @@ class TargetLoad:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredBlast:
     """A blast with the loads on buildings.
 
     Attributes:
@@ -155,7 +155,7 @@ class Measured:
 
     result: GasResult
     histories: WallHistories
-    targets: tuple[Target, ...]
+    targets: tuple[ReportedBuilding, ...]
 
     @cached_property
     def loads(self) -> dict[str, TargetLoad]:
@@ -179,7 +179,7 @@ class Measured:
         notes = (note for name in names for note in self.result.impulse(name).notes)
         return tuple(dict.fromkeys(notes))
 
-    def _load(self, target: Target, walls: pd.DataFrame) -> TargetLoad:
+    def _load(self, target: ReportedBuilding, walls: pd.DataFrame) -> TargetLoad:
         by_wall = walls.groupby("face", observed=True)["positive_impulse_pa_s"].mean()
         wall = next(each for each in WALLS if each == by_wall.idxmax())
         arrivals = walls["arrival_s"].to_numpy()
@@ -230,10 +230,10 @@ def _zero_s(time_s: FloatArray, pressure_pa: FloatArray, index: int) -> float:
 
 def measure(
     blast: GasBlast,
-    targets: Sequence[Target],
+    targets: Sequence[ReportedBuilding],
     progress: Callable[[float], None] | None = None,
-) -> Measured:
+) -> MeasuredBlast:
     """Run a blast and return the loads on buildings."""
     histories = WallHistories(targets)
     result = blast.run(progress, lambda _: (histories,))
-    return Measured(result, histories, tuple(targets))
+    return MeasuredBlast(result, histories, tuple(targets))

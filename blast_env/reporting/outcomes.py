@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from blast_env.geometry import Layout, Rectangle
-from blast_env.reporting.loads import Target, TargetLoad
+from blast_env.reporting.loads import ReportedBuilding, TargetLoad
 from blast_env.reporting.threats import NamedCharge
 from blast_env.statistics import reductions
 
@@ -20,7 +20,7 @@ class LoadPair:
         walled: With it.
     """
 
-    target: Target
+    target: ReportedBuilding
     threat: NamedCharge
     cell_m: float
     bare: TargetLoad

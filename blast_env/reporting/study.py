@@ -19,7 +19,7 @@ from blast_env.export.plan import LayoutPlan
 from blast_env.geometry import Element, Layout, Piece, layout_text
 from blast_env.reporting.figures import Picture, blast_pictures, film_stills
 from blast_env.reporting.limits import Limit, check_limits
-from blast_env.reporting.loads import Measured, Target, measure, targets_of
+from blast_env.reporting.loads import MeasuredBlast, ReportedBuilding, measure, targets_of
 from blast_env.reporting.outcomes import FrontPoint, ItemWorth, LoadPair, Outcome
 from blast_env.reporting.threats import (
     NamedCharge,
@@ -122,7 +122,7 @@ class Study:
     scenario: Scenario
     layout: Layout
     options: StudyOptions
-    targets: tuple[Target, ...]
+    targets: tuple[ReportedBuilding, ...]
     threats: tuple[NamedCharge, ...]
     bill: pd.DataFrame
     cost: float
@@ -137,7 +137,7 @@ class Study:
     left_out: tuple[str, ...]
     digests: tuple[tuple[str, str], ...]
 
-    def pair(self, target: Target, threat: NamedCharge, cell_m: float) -> LoadPair:
+    def pair(self, target: ReportedBuilding, threat: NamedCharge, cell_m: float) -> LoadPair:
         """Return the loads on a building under a threat with one size of cells."""
         return next(
             each
@@ -232,7 +232,7 @@ class Runs:
         scenario: Scenario,
         layout: Layout,
         options: StudyOptions,
-        targets: tuple[Target, ...],
+        targets: tuple[ReportedBuilding, ...],
         threats: tuple[NamedCharge, ...],
         progress: Told,
     ) -> None:
@@ -253,7 +253,7 @@ class Runs:
             # Of the finer cells: only these two results are in memory at once.
             self.pictures[threat.name] = blast_pictures(both[0], both[1], self.options.units)
 
-    def _measured(self, threat: NamedCharge, cell_m: float, layout: Layout) -> Measured:
+    def _measured(self, threat: NamedCharge, cell_m: float, layout: Layout) -> MeasuredBlast:
         words = "with the layout" if layout else "without a barrier"
         label = f"{threat.name} {words}, cells of {cell_m:g} m"
         blast = GasBlast(self.scenario, layout, 0, GasEngine(cell_m=cell_m), threat.charge)
@@ -263,7 +263,7 @@ class Runs:
         return measured
 
     def _pairs(
-        self, threat: NamedCharge, cell_m: float, bare: Measured, walled: Measured
+        self, threat: NamedCharge, cell_m: float, bare: MeasuredBlast, walled: MeasuredBlast
     ) -> Iterator[LoadPair]:
         for target in self.targets:
             if target.name in bare.loads and target.name in walled.loads:

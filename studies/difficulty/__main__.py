@@ -28,8 +28,8 @@ from blast_env.tables import markdown_table
 from studies.difficulty.figure import difficulty_figure
 from studies.difficulty.items import ItemEffort, ItemResult, ItemStudy, cost_of, pieces_text
 from studies.difficulty.items_figure import items_figure
-from studies.difficulty.outcomes import Outcome, TaskResult
-from studies.difficulty.study import Effort, Study
+from studies.difficulty.outcomes import TaskResult, WayOutcome
+from studies.difficulty.study import DifficultyStudy, Effort
 from studies.difficulty.verdict import (
     Criterion,
     difficulty_criteria,
@@ -118,7 +118,7 @@ def study_scenario(
     start = perf_counter()
     print_line(f"{scenario.name}: at most {effort.blasts:,} blasts")
     with progress_bar(scenario.name) as progress:
-        study = Study(scenario, effort, engine, processes, progress)
+        study = DifficultyStudy(scenario, effort, engine, processes, progress)
         hidden, visible = study.hidden(), study.visible()
     best = hidden.best
     evaluation = evaluate_against(study.evaluator, best.layouts[0], study.held_out)
@@ -256,7 +256,7 @@ def picture_path(folder: Path, name: str) -> Path:
     return folder / f"scenario_{name}.png"
 
 
-def origin(study: Study) -> str:
+def origin(study: DifficultyStudy) -> str:
     """Return what the figures were made with; the hash tells when they are out of date."""
     scenario, evaluator = study.evaluator.scenario, study.evaluator
     return (
@@ -265,7 +265,7 @@ def origin(study: Study) -> str:
     )
 
 
-def row(outcome: Outcome) -> tuple[str, ...]:
+def row(outcome: WayOutcome) -> tuple[str, ...]:
     """Return the cells of a row of the tables."""
     reduction = outcome.reduction
     value, low, high = (f"{_PERCENT * each:.0f}" for each in reduction)

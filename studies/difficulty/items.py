@@ -42,7 +42,7 @@ from blast_env.scenario import (
     VehicleCharge,
     VehicleSource,
 )
-from studies.difficulty.outcomes import Outcome, TaskResult
+from studies.difficulty.outcomes import TaskResult, WayOutcome
 from studies.difficulty.study import STAND_OFFS
 
 METHOD: Final = "annealing"
@@ -177,13 +177,13 @@ class ItemResult:
     effort: ItemEffort
     places: tuple[Threat, ...]
     task: TaskResult
-    finalists: Outcome
-    of_places: Outcome
+    finalists: WayOutcome
+    of_places: WayOutcome
     buys: tuple[Purchase | None, ...]
     searched_blasts: int
 
     @property
-    def best(self) -> Outcome:
+    def best(self) -> WayOutcome:
         """What reduces most of all that was found."""
         return self.task.best
 
@@ -289,8 +289,8 @@ class ItemStudy:
         bare = self._impulses([()])
         check_something_arrives([Case(scenario, self.places)], bare)
 
-        def outcome(name: str, layouts: Sequence[Layout]) -> Outcome:
-            return Outcome(name, tuple(layouts), self._impulses(layouts), bare[0])
+        def outcome(name: str, layouts: Sequence[Layout]) -> WayOutcome:
+            return WayOutcome(name, tuple(layouts), self._impulses(layouts), bare[0])
 
         rng = np.random.default_rng(0)
         random = outcome(_RANDOM, [random_layout(scenario, rng) for _ in range(effort.layouts)])
@@ -308,7 +308,7 @@ class ItemStudy:
             effort=effort,
             places=self.places,
             task=TaskResult(
-                bare=Outcome(_BARE, ((),), bare, bare[0]),
+                bare=WayOutcome(_BARE, ((),), bare, bare[0]),
                 random=random,
                 rules=task_rules,
                 searched=outcome(f"{METHOD}, {blasts} blasts", [found[best]]),

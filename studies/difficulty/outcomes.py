@@ -17,7 +17,7 @@ from blast_env.statistics import (
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class WayOutcome:
     """What one way to place a barrier leaves of the impulse.
 
     Impulses are those of `BlastLoads.protected_impulse_pa_s`. In the visible task a threat is a
@@ -75,7 +75,7 @@ class Outcome:
         tails = [conditional_value_at_risk(row, CVAR_LEVEL) for row in self.impulse_pa_s]
         return float(np.mean(tails))
 
-    def better_by(self, other: "Outcome") -> Estimate:
+    def better_by(self, other: "WayOutcome") -> Estimate:
         """Return by how much more than another one this reduces, on the same threats."""
         gained = other.impulse_pa_s.mean(axis=0) - self.impulse_pa_s.mean(axis=0)
         return reduction_estimate(self.unprotected_pa_s - gained, self.unprotected_pa_s)
@@ -92,22 +92,22 @@ class TaskResult:
         searched: The best that was searched.
     """
 
-    bare: Outcome
-    random: Outcome
-    rules: tuple[Outcome, ...]
-    searched: Outcome
+    bare: WayOutcome
+    random: WayOutcome
+    rules: tuple[WayOutcome, ...]
+    searched: WayOutcome
 
     @property
-    def rows(self) -> tuple[Outcome, ...]:
+    def rows(self) -> tuple[WayOutcome, ...]:
         """All of them in the order of the table."""
         return (self.bare, self.random, *self.rules, self.searched)
 
     @property
-    def best_rule(self) -> Outcome:
+    def best_rule(self) -> WayOutcome:
         """The best of the layouts by hand."""
         return max(self.rules, key=lambda outcome: outcome.reduction.value)
 
     @property
-    def best(self) -> Outcome:
+    def best(self) -> WayOutcome:
         """What reduces most."""
         return max(self.best_rule, self.searched, key=lambda outcome: outcome.reduction.value)

@@ -19,7 +19,7 @@ from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_t
 from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Scenario
-from studies.difficulty.outcomes import Outcome, TaskResult
+from studies.difficulty.outcomes import TaskResult, WayOutcome
 
 STAND_OFFS: Final = {0.0: "near the charge", 0.5: "in the middle", 1.0: "near the building"}
 """Shares of the way through the build zone at which the hand-made walls stand."""
@@ -66,7 +66,7 @@ class Effort:
         )
 
 
-class Study:
+class DifficultyStudy:
     """Runs the blasts of both tasks in a scenario.
 
     Args:
@@ -107,12 +107,12 @@ class Study:
         bare = self._impulses([()], self.held_out)
         check_something_arrives([Case(scenario, self.held_out)], bare)
 
-        def outcome(name: str, layouts: Sequence[Layout]) -> Outcome:
-            return Outcome(name, tuple(layouts), self._impulses(layouts, self.held_out), bare[0])
+        def outcome(name: str, layouts: Sequence[Layout]) -> WayOutcome:
+            return WayOutcome(name, tuple(layouts), self._impulses(layouts, self.held_out), bare[0])
 
         middle = expected_charge(scenario.charge)
         return TaskResult(
-            bare=Outcome(_BARE, ((),), bare, bare[0]),
+            bare=WayOutcome(_BARE, ((),), bare, bare[0]),
             random=outcome(_RANDOM, self._pool[: effort.random_hidden]),
             rules=tuple(
                 outcome(f"wall {where}", [line_of_sight_wall(scenario, middle, share)])
@@ -127,10 +127,10 @@ class Study:
         charges = [threat.charge for threat in self._tried]
         bare = np.stack([self._on_charge([()], charge)[0] for charge in charges])
 
-        def outcome(name: str, layouts: Sequence[Layout]) -> Outcome:
+        def outcome(name: str, layouts: Sequence[Layout]) -> WayOutcome:
             pairs = zip(layouts, charges, strict=True)
             impulse = np.array([self._on_charge([layout], charge) for layout, charge in pairs])
-            return Outcome(name, tuple(layouts), impulse.reshape(1, -1), bare)
+            return WayOutcome(name, tuple(layouts), impulse.reshape(1, -1), bare)
 
         random = self._pool[: effort.random_visible]
         on_charges = np.stack([self._on_charge(random, charge) for charge in charges], axis=1)
@@ -139,8 +139,8 @@ class Study:
             for number, charge in enumerate(charges)
         ]
         return TaskResult(
-            bare=Outcome(_BARE, ((),), bare[np.newaxis], bare),
-            random=Outcome(_RANDOM, tuple(random), on_charges, bare),
+            bare=WayOutcome(_BARE, ((),), bare[np.newaxis], bare),
+            random=WayOutcome(_RANDOM, tuple(random), on_charges, bare),
             rules=tuple(
                 outcome(
                     f"wall {where}",

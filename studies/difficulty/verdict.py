@@ -6,7 +6,7 @@ from typing import Final
 
 from blast_env.statistics import Estimate
 from studies.difficulty.items import ItemResult
-from studies.difficulty.outcomes import Outcome, TaskResult
+from studies.difficulty.outcomes import TaskResult, WayOutcome
 from studies.noise import Noise
 
 LEAST_REDUCTION, MOST_REDUCTION = 0.15, 0.85
@@ -79,7 +79,7 @@ def difficulty_criteria(hidden: TaskResult, visible: TaskResult) -> tuple[Criter
     )
 
 
-def worst_wall(result: TaskResult) -> Outcome:
+def worst_wall(result: TaskResult) -> WayOutcome:
     """Return the wall at the worst distance."""
     return min(result.rules, key=lambda outcome: outcome.reduction.value)
 

@@ -58,7 +58,7 @@ FACADE: Final = "facade, mean"
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class WallScene:
     """A charge, a wall of finite height and a building, as cells.
 
     Attributes:
@@ -78,7 +78,7 @@ class Scene:
         return np.concatenate((overpressure_pa[:, :own], mean), axis=1)
 
 
-def scene(cell_m: float) -> Scene:
+def scene(cell_m: float) -> WallScene:
     """Return the scene with cells of a size.
 
     Raises:
@@ -100,10 +100,10 @@ def scene(cell_m: float) -> Scene:
     rows = range(round(south / cell_m), round(north / cell_m))
     before = round(left / cell_m) - 1
     facade = [(before, row, level) for row in rows for level in range(round(top / cell_m))]
-    return Scene(grid, (*GAUGES_M, FACADE), np.array([*cells, *facade]))
+    return WallScene(grid, (*GAUGES_M, FACADE), np.array([*cells, *facade]))
 
 
-def started(scene: Scene, gauges: Gauges) -> GasSolver:
+def started(scene: WallScene, gauges: Gauges) -> GasSolver:
     """Return our solver with the charge laid onto the grid, its front at the wall."""
     charge = GasCharge(_CHARGE_KG, _CHARGE_M, BALLOON)
     solver = GasSolver(
@@ -113,7 +113,7 @@ def started(scene: Scene, gauges: Gauges) -> GasSolver:
     return solver
 
 
-def ours(scene: Scene, until_s: float) -> Histories:
+def ours(scene: WallScene, until_s: float) -> Histories:
     """Run the scene with the project's own solver."""
     gauges = Gauges(scene.grid, scene.gauges)
     solver = started(scene, gauges)
@@ -125,7 +125,7 @@ def ours(scene: Scene, until_s: float) -> Histories:
     )
 
 
-def rho_central_foam(scene: Scene, until_s: float, folder: Path) -> Histories:
+def rho_central_foam(scene: WallScene, until_s: float, folder: Path) -> Histories:
     """Write the case into a folder, run it with OpenFOAM, and read what it recorded.
 
     Args:
@@ -177,7 +177,7 @@ def _run(command: tuple[str, ...], folder: Path) -> str:
     return done.stdout
 
 
-def _write_case(scene: Scene, solver: GasSolver, until_s: float, folder: Path) -> None:
+def _write_case(scene: WallScene, solver: GasSolver, until_s: float, folder: Path) -> None:
     """Write everything but the fields, which need the mesh without the solids."""
     for name in ("system", "constant", "0"):
         make_folder(folder / name)
@@ -217,7 +217,7 @@ def _block_mesh(grid: GasGrid) -> str:
     )
 
 
-def _write_fields(scene: Scene, solver: GasSolver, folder: Path) -> None:
+def _write_fields(scene: WallScene, solver: GasSolver, folder: Path) -> None:
     """Write pressure, temperature and velocity of the air cells in OpenFOAM's order, x first."""
     air = ~scene.grid.solid.transpose(2, 1, 0)
     pressure = solver.pressure().transpose(2, 1, 0)[air]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from blast_agents.league import Standings, Verdict, hidden_track, known_track, verdicts
+from blast_agents.league import LeagueVerdict, Standings, hidden_track, known_track, verdicts
 from blast_agents.league.figure import league_figure
 from blast_agents.league.report import (
     case_table,
@@ -148,7 +148,7 @@ def test_agents_are_held_against_the_best_rule_genetic_search_and_the_best_searc
     ],
 )
 def test_the_interval_decides(low: float, high: float, words: str) -> None:
-    verdict = Verdict("agent", "search", Estimate(0.0, low, high), "9 cases", 1.0)
+    verdict = LeagueVerdict("agent", "search", Estimate(0.0, low, high), "9 cases", 1.0)
     assert words in verdict.conclusion
     assert words in verdict.text
 

@@ -16,7 +16,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, layout_text
 from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Study, StudyOptions, run_study, write_report
-from blast_env.reporting.loads import Measured, measure, targets_of
+from blast_env.reporting.loads import MeasuredBlast, measure, targets_of
 from blast_env.reporting.page import report_html
 from blast_env.reporting.study import Runs
 from blast_env.reporting.threats import chief_threats
@@ -31,12 +31,12 @@ def page(study: Study) -> str:
 
 
 @pytest.fixture(scope="module")
-def measured() -> Measured:
+def measured() -> MeasuredBlast:
     scenario = small_hut()
     return measure(GasBlast(scenario, LAYOUT), targets_of(scenario))
 
 
-def test_loads_are_those_of_the_blast(study: Study, measured: Measured) -> None:
+def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> None:
     (threat,), (target,) = study.threats, study.targets
     result = blast_env.simulate(small_hut(), LAYOUT, engine="gas")
     (row,) = result.structures.to_dict("records")
@@ -55,7 +55,7 @@ def test_loads_are_those_of_the_blast(study: Study, measured: Measured) -> None:
     assert digests["T1 with the layout, cells of 0.5 m"] == result.digest
 
 
-def test_histories_are_the_momentum_of_the_walls(measured: Measured) -> None:
+def test_histories_are_the_momentum_of_the_walls(measured: MeasuredBlast) -> None:
     """Mean overpressure over time is the impulse of all phases, positive and negative."""
     faces = measured.result.faces
     for wall in ("west", "north"):

@@ -7,7 +7,7 @@ from blast_agents.rules import random_layout
 from blast_env.scenario import Placement, Scenario
 from blast_env.sites import SiteMeasures, SiteRanges
 from studies.check_sites import (
-    Measured,
+    MeasuredSite,
     drawn_sites,
     facade_and_depth_m,
     measured,
@@ -15,9 +15,9 @@ from studies.check_sites import (
 from tests.sites.cases import yard
 
 
-def result(reduction: list[float]) -> Measured:
+def result(reduction: list[float]) -> MeasuredSite:
     shares = SiteMeasures(1.0, 0.8, 0.7, 0.4)
-    return Measured(True, shares, 1000.0, np.array(reduction), np.array(reduction))
+    return MeasuredSite(True, shares, 1000.0, np.array(reduction), np.array(reduction))
 
 
 @pytest.mark.parametrize(

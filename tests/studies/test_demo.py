@@ -15,7 +15,7 @@ from blast_env.evaluation import SeedRange
 from blast_env.export import SUFFIXES
 from blast_env.scenario import Placement, save_scenario
 from studies.demo import AGENT, DemoSettings, clear, demonstrate
-from studies.demo_comparison import Comparison
+from studies.demo_comparison import AgentComparison
 from tests.agents.league_cases import TRAINING, result, standings
 from tests.agents.test_self_labelling import SMALL, wide_yard
 
@@ -39,7 +39,7 @@ def tiny(folder: Path) -> DemoSettings:
 
 
 @pytest.fixture(scope="module")
-def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSettings, Comparison, str]:
+def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSettings, AgentComparison, str]:
     """The settings of a demonstration, what it found and what it printed."""
     settings = tiny(tmp_path_factory.mktemp("demo"))
     with redirect_stdout(StringIO()) as printed:
@@ -47,7 +47,7 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoSettings, Compa
     return settings, comparison, printed.getvalue()
 
 
-def test_it_trains_compares_and_films(first: tuple[DemoSettings, Comparison, str]) -> None:
+def test_it_trains_compares_and_films(first: tuple[DemoSettings, AgentComparison, str]) -> None:
     settings, comparison, printed = first
     assert comparison.verdict in printed
     assert "judged by the engine gas" in printed
@@ -69,7 +69,7 @@ def test_it_trains_compares_and_films(first: tuple[DemoSettings, Comparison, str
 
 
 def test_it_clears_its_own_run_and_nothing_of_others(
-    tmp_path: Path, first: tuple[DemoSettings, Comparison, str]
+    tmp_path: Path, first: tuple[DemoSettings, AgentComparison, str]
 ) -> None:
     settings = replace(first[0], out=tmp_path / "out")
     shutil.copytree(first[0].out, settings.out)
@@ -87,9 +87,9 @@ def comparison_of(
     random: list[float],
     rule: list[float] | None = None,
     other: list[float] | None = None,
-) -> Comparison:
+) -> AgentComparison:
     """Loads by hand, a threat each; without a barrier it is 10 Pa s everywhere."""
-    return Comparison(
+    return AgentComparison(
         standings(
             [[10.0]] * len(agent),
             result(RandomLayout.name, [[each] for each in random]),

@@ -23,7 +23,7 @@ from studies.difficulty.items import (
     rules_of,
 )
 from studies.difficulty.items_figure import items_figure
-from studies.difficulty.outcomes import Outcome, TaskResult
+from studies.difficulty.outcomes import TaskResult, WayOutcome
 from studies.difficulty.verdict import item_criteria, joint_criteria
 from tests.catalogue_sites import yard_document
 from tests.vehicle_sites import gate_site
@@ -126,10 +126,10 @@ def test_every_bundled_scenario_with_items_can_be_studied() -> None:
         assert scenario.zone.budget is not None  # or random layouts would not cost the same
 
 
-def row(name: str, *left: float, shift: float = 0.0) -> Outcome:
+def row(name: str, *left: float, shift: float = 0.0) -> WayOutcome:
     """Return layouts that leave such shares of the impulse, at the last place more by `shift`."""
     shares = np.array(left)[:, None] + np.array([0.0, 0.0, shift])
-    return Outcome(name, ((),) * len(left), shares * BARE, BARE)
+    return WayOutcome(name, ((),) * len(left), shares * BARE, BARE)
 
 
 def made_up(
@@ -141,7 +141,7 @@ def made_up(
 ) -> ItemResult:
     """Return a result with a rule that buys height, one that buys length and one for both."""
     document = yard_document() | {"name": name}
-    of_places = Outcome(
+    of_places = WayOutcome(
         "best for a place",
         ((),) * PLACES,
         BARE * (searched - 0.1 + elsewhere * (1.0 - np.eye(PLACES))),

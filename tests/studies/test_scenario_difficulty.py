@@ -23,8 +23,8 @@ from studies.difficulty.__main__ import (
     with_section,
 )
 from studies.difficulty.figure import difficulty_figure
-from studies.difficulty.outcomes import Outcome, TaskResult
-from studies.difficulty.study import STAND_OFFS, Effort, Study
+from studies.difficulty.outcomes import TaskResult, WayOutcome
+from studies.difficulty.study import STAND_OFFS, DifficultyStudy, Effort
 from studies.difficulty.verdict import difficulty_criteria
 from tests.agents.search_cases import ballistic
 
@@ -45,17 +45,17 @@ BARE = np.linspace(90.0, 110.0, THREATS)
 RNG = np.random.default_rng(0)
 
 
-def outcome(*left: float, scatter: float = 0.01) -> Outcome:
+def outcome(*left: float, scatter: float = 0.01) -> WayOutcome:
     """Return an outcome of layouts that leave such shares of the impulse."""
     shares = np.array(left)[:, None] + scatter * RNG.normal(size=(len(left), THREATS))
-    return Outcome("made up", ((),) * len(left), shares * BARE, BARE)
+    return WayOutcome("made up", ((),) * len(left), shares * BARE, BARE)
 
 
 def result(
     walls: tuple[float, float, float], searched: float, random: tuple[float, ...]
 ) -> TaskResult:
     return TaskResult(
-        bare=Outcome("no barrier", ((),), BARE[np.newaxis], BARE),
+        bare=WayOutcome("no barrier", ((),), BARE[np.newaxis], BARE),
         random=outcome(*random),
         rules=tuple(outcome(each) for each in walls),
         searched=outcome(searched),
@@ -66,22 +66,22 @@ HARD = {"walls": (0.4, 0.6, 0.7), "searched": 0.5, "random": (0.7, 0.75, 0.8, 0.
 
 
 @pytest.fixture(scope="module")
-def study() -> Study:
-    return Study(ballistic("courtyard"), SMALL, "event", processes=1)
+def study() -> DifficultyStudy:
+    return DifficultyStudy(ballistic("courtyard"), SMALL, "event", processes=1)
 
 
 @pytest.fixture(scope="module")
-def hidden(study: Study) -> TaskResult:
+def hidden(study: DifficultyStudy) -> TaskResult:
     return study.hidden()
 
 
 @pytest.fixture(scope="module")
-def visible(study: Study) -> TaskResult:
+def visible(study: DifficultyStudy) -> TaskResult:
     return study.visible()
 
 
 def test_one_layout_for_all_is_judged_as_evaluate_layout_judges_it(
-    study: Study, hidden: TaskResult
+    study: DifficultyStudy, hidden: TaskResult
 ) -> None:
     for row in (*hidden.rules, hidden.searched):
         expected = evaluate_against(study.evaluator, row.layouts[0], study.held_out)
@@ -93,7 +93,9 @@ def test_one_layout_for_all_is_judged_as_evaluate_layout_judges_it(
     assert hidden.bare.reduction == (0.0, 0.0, 0.0)
 
 
-def test_every_visible_charge_gets_a_wall_of_its_own(study: Study, visible: TaskResult) -> None:
+def test_every_visible_charge_gets_a_wall_of_its_own(
+    study: DifficultyStudy, visible: TaskResult
+) -> None:
     scenario, charges = study.evaluator.scenario, [each.charge for each in study._tried]
     for wall, share in zip(visible.rules, STAND_OFFS, strict=True):
         assert list(wall.layouts) == [line_of_sight_wall(scenario, at, share) for at in charges]
@@ -101,12 +103,14 @@ def test_every_visible_charge_gets_a_wall_of_its_own(study: Study, visible: Task
     assert visible.random.impulse_pa_s.shape == (SMALL.random_visible, SMALL.charges)
 
 
-def test_it_costs_what_it_says(study: Study, hidden: TaskResult, visible: TaskResult) -> None:
+def test_it_costs_what_it_says(
+    study: DifficultyStudy, hidden: TaskResult, visible: TaskResult
+) -> None:
     """Fewer blasts only where a layout comes up twice: the best one was tried already."""
     assert 0.8 * SMALL.blasts <= study.evaluator.blasts <= SMALL.blasts
 
 
-def test_held_out_seeds_are_not_those_of_training(study: Study) -> None:
+def test_held_out_seeds_are_not_those_of_training(study: DifficultyStudy) -> None:
     assert all(threat.seed in SeedRange.JUDGEMENT.value for threat in study.held_out)
     tried = (*study._tried, *study._again(study._tried[0].charge))
     assert all(threat.seed in SeedRange.SEARCH.value for threat in tried)
@@ -114,13 +118,15 @@ def test_held_out_seeds_are_not_those_of_training(study: Study) -> None:
 
 def test_the_search_prefers_what_does_best_on_training(monkeypatch: pytest.MonkeyPatch) -> None:
     """With impulses that fall with the layout's number, the last one must win both rounds."""
-    study = Study(load_scenario("courtyard"), replace(SMALL, layouts=6), "event", processes=1)
+    study = DifficultyStudy(
+        load_scenario("courtyard"), replace(SMALL, layouts=6), "event", processes=1
+    )
     pool = study._pool
 
-    def numbered(self: Study, layouts: list, threats: list) -> FloatArray:
+    def numbered(self: DifficultyStudy, layouts: list, threats: list) -> FloatArray:
         return np.array([[-float(pool.index(layout))] * len(threats) for layout in layouts])
 
-    monkeypatch.setattr(Study, "_impulses", numbered)
+    monkeypatch.setattr(DifficultyStudy, "_impulses", numbered)
     assert study._best_of_pool(numbered(study, pool, [0]), study.held_out) == pool[-1]
 
 
@@ -172,7 +178,7 @@ def test_layouts_that_luck_alone_tells_apart_are_found() -> None:
     assert unmet({"random": (0.8, 0.8, 0.8, 0.8)}, {}) == [4]
 
 
-def test_the_picture_shows_both_plans(study: Study, hidden: TaskResult) -> None:
+def test_the_picture_shows_both_plans(study: DifficultyStudy, hidden: TaskResult) -> None:
     evaluation = evaluate_against(study.evaluator, hidden.best.layouts[0], study.held_out)
     figure = difficulty_figure(evaluation, "a wall")
     titles = [axes.get_title() for axes in figure.axes[:2]]

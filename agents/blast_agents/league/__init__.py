@@ -12,7 +12,7 @@ from blast_agents.league.entries import (
     VisibilityLayout,
     standard_entries,
 )
-from blast_agents.league.standings import Result, Standings, Verdict, verdicts
+from blast_agents.league.standings import LeagueVerdict, Result, Standings, verdicts
 from blast_agents.league.store import ResultStore
 from blast_agents.league.tracks import (
     TRACKS,
@@ -29,6 +29,7 @@ __all__ = [
     "Agent",
     "Contest",
     "Entry",
+    "LeagueVerdict",
     "NoBarrier",
     "Outlook",
     "RandomLayout",
@@ -39,7 +40,6 @@ __all__ = [
     "Standings",
     "Track",
     "Training",
-    "Verdict",
     "VisibilityLayout",
     "find_tracks",
     "hidden_track",

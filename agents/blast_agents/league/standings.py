@@ -174,7 +174,7 @@ class Standings:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class LeagueVerdict:
     """An agent, or a search that begins with one, against a rule or another search, case by case.
 
     Attributes:
@@ -219,14 +219,14 @@ class Verdict:
         )
 
 
-def verdicts(standings: Standings) -> tuple[Verdict, ...]:
+def verdicts(standings: Standings) -> tuple[LeagueVerdict, ...]:
     """Return a verdict for all that has learnt, and each of the references."""
     count = len(standings.track.cases)
     sample = f"{count} cases"
     if standings.has_one_case:
         sample = f"{standings.unprotected.shape[1]} held-out threats of one case"
     return tuple(
-        Verdict(
+        LeagueVerdict(
             entry=result.name,
             reference=reference.name,
             difference=standings.difference(result, reference),

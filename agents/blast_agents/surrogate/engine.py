@@ -9,7 +9,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from blast_agents.surrogate.network import Surrogate, load_surrogate, packaged_surrogate
-from blast_agents.surrogate.walls import Site, site_of
+from blast_agents.surrogate.walls import SurrogateSite, site_of
 from blast_env.arrays import FloatArray
 from blast_env.engines import BlastLoads, Engine, StructureLoad, find_engine
 from blast_env.geometry import Element
@@ -47,7 +47,7 @@ class SurrogateEngine(Engine):
     name: str = field(init=False, default=SURROGATE)
     version: str = field(init=False)
     digest: str = field(init=False)
-    _sites: OrderedDict[str, Site] = field(
+    _sites: OrderedDict[str, SurrogateSite] = field(
         default_factory=OrderedDict, init=False, repr=False, compare=False
     )
 
@@ -109,7 +109,7 @@ class SurrogateEngine(Engine):
         modules = [each.rows * each.columns for each in scenario.structures]
         return BlastLoads(structures, np.repeat(impulse_pa_s, modules))
 
-    def _site(self, scenario: Scenario) -> Site:
+    def _site(self, scenario: Scenario) -> SurrogateSite:
         key = scenario.content_hash
         if key not in self._sites:
             self._sites[key] = site_of(scenario)

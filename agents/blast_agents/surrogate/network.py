@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from blast_agents.surrogate.walls import FEATURES, Approach, Site
+from blast_agents.surrogate.walls import FEATURES, Approach, SurrogateSite
 from blast_env.arrays import FloatArray
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
@@ -104,7 +104,7 @@ class Guess(NamedTuple):
     peak_pa: FloatArray | None = None
     peak_spread: FloatArray | None = None
 
-    def loads(self, site: Site) -> FloatArray:
+    def loads(self, site: SurrogateSite) -> FloatArray:
         """Return the load that counts behind each layout, in the objective's unit (layouts,).
 
         Args:
@@ -168,7 +168,7 @@ class Surrogate:
         return sha256(numbers).hexdigest()[:16]
 
     def guess(
-        self, site: Site, layouts: Sequence[Sequence[Element]], charges: Sequence[Charge]
+        self, site: SurrogateSite, layouts: Sequence[Sequence[Element]], charges: Sequence[Charge]
     ) -> Guess:
         """Return what blasts behind layouts would do, without one.
 

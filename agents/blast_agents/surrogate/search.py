@@ -13,7 +13,7 @@ from blast_agents.search.moves import Moves
 from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
 from blast_agents.search.session import SearchSession
 from blast_agents.surrogate.network import Surrogate
-from blast_agents.surrogate.walls import Site, site_of
+from blast_agents.surrogate.walls import SurrogateSite, site_of
 from blast_env.arrays import FloatArray
 from blast_env.evaluation import Case, Threat
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
@@ -42,7 +42,7 @@ class Guesses:
 
     surrogate: Surrogate
     case: Case
-    site: Site
+    site: SurrogateSite
     _known: dict[Layout, float] = field(default_factory=dict)
 
     @classmethod

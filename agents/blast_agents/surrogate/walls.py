@@ -95,7 +95,7 @@ class Approach:
         return np.hstack((self.fixed, self.ways.shares(barrier)))
 
 
-class Site:
+class SurrogateSite:
     """A scenario as the surrogate sees it.
 
     Args:
@@ -164,13 +164,13 @@ class Site:
         return Approach(ways, fixed, np.log(impulse), np.log(peak), points.area_m2)
 
 
-def site_of(scenario: Scenario) -> Site:
+def site_of(scenario: Scenario) -> SurrogateSite:
     """Return a scenario as the surrogate sees it.
 
     Raises:
         BlastEnvError: If nothing on it is protected.
     """
-    site = Site(scenario)
+    site = SurrogateSite(scenario)
     if not site.protected:
         raise BlastEnvError(f"{scenario.name}: no structure is protected")
     return site
