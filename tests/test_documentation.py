@@ -135,15 +135,15 @@ def test_exceptions_stand_for_commands_and_code_that_the_pages_show() -> None:
     blocks = {(each.page, each.number) for page in CODE for each in CODE[page]}
     assert {*exceptions.CODE_NOT_RUN} <= blocks
     assert {*exceptions.CODE_OF_THE_BUILD} <= {*WITH_CODE}
-    pages = {*exceptions.BACKGROUND, *exceptions.FOLLOWS, *exceptions.FOLLOWS.values()}
-    assert pages | {page for each in exceptions.GIVEN for page in each.pages} <= {*STEPS}
+    assert {*exceptions.BACKGROUND} | {
+        page for each in exceptions.GIVEN for page in each.pages
+    } <= {*STEPS}
 
 
 def test_what_pages_take_for_granted_they_name() -> None:
     for given in exceptions.GIVEN:
         for page in given.pages:
-            following = [each for each, first in exceptions.FOLLOWS.items() if first == page]
-            assert any(given.path in TEXTS[each] for each in (page, *following)), given.path
+            assert given.path in TEXTS[page], given.path
 
 
 def test_no_line_of_a_block_of_commands_is_overlooked() -> None:

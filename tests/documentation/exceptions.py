@@ -130,9 +130,6 @@ GIVEN: Final = (
     ),
 )
 
-FOLLOWS: Final = {"docs/studies/league_tables.md": "docs/studies/league.md"}
-"""Pages that are read after another one, and go on in its folder."""
-
 SERVERS: Final = {
     "blast-env app": Server(8080),
     "blast-env app --port 8090 --folder designs --run runs/courtyard": Server(8090),

@@ -12,7 +12,7 @@ import socket
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +26,6 @@ import typer
 from tests.documentation.exceptions import (
     BACKGROUND,
     CODE_NOT_RUN,
-    FOLLOWS,
     GIVEN,
     NOT_RUN,
     SERVERS,
@@ -217,7 +216,7 @@ def beside(page: str, folder: Path) -> Iterator[None]:
             process.wait(30)
 
 
-def run_page(name: str, steps: list[Step], kept: Path, tally: Tally) -> None:
+def run_page(name: str, steps: Sequence[Step], kept: Path, tally: Tally) -> None:
     """Run steps in a folder of the page's own, which is thrown away."""
     with TemporaryDirectory() as scratch:
         page = Page(Path(scratch))
@@ -255,11 +254,9 @@ def main(
     tally = Tally()
     print("processor and passed time of each step")
     with TemporaryDirectory() as kept:
-        for name in dict.fromkeys(FOLLOWS.get(page, page) for page in pages or STEPS):
-            following = [page for page, first in FOLLOWS.items() if first == name]
-            steps = [step for page in (name, *following) for step in STEPS[page]]
-            if steps:
-                run_page(name, steps, Path(kept), tally)
+        for name in dict.fromkeys(pages or STEPS):
+            if STEPS[name]:
+                run_page(name, STEPS[name], Path(kept), tally)
     print(", ".join(f"{count} {became}" for became, count in tally.counts.most_common()))
     print(f"{used_s():.0f} s of processor time")
     for failure in tally.failures:
