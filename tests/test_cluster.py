@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from blast_env import cluster
 from blast_env.cli import app
 from blast_env.cluster import on_cluster
-from blast_env.engines.loads import BlastLoads
+from blast_env.engines.contract import BlastLoads
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.runner import as_completed, in_order, run_all

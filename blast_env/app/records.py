@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from blast_env.documents import read_text
-from blast_env.engines.table import CALIBRATED_ENGINES
+from blast_env.engines.contract import CALIBRATED_ENGINES
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout

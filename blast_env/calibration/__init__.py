@@ -2,27 +2,26 @@
 
 from blast_env.calibration.laws import (
     FewDistancesWarning,
+    FitMetrics,
+    Interval,
+    LeaveOneOut,
     LinearLaw,
     PowerLaw,
     ProportionalLaw,
     ScalingLaw,
+    bootstrap_coefficients,
     fit_linear,
+    fit_metrics,
     fit_power_law,
     fit_proportional,
-)
-from blast_env.calibration.load_unit import CalibratedLoad, LoadUnit
-from blast_env.calibration.metrics import (
-    FitMetrics,
-    Interval,
-    LeaveOneOut,
-    bootstrap_coefficients,
-    fit_metrics,
     leave_one_out,
     shape_rms_percent,
 )
 from blast_env.calibration.model import (
+    CalibratedLoad,
     Calibration,
     CalibrationError,
+    LoadUnit,
     ScaledImpulse,
     load_calibration,
     save_calibration,

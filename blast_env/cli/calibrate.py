@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from blast_env.calibration.laws import LawName
-from blast_env.calibration.metrics import shape_rms_percent
+from blast_env.calibration.laws import LawName, shape_rms_percent
 from blast_env.calibration.model import (
     Calibration,
     SimulatedQuantity,

@@ -9,7 +9,7 @@ import typer
 from blast_env.cli.cluster import CLUSTER_HELP
 from blast_env.cli.command import FOLDER, Command, option
 from blast_env.cli.output import check_json, resume_with_cache
-from blast_env.engines.table import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
+from blast_env.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.envs.arguments import ResetOptions
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 

@@ -20,7 +20,7 @@ from blast_env.cli.output import (
 from blast_env.cli.pieces import print_pieces
 from blast_env.cli.targets import PICTURES
 from blast_env.engines import Blast, BlastResult, Engine, find_engine
-from blast_env.engines.table import load_plugin
+from blast_env.engines.contract import load_plugin
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import Charge

@@ -3,11 +3,18 @@
 `engines.gas` is not imported here: it takes Numba, and with it half a second.
 """
 
-from blast_env.engines.contract import Engine, EngineOption
-from blast_env.engines.loads import BlastLoads, StructureLoad
+from blast_env.engines.contract import (
+    CALIBRATED_ENGINES,
+    ENGINE_NAMES,
+    JUDGE,
+    BlastLoads,
+    Engine,
+    EngineOption,
+    StructureLoad,
+    find_engine,
+)
 from blast_env.engines.particles import Blast, BlastResult, ParticleEngine
 from blast_env.engines.simulate import simulate, simulate_many
-from blast_env.engines.table import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE, find_engine
 
 __all__ = [
     "CALIBRATED_ENGINES",

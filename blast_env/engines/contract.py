@@ -1,4 +1,4 @@
-"""What an engine is: it tells the loads of a blast, and what kind of answer that is.
+"""What an engine is: it tells the loads of a blast, and what kind of answer that is; all of them.
 
 An engine of one's own is a class with a name, a version and `loads`; everything else has a default:
 
@@ -7,22 +7,118 @@ An engine of one's own is a class with a name, a version and `loads`; everything
 
         def loads(self, scenario, layout, charge, seed): ...
 
-It can be given wherever an engine's name can. A line in `engines.table` gives it a name of its own.
+It can be given wherever an engine's name can. A line in the table below gives it a name of its own.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from importlib import import_module
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from blast_env.calibration.model import Calibration
-from blast_env.engines.loads import BlastLoads
-from blast_env.errors import BlastEnvError, value_text
+from blast_env.errors import BlastEnvError, UnknownNameError, import_extra, value_text
 from blast_env.geometry import Element
-from blast_env.scenario import AnyCharge, AnyScenario, Scenario
+from blast_env.scenario import AnyCharge, AnyScenario, ObjectiveSection, Scenario, find_scenario
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
+
+
+@dataclass(frozen=True)
+class StructureLoad:
+    """The load on one structure.
+
+    Attributes:
+        name: Name of the structure.
+        protected: Whether its load counts.
+        weight: How much it counts among the protected structures.
+        impulse_sim: Sum of m |v| over the collisions, simulation units.
+        transferred_impulse_sim: Momentum really transferred, simulation units.
+        impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s.
+        peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which know none.
+        peak_weight: How much that counts among the protected structures.
+        in_range: Whether the calibration was made for this distance and charge.
+        notes: Why not, a sentence each.
+    """
+
+    name: str
+    protected: bool
+    weight: float
+    impulse_sim: float
+    transferred_impulse_sim: float
+    impulse_pa_s: float
+    peak_pa: float | None
+    peak_weight: float
+    in_range: bool
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class BlastLoads:
+    """The loads of one blast on all structures; the barrier is none.
+
+    Attributes:
+        structures: One load a structure, in the order of the scene.
+        module_impulse_sim: Sum of m |v| on each module of the structures, in the order of the
+            scene, simulation units (modules,); for gas dynamics the momentum on its walls, N s.
+    """
+
+    structures: tuple[StructureLoad, ...]
+    module_impulse_sim: NDArray[np.float64]
+
+    def are_for(self, scenario: AnyScenario) -> bool:
+        """Return whether these can be loads of a scenario: finite, one a structure and module."""
+        structures = find_scenario(scenario).structures
+        names = [structure.name for structure in structures]
+        modules = sum(structure.rows * structure.columns for structure in structures)
+        impulses = np.array([load.impulse_pa_s for load in self.structures])
+        return (
+            [load.name for load in self.structures] == names
+            and self.module_impulse_sim.shape == (modules,)
+            and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse_sim).all())
+        )
+
+    @property
+    def protected(self) -> tuple[StructureLoad, ...]:
+        """The loads on the protected structures."""
+        return tuple(load for load in self.structures if load.protected)
+
+    @property
+    def protected_impulse_pa_s(self) -> float:
+        """Impulses of the protected structures, by weight, added up, Pa*s."""
+        return sum(load.weight * load.impulse_pa_s for load in self.protected)
+
+    @property
+    def protected_impulse_sim(self) -> float:
+        """Impulses of the protected structures, by weight, added up, simulation units."""
+        return sum(load.weight * load.impulse_sim for load in self.protected)
+
+    @property
+    def protected_peak_pa(self) -> float:
+        """The largest overpressure on any wall of a protected structure, Pa; NaN for particles."""
+        peaks = [load.peak_pa for load in self.protected]
+        return max((np.nan if peak is None else peak for peak in peaks), default=0.0)
+
+    def load(self, objective: ObjectiveSection) -> float:
+        """Return the load of the protected structures in the unit of the objective.
+
+        Args:
+            objective: Says which load counts.
+        """
+        return sum(
+            objective.load(load.impulse_pa_s, load.peak_pa or 0.0, load.weight, load.peak_weight)
+            for load in self.protected
+        )
+
+    @property
+    def in_range(self) -> bool:
+        """Whether the calibration was made for this distance to every protected structure."""
+        return all(load.in_range for load in self.protected)
 
 
 @dataclass(frozen=True)
@@ -181,3 +277,75 @@ class Engine(ABC):
 def plain_settings(engine: Engine) -> Mapping[str, Any]:
     """Return the values of an engine's own options, for records."""
     return {option.name: getattr(engine, option.name) for option in engine.options}
+
+
+@dataclass(frozen=True)
+class _Row:
+    """Where an engine is, and what must be known of it before it is imported.
+
+    Attributes:
+        place: "module:Class", as text: only the engine that runs is imported, for Numba alone
+            takes half a second.
+        needs_calibration: As of the class.
+        extra: The extra that it needs; empty for none.
+    """
+
+    place: str
+    needs_calibration: bool = False
+    extra: str = ""
+
+
+_TABLE: Final[Mapping[str, _Row]] = MappingProxyType(
+    {
+        "pymunk": _Row("blast_env.engines.particles:PymunkEngine", needs_calibration=True),
+        "event": _Row("blast_env.engines.particles:EventEngine", needs_calibration=True),
+        "gas": _Row("blast_env.engines.gas:GasEngine"),
+        "surrogate": _Row("blast_agents.surrogate.engine:SurrogateEngine", extra="agents"),
+    }
+)
+
+ENGINE_NAMES: Final = tuple(_TABLE)
+"""The engines that come with the package; the first one is the reference of the paper's model."""
+
+CALIBRATED_ENGINES: Final = tuple(name for name, row in _TABLE.items() if row.needs_calibration)
+"""Those whose loads a calibration turns into Pa s."""
+
+JUDGE: Final = "gas"
+"""The engine whose word counts about protection."""
+
+
+def find_engine(engine: str | Engine, cell_m: float | None = None) -> Engine:
+    """Return an engine by its name, or the engine itself.
+
+    Args:
+        engine: The name, or the engine.
+        cell_m: Side of the cells of gas dynamics; that of the engine unless given.
+
+    Raises:
+        UnknownNameError: If there is no engine of that name.
+        BlastEnvError: If `cell_m` does not divide the side of a module, or is given for an engine
+            that has no cells; or an extra is missing.
+    """
+    found = _made(engine) if isinstance(engine, str) else engine
+    if not isinstance(found, Engine):
+        raise BlastEnvError(f"engine is {value_text(engine)}, must be a name or an engine")
+    return found.configured(cell_m=cell_m)
+
+
+def _made(name: str) -> Engine:
+    if name not in _TABLE:
+        raise UnknownNameError("engine", name, ENGINE_NAMES)
+    row = _TABLE[name]
+    module, _, kind = row.place.partition(":")
+    if not row.extra:
+        made: Engine = getattr(import_module(module), kind)()
+        return made
+    with import_extra(row.extra, f"engine {name!r}"):
+        guessing: Engine = getattr(import_module(module), kind)()
+    return guessing
+
+
+def load_plugin(place: str) -> Any:
+    """Return what a "module:name" stands for; see `Engine.unfolding`."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)

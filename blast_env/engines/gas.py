@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.calibration.model import ScaledImpulse
 from blast_env.engines.bays import BAY_COLUMNS, BayLoads
-from blast_env.engines.contract import Engine, EngineOption
-from blast_env.engines.loads import BlastLoads, StructureLoad
+from blast_env.engines.contract import BlastLoads, Engine, EngineOption, StructureLoad
 from blast_env.engines.pieces import PIECE_COLUMNS, PieceLoads
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Element, layout_text

@@ -14,20 +14,17 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from blast_env.calibration.load_unit import LoadUnit
 from blast_env.calibration.model import (
     Calibration,
     CalibrationError,
+    LoadUnit,
     ScaledImpulse,
     scenario_calibration,
 )
-from blast_env.engines.contract import Engine
-from blast_env.engines.loads import BlastLoads, StructureLoad
-from blast_env.engines.table import find_engine
+from blast_env.engines.contract import BlastLoads, Engine, StructureLoad, find_engine
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, layout_text
-from blast_env.physics.collisions import CollisionArray
-from blast_env.physics.engine import BallStates, BlastRun, EndReason
+from blast_env.physics.engine import BallStates, BlastRun, CollisionArray, EndReason
 from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.provenance import versions

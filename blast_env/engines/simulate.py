@@ -3,9 +3,8 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Literal, overload
 
-from blast_env.engines.contract import BlastOutcome, Engine
+from blast_env.engines.contract import BlastOutcome, Engine, find_engine
 from blast_env.engines.particles import Blast, BlastResult
-from blast_env.engines.table import find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
 from blast_env.runner import check_workers, in_order

@@ -1,15 +1,18 @@
-"""Checking the arguments of environments and the options of `reset`."""
+"""The arguments of environments and the options of `reset`: checked, and kept as plain data."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import wraps
 from inspect import signature
+from pathlib import Path
 from typing import Any, Final, ParamSpec, TypeVar
+
+from gymnasium.envs.registration import EnvSpec
 
 from blast_env.errors import BlastEnvError, UnknownArgumentError, UnknownNameError, value_text
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
-from blast_env.scenario import AnyCharge, VehicleCharge
+from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 from blast_env.values import MOST_SEED, finite_number, number_pair, whole_number
 
 _Parameters = ParamSpec("_Parameters")
@@ -175,3 +178,31 @@ class ResetOptions:
             drawn.tnt_kg if self.tnt_kg is None else self.tnt_kg,
             drawn.height_m if self.charge_height_m is None else self.charge_height_m,
         )
+
+
+class PlainSpec:
+    """A mixin for environments: keeps the arguments of `gymnasium.make` as plain data.
+
+    A scenario becomes its document, a path becomes text. Whatever else is no plain data stays as
+    it is, and `EnvSpec.to_json` refuses it.
+    """
+
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What `gymnasium.make` made the environment from; `None` if it was made otherwise."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        if spec is not None:
+            kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
+            spec = replace(spec, kwargs=kwargs)
+        self._spec = spec
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Scenario):
+        return value.model_dump(mode="json", exclude_none=True)
+    return str(value) if isinstance(value, Path) else value

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from blast_env.engines import Engine, find_engine
 from blast_env.envs.arguments import (
+    PlainSpec,
     ResetOptions,
     check_names,
     checked_keywords,
@@ -28,7 +29,6 @@ from blast_env.envs.episode import (
     total,
 )
 from blast_env.envs.observations import OBSERVATIONS, Array, Observable, Observation
-from blast_env.envs.spec import PlainSpec
 from blast_env.envs.strategies import (
     REWARDS,
     Reward,

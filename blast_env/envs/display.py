@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.engines.table import load_plugin
+from blast_env.engines.contract import load_plugin
 from blast_env.envs.episode import Episode
 from blast_env.envs.observations import VehicleView
 from blast_env.evaluation.cases import Threat

@@ -10,9 +10,14 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from blast_env.engines import Blast, BlastResult, Engine, find_engine
-from blast_env.engines.table import load_plugin
-from blast_env.envs.arguments import ResetOptions, check_names, checked_keywords, checked_options
-from blast_env.envs.spec import PlainSpec
+from blast_env.engines.contract import load_plugin
+from blast_env.envs.arguments import (
+    PlainSpec,
+    ResetOptions,
+    check_names,
+    checked_keywords,
+    checked_options,
+)
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
 from blast_env.physics.engine import BlastRun, EndReason

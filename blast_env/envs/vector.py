@@ -11,9 +11,9 @@ from gymnasium.vector import SyncVectorEnv
 from gymnasium.vector.utils import iterate
 from gymnasium.wrappers import TimeLimit
 
+from blast_env.envs.arguments import PlainSpec
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.simulator_env import BlastSimulatorEnv
-from blast_env.envs.spec import PlainSpec
 
 _Observation = TypeVar("_Observation")
 _Action = TypeVar("_Action")

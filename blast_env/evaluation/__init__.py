@@ -1,6 +1,6 @@
 """Evaluating layouts: loads under threats, and reductions with their uncertainty."""
 
-from blast_env.engines.loads import BlastLoads, StructureLoad
+from blast_env.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.cases import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.comparison import (
     Assessment,

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.engines.loads import BlastLoads
+from blast_env.engines.contract import BlastLoads
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, check_distinct
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators

@@ -12,7 +12,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.engines import Engine, find_engine
-from blast_env.engines.loads import BlastLoads, StructureLoad
+from blast_env.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.cases import Case, Threat, draw_threats
 from blast_env.evaluation.comparison import Comparison, loads_of_both
 from blast_env.evaluation.evaluator import BlastEvaluator

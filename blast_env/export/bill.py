@@ -1,20 +1,63 @@
-"""What a layout consists of, as tables: its modules or pieces, and the bill of quantities."""
+"""A layout on its site for other programs: its modules or pieces, and the bill of quantities."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from math import fsum
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from blast_env.export.plan import LayoutPlan
-from blast_env.geometry import Element, Piece
-from blast_env.plan import rounded_m
+from blast_env.geometry import Element, Layout, Piece
+from blast_env.physics.scene import Charge
+from blast_env.physics.structure import ModularPart
+from blast_env.plan import Feature, rounded_m, site_features
 from blast_env.provenance import package_version
-from blast_env.scenario import Placement
+from blast_env.scenario import Placement, ScenarioField, check_layout
+from blast_env.scenario.build_scene import barrier_outline
 from blast_env.tables import Column, as_types, table_of
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class LayoutPlan:
+    """A layout on its site.
+
+    Attributes:
+        scenario: The scenario; its bundled name or path will do.
+        layout: (row, column) of each module, or the pieces; their order is kept.
+        charge: The charge that the layout was made for; `None` where it is for all the places
+            where the scenario may have one, or nobody knows.
+        provenance: How the layout was made: anything that JSON can hold.
+
+    Raises:
+        LayoutError: If the layout does not fit the scenario.
+    """
+
+    scenario: ScenarioField = ScenarioField()
+    layout: Layout  # type: ignore[misc]  # a scenario has no default
+    charge: Charge | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the layout."""
+        object.__setattr__(self, "layout", check_layout(self.scenario, self.layout))
+
+    @property
+    def modules(self) -> tuple[ModularPart, ...]:
+        """The modules, in the order of the layout, with the names that the blast's tables have."""
+        zone = self.scenario.build_zone
+        if zone is None:
+            return ()
+        return tuple(barrier_outline(zone, self.layout).build().parts)
+
+    @cached_property
+    def features(self) -> tuple[Feature, ...]:
+        """Everything on the site, in metres; what lies on top comes last."""
+        return site_features(self.scenario, self.layout, self.charge)
+
 
 MODULE_COLUMNS: Final = (
     Column("module_id", "", "name of the module, made from its centre in metres"),

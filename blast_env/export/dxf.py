@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from blast_env.errors import import_extra
-from blast_env.export.plan import LayoutPlan
+from blast_env.export.bill import LayoutPlan
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
 from blast_env.labels import best_place

@@ -11,13 +11,11 @@ import numpy as np
 
 from blast_env import tables
 from blast_env.errors import BlastEnvError, suggestion
-from blast_env.export.bill import bill_of_quantities, element_table, write_excel
-from blast_env.export.plan import LayoutPlan
+from blast_env.export.bill import LayoutPlan, bill_of_quantities, element_table, write_excel
 from blast_env.files import make_folder, write_atomically
 from blast_env.plan import Feature
 from blast_env.scenario import write_layout
-from blast_env.scenario.georeference import AnyGeoreference
-from blast_env.scenario.sections import PointM
+from blast_env.scenario.sections import AnyGeoreference, PointM
 from blast_env.values import path_of
 
 _DIGITS: Final = 9  # of a coordinate on a map: a tenth of a millimetre in degrees

@@ -14,16 +14,14 @@ from scipy.special import stdtrit
 
 from blast_env.calibration.laws import (
     Fit,
+    FitMetrics,
     LawName,
     ScalingLaw,
+    bootstrap_coefficients,
     fit_linear,
+    fit_metrics,
     fit_power_law,
     fit_proportional,
-)
-from blast_env.calibration.metrics import (
-    FitMetrics,
-    bootstrap_coefficients,
-    fit_metrics,
     leave_one_out,
 )
 from blast_env.calibration.model import (

@@ -10,7 +10,7 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.importing.site_map import MapCoordinates, SourceCoordinates
-from blast_env.scenario.georeference import AnyGeoreference, DrawingGeoreference, MapGeoreference
+from blast_env.scenario.sections import AnyGeoreference, DrawingGeoreference, MapGeoreference
 
 with import_extra("maps", "maps and drawings"):
     from pyproj import CRS, Transformer

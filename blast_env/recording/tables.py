@@ -8,7 +8,7 @@ import pandas as pd
 
 from blast_env.arrays import FloatArray
 from blast_env.calibration import LoadUnit
-from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
+from blast_env.physics.engine import CollisionArray, incidence_angle_rad
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import ModularObstacle
 from blast_env.tables import Column, as_types, texts

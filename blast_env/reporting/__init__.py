@@ -1,8 +1,8 @@
 """A report on a layout, for whoever has to decide on it: HTML that needs nothing else, and PDF."""
 
-from blast_env.reporting.limits import Limit
+from blast_env.reporting.loads import UNITS, UnitSystem
+from blast_env.reporting.outcomes import Limit
 from blast_env.reporting.page import write_report
 from blast_env.reporting.study import Study, StudyOptions, run_study
-from blast_env.reporting.units import UNITS, UnitSystem
 
 __all__ = ["UNITS", "Limit", "Study", "StudyOptions", "UnitSystem", "run_study", "write_report"]

@@ -32,10 +32,9 @@ from blast_env.rendering.site_plan import (
     write_names,
 )
 from blast_env.rendering.style import count_of, render_extra, unit_interval
-from blast_env.reporting.loads import MeasuredBlast, ReportedBuilding
+from blast_env.reporting.loads import MeasuredBlast, ReportedBuilding, UnitSystem
 from blast_env.reporting.outcomes import FrontPoint, ItemWorth, Outcome
 from blast_env.reporting.threats import NamedCharge
-from blast_env.reporting.units import UnitSystem
 from blast_env.scenario import Scenario
 from blast_env.units import MODULE_SIDE_M, MS_PER_S
 

@@ -1,8 +1,9 @@
-"""Loads by building and wall, with how long they last."""
+"""Loads by building and wall, with how long they last, and the units that a report has."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -11,11 +12,63 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.engines.gas import GasBlast, GasResult
+from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.gas.probes import ARRIVAL_PA
 from blast_env.physics.gas.solver import GasSolver
 from blast_env.physics.scene import WALLS, WallName
 from blast_env.scenario import AnyStructure, Scenario
+from blast_env.units import MS_PER_S, PA_PER_KPA, PA_PER_PSI
+
+
+@dataclass(frozen=True)
+class UnitSystem:
+    """Units of loads; lengths are metres and masses kilograms in both.
+
+    Attributes:
+        name: How the command line calls it.
+        impulse: Unit of impulses.
+        pressure: Unit of overpressures.
+        pa_s_per_impulse: Pascal seconds in a unit of impulse.
+        pa_per_pressure: Pascals in a unit of pressure.
+    """
+
+    name: str
+    impulse: str
+    pressure: str
+    pa_s_per_impulse: float
+    pa_per_pressure: float
+
+    def impulse_of(self, pa_s: float) -> float:
+        """Return an impulse in Pa s in this unit."""
+        return pa_s / self.pa_s_per_impulse
+
+    def pressure_of(self, pa: float) -> float:
+        """Return a pressure in Pa in this unit."""
+        return pa / self.pa_per_pressure
+
+    @classmethod
+    def named(cls, name: str) -> "UnitSystem":
+        """Return the units of a name.
+
+        Raises:
+            UnknownNameError: If there are none.
+        """
+        if name not in UNITS:
+            raise UnknownNameError("units", name, UNITS)
+        return UNITS[name]
+
+
+UNITS: Final[Mapping[str, UnitSystem]] = MappingProxyType(
+    {
+        each.name: each
+        for each in (
+            UnitSystem("si", "Pa·s", "kPa", 1.0, PA_PER_KPA),
+            UnitSystem("psi", "psi·ms", "psi", PA_PER_PSI / MS_PER_S, PA_PER_PSI),
+        )
+    }
+)
+"""The units by their names."""
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,7 @@ from blast_env.reporting.figures import (
     site_plan,
     worth_map,
 )
-from blast_env.reporting.limits import Limit
-from blast_env.reporting.outcomes import LoadPair
+from blast_env.reporting.outcomes import Limit, LoadPair
 from blast_env.reporting.study import Study
 from blast_env.reporting.threats import other_places
 from blast_env.scenario import write_layout

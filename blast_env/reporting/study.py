@@ -14,13 +14,25 @@ from blast_env.documents import parse_csv, read_text
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError, shortened
 from blast_env.evaluation import BlastEvaluator, Threat
-from blast_env.export.bill import bill_of_quantities
-from blast_env.export.plan import LayoutPlan
+from blast_env.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.geometry import Element, Layout, Piece, layout_text
 from blast_env.reporting.figures import Picture, blast_pictures, film_stills
-from blast_env.reporting.limits import Limit, check_limits
-from blast_env.reporting.loads import MeasuredBlast, ReportedBuilding, measure, targets_of
-from blast_env.reporting.outcomes import FrontPoint, ItemWorth, LoadPair, Outcome
+from blast_env.reporting.loads import (
+    UNITS,
+    MeasuredBlast,
+    ReportedBuilding,
+    UnitSystem,
+    measure,
+    targets_of,
+)
+from blast_env.reporting.outcomes import (
+    FrontPoint,
+    ItemWorth,
+    Limit,
+    LoadPair,
+    Outcome,
+    check_limits,
+)
 from blast_env.reporting.threats import (
     NamedCharge,
     asked_threats,
@@ -28,7 +40,6 @@ from blast_env.reporting.threats import (
     other_masses,
     other_places,
 )
-from blast_env.reporting.units import UNITS, UnitSystem
 from blast_env.scenario import AnyCharge, Placement, Scenario, check_layout
 from blast_env.statistics import reductions
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout, Rectangle
-from blast_env.physics.parameters import SimulationParameters
+from blast_env.physics.parameters import SimulationParameters, for_charge
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
-from blast_env.physics.presets import for_charge
 from blast_env.physics.scene import BlastSite, Charge, Gauge, Scene, StructureOutline
 from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
 from blast_env.scenario import (

@@ -12,9 +12,8 @@ from pydantic import TypeAdapter, ValidationError
 from blast_env.arrays import BoolArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, stacked_runs
-from blast_env.physics.parameters import AirParameters, SimulationParameters
+from blast_env.physics.parameters import AirParameters, SimulationParameters, for_charge
 from blast_env.physics.particles import lattice_capacity
-from blast_env.physics.presets import for_charge
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.response.components import Component, Glazing, Wall
 from blast_env.scenario.facade import facade_problems

@@ -38,12 +38,12 @@ from blast_env.scenario.checks import (
     vehicle_ground,
 )
 from blast_env.scenario.facade import facade_bays
-from blast_env.scenario.georeference import AnyGeoreference
 from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, ScenarioError, problems_from
 from blast_env.scenario.sections import (
     FOR_PEOPLE,
+    AnyGeoreference,
     AnySource,
     AnyStructure,
     ChargeSource,

@@ -5,6 +5,7 @@ from blast_env.sites.criterion import (
     Objection,
     SiteCriterion,
     SiteMeasures,
+    Visibility,
     VisibilityCriterion,
     visibility_layout,
 )
@@ -18,7 +19,6 @@ from blast_env.sites.source import (
     training_sites,
 )
 from blast_env.sites.turning import turned
-from blast_env.sites.visibility import Visibility
 
 __all__ = [
     "FAMILIES",

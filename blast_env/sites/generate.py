@@ -25,9 +25,8 @@ from blast_env.scenario import (
     Site,
 )
 from blast_env.sites.criterion import Objection, SiteCriterion, VisibilityCriterion
-from blast_env.sites.draws import Apart, Draws, draw_place, on_grid
 from blast_env.sites.item_sites import ItemSiteRanges, draw_item_site
-from blast_env.sites.ranges import MARGIN_M, SiteRanges, Span
+from blast_env.sites.ranges import MARGIN_M, Apart, Draws, SiteRanges, Span, draw_place, on_grid
 from blast_env.sites.turning import turned
 from blast_env.units import MODULE_SIDE_M
 

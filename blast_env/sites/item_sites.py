@@ -7,13 +7,14 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.physics.presets import preset
+from blast_env.physics.parameters import preset
 from blast_env.scenario import SCHEMA_VERSION, Scenario
-from blast_env.sites.draws import Apart, Draws, draw_place, on_grid
 from blast_env.sites.ranges import (
     MARGIN_M,
+    Apart,
     Bounds,
     CountsBounds,
+    Draws,
     LengthBounds,
     LengthsBounds,
     PairBounds,
@@ -21,6 +22,8 @@ from blast_env.sites.ranges import (
     Span,
     WholeSpan,
     check_bounds,
+    draw_place,
+    on_grid,
 )
 from blast_env.sites.turning import turned
 from blast_env.units import MODULE_SIDE_M

@@ -29,7 +29,7 @@ from blast_env.app.work import ReportTask, ThreatOf, read_task, write_task
 from blast_env.calibration.model import load_calibration, save_calibration
 from blast_env.cluster import address_of
 from blast_env.engines import simulate
-from blast_env.engines.loads import BlastLoads, StructureLoad
+from blast_env.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation import Threat
 from blast_env.evaluation.store import BlastKey, DiskCache
 from blast_env.fitting.free_field import FreeFieldRun

@@ -28,8 +28,7 @@ from blast_env.fitting.free_field import (
     paper_reference,
 )
 from blast_env.geometry import Rectangle
-from blast_env.physics.parameters import with_overrides
-from blast_env.physics.presets import preset
+from blast_env.physics.parameters import preset, with_overrides
 from blast_env.scenario import Scenario
 from tests.scenarios import BALLISTIC_COURTYARD
 

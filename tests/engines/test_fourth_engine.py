@@ -8,7 +8,7 @@ import pytest
 from blast_agents.search import LayoutProblem, find_search_method
 
 import blast_env
-from blast_env.engines import find_engine, table
+from blast_env.engines import contract, find_engine
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats, evaluate_layout
 from blast_env.scenario import load_scenario
@@ -22,8 +22,8 @@ WALL = [(10, 0), (11, 0), (12, 0)]
 @pytest.fixture(autouse=True)
 def one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Add the line: the file is `tests/engines/shade.py`."""
-    row = table._Row("tests.engines.shade:ShadeEngine")
-    monkeypatch.setattr(table, "_TABLE", MappingProxyType({**table._TABLE, "shade": row}))
+    row = contract._Row("tests.engines.shade:ShadeEngine")
+    monkeypatch.setattr(contract, "_TABLE", MappingProxyType({**contract._TABLE, "shade": row}))
 
 
 def test_it_is_found_by_its_name_and_described() -> None:

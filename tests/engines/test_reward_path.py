@@ -61,6 +61,6 @@ def test_the_way_to_the_reward_is_short() -> None:
     assert ended
     functions = {each for each in called if written_by_hand(each[1])}
     modules = {module for module, _ in functions}
-    assert "blast_env.engines.loads" in modules
+    assert "blast_env.engines.contract" in modules
     assert len(functions) <= MOST_FUNCTIONS, sorted(functions)
     assert len(modules) <= MOST_MODULES, sorted(modules)

@@ -16,7 +16,7 @@ from blast_env.importing.cells import (
     owners,
     rectangles_of,
 )
-from blast_env.importing.direction import dominant_direction_deg, grid_offset_m
+from blast_env.importing.placing import dominant_direction_deg, grid_offset_m
 
 MASKS = arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9)))
 

@@ -23,8 +23,8 @@ from blast_env.scenario import (
     save_scenario,
     usable_cells,
 )
-from blast_env.scenario.georeference import DrawingGeoreference, MapGeoreference
 from blast_env.scenario.models import PointM
+from blast_env.scenario.sections import DrawingGeoreference, MapGeoreference
 from tests.importing.maps import BLOCK, LAYERS, charge, outline, rectangle, written
 
 HALL = ImportOptions(protect=("Town Hall",))

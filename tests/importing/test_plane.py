@@ -8,7 +8,7 @@ from pyproj import Geod, Transformer
 
 from blast_env.errors import BlastEnvError
 from blast_env.importing.plane import LocalPlane, rotated, to_map
-from blast_env.scenario.georeference import DrawingGeoreference, MapGeoreference
+from blast_env.scenario.sections import DrawingGeoreference, MapGeoreference
 
 EARTH = Geod(ellps="WGS84")
 

@@ -7,8 +7,13 @@ from hypothesis import strategies as st
 
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
-from blast_env.physics.parameters import SimulationParameters, with_overrides
-from blast_env.physics.presets import for_charge, preset, with_resolution
+from blast_env.physics.parameters import (
+    SimulationParameters,
+    for_charge,
+    preset,
+    with_overrides,
+    with_resolution,
+)
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
 from blast_env.scenario.build_scene import build_scene, build_site

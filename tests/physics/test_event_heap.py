@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.physics.event.queue import schedule, unschedule
+from blast_env.physics.event.prediction import schedule, unschedule
 from blast_env.physics.event.state import BALL, HEAP_ENTRY, NOBODY, RecordArray
 
 BALLS = 24

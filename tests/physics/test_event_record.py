@@ -9,7 +9,7 @@ from blast_env import load_scenario, simulate
 from blast_env.arrays import FloatArray
 from blast_env.engines import CALIBRATED_ENGINES, Blast
 from blast_env.engines.particles import find_particle_engine
-from blast_env.physics.collisions import COLLISION_DTYPE, incidence_angle_rad
+from blast_env.physics.engine import COLLISION_DTYPE, incidence_angle_rad
 from tests.physics.scenes import EVENT, KEEP_MASS, closed_box, hot_cloud, parameters
 
 COURTYARD = load_scenario("courtyard")

@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.engines import ParticleEngine
 from blast_env.engines.particles import PymunkEngine
-from blast_env.physics.collisions import CollisionArray, incidence_angle_rad
+from blast_env.physics.engine import CollisionArray, incidence_angle_rad
 from blast_env.physics.particles import CollisionType
 from tests.physics.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, wall
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from blast_env import load_scenario, simulate
-from blast_env.physics.parameters import SimulationParameters
-from blast_env.physics.presets import preset, with_resolution
+from blast_env.physics.parameters import SimulationParameters, preset, with_resolution
 
 
 def air_density(parameters: SimulationParameters) -> float:

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from blast_env.engines import BlastResult
-from blast_env.physics.collisions import COLLISION_DTYPE, CollisionArray
+from blast_env.physics.engine import COLLISION_DTYPE, CollisionArray
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import ModularObstacle
 from blast_env.recording.tables import (

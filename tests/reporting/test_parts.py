@@ -12,8 +12,8 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Piece
 from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Limit, StudyOptions, UnitSystem
-from blast_env.reporting.limits import check_limits
 from blast_env.reporting.loads import TargetLoad, first_phase_s, targets_of
+from blast_env.reporting.outcomes import check_limits
 from blast_env.reporting.study import Runs, layout_from
 from blast_env.reporting.threats import asked_threats, chief_threats, other_masses, other_places
 from blast_env.scenario import Scenario, ScenarioError

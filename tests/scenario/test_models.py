@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from blast_env.errors import BlastEnvError
-from blast_env.physics.presets import preset
+from blast_env.physics.parameters import preset
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
     PointSource,

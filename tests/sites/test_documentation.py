@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from blast_env.sites import HELD_OUT_SITES, SiteRanges, VisibilityCriterion
+from blast_env.sites.criterion import DIRECTIONS
 from blast_env.sites.generate import MOST_TRIES
-from blast_env.sites.visibility import DIRECTIONS
 
 PAGE = Path(__file__).parents[2] / "docs" / "researchers" / "sites.md"
 DOCUMENT = PAGE.read_text(encoding="utf-8")

@@ -21,10 +21,9 @@ from blast_env.sites import (
     SiteSource,
     generate_site,
 )
-from blast_env.sites.criterion import cut_share_of
+from blast_env.sites.criterion import TARGETS, Visibility, cut_share_of
 from blast_env.sites.generate import ITEM_CRITERION
 from blast_env.sites.item_sites import ITEM_KINDS, POST
-from blast_env.sites.visibility import TARGETS, Visibility
 from tests.catalogue_sites import yard
 from tests.envs.small import ThinEngine, play, same
 

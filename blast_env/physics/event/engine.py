@@ -5,8 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from blast_env.physics.collisions import COLLISION_DTYPE, CollisionLog
-from blast_env.physics.engine import BallStates, EndReason
+from blast_env.physics.engine import COLLISION_DTYPE, BallStates, CollisionLog, EndReason
 from blast_env.physics.event import loop
 from blast_env.physics.event.loop import run_world
 from blast_env.physics.event.state import RECORD_COLUMNS, with_walls, world_of

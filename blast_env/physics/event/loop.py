@@ -14,8 +14,14 @@ from numba.core import event
 from numpy.typing import NDArray
 
 from blast_env.physics.event.contacts import collide_balls, collide_with_module
-from blast_env.physics.event.prediction import cell_at, cross, enter_cell, leave_cell, look_ahead
-from blast_env.physics.event.queue import unschedule
+from blast_env.physics.event.prediction import (
+    cell_at,
+    cross,
+    enter_cell,
+    leave_cell,
+    look_ahead,
+    unschedule,
+)
 from blast_env.physics.event.state import (
     BORDER,
     CHANGED,

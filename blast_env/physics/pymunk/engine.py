@@ -10,18 +10,20 @@ import pymunk
 from numpy.typing import NDArray
 
 from blast_env.arrays import IntArray
-from blast_env.physics.collisions import CollisionLog
-from blast_env.physics.engine import BallStates, EndReason, can_reach
+from blast_env.physics.engine import BallStates, CollisionLog, EndReason, can_reach
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.pymunk.space import (
+    HALF,
+    OUTWARD,
     BallShape,
     ContactReader,
     ModuleShape,
     PymunkSpace,
     StepContacts,
+    WallSides,
     build_space,
+    height_above,
 )
-from blast_env.physics.pymunk.walls import HALF, OUTWARD, WallSides, height_above
 from blast_env.physics.scene import Scene
 
 _TOO_FAST: Final = 2.0
