@@ -1,21 +1,40 @@
-"""`blast-env assess`: does the building pass, and what would better glass bring?"""
+"""`blast-env assess`: does the building pass, does the barrier stand, what brings better glass?"""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import CELL_HELP, SCENARIO_HELP, ChargeOptions
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.cli.pieces import print_pieces
 from blast_env.cli.targets import PICTURES
 from blast_env.engines import JUDGE, find_engine
+from blast_env.engines.bays import BAY_COLUMNS
+from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation import draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
-from blast_env.evaluation.consequences import Consequences, consequences, other_glazing
+from blast_env.evaluation.consequences import (
+    CASE_COLUMNS,
+    BuildingResponse,
+    Consequences,
+    bay_table,
+    consequences,
+    other_glazing,
+    piece_table,
+)
 from blast_env.geometry import Layout, layout_counts
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.physics.scene import Charge
+from blast_env.provenance import versions
+from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario
+from blast_env.tables import write_csv
+from blast_env.units import PA_PER_KPA
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _HEADERS: Final = (
     "layout",
@@ -25,6 +44,10 @@ _HEADERS: Final = (
     "worst pane (GSA)",
     "worst panel",
 )
+_NEIGHBOURS: Final = (
+    *("layout", "building", "side-on peak (kPa)", "side-on impulse (Pa s)"),
+    *(f"{damage} (%)" for damage in BuildingDamage),
+)
 _LEVELS: Final = {level.label: level for level in LevelOfProtection}
 
 
@@ -32,8 +55,10 @@ _LEVELS: Final = {level.label: level for level in LevelOfProtection}
 class AssessCommand(ChargeOptions):
     """Say what charges do to the buildings: panes, panels, level of protection.
 
-    By gas dynamics, a blast a charge, with and without the layout. Structures need a facade in the
-    scenario file. What better glass would bring needs no further blast, and is printed as well.
+    By gas dynamics, a blast a charge, with and without the layout; the barrier is judged as well.
+    Structures need a facade in the
+    scenario file; what stands without one is taken for an ordinary house. What better glass would
+    bring needs no further blast, and is printed as well.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -41,15 +66,26 @@ class AssessCommand(ChargeOptions):
     target: str = option("low", "Level of protection to reach: very low, low, medium or high.")
     charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
     cell_m: float | None = option(None, CELL_HELP)
+    without_fallen: bool = option(
+        False, "Take pieces away that overturn before a blast is over, and run it again."
+    )
     picture: Path | None = option(
         None, "Picture of the facades under the worst charge: .png, .svg, .pdf.", writes=PICTURES
+    )
+    view: Path | None = option(
+        None, "Picture of the site in three dimensions, bays by their damage.", writes=PICTURES
+    )
+    diagram: Path | None = option(
+        None, "Pressure-impulse diagram with every bay on it.", writes=PICTURES
+    )
+    table: Path | None = option(
+        None, "Table of every bay under every charge: .csv, .xlsx.", writes=(".csv", ".xlsx")
     )
 
     def __call__(self) -> None:
         """Run the blasts, and print the verdict."""
         if self.target not in _LEVELS:
             raise UnknownNameError("level of protection", self.target, _LEVELS)
-        target = _LEVELS[self.target]
         scenario = load_scenario(self.scenario)
         layouts: dict[str, Layout] = {"no barrier": ()}
         if self.layout is not None:
@@ -60,23 +96,35 @@ class AssessCommand(ChargeOptions):
         found = {}
         for name, layout in layouts.items():
             with progress_bar(f"{len(charges)} blasts, {name}") as progress:
-                found[name] = consequences(scenario, layout, charges, engine, progress)
-        last, judged = list(found.items())[-1]
-        passes = judged.passes(target)
-        print_line(
-            f"{scenario.name}, {last}: {'PASSES' if passes else 'FAILS'} level {target.label!r} "
-            f"under {len(charges)} charges"
-        )
+                found[name] = consequences(
+                    scenario, layout, charges, engine, progress, without_fallen=self.without_fallen
+                )
+        self._print_verdict(scenario, found)
         self._print(scenario, found)
-        self._print_glazing(scenario, judged, target)
+        self._print_neighbours(found)
+        self._print_barriers(found)
+        self._print_glazing(scenario, list(found.values())[-1])
         print_line(engine.describe([scenario]))
-        if self.picture is not None:
-            self._draw(self.picture, found)
+        self._write(scenario, layouts, found)
 
     def _charges(self, scenario: Scenario) -> list[AnyCharge]:
         threats = one_of_each_charge(draw_threats(scenario, range(self.charges)))
         fixed = [self.fixed(scenario, threat.charge) for threat in threats]
         return list(dict.fromkeys(fixed))
+
+    def _print_verdict(self, scenario: Scenario, found: dict[str, Consequences]) -> None:
+        target = _LEVELS[self.target]
+        name, judged = list(found.items())[-1]
+        count = len(judged.barriers)
+        print_line(
+            f"{scenario.name}, {name}: {'PASSES' if judged.passes(target) else 'FAILS'} level "
+            f"{target.label!r} under {count} charges"
+        )
+        if judged.depends_on_cells(target):
+            print_line(
+                "This verdict depends on the cells: with peaks as sharp as Kingery and Bulmash's "
+                "it FAILS. Take smaller ones (--cell)."
+            )
 
     def _print(self, scenario: Scenario, found: dict[str, Consequences]) -> None:
         table = make_table(f"{scenario.name}: the worst of all charges", _HEADERS, text_columns=3)
@@ -85,35 +133,111 @@ class AssessCommand(ChargeOptions):
                 table.add_row(name, building, *_row(each, building))
         result_console().print(table)
 
-    def _print_glazing(
-        self, scenario: Scenario, judged: Consequences, target: LevelOfProtection
-    ) -> None:
+    def _print_neighbours(self, found: dict[str, Consequences]) -> None:
+        if not any(each.neighbours for each in found.values()):
+            return
+        title = "without a facade: how likely an ordinary house there is damaged, worst charge"
+        table = make_table(title, _NEIGHBOURS, text_columns=2)
+        for name, each in found.items():
+            for worst in each.worst_neighbours:
+                shares = (f"{100.0 * worst.probability[damage]:.0f}" for damage in BuildingDamage)
+                peak = f"{worst.peak_pa / PA_PER_KPA:.1f}"
+                table.add_row(name, worst.building, peak, f"{worst.impulse_pa_s:,.0f}", *shares)
+        result_console().print(table)
+
+    def _print_barriers(self, found: dict[str, Consequences]) -> None:
+        judged = list(found.values())[-1]
+        worst = judged.worst_barrier
+        if worst is not None:
+            print_pieces(worst.pieces, f"the barrier under {_charge_text(worst.charge)}, the worst")
+        for each in judged.barriers:
+            if each.taken_away:
+                print_line(
+                    f"{len(each.taken_away)} pieces overturned before the blast of "
+                    f"{_charge_text(each.charge)} was over, and were taken away for it"
+                )
+
+    def _print_glazing(self, scenario: Scenario, judged: Consequences) -> None:
         headers = ("glass in all windows", *_HEADERS[1:], "passes")
         table = make_table("the same loads, other glass", headers, text_columns=3)
         for name, glazing in other_glazing(scenario).items():
             other = judged.with_glazing(glazing)
             for building in other.buildings:
-                passes = "yes" if other.level(building) >= target else "no"
+                passes = "yes" if other.level(building) >= _LEVELS[self.target] else "no"
                 table.add_row(name, building, *_row(other, building), passes)
         result_console().print(table)
 
-    def _draw(self, picture: Path, found: dict[str, Consequences]) -> None:
+    def _write(
+        self, scenario: Scenario, layouts: dict[str, Layout], found: dict[str, Consequences]
+    ) -> None:
+        """Write the table, and the pictures of the worst charge."""
+        if self.table is not None:
+            print_line(f"wrote {self._write_table(self.table, scenario, found)}")
+        if self.picture is None and self.view is None and self.diagram is None:
+            return
         # Here, because pictures need the extra `render`.
-        from blast_env.rendering.facade import facade_picture
+        from blast_env.rendering.facade import damage_view, facade_picture
         from blast_env.rendering.figures import save_figure
+        from blast_env.rendering.pressure_impulse import pressure_impulse_diagram
 
-        first = next(iter(found.values()))
-        building = min(first.buildings, key=first.level)
-        responses = {name: each.of(building) for name, each in found.items()}
-        bare = next(iter(responses.values()))
-        worst = max(range(len(bare)), key=lambda k: bare[k].facade.broken_panes)
-        rows = [(name, each[worst]) for name, each in responses.items()]
-        x_m, y_m = rows[0][1].charge.position_m
-        title = f"{building}: {rows[0][1].charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m, the worst"
-        print_line(f"wrote {save_figure(facade_picture(rows, title), picture)}")
+        rows = _worst_rows(found)
+        charge = rows[0][1].charge
+        title = f"{rows[0][1].building}: {_charge_text(charge)}, the worst"
+        figures: list[tuple[Path | None, Figure]] = []
+        if self.picture is not None:
+            figures.append((self.picture, facade_picture(rows, title)))
+        if self.diagram is not None:
+            points = [(name, each.facade) for name, each in rows]
+            figures.append((self.diagram, pressure_impulse_diagram(points, title)))
+        if self.view is not None:
+            number = found[rows[0][0]].of(rows[0][1].building).index(rows[0][1])
+            views = [
+                (name, layouts[name], [each.of(b)[number] for b in each.buildings])
+                for name, each in found.items()
+            ]
+            words = f"{scenario.name}: {_charge_text(charge)}, the worst"
+            figures.append((self.view, damage_view(scenario, views, words)))
+        for path, figure in figures:
+            assert path is not None
+            print_line(f"wrote {save_figure(figure, path)}")
+
+    def _write_table(self, path: Path, scenario: Scenario, found: dict[str, Consequences]) -> Path:
+        """Write the bays; a workbook has the barrier's pieces as well."""
+        bays = bay_table(found)
+        if path.suffix.lower() == ".csv":
+            return write_csv(bays, path)
+        from blast_env.recording.excel import SheetTable, write_tables
+
+        tables = [SheetTable("Bays", bays, (*CASE_COLUMNS, *BAY_COLUMNS))]
+        pieces = piece_table(found)
+        if len(pieces):
+            tables.append(SheetTable("Pieces", pieces, (*CASE_COLUMNS, *PIECE_COLUMNS)))
+        engine = find_engine(JUDGE, self.cell_m)
+        record: dict[str, str | int | float] = {
+            "scenario": scenario.name,
+            "scenario hash": scenario.content_hash,
+            "engine": engine.words,
+            "engine version": engine.version,
+            "blast-env version": versions(engine.version)["blast_env"],
+        }
+        return write_tables(record, tables, path, f"Bays of {scenario.name}")
 
 
-def _row(found: Consequences, building: str) -> tuple[str, str, str, str]:
+def _worst_rows(found: dict[str, Consequences]) -> list[tuple[str, BuildingResponse]]:
+    """Return the worst building under its worst charge, a layout each."""
+    first = next(iter(found.values()))
+    building = min(first.buildings, key=first.level)
+    bare = first.of(building)
+    worst = max(range(len(bare)), key=lambda k: bare[k].facade.broken_panes)
+    return [(name, each.of(building)[worst]) for name, each in found.items()]
+
+
+def _charge_text(charge: Charge) -> str:
+    x_m, y_m = charge.position_m
+    return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
+
+
+def _row(found: Consequences, building: str) -> Sequence[str]:
     facades = [each.facade for each in found.of(building)]
     worst = max(facades, key=lambda facade: facade.broken_panes)
     return (

@@ -37,6 +37,7 @@ BAY_COLUMNS: Final = (
     Column("panes", "", "panes in the bay"),
     Column("break_probability", "", "share of such panes that break"),
     Column("condition", "", "performance condition of glazing, GSA: 1, 2, 3a, 3b, 4, 5"),
+    Column("flight_m", "m", "how far the fragments of panes that break fly; 0 where they are held"),
     Column("ductility", "", "of the wall panel: largest deflection over that at yield"),
     Column("rotation_deg", "degrees", "support rotation of the wall panel"),
     Column("damage", "", "damage of the wall panel in the terms of PDC-TR 06-08"),
@@ -95,10 +96,15 @@ class BayLoads:
 
     def table(self) -> "pd.DataFrame":
         """Return one row a bay; see `BAY_COLUMNS`."""
-        return table_of([self._row(index) for index in range(len(self.bays))], BAY_COLUMNS)
+        return table_of(bay_rows(self.response) if self.bays else [], BAY_COLUMNS)
 
-    def _row(self, index: int) -> dict[str, object]:
-        filled, found = self.bays[index], self.response
+
+def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:
+    """Return what became of bays, one row each, with the keys of `BAY_COLUMNS`."""
+    panes = {index: row for row, index in enumerate(found.glazed.tolist())}
+    panels = {index: row for row, index in enumerate(found.walled.tolist())}
+    rows = []
+    for index, filled in enumerate(found.bays):
         bay = filled.bay
         pressure = found.pressure_pa[index]
         row: dict[str, object] = {
@@ -113,20 +119,23 @@ class BayLoads:
             "panes": filled.panes,
             "break_probability": np.nan,
             "condition": "",
+            "flight_m": np.nan,
             "ductility": np.nan,
             "rotation_deg": np.nan,
             "damage": "",
         }
-        if filled.glazing is not None:
-            pane = found.glazed.tolist().index(index)
+        if index in panes:
+            pane = panes[index]
+            row["flight_m"] = found.glazing.flight_m[pane]
             row["break_probability"] = found.glazing.break_probability[pane]
             row["condition"] = GlazingCondition(int(found.glazing.condition[pane])).label
-        if filled.wall is not None:
-            panel = found.walled.tolist().index(index)
+        if index in panels:
+            panel = panels[index]
             row["ductility"] = found.walls.ductility[panel]
             row["rotation_deg"] = found.walls.rotation_deg[panel]
             row["damage"] = found.walls.levels[panel].name.lower()
-        return row
+        rows.append(row)
+    return rows
 
 
 def _patches(

@@ -1,23 +1,52 @@
-"""What a charge does to the buildings of a site: panes, panels, levels of protection.
+"""What a charge does to the buildings of a site, and to the barrier before them.
+
+Panes, panels and levels of protection of buildings with a facade; what would become of an ordinary
+house where others stand; which pieces of the barrier slide, rock or overturn.
 
 Loads come from gas dynamics, a blast a charge and a layout. Other glass needs no new blast: the
 loads stay, and the response is worked out again.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from math import cbrt
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from blast_env.engines.bays import BAY_COLUMNS, bay_rows
 from blast_env.engines.contract import Engine
+from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element
+from blast_env.evaluation.neighbours import Neighbour, neighbours_of
+from blast_env.geometry import Element, Layout
 from blast_env.physics.scene import Charge
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.response.components import Glazing, catalogue
-from blast_env.response.facade import FacadeResponse, FilledBay, respond
+from blast_env.response.facade import FacadeResponse, FilledBay, respond, sharpened
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.scenario.build_scene import charge_against
+from blast_env.tables import Column, table_of
+
+if TYPE_CHECKING:  # a third of a second to import
+    import pandas as pd
+
+_CELLS_OF_HALF_A_PEAK: Final = 9.3
+"""Cells per m/kg^(1/3) of a charge with which peaks are about half of Kingery and Bulmash's."""
+
+
+def peak_factor(cell_m: float, tnt_kg: float) -> float:
+    """Return what peaks on cells must be multiplied by to be as sharp as Kingery and Bulmash's.
+
+    A rule that errs on the safe side: 2 with 9.3 cells per m/kg^(1/3), 1.5 with twice as many
+    (`python -m studies.response cells`).
+
+    Args:
+        cell_m: Side of the cells.
+        tnt_kg: Mass of the charge.
+    """
+    return 1.0 + _CELLS_OF_HALF_A_PEAK * cell_m / cbrt(tnt_kg)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +57,35 @@ class BuildingResponse:
         building: Its name; structures that are parts of one building are one.
         charge: The charge where it went off.
         facade: What became of its bays.
+        peak_factor: What its peaks would be multiplied by if cells did not clip them.
     """
 
     building: str
     charge: Charge
     facade: FacadeResponse
+    peak_factor: float = 1.0
+
+    @cached_property
+    def sharpened(self) -> FacadeResponse:
+        """What would become of its bays with larger peaks of the same impulse."""
+        found = self.facade
+        histories = sharpened(found.time_s, found.pressure_pa, self.peak_factor)
+        return respond(found.bays, *histories)
+
+
+@dataclass(frozen=True, eq=False)
+class BarrierResponse:
+    """What one charge does to the barrier.
+
+    Attributes:
+        charge: The charge where it went off.
+        pieces: One row a piece; see `blast_env.engines.pieces.PIECE_COLUMNS`.
+        taken_away: Pieces that overturned before the blast was over, and were taken away for it.
+    """
+
+    charge: Charge
+    pieces: "pd.DataFrame"
+    taken_away: Layout = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +93,14 @@ class Consequences:
     """What charges do to the buildings of a site behind a layout.
 
     Attributes:
-        responses: One a building and charge.
+        responses: One a building with a facade and charge.
+        neighbours: One a building without and charge.
+        barriers: One a charge.
     """
 
     responses: tuple[BuildingResponse, ...]
+    neighbours: tuple[Neighbour, ...] = ()
+    barriers: tuple[BarrierResponse, ...] = ()
 
     @property
     def buildings(self) -> tuple[str, ...]:
@@ -58,6 +115,31 @@ class Consequences:
         """Return the level of protection that a building reaches under every charge."""
         return min(each.facade.level_of_protection for each in self.of(building))
 
+    def sharpened_level(self, building: str) -> LevelOfProtection:
+        """Return the level that it would reach with peaks that cells do not clip."""
+        return min(each.sharpened.level_of_protection for each in self.of(building))
+
+    def depends_on_cells(self, target: LevelOfProtection) -> bool:
+        """Return whether sharper peaks would turn the verdict on a level."""
+        levels = [self.sharpened_level(building) for building in self.buildings]
+        return self.passes(target) and min(levels, default=target) < target
+
+    @property
+    def worst_neighbours(self) -> tuple[Neighbour, ...]:
+        """Every building without a facade, under the charge that would do most to a house there."""
+        found: dict[str, Neighbour] = {}
+        for each in self.neighbours:
+            worst = found.setdefault(each.building, each)
+            if each.probability[BuildingDamage.MAJOR] > worst.probability[BuildingDamage.MAJOR]:
+                found[each.building] = each
+        return tuple(found.values())
+
+    @property
+    def worst_barrier(self) -> BarrierResponse | None:
+        """The barrier under the charge that tilts a piece most; `None` where no piece stands."""
+        standing = [each for each in self.barriers if len(each.pieces)]
+        return max(standing, key=lambda each: float(each.pieces["tilt"].max()), default=None)
+
     def passes(self, target: LevelOfProtection) -> bool:
         """Return whether all buildings reach a level under every charge."""
         return all(self.level(building) >= target for building in self.buildings)
@@ -68,8 +150,9 @@ class Consequences:
         Args:
             glazing: The component whose glass is taken.
         """
-        return Consequences(
-            tuple(
+        return replace(
+            self,
+            responses=tuple(
                 replace(
                     each,
                     facade=respond(
@@ -79,7 +162,7 @@ class Consequences:
                     ),
                 )
                 for each in self.responses
-            )
+            ),
         )
 
 
@@ -96,12 +179,59 @@ def other_glazing(scenario: Scenario) -> dict[str, Glazing]:
     return {name: each for name, each in known.items() if isinstance(each, Glazing)}
 
 
+CASE_COLUMNS: Final = (
+    Column("layout", "", "the layout, or that there is none"),
+    Column("charge_x_m", "m", "where the charge goes off, from the left border"),
+    Column("charge_y_m", "m", "where the charge goes off, from the lower border"),
+    Column("tnt_kg", "kg", "its mass"),
+)
+"""What stands before the columns of bays and of pieces in a table of several charges."""
+
+
+def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
+    """Return one row a layout, charge and bay: `CASE_COLUMNS`, then `BAY_COLUMNS`.
+
+    Args:
+        found: What charges do, by the words for the layout.
+    """
+    rows = [
+        _case(name, each.charge) | row
+        for name, judged in found.items()
+        for each in judged.responses
+        for row in bay_rows(each.facade)
+    ]
+    return table_of(rows, (*CASE_COLUMNS, *BAY_COLUMNS))
+
+
+def piece_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
+    """Return one row a layout, charge and piece: `CASE_COLUMNS`, then `PIECE_COLUMNS`.
+
+    Args:
+        found: What charges do, by the words for the layout.
+    """
+    rows = [
+        _case(name, each.charge) | row
+        for name, judged in found.items()
+        for each in judged.barriers
+        for row in each.pieces.to_dict("records")
+    ]
+    return table_of(rows, (*CASE_COLUMNS, *PIECE_COLUMNS))
+
+
+def _case(layout: str, charge: Charge) -> dict[Any, Any]:
+    x_m, y_m = charge.position_m
+    values = (layout, x_m, y_m, charge.tnt_kg)
+    return {column.name: value for column, value in zip(CASE_COLUMNS, values, strict=True)}
+
+
 def consequences(
     scenario: AnyScenario,
     layout: Sequence[Element],
     charges: Iterable[AnyCharge],
     engine: Engine,
     progress: Callable[[float], None] | None = None,
+    *,
+    without_fallen: bool = False,
 ) -> Consequences:
     """Return what charges do to the buildings behind a layout; a blast a charge.
 
@@ -111,6 +241,8 @@ def consequences(
         charges: The charges, or the vehicles that bring them.
         engine: An engine that knows overpressures.
         progress: Called with the share of the blasts that is done.
+        without_fallen: Whether pieces that overturn before a blast is over do not count: they are
+            taken away, and the blast is run again until no other one falls.
 
     Raises:
         BlastEnvError: If no structure has a facade, or the engine knows no overpressure.
@@ -123,21 +255,46 @@ def consequences(
     if not engine.has_peaks:
         raise BlastEnvError(f"engine {engine.name!r} knows no overpressure: must be 'gas'")
     responses: list[BuildingResponse] = []
+    neighbours: list[Neighbour] = []
+    barriers: list[BarrierResponse] = []
     every = list(charges)
     for number, charge in enumerate(every, start=1):
-        result = engine.blast(found, layout, 0, charge).run()
-        loads = getattr(result, "bay_loads", None)
-        if loads is None:
-            raise BlastEnvError(f"engine {engine.name!r} records no bays: must be 'gas'")
         where = charge_against(found, layout, charge)
-        responses += by_building(found, loads.response, where)
+        result, fallen = _blast(found, tuple(layout), charge, where, engine, without_fallen)
+        factor = peak_factor(result.run.grid.cell_m, where.tnt_kg)
+        responses += by_building(found, result.bay_loads.response, where, factor)
+        neighbours += neighbours_of(found, result, where)
+        barriers.append(BarrierResponse(where, result.pieces, fallen))
         if progress is not None:
             progress(number / len(every))
-    return Consequences(tuple(responses))
+    return Consequences(tuple(responses), tuple(neighbours), tuple(barriers))
+
+
+def _blast(
+    scenario: Scenario,
+    layout: Layout,
+    charge: AnyCharge,
+    where: Charge,
+    engine: Engine,
+    without_fallen: bool,
+) -> tuple[Any, Layout]:
+    """Return the result of a blast, and the pieces that were taken away for it."""
+    fallen: Layout = ()
+    result: Any = engine.blast(scenario, layout, 0, charge).run()
+    if getattr(result, "bay_loads", None) is None:
+        raise BlastEnvError(f"engine {engine.name!r} records no bays: must be 'gas'")
+    while without_fallen and result.piece_loads is not None:
+        falling = result.piece_loads.fallen(result.time_s)
+        if not falling:
+            break
+        fallen += falling
+        standing = tuple(each for each in layout if each not in fallen)
+        result = engine.blast(scenario, standing, 0, where).run()
+    return result, fallen
 
 
 def by_building(
-    scenario: Scenario, facade: FacadeResponse, charge: Charge
+    scenario: Scenario, facade: FacadeResponse, charge: Charge, peak_factor: float = 1.0
 ) -> list[BuildingResponse]:
     """Return what a blast does to each building with a facade.
 
@@ -145,6 +302,7 @@ def by_building(
         scenario: Says which structures are parts of one building.
         facade: What became of all bays of the site.
         charge: The charge where it went off.
+        peak_factor: What its peaks would be multiplied by if cells did not clip them.
     """
     names = {each.name: each.building or each.name for each in scenario.structures}
     owners = [names[each.bay.structure] for each in facade.bays]
@@ -154,5 +312,5 @@ def by_building(
         part = respond(
             [facade.bays[index] for index in own.tolist()], facade.time_s, facade.pressure_pa[own]
         )
-        found.append(BuildingResponse(building, charge, part))
+        found.append(BuildingResponse(building, charge, part, peak_factor))
     return found

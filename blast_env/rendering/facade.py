@@ -1,31 +1,43 @@
-"""Facades unfolded, each bay in the colour of what becomes of it."""
+"""Facades in the colours of what becomes of them: unfolded, and in the oblique view of the site."""
 
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+
 from blast_env.evaluation.consequences import BuildingResponse
+from blast_env.geometry import Layout
+from blast_env.rendering.oblique import Colour, Tile, draw_oblique
+from blast_env.rendering.site_plan import write_names
 from blast_env.rendering.style import render_extra
-from blast_env.response.facade import FacadeResponse
-from blast_env.response.glass import GlazingCondition
-from blast_env.response.walls import DamageLevel
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.facade import Bay, FacadeResponse
+from blast_env.scenario import Scenario
 
 with render_extra():
     from matplotlib.axes import Axes
+    from matplotlib.colors import to_rgb
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch, Rectangle
 
-_DAMAGE_COLOURS: Final = ("#e8e8e8", "#f6d87a", "#ee9c4e", "#d65a3a", "#8c1d18")
-_GLASS_COLOURS: Final = ("#9fd3f2", "#7fb7a4", "#c9d46a", "#f0c04a", "#e0803a", "#b3261e")
-_DAMAGE_WORDS: Final = ("superficial", "moderate", "heavy", "hazardous", "blowout")
-_GLASS_WORDS: Final = (
-    "1: no break",
-    "2: breaks, retained",
-    "3a: within 1 m",
-    "3b: within 3 m",
-    "4: low on a wall 3 m behind",
-    "5: high on it",
-)
+# Darker is worse, so that the order is seen without colours as well.
+LEVEL_COLOURS: Final = {
+    LevelOfProtection.HIGH: "#f4f4ec",
+    LevelOfProtection.MEDIUM: "#fbd977",
+    LevelOfProtection.LOW: "#f0933c",
+    LevelOfProtection.VERY_LOW: "#c8321f",
+    LevelOfProtection.BELOW_STANDARDS: "#4a0d2b",
+}
+_LEVEL_WORDS: Final = {
+    LevelOfProtection.HIGH: "high: pane unbroken (GSA 1), wall superficial",
+    LevelOfProtection.MEDIUM: "medium: pane broken but held (2), wall moderate",
+    LevelOfProtection.LOW: "low: glass within 1 m (3a), wall heavy",
+    LevelOfProtection.VERY_LOW: "very low: glass within 3 m (3b), wall hazardous",
+    LevelOfProtection.BELOW_STANDARDS: "below: glass hits a wall 3 m behind (4, 5), blowout",
+}
+_NOTHING: Final = "#d4d8dd"
 _GAP_M: Final = 2.0
+_VIEW_IN: Final = (5.2, 4.4)
 
 
 def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> Figure:
@@ -36,7 +48,7 @@ def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> 
             all rows.
         title: Above the picture.
     """
-    height = 1.4 + 2.3 * len(rows)
+    height = 1.6 + 2.5 * len(rows)
     figure = Figure(figsize=(10.0, height), layout="constrained")
     axes = figure.subplots(len(rows), 1, squeeze=False)[:, 0]
     figure.suptitle(title)
@@ -44,22 +56,77 @@ def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> 
         _draw(plot, response.facade)
         level = response.facade.level_of_protection.label
         plot.set_title(f"{words}: level of protection {level}", fontsize=10, loc="left")
-    handles = [
-        Patch(facecolor=colour, edgecolor="0.4", label=f"wall: {words}")
-        for colour, words in zip(_DAMAGE_COLOURS, _DAMAGE_WORDS, strict=True)
-    ]
-    handles += [
-        Patch(facecolor=colour, edgecolor="0.4", label=f"pane {words}")
-        for colour, words in zip(_GLASS_COLOURS, _GLASS_WORDS, strict=True)
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8)
+    _write_levels(figure, 2)
     return figure
+
+
+def damage_view(
+    scenario: Scenario,
+    views: Sequence[tuple[str, Layout, Sequence[BuildingResponse]]],
+    title: str,
+) -> Figure:
+    """Return the site in the oblique view, each bay in the colour of what becomes of it.
+
+    Args:
+        scenario: The scenario.
+        views: What a view shows, in words; the layout; and the buildings under one charge.
+        title: Above the picture.
+    """
+    width_in, height_in = _VIEW_IN
+    figure = Figure(figsize=(width_in * len(views), height_in + 1.2), layout="constrained")
+    figure.suptitle(title)
+    panels = figure.subplots(1, len(views), squeeze=False)[0]
+    shown = []
+    for axes, (words, layout, responses) in zip(panels, views, strict=True):
+        tiles: dict[str, list[Tile]] = {}
+        for response in responses:
+            for index, each in enumerate(response.facade.bays):
+                bay = each.bay
+                tile = _tile(scenario, bay, to_rgb(_bay_colour(response.facade, index)))
+                tiles.setdefault(bay.structure, []).append(tile)
+        view, features = draw_oblique(axes, scenario, layout, tiles=tiles)
+        axes.set_title(words, fontsize=10)
+        shown.append((axes, features, view))
+    _write_levels(figure, 2 if len(views) > 1 else 1)
+    for axes, features, view in shown:
+        write_names(axes, features, view)
+    return figure
+
+
+def _write_levels(figure: Figure, columns: int) -> None:
+    handles = [
+        Patch(facecolor=LEVEL_COLOURS[level], edgecolor="0.4", label=words)
+        for level, words in _LEVEL_WORDS.items()
+    ]
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=columns,
+        fontsize=8,
+        title="level of protection that a pane or a wall panel allows",
+        title_fontsize=8,
+    )
+
+
+def _bay_colour(facade: FacadeResponse, index: int) -> str:
+    found = (facade.glass_levels.get(index), facade.wall_levels.get(index))
+    return LEVEL_COLOURS[min(each for each in found if each is not None)]
+
+
+def _tile(scenario: Scenario, bay: Bay, colour: Colour) -> Tile:
+    """Return a bay as a part of its structure's walls."""
+    structure = next(each for each in scenario.structures if each.name == bay.structure)
+    left, bottom, right, top = structure.rectangle_m
+    at_m = {"west": left, "east": right, "south": bottom, "north": top}[bay.wall]
+    sides = [(bay.left_m, bay.floor_m), (bay.right_m, bay.floor_m)]
+    sides += [(bay.right_m, bay.top_m), (bay.left_m, bay.top_m)]
+    across = bay.wall in ("west", "east")
+    corners = [(at_m, along, z) if across else (along, at_m, z) for along, z in sides]
+    return Tile(bay.wall, np.array(corners), colour)
 
 
 def _draw(plot: Axes, facade: FacadeResponse) -> None:
     """Draw the walls side by side, seen from outside."""
-    damage = dict(zip(facade.walled.tolist(), facade.walls.levels, strict=True))
-    conditions = dict(zip(facade.glazed.tolist(), facade.glazing.condition.tolist(), strict=True))
     begin, ticks = 0.0, []
     places = dict.fromkeys((each.bay.structure, each.bay.wall) for each in facade.bays)
     top_m = max(each.bay.top_m for each in facade.bays)
@@ -75,12 +142,11 @@ def _draw(plot: Axes, facade: FacadeResponse) -> None:
             bay = facade.bays[index].bay
             # Seen from outside: x runs to the right on south walls, to the left on north ones.
             mirrored = wall in ("north", "west")
-            offset = high - bay.right_m if mirrored else bay.left_m - low
-            level = damage.get(index, DamageLevel.SUPERFICIAL)
-            _add(
-                plot, begin + offset, bay.floor_m, bay.width_m, bay.height_m, _DAMAGE_COLOURS[level]
-            )
-            _add_panes(plot, begin + offset, facade, index, conditions.get(index))
+            left_m = begin + (high - bay.right_m if mirrored else bay.left_m - low)
+            level = facade.wall_levels.get(index)
+            colour = _NOTHING if level is None else LEVEL_COLOURS[level]
+            _add(plot, left_m, bay.floor_m, bay.width_m, bay.height_m, colour)
+            _add_panes(plot, left_m, facade, index)
         ticks.append((begin + 0.5 * (high - low), f"{structure}, {wall}"))
         begin += high - low + _GAP_M
     plot.set_xlim(-0.5, begin - _GAP_M + 0.5)
@@ -91,13 +157,11 @@ def _draw(plot: Axes, facade: FacadeResponse) -> None:
     plot.spines[["top", "right"]].set_visible(False)
 
 
-def _add_panes(
-    plot: Axes, left_m: float, facade: FacadeResponse, index: int, condition: float | None
-) -> None:
+def _add_panes(plot: Axes, left_m: float, facade: FacadeResponse, index: int) -> None:
     filled = facade.bays[index]
-    if filled.glazing is None or condition is None:
+    if filled.glazing is None:
         return
-    colour = _GLASS_COLOURS[GlazingCondition(int(condition)) - 1]
+    colour = LEVEL_COLOURS[facade.glass_levels[index]]
     space_m = (filled.bay.width_m - filled.panes * filled.glazing.width_m) / (filled.panes + 1)
     for number in range(filled.panes):
         x_m = left_m + space_m + number * (filled.glazing.width_m + space_m)

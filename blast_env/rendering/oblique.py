@@ -1,8 +1,9 @@
 """The oblique view of a site: isometric, so that lengths, widths and heights have one scale."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, radians, sin, tan
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -114,6 +115,20 @@ def corner_towards(scenario: Scenario) -> str:
     return "southeast" if east else "southwest"
 
 
+class Tile(NamedTuple):
+    """A part of a wall in a colour of its own.
+
+    Attributes:
+        wall: The wall that it is on: west, east, south or north.
+        corners_m: Its corners in order (4, 3).
+        colour: Its colour.
+    """
+
+    wall: str
+    corners_m: FloatArray
+    colour: Colour
+
+
 class Box(NamedTuple):
     """Something on the ground that a view shows.
 
@@ -122,12 +137,14 @@ class Box(NamedTuple):
         height_m: Its height.
         colour: Colour of its top.
         edge: Colour of its edges.
+        tiles: Parts of its walls.
     """
 
     rectangle_m: Rectangle
     height_m: float
     colour: Colour
     edge: Colour
+    tiles: Sequence[Tile] = ()
 
 
 def painted_order(view: ObliqueView, rectangles_m: Sequence[Rectangle]) -> list[int]:
@@ -159,7 +176,11 @@ def painted_order(view: ObliqueView, rectangles_m: Sequence[Rectangle]) -> list[
 
 
 def draw_oblique(
-    axes: Axes, scenario: Scenario, layout: Sequence[Element] = (), corner: str | None = None
+    axes: Axes,
+    scenario: Scenario,
+    layout: Sequence[Element] = (),
+    corner: str | None = None,
+    tiles: Mapping[str, Sequence[Tile]] = MappingProxyType({}),
 ) -> tuple[ObliqueView, tuple[Feature, ...]]:
     """Draw a site with what stands on it, heights to scale, and where charges may go off.
 
@@ -171,6 +192,7 @@ def draw_oblique(
         scenario: The scenario.
         layout: What stands on the build zone; it must fit there.
         corner: Over which corner one looks; that on the side of the charges unless given.
+        tiles: Parts of the walls of structures, by the names of these.
 
     Returns:
         The view, to draw more in it, and what was drawn.
@@ -181,7 +203,11 @@ def draw_oblique(
     site_m = scenario.site.rectangle_m
     view = ObliqueView(site_m, corner or corner_towards(scenario))
     features = (*_raised(scenario, layout), *vehicle_features(scenario, layout))
-    boxes = [_box_of(each) for each in features if each.kind in STANDING]
+    boxes = [
+        _box_of(each)._replace(tiles=tiles.get(each.name, ()))
+        for each in features
+        if each.kind in STANDING
+    ]
     _set_up(axes, view, boxes)
     draw_features(axes, without(features, *STANDING), view)
     _draw_boxes(axes, view, boxes)
@@ -245,6 +271,11 @@ def _draw_boxes(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
             red, green, blue = box.colour
             colours.append((bright * red, bright * green, bright * blue))
             edges.append(box.edge)
+        for tile in box.tiles:
+            if tile.wall in view.corner:  # "southwest": its south and west walls are seen
+                polygons.append(view.places(tile.corners_m))
+                colours.append(tile.colour)
+                edges.append(box.edge)
     faces = PolyCollection(polygons, facecolor=colours, edgecolor=edges, linewidth=0.5, zorder=3.0)
     faces.set_joinstyle("round")
     axes.add_collection(faces, autolim=False)

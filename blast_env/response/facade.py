@@ -7,6 +7,7 @@ serves all that stands in it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import floor
 
 import numpy as np
@@ -24,6 +25,8 @@ STOREY_M = 3.5
 
 BAY_M = 3.0
 """Width of a bay unless a facade says otherwise."""
+
+_FINER = 4  # times are so much finer where histories are sharpened
 
 
 @dataclass(frozen=True)
@@ -216,21 +219,61 @@ class FacadeResponse:
 
     @property
     def level_of_protection(self) -> LevelOfProtection:
-        """Level of protection of the building: what its worst component allows.
+        """Level of protection of the building: what its worst component allows."""
+        return min(level_by_glass(self.worst_condition), level_of_protection(self.worst_damage))
 
-        Of glazing its hazard counts, in the words of GSA's table 8-1: none and unbroken high, none
-        and broken medium, very low (3a) low, low (3b) very low, more below standards. That these
-        hazards go with those levels of UFC 4-010-01 is an assumption on the safe side.
-        """
-        by_glass = {
-            GlazingCondition.NO_BREAK: LevelOfProtection.HIGH,
-            GlazingCondition.RETAINED: LevelOfProtection.MEDIUM,
-            GlazingCondition.WITHIN_1_M: LevelOfProtection.LOW,
-            GlazingCondition.WITHIN_3_M: LevelOfProtection.VERY_LOW,
-            GlazingCondition.LOW_ON_PANEL: LevelOfProtection.BELOW_STANDARDS,
-            GlazingCondition.HIGH_ON_PANEL: LevelOfProtection.BELOW_STANDARDS,
-        }
-        return min(by_glass[self.worst_condition], level_of_protection(self.worst_damage))
+    @cached_property
+    def glass_levels(self) -> dict[int, LevelOfProtection]:
+        """What level the panes of each bay allow, by its index."""
+        conditions = map(GlazingCondition, map(int, self.glazing.condition.tolist()))
+        return dict(zip(self.glazed.tolist(), map(level_by_glass, conditions), strict=True))
+
+    @cached_property
+    def wall_levels(self) -> dict[int, LevelOfProtection]:
+        """What level the wall panel of each bay allows, by its index."""
+        levels = map(level_of_protection, self.walls.levels)
+        return dict(zip(self.walled.tolist(), levels, strict=True))
+
+
+def level_by_glass(condition: GlazingCondition) -> LevelOfProtection:
+    """Return the level of protection that the worst pane of a building allows.
+
+    Its hazard counts, in the words of GSA's table 8-1: none and unbroken high, none and broken
+    medium, very low (3a) low, low (3b) very low, more below standards. That these hazards go with
+    those levels of UFC 4-010-01 is an assumption on the safe side.
+    """
+    return {
+        GlazingCondition.NO_BREAK: LevelOfProtection.HIGH,
+        GlazingCondition.RETAINED: LevelOfProtection.MEDIUM,
+        GlazingCondition.WITHIN_1_M: LevelOfProtection.LOW,
+        GlazingCondition.WITHIN_3_M: LevelOfProtection.VERY_LOW,
+    }.get(condition, LevelOfProtection.BELOW_STANDARDS)
+
+
+def sharpened(
+    time_s: FloatArray, pressure_pa: FloatArray, factor: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return histories with larger peaks, shorter by as much: impulses stay.
+
+    Cells smear a front and clip its peak, but keep its impulse. Each history is compressed about
+    the time at which it has risen to half of its peak.
+
+    Args:
+        time_s: Times of the histories, ascending (times,).
+        pressure_pa: The histories (bays, times).
+        factor: What pressures are multiplied by, and times after that divided by.
+
+    Returns:
+        Times, and histories (bays, times); there are more times than before.
+    """
+    steps = np.arange(_FINER * (len(time_s) - 1) + 1) / _FINER
+    times_s = np.interp(steps, np.arange(len(time_s)), time_s)
+    sharper = np.zeros((len(pressure_pa), len(times_s)))
+    for index, history in enumerate(pressure_pa):
+        arrival_s = time_s[np.argmax(history >= 0.5 * history.max())]
+        before_s = arrival_s + factor * (times_s - arrival_s)
+        sharper[index] = factor * np.interp(before_s, time_s, history, left=0.0, right=0.0)
+    return times_s, sharper
 
 
 def respond(

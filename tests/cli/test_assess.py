@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -33,13 +34,18 @@ def run(*words: str | Path) -> str:
 @pytest.mark.slow
 def test_the_verdict_comes_first_and_better_glass_may_turn_it(site: Path, tmp_path: Path) -> None:
     """1 kg at 8.5 m: annealed glass flies 3 m, laminated glass stays in its frame."""
-    picture = tmp_path / "facade.png"
-    output = run(site, "--tnt-kg", "1", "--target", "medium", "--picture", picture)
+    picture, view, diagram, table = (
+        tmp_path / name for name in ("facade.png", "view.png", "diagram.png", "bays.xlsx")
+    )
+    files = ("--picture", picture, "--view", view, "--diagram", diagram, "--table", table)
+    output = run(site, "--tnt-kg", "1", "--target", "medium", *files)
     assert output.startswith("glazed_room, no barrier: FAILS level 'medium' under 1 charges")
     rows = {line.split()[0]: line for line in output.splitlines() if line.startswith("window")}
     assert rows["window_annealed_6"].endswith("no")
     assert rows["window_laminated_6"].endswith("yes")
-    assert picture.stat().st_size > 10_000
+    assert all(each.stat().st_size > 10_000 for each in (picture, view, diagram))
+    bays = pd.read_excel(table, "Bays", header=None).astype(str)
+    assert "control_room/west/1/1" in bays.to_numpy()
 
 
 def test_a_site_without_facades() -> None:

@@ -9,7 +9,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall, catalogue, find_component
-from blast_env.response.facade import Bay, FilledBay, divide, respond
+from blast_env.response.facade import Bay, FilledBay, divide, respond, sharpened
 from blast_env.response.glass import GlazingCondition
 
 GROUND = Rectangle(10.0, 20.0, 22.0, 27.0)
@@ -73,6 +73,17 @@ def test_a_pane_that_is_too_large_for_its_bay() -> None:
 def test_a_bay_with_nothing_in_it() -> None:
     with pytest.raises(BlastEnvError, match="neither windows nor a wall"):
         FilledBay(bay())
+
+
+@given(st.floats(1.0, 3.0), st.floats(0.002, 0.05))
+def test_sharper_histories_keep_their_impulse(factor: float, lasts_s: float) -> None:
+    """A front that rises over four steps of 1 ms, and falls in a time of its own."""
+    time_s = np.arange(0.0, 0.2, 0.001)
+    gone_s = time_s - 0.02
+    history = 1e4 * np.clip(1.0 + gone_s / 0.004, 0.0, 1.0) * np.clip(1.0 - gone_s / lasts_s, 0, 1)
+    times_s, (sharper,) = sharpened(time_s, history[np.newaxis], factor)
+    assert np.trapezoid(sharper, times_s) == pytest.approx(np.trapezoid(history, time_s), rel=0.08)
+    assert sharper.max() == pytest.approx(factor * history.max(), rel=0.15)
 
 
 def test_windows_and_walls_of_a_building_decide_together() -> None:

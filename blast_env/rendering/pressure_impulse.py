@@ -1,0 +1,177 @@
+"""Pressure-impulse diagrams: how near each bay is to the next level, without and with a layout."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.rendering.facade import LEVEL_COLOURS
+from blast_env.rendering.style import number_on_axis, render_extra
+from blast_env.response.buildings import LevelOfProtection, level_of_protection
+from blast_env.response.components import Glazing, Wall
+from blast_env.response.facade import FacadeResponse, FilledBay, level_by_glass
+from blast_env.response.glass import GlazingCondition, Pane, glazing_responses
+from blast_env.response.walls import Panel, panel_responses
+from blast_env.units import PA_PER_KPA
+
+with render_extra():
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+    from matplotlib.ticker import FuncFormatter
+
+_PEAKS: Final = 24
+_HALVINGS: Final = 8
+_MOST_PANELS: Final = 4
+_REACH: Final = 3.0
+_DECADES: Final = 100.0  # smaller loads are left of the picture
+_STATIC_S: Final = 0.5  # a load that lasts longer does no more to what is stiffer
+_PANEL_IN: Final = (4.9, 4.2)
+_INK: Final = ("#0072B2", "#000000")
+
+Component = tuple[Glazing | Wall, float]
+"""A component, and the height of the storey that it stands in."""
+
+
+def pressure_impulse_diagram(rows: Sequence[tuple[str, FacadeResponse]], title: str) -> Figure:
+    """Return a diagram a component, with a point a bay and row: its peak and its impulse.
+
+    Regions are those of a triangular load, which falls from its peak at once. The four components
+    that stand in most bays are shown.
+
+    Args:
+        rows: What a row is, in words, and the same facade each time: without a barrier, and with.
+        title: Above the picture.
+    """
+    groups = _groups(rows[0][1].bays)[:_MOST_PANELS]
+    columns = min(len(groups), 2)
+    lines = -(-len(groups) // columns)
+    width_in, height_in = _PANEL_IN
+    size_in = (width_in * columns + (2.0 if columns == 1 else 0.0), height_in * lines + 1.5)
+    figure = Figure(figsize=size_in, layout="constrained")
+    figure.suptitle(title)
+    panels = figure.subplots(lines, columns, squeeze=False).ravel()
+    for axes, (component, members) in zip(panels, groups, strict=False):
+        _draw(axes, component, members, rows)
+    for axes in panels[len(groups) :]:
+        axes.set_visible(False)
+    handles: list[Artist] = [
+        Patch(facecolor=LEVEL_COLOURS[level], edgecolor="0.4", label=level.label)
+        for level in reversed(LevelOfProtection)
+    ]
+    handles += [
+        Line2D([], [], color=colour, marker=marker, linestyle="", markerfacecolor=fill, label=words)
+        for (words, _), colour, marker, fill in zip(rows, _INK, "os", ("none", "w"), strict=False)
+    ]
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=4,
+        fontsize=8,
+        title="level of protection under a triangular load; a point is a bay",
+        title_fontsize=8,
+    )
+    return figure
+
+
+def _groups(bays: Sequence[FilledBay]) -> list[tuple[Component, list[int]]]:
+    """Return the components, each with the bays that it stands in, the most frequent first."""
+    found: list[tuple[Component, list[int]]] = []
+    for index, each in enumerate(bays):
+        for component in (each.glazing, each.wall):
+            if component is None:
+                continue
+            storey_m = round(each.bay.height_m, 3) if isinstance(component, Wall) else 0.0
+            key = (component, storey_m)
+            members = next((own for known, own in found if known == key), None)
+            if members is None:
+                found.append((key, [index]))
+            else:
+                members.append(index)
+    return sorted(found, key=lambda item: -len(item[1]))
+
+
+def _draw(
+    axes: Axes,
+    component: Component,
+    members: Sequence[int],
+    rows: Sequence[tuple[str, FacadeResponse]],
+) -> None:
+    loads = [_loads(facade, members) for _, facade in rows]
+    every = np.concatenate(loads)
+    most = every.max(axis=0)
+    low, high = np.maximum(every.min(axis=0), most / _DECADES) / _REACH, most * _REACH
+    peak_kpa = np.geomspace(low[0], high[0], _PEAKS)
+    bounds = level_bounds(component, PA_PER_KPA * peak_kpa, (low[1], high[1]))
+    begin = np.full(_PEAKS, low[1])
+    for level in reversed(LevelOfProtection):
+        end = bounds.get(level, np.full(_PEAKS, high[1]))
+        axes.fill_betweenx(peak_kpa, begin, end, color=LEVEL_COLOURS[level], alpha=0.75, lw=0.0)
+        begin = end
+    styles = zip(loads, _INK, "os", ("none", "w"), strict=False)
+    for points, colour, marker, fill in styles:
+        axes.plot(
+            points[:, 1], points[:, 0], marker, color=colour, markerfacecolor=fill, markersize=5.0
+        )
+    if len(loads) == 2:
+        for first, second in zip(*loads, strict=True):
+            ends = np.array([first, second])
+            axes.plot(ends[:, 1], ends[:, 0], "-", color="0.25", linewidth=0.5)
+    axes.set(xscale="log", yscale="log", xlim=(low[1], high[1]), ylim=(low[0], high[0]))
+    axes.set(xlabel="impulse of all positive phases (Pa s)", ylabel="peak of the mean (kPa)")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(number_on_axis))
+        axis.set_minor_formatter("")
+    axes.set_title(component[0].title, fontsize=9)
+
+
+def _loads(facade: FacadeResponse, members: Sequence[int]) -> FloatArray:
+    """Return peak (kPa) and impulse (Pa s) of bays (bays, 2)."""
+    pressure = facade.pressure_pa[list(members)]
+    impulse = np.trapezoid(np.maximum(pressure, 0.0), facade.time_s, axis=1)
+    peak = pressure.max(axis=1) / PA_PER_KPA
+    points: FloatArray = np.maximum(np.column_stack([peak, impulse]), 1e-3)
+    return points
+
+
+def level_bounds(
+    component: Component, peak_pa: FloatArray, impulses_pa_s: tuple[float, float]
+) -> dict[LevelOfProtection, FloatArray]:
+    """Return up to which impulse of a triangular load a component allows each level.
+
+    Args:
+        component: The component.
+        peak_pa: Peaks of the loads (peaks,).
+        impulses_pa_s: Between which impulses; a bound outside them is the nearer one.
+
+    Returns:
+        By level, the best first (peaks,); below standards there is no bound.
+    """
+    found: dict[LevelOfProtection, FloatArray] = {}
+    chosen, storey_m = component
+    part = chosen.panel(storey_m) if isinstance(chosen, Wall) else chosen.pane
+    for level in sorted(LevelOfProtection, reverse=True)[:-1]:
+        low, high = (np.full(len(peak_pa), each) for each in impulses_pa_s)
+        for _ in range(_HALVINGS):
+            middle = np.sqrt(low * high)
+            allows = np.array(
+                [
+                    _level(part, *load) >= level
+                    for load in zip(peak_pa.tolist(), middle.tolist(), strict=True)
+                ]
+            )
+            low, high = np.where(allows, middle, low), np.where(allows, high, middle)
+        found[level] = np.sqrt(low * high)
+    return found
+
+
+def _level(part: Pane | Panel, peak_pa: float, impulse_pa_s: float) -> LevelOfProtection:
+    lasts_s = min(2.0 * impulse_pa_s / peak_pa, _STATIC_S)
+    time_s, history = np.array([0.0, lasts_s]), np.array([[peak_pa, 0.0]])
+    if isinstance(part, Panel):
+        return level_of_protection(panel_responses([part], time_s, history).levels[0])
+    panes = glazing_responses([part], time_s, history)
+    return level_by_glass(GlazingCondition(int(panes.condition[0])))

@@ -1,0 +1,107 @@
+"""What charges do to buildings, neighbours and the barrier, on a yard where a blast is cheap."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blast_env.calibration import kingery_bulmash
+from blast_env.engines.gas import GasEngine
+from blast_env.evaluation.consequences import (
+    BuildingResponse,
+    Consequences,
+    bay_table,
+    consequences,
+    peak_factor,
+    piece_table,
+)
+from blast_env.evaluation.neighbours import side_on_impulse_pa_s, side_on_peak_pa
+from blast_env.geometry import Layout
+from blast_env.physics.scene import Charge
+from blast_env.response.buildings import BuildingDamage, LevelOfProtection
+from blast_env.response.facade import respond
+from blast_env.scenario import Scenario
+from tests.catalogue_sites import ITEMS, WALL, yard_document
+
+FACADE = {"storey_m": 2.5, "bay_m": 1.5, "glazing": "window_laminated_6", "wall": "concrete_200"}
+CHARGE = Charge((2.0, 6.0), 5.0)
+
+
+def site(**wall: Any) -> Scenario:
+    """Return the yard with a facade on the hut, and a shed without one."""
+    document = yard_document(items=[ITEMS[0] | wall, *ITEMS[1:]])
+    shed = document["structures"][0] | {"name": "shed", "corner_m": [7.5, 0.5], "rows": 4}
+    document["structures"][0] = document["structures"][0] | {"facade": FACADE, "faces": ["west"]}
+    document["structures"].append(shed | {"protected": False})
+    return Scenario.from_document(document, "yard")
+
+
+def judge(scenario: Scenario, layout: Layout, without_fallen: bool = False) -> Consequences:
+    return consequences(scenario, layout, [CHARGE], GasEngine(), without_fallen=without_fallen)
+
+
+@pytest.fixture(scope="module")
+def found() -> Consequences:
+    return judge(site(), WALL)
+
+
+def test_what_stands_without_a_facade_is_a_neighbour(found: Consequences) -> None:
+    (shed,) = found.worst_neighbours
+    assert (shed.building, shed.wall) == ("shed", "west")
+    order = [shed.probability[damage] for damage in BuildingDamage]
+    assert order == sorted(order, reverse=True)
+    assert 0.0 < order[0] < 1.0
+    assert found.buildings == ("hut",)
+
+
+@pytest.mark.parametrize("scaled", [5.0, 10.0, 15.0])
+def test_side_on_values_come_back_from_reflected_ones(scaled: float) -> None:
+    """Kingery and Bulmash's curves in the open: peaks exactly, impulses within 8 %."""
+    reflected, peak, reflected_i, impulse = (
+        float(kingery_bulmash(quantity, scaled, 1.0, "hemispherical"))
+        for quantity in (
+            "reflected_overpressure",
+            "incident_overpressure",
+            "reflected_impulse",
+            "incident_impulse",
+        )
+    )
+    assert side_on_peak_pa(np.array([reflected])).item() == pytest.approx(peak, rel=0.01)
+    assert side_on_impulse_pa_s(np.array([reflected_i])).item() == pytest.approx(impulse, rel=0.08)
+
+
+def test_pieces_that_fall_in_time_are_taken_away(found: Consequences) -> None:
+    """A wall of 300 kg is on its way when the blast is over; lighter ones do not count."""
+    (barrier,) = judge(site(mass_kg=300.0), WALL, without_fallen=True).barriers
+    assert barrier.taken_away == ()
+    assert list(barrier.pieces["outcome"][:1]) == ["overturns"]
+    gone = judge(site(mass_kg=60.0), WALL, without_fallen=True)
+    (barrier,) = gone.barriers
+    assert barrier.taken_away == WALL[:2]
+    assert list(barrier.pieces["piece"]) == ["post_x4.250_y4.750"]
+    peaks = [each.responses[0].facade.pressure_pa.max() for each in (gone, found)]
+    assert peaks[0] > peaks[1]
+
+
+def test_a_verdict_that_sharper_peaks_would_turn_depends_on_the_cells() -> None:
+    assert peak_factor(0.5, 5.0) == pytest.approx(1.0 + 9.3 * 0.5 / 5.0 ** (1.0 / 3.0))
+    time_s, bays = np.array([0.0, 0.02, 0.1]), site().bays
+    turned = []
+    for peak_pa in np.geomspace(1e3, 3e4, 30).tolist():
+        history = np.tile([peak_pa, 0.0, 0.0], (len(bays), 1))
+        response = BuildingResponse("hut", CHARGE, respond(bays, time_s, history), 2.0)
+        found = Consequences((response,))
+        level, sharper = found.level("hut"), found.sharpened_level("hut")
+        assert sharper <= level
+        depends = [each for each in LevelOfProtection if found.depends_on_cells(each)]
+        assert depends == [each for each in LevelOfProtection if sharper < each <= level]
+        turned += depends
+    assert turned
+
+
+def test_tables_have_a_row_a_layout_charge_and_bay_or_piece(found: Consequences) -> None:
+    both = {"none": judge(site(), ()), "walls": found}
+    bays = bay_table(both)
+    assert list(bays["layout"]) == ["none", "none", "walls", "walls"]
+    assert list(bays["bay"][:2]) == ["hut/west/1/1", "hut/west/1/2"]
+    assert list(piece_table(both)["layout"]) == ["walls"] * 3

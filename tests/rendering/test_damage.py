@@ -1,0 +1,91 @@
+"""Pictures of damage: facades unfolded and in three dimensions, pressure-impulse diagrams."""
+
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Rectangle
+
+from blast_env.evaluation.consequences import BuildingResponse
+from blast_env.physics.scene import Charge
+from blast_env.rendering.facade import LEVEL_COLOURS, damage_view, facade_picture
+from blast_env.rendering.pressure_impulse import level_bounds, pressure_impulse_diagram
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.components import Glazing, find_component
+from blast_env.response.facade import FacadeResponse, respond
+from blast_env.scenario import Scenario
+from tests.catalogue_sites import WALL, yard_document
+
+CHARGE = Charge((2.0, 6.0), 5.0)
+WORST = LEVEL_COLOURS[LevelOfProtection.BELOW_STANDARDS]
+BEST = LEVEL_COLOURS[LevelOfProtection.HIGH]
+
+
+@pytest.fixture(scope="module")
+def site() -> Scenario:
+    document = yard_document()
+    facade = {"storey_m": 2.5, "glazing": "window_annealed_4", "wall": "concrete_200"}
+    document["structures"][0]["facade"] = facade
+    return Scenario.from_document(document, "yard")
+
+
+def response(site: Scenario, peak_pa: float) -> FacadeResponse:
+    """Return what a triangle of 10 ms does to the western bay; the others are not loaded."""
+    time_s = np.array([0.0, 0.01, 0.02])
+    loads = [peak_pa if each.bay.wall == "west" else 0.0 for each in site.bays]
+    return respond(site.bays, time_s, np.outer(loads, [1.0, 0.0, 0.0]))
+
+
+def both(site: Scenario) -> list[tuple[str, BuildingResponse]]:
+    return [
+        (words, BuildingResponse("hut", CHARGE, response(site, peak_pa)))
+        for words, peak_pa in (("no barrier", 4e4), ("walls", 100.0))
+    ]
+
+
+def test_panes_and_walls_have_the_colours_of_what_they_allow(site: Scenario) -> None:
+    """Four walls of a bay with two panes each; in the west the panes fly, and the wall holds."""
+    figure = facade_picture(both(site), "hut")
+    bare, walled = (
+        [each for each in plot.patches if isinstance(each, Rectangle)] for plot in figure.axes
+    )
+    for patches, panes in ((bare, WORST), (walled, BEST)):
+        colours = [tuple(each.get_facecolor()[:3]) for each in patches]
+        assert len(colours) == 4 * 3
+        assert colours.count(to_rgb(panes)) >= 2
+    assert "level of protection below standards" in figure.axes[0].get_title("left")
+    assert "level of protection high" in figure.axes[1].get_title("left")
+
+
+def test_a_view_shows_the_bays_of_the_walls_that_are_seen(site: Scenario) -> None:
+    """From the south-west: the western bay, with and without a barrier, and the southern one."""
+    (_, bare), (_, walled) = both(site)
+    figure = damage_view(site, [("no barrier", (), [bare]), ("walls", WALL, [walled])], "hut")
+    for axes, west in zip(figure.axes, (WORST, BEST), strict=True):
+        faces = next(each for each in axes.collections if isinstance(each, PolyCollection))
+        colours = [tuple(each[:3]) for each in np.asarray(faces.get_facecolor()).tolist()]
+        assert colours.count(to_rgb(west)) == (1 if west == WORST else 2)
+        assert colours.count(to_rgb(BEST)) == (1 if west == WORST else 2)
+
+
+def test_a_diagram_has_a_point_a_bay_and_layout(site: Scenario) -> None:
+    figure = pressure_impulse_diagram([(words, each.facade) for words, each in both(site)], "hut")
+    glass, wall = figure.axes
+    assert glass.get_title() == "window, 4 mm annealed"
+    assert wall.get_title() == "reinforced concrete wall, 200 mm"
+    points = [line for line in glass.lines if line.get_linestyle() == "None"]
+    peaks = [np.asarray(line.get_ydata(), dtype=np.float64) for line in points]
+    assert [len(each) for each in peaks] == [4, 4]
+    assert peaks[0].max() == pytest.approx(40.0)
+
+
+def test_worse_levels_begin_at_larger_impulses_and_thicker_glass_holds_more() -> None:
+    peaks = np.array([2e3, 1e4, 1e5])
+    thin, thick = (
+        level_bounds((component, 0.0), peaks, (1.0, 1e4))
+        for component in map(find_component, ("window_annealed_4", "window_annealed_6"))
+        if isinstance(component, Glazing)
+    )
+    ordered = np.array(list(thick.values()))
+    assert (np.diff(ordered, axis=0) >= 0.0).all()
+    assert (thick[LevelOfProtection.HIGH] >= thin[LevelOfProtection.HIGH]).all()
