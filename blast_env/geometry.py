@@ -28,6 +28,20 @@ class Piece(NamedTuple):
     turned: bool = False
 
 
+class Measure(Piece):
+    """An item that hardens parts of facades: a piece that covers no cell.
+
+    Its row and column are 0. It is equal to the plain tuple.
+    """
+
+    __slots__ = ()
+
+    @classmethod
+    def named(cls, item: str) -> "Measure":
+        """Return the measure of a name."""
+        return cls(0, 0, item)
+
+
 Element = Cell | Piece
 """What a layout consists of: single modules, or pieces where the build zone has a catalogue."""
 
@@ -127,6 +141,11 @@ def stacked_runs(cells: BoolArray) -> IntArray:
 
 Layout = tuple[Element, ...]
 """The modules, or the pieces, in the order of their placing."""
+
+
+def standing(layout: "Iterable[Element]") -> "Layout":
+    """Return what of a layout stands on the ground: all but the measures that harden facades."""
+    return tuple(element for element in layout if not isinstance(element, Measure))
 
 
 def layout_text(layout: Iterable[Element]) -> str:

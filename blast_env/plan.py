@@ -16,7 +16,7 @@ from typing import Final, Literal
 import numpy as np
 
 from blast_env.arrays import BoolArray
-from blast_env.geometry import Element, Piece, Rectangle
+from blast_env.geometry import Element, Piece, Rectangle, standing
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import Colour
 from blast_env.scenario import (
@@ -385,7 +385,7 @@ def barrier_features(zone: BuildZone, layout: Sequence[Element]) -> Iterator[Fea
     colours, words = item_colours(zone), item_words(zone, layout)
     if zone.items:
         items = {item.name: item for item in zone.items}
-        for piece in layout:
+        for piece in standing(layout):
             assert isinstance(piece, Piece)
             item = items[piece.item]
             feature = area_feature(

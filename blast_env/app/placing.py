@@ -68,7 +68,7 @@ def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
             len(item.orientations) > 1,
             left,
         )
-        for item, left in zip(zone.items, placement.stocks_left, strict=True)
+        for item, left in zip(zone.items, placement.stocks_left, strict=False)
     )
 
 

@@ -210,7 +210,8 @@ def _loads(
     with progress_bar(f"{len(set(pairs))} blasts of gas dynamics") as progress:
         loads = iter(evaluator.loads_of_many(pairs, processes, progress))
     return {
-        name: case.combined([next(loads).load(objective) for _ in case.threats]) for name in layouts
+        name: case.counted([next(loads).load(objective) for _ in case.threats], layout)
+        for name, layout in layouts.items()
     }
 
 

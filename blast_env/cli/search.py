@@ -118,7 +118,7 @@ def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
         f"{problem.scenario.name}: {result.method} search, {_risk_text(problem)}",
         ("threats", "number", "without", "with", "reduction", "95 % interval"),
     )
-    bare, load = problem.case.combined(problem.unprotected), problem.load(result.layout)
+    bare, load = problem.case.counted(problem.unprotected), problem.load(result.layout)
     counts = problem.scenario.objective
     table.add_row(
         "of the search",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
 from blast_env.physics.gas.settings import FACE_NAMES
+from blast_env.response.damage import Alternatives, BayDamage, bay_damages
 from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond
 from blast_env.response.glass import GlazingCondition
 from blast_env.tables import Column, table_of
@@ -79,6 +80,17 @@ class BayLoads:
         """What becomes of the bays."""
         histories = self.recorder.history_pa.astype(np.float64)
         return respond(self.bays, self.recorder.time_s, histories)
+
+    def damages(self, alternatives: Sequence[Alternatives]) -> tuple[BayDamage, ...]:
+        """Return the damage of the bays under each component that they may have.
+
+        Args:
+            alternatives: What may stand in the bays of the scenario.
+        """
+        by_name = {each.name: each for each in alternatives}
+        own = [by_name[each.bay.name] for each in self.bays]
+        histories = self.recorder.history_pa.astype(np.float64)
+        return bay_damages(own, self.recorder.time_s, histories) if own else ()
 
     def history(self, name: str) -> "pd.DataFrame":
         """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.

@@ -11,7 +11,7 @@ It can be given wherever an engine's name can. A line in the table below gives i
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from types import MappingProxyType
@@ -23,7 +23,10 @@ from numpy.typing import NDArray
 from blast_env.calibration.model import Calibration
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra, value_text
 from blast_env.geometry import Element
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.damage import BayDamage, level_of, worst
 from blast_env.scenario import AnyCharge, AnyScenario, ObjectiveSection, Scenario, find_scenario
+from blast_env.scenario.facade import NamedBay
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
@@ -44,6 +47,8 @@ class StructureLoad:
         peak_weight: How much that counts among the protected structures.
         in_range: Whether the calibration was made for this distance and charge.
         notes: Why not, a sentence each.
+        response: What counts of the response of its bays, where the objective counts that.
+        worst_damage: The largest damage of its bays, likewise.
     """
 
     name: str
@@ -56,6 +61,8 @@ class StructureLoad:
     peak_weight: float
     in_range: bool
     notes: tuple[str, ...]
+    response: float | None = None
+    worst_damage: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +73,39 @@ class BlastLoads:
         structures: One load a structure, in the order of the scene.
         module_impulse_sim: Sum of m |v| on each module of the structures, in the order of the
             scene, simulation units (modules,); for gas dynamics the momentum on its walls, N s.
+        bays: Damage of the bays of facades under each component that they may have, where the
+            objective counts that.
     """
 
     structures: tuple[StructureLoad, ...]
     module_impulse_sim: NDArray[np.float64]
+    bays: tuple[BayDamage, ...] = ()
+
+    def with_facades(
+        self, named: Collection[NamedBay], objective: ObjectiveSection
+    ) -> "BlastLoads":
+        """Return the loads with the response of the facades; no blast is needed for other ones.
+
+        Args:
+            named: What stands in the bays.
+            objective: Says what counts of their response.
+
+        Raises:
+            BlastEnvError: If the bays were not recorded.
+        """
+        if not self.bays:
+            raise BlastEnvError("the engine records no bays, but objective.kind is 'response'")
+        responded = []
+        for load in self.structures:
+            own = [each for each in self.bays if each.structure == load.name]
+            response, most = structure_response(own, named, objective)
+            responded.append(replace(load, response=response, worst_damage=most))
+        return replace(self, structures=tuple(responded))
+
+    @property
+    def level(self) -> LevelOfProtection:
+        """The level of protection that the facades of the protected structures reach."""
+        return level_of(worst(load.worst_damage or 0.0 for load in self.protected))
 
     def are_for(self, scenario: AnyScenario) -> bool:
         """Return whether these can be loads of a scenario: finite, one a structure and module."""
@@ -81,6 +117,18 @@ class BlastLoads:
             [load.name for load in self.structures] == names
             and self.module_impulse_sim.shape == (modules,)
             and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse_sim).all())
+            and self._has_bays_of(find_scenario(scenario))
+        )
+
+    def _has_bays_of(self, scenario: Scenario) -> bool:
+        """Return whether the damage of bays is what a scenario asks for: of known bays, finite."""
+        if not scenario.objective.is_response:
+            return not self.bays
+        known = {each.name: {*each.glazing, *each.wall} for each in scenario.alternatives}
+        return bool(self.bays) and all(
+            known.get(each.name) == set(each.damage)
+            and np.isfinite([*each.damage.values(), each.area_m2, each.glazed_m2]).all()
+            for each in self.bays
         )
 
     @property
@@ -111,7 +159,13 @@ class BlastLoads:
             objective: Says which load counts.
         """
         return sum(
-            objective.load(load.impulse_pa_s, load.peak_pa or 0.0, load.weight, load.peak_weight)
+            objective.load(
+                load.impulse_pa_s,
+                load.peak_pa or 0.0,
+                load.weight,
+                load.peak_weight,
+                load.response,
+            )
             for load in self.protected
         )
 
@@ -119,6 +173,27 @@ class BlastLoads:
     def in_range(self) -> bool:
         """Whether the calibration was made for this distance to every protected structure."""
         return all(load.in_range for load in self.protected)
+
+
+def structure_response(
+    bays: Collection[BayDamage], named: Collection[NamedBay], objective: ObjectiveSection
+) -> tuple[float, float]:
+    """Return what counts of the response of one structure, and the largest damage of its bays.
+
+    Args:
+        bays: The damage of its bays under each component that they may have.
+        named: What stands in the bays, of all structures.
+        objective: Says what counts.
+    """
+    chosen = {each.bay.name: each for each in named}
+    is_glazing = objective.measure == "glazing"
+    damage, area_m2 = [], []
+    for each in bays:
+        bay = chosen[each.name]
+        names = (bay.glazing,) if is_glazing else (bay.glazing, bay.wall)
+        damage.append(worst(each.damage[name] for name in names if name is not None))
+        area_m2.append(each.glazed_m2 if is_glazing else each.area_m2)
+    return objective.response(np.array(damage), np.array(area_m2)), worst(damage)
 
 
 @dataclass(frozen=True)
@@ -228,10 +303,19 @@ class Engine(ABC):
             BlastEnvError: If it cannot; the message says why.
         """
         if scenario.objective.needs_peaks and not self.has_peaks:
+            counts = scenario.objective
+            key, value = (
+                ("kind", counts.kind)
+                if counts.is_response
+                else (
+                    "quantity",
+                    counts.quantity,
+                )
+            )
+            instead = "load" if counts.is_response else "impulse"
             raise BlastEnvError(
-                f"scenario {scenario.name!r}: objective.quantity is"
-                f" {scenario.objective.quantity!r}, but engine {self.name!r} knows no"
-                " overpressure: must be 'impulse', or the engine 'gas'"
+                f"scenario {scenario.name!r}: objective.{key} is {value!r}, but engine"
+                f" {self.name!r} knows no overpressure: must be {instead!r}, or the engine 'gas'"
             )
 
     def calibration(self, scenario: Scenario) -> Calibration | None:  # noqa: ARG002

@@ -32,6 +32,7 @@ from blast_env.physics.gas.settings import (
 )
 from blast_env.physics.scene import BlastSite
 from blast_env.provenance import versions
+from blast_env.response.damage import BayDamage
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.scenario.build_scene import build_site, draw_threat
 from blast_env.tables import Column, as_types, table_of, texts
@@ -205,7 +206,7 @@ class GasBlast:
                 result, in `run.solver.recorders`.
         """
         run = self.engine.start_on(self.site, recorders)
-        bays = BayLoads.begin(run, self.scenario.bays)
+        bays = BayLoads.begin(run, self.scenario.bays_with(self.layout))
         if bays.bays:
             run.record(bays.recorder)
         pieces = PieceLoads.begin(run, self.scenario, self.layout)
@@ -447,7 +448,14 @@ class GasResult:
                         notes=scaled.notes,
                     )
                 )
-        return BlastLoads(tuple(loads), self.module_impulse_n_s)
+        return BlastLoads(tuple(loads), self.module_impulse_n_s, self._bay_damages)
+
+    @property
+    def _bay_damages(self) -> tuple[BayDamage, ...]:
+        """What becomes of the bays, where that counts."""
+        if self.bay_loads is None or not self.blast.scenario.objective.is_response:
+            return ()
+        return self.bay_loads.damages(self.blast.scenario.alternatives)
 
     def _walls(self, index: int) -> NDArray[np.int64]:
         """Return the faces of the walls of a structure whose load counts (n,)."""

@@ -33,7 +33,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, SeedRange, Threat
 from blast_env.evaluation.comparison import Assessment, Objective
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
-from blast_env.geometry import Layout
+from blast_env.geometry import Layout, Measure
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
@@ -124,7 +124,9 @@ class Episode:
         """
         placement, _, ended = self._after(action, illegal)
         case = self.objective.case
-        layouts = (placement.layout, ()) if ended else ()
+        # Measures that harden facades need no blast of their own.
+        barrier = tuple(each for each in placement.layout if not isinstance(each, Measure))
+        layouts = (barrier, ()) if ended else ()
         return tuple(
             BlastAsked(case.scenario, layout, threat)
             for layout in layouts
@@ -165,7 +167,7 @@ class Episode:
             "impulse_psi_s": protected.impulse_psi_s,
             "impulse_pa_s": protected.impulse_pa_s,
             "unprotected_impulse_pa_s": unprotected.impulse_pa_s,
-            **_peaks(protected, unprotected),
+            **_where_known(protected, unprotected),
             "reduction": protected.reduction_from(unprotected),
             "layout": self.placement.layout,
             "scenario_hash": self.objective.evaluator.scenario_hash,
@@ -181,11 +183,20 @@ class Episode:
         }
 
 
-def _peaks(protected: Assessment, unprotected: Assessment) -> dict[str, float]:
-    """Return the peaks as they are told; nothing where the engine knows no overpressure."""
+def _where_known(protected: Assessment, unprotected: Assessment) -> dict[str, Any]:
+    """Return peaks, if the engine knows them, and the response of facades, where that counts."""
     if isnan(unprotected.peak_pa):
         return {}
-    return {"peak_pa": protected.peak_pa, "unprotected_peak_pa": unprotected.peak_pa}
+    peaks = {"peak_pa": protected.peak_pa, "unprotected_peak_pa": unprotected.peak_pa}
+    if protected.level is None or unprotected.level is None:
+        return peaks
+    return {
+        **peaks,
+        "response": protected.load,
+        "unprotected_response": unprotected.load,
+        "level_of_protection": protected.level.label,
+        "unprotected_level_of_protection": unprotected.level.label,
+    }
 
 
 def _with_illegal_term(terms: Mapping[str, float], illegal: float) -> dict[str, float]:

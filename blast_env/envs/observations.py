@@ -213,15 +213,16 @@ def occupied_cells(placement: Placement) -> BoolArray:
 
 
 def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
-    """Return what does not change of the items of a catalogue.
+    """Return what does not change of the items of a catalogue, measures among them.
 
     Returns:
         Their heights (items,), and what a piece of each costs (items,): as a share of the budget,
         or of the dearest item's cost where there is no budget, at most 1.
     """
-    costs = np.array([item.cost for item in zone.items])
+    everything = {each.item: each for each in zone.catalogue.variants}.values()
+    costs = np.array([each.cost for each in everything])
     shares = np.minimum(costs / (zone.budget or costs.max(initial=1.0)), 1.0)
-    return np.array([height_share(item.height_m) for item in zone.items]), np.asarray(shares)
+    return np.array([height_share(each.height_m) for each in everything]), np.asarray(shares)
 
 
 def items_placed(placement: Placement) -> tuple[FloatArray, FloatArray]:
@@ -713,7 +714,9 @@ class FeaturesObservation:
         cells = zone.rows * zone.columns
         length = _FIXED + 3 * cells + bool(scenario.vehicles)
         if catalogue.has_items:
-            length += MOST_STRUCTURES + 3 * len(zone.items) + (2 + len(catalogue.variants)) * cells
+            length += (
+                MOST_STRUCTURES + 3 * len(catalogue.names) + (2 + len(catalogue.variants)) * cells
+            )
         return spaces.Box(0.0, 1.0, (length,), np.float32)
 
     def episode(self, observable: Observable) -> "FeaturesEpisode":

@@ -14,6 +14,7 @@ from blast_env.physics.scene import Charge
 from blast_env.scenario import (
     AnyCharge,
     AnyScenario,
+    Placement,
     ScenarioField,
     VehicleCharge,
     find_scenario,
@@ -217,6 +218,21 @@ class Case:
         means = [float(values[index :: len(self.charges)].mean()) for index in range(count)]
         risk = self.risk or self.scenario.objective.risk
         return risk(np.array(means))
+
+    def counted(self, loads: Sequence[float] | FloatArray, layout: Sequence[Element] = ()) -> float:
+        """Return what a layout is worth by the scenario's objective, which may count its cost.
+
+        Args:
+            loads: What counts under each threat, as for `combined`.
+            layout: The layout.
+        """
+        objective, combined = self.scenario.objective, self.combined(loads)
+        if objective.target is None:
+            return combined
+        zone = self.scenario.build_zone
+        budget = None if zone is None else zone.budget
+        cost = Placement(self.scenario, tuple(layout)).cost
+        return objective.counted(combined, cost / budget if budget else 0.0)
 
 
 def visible_case(

@@ -17,6 +17,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, check_distinct
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
 from blast_env.geometry import Element, Layout
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import check_layout
 from blast_env.statistics import (
     CVAR_LEVEL,
@@ -43,6 +44,7 @@ class Assessment:
         load: What the scenario's objective counts, in its unit: Pa s for impulses, Pa for peaks,
             without a unit for both.
         in_range: Whether the calibration was made for every one of the blasts.
+        level: Where the response of facades counts: the level of protection under every charge.
     """
 
     impulse_pa_s: float
@@ -50,6 +52,7 @@ class Assessment:
     peak_pa: float
     load: float
     in_range: bool
+    level: LevelOfProtection | None = None
 
     @property
     def impulse_psi_s(self) -> float:
@@ -93,7 +96,8 @@ class Objective:
                 impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),
                 impulse_sim=combined([each.protected_impulse_sim for each in loads]),
                 peak_pa=combined([each.protected_peak_pa for each in loads]),
-                load=combined([each.load(counts) for each in loads]),
+                load=self.case.counted([each.load(counts) for each in loads], layout),
+                level=min(each.level for each in loads) if counts.kind == "response" else None,
                 in_range=all(each.in_range for each in loads),
             )
         return self._assessed[key]
@@ -157,15 +161,21 @@ class Comparison:
         """Whether there is but one case, so that intervals and worst are over its threats."""
         return len(self.cases) == 1
 
+    @property
+    def _is_mean(self) -> bool:
+        """Whether a layout is worth the mean over the charges, and its cost does not count."""
+        return self.cases[0].is_mean and self.cases[0].scenario.objective.target is None
+
     @cached_property
     def case_reductions(self) -> FloatArray:
         """The reduction in each case (cases,)."""
-        return reductions(self._of_cases(self.loads), self._of_cases(self.unprotected))
+        bare = self._of_cases(self.unprotected, [()] * len(self.cases))
+        return reductions(self._of_cases(self.loads, self.layouts), bare)
 
     @cached_property
     def reduction(self) -> Estimate:
         """The mean reduction with its 95 % interval."""
-        if self.has_one_case and self.cases[0].is_mean:
+        if self.has_one_case and self._is_mean:
             return reduction_estimate(self.loads[0], self.unprotected[0])
         if self.has_one_case:
             return Estimate(float(self.case_reductions[0]), np.nan, np.nan)
@@ -178,7 +188,7 @@ class Comparison:
         Args:
             other: Other layouts on the same cases.
         """
-        if self.has_one_case and self.cases[0].is_mean:
+        if self.has_one_case and self._is_mean:
             # As a reduction: of what is left if all that this takes off more is taken off.
             bare = self.unprotected[0]
             left = bare + self.loads[0] - other.loads[0]
@@ -217,11 +227,14 @@ class Comparison:
 
     def _samples(self, loads: FloatArray) -> FloatArray:
         """Return what means and tails are over: the cases, or the threats of a single one."""
-        return loads[0] if self.has_one_case else self._of_cases(loads)
+        combined = [case.combined(row) for case, row in zip(self.cases, loads, strict=True)]
+        samples: FloatArray = loads[0] if self.has_one_case else np.array(combined)
+        return samples
 
-    def _of_cases(self, loads: FloatArray) -> FloatArray:
-        """Return the load that counts in each case (cases,)."""
-        return np.array([case.combined(row) for case, row in zip(self.cases, loads, strict=True)])
+    def _of_cases(self, loads: FloatArray, layouts: Sequence[Layout]) -> FloatArray:
+        """Return what layouts are worth in each case (cases,)."""
+        rows = zip(self.cases, loads, layouts, strict=True)
+        return np.array([case.counted(row, layout) for case, row, layout in rows])
 
 
 def compare(

@@ -27,6 +27,7 @@ from blast_env.response.components import Glazing, catalogue
 from blast_env.response.facade import FacadeResponse, FilledBay, respond, sharpened
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.scenario.build_scene import charge_against
+from blast_env.scenario.facade import with_glass
 from blast_env.tables import Column, table_of
 
 if TYPE_CHECKING:  # a third of a second to import
@@ -167,10 +168,7 @@ class Consequences:
 
 
 def _reglazed(bay: FilledBay, glazing: Glazing) -> FilledBay:
-    if bay.glazing is None:
-        return bay
-    kept = {name: getattr(bay.glazing, name) for name in ("width_m", "height_m", "sill_m")}
-    return replace(bay, glazing=glazing.model_copy(update=kept))
+    return replace(bay, glazing=bay.glazing and with_glass(bay.glazing, glazing))
 
 
 def other_glazing(scenario: Scenario) -> dict[str, Glazing]:

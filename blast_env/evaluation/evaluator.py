@@ -17,7 +17,7 @@ from blast_env.evaluation.store import (
     engine_text,
     find_cache,
 )
-from blast_env.geometry import Element, Layout
+from blast_env.geometry import Element, Layout, Measure
 from blast_env.physics.scene import Charge
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
@@ -134,8 +134,9 @@ class BlastEvaluator:
         """
         check_workers("processes", processes)
         asked: dict[BlastKey, AnyCharge] = {}
-        keys = []
+        keys, layouts = [], []
         for layout, threat in pairs:
+            layouts.append(tuple(check_layout(self.scenario, layout)))
             keys.append(self._key(layout, threat))
             asked.setdefault(keys[-1], threat.charge)
         found = {key: loads for key in asked if (loads := self._known(key)) is not None}
@@ -146,10 +147,18 @@ class BlastEvaluator:
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(keys))
         self.cache_hits += len(keys) - len(missing)
-        return [found[key] for key in keys]
+        objective, loads_of = self.scenario.objective, [found[key] for key in keys]
+        if objective.kind != "response":
+            return loads_of
+        return [
+            loads.with_facades(self.scenario.named_bays(layout), objective)
+            for loads, layout in zip(loads_of, layouts, strict=True)
+        ]
 
     def _key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
-        cells = tuple(sorted(check_layout(self.scenario, layout)))
+        # Measures that harden facades change no load: they need no blast of their own.
+        checked = check_layout(self.scenario, layout)
+        cells = tuple(sorted(each for each in checked if not isinstance(each, Measure)))
         # Without noise there is nothing to draw: a charge has one realisation.
         seed = threat.seed if self.engine.has_noise else 0
         charge = threat.charge_against(self.scenario, cells)

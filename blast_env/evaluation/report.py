@@ -225,8 +225,8 @@ def case_table(comparison: Comparison) -> "pd.DataFrame":
                 "charge_height_m": charge.height_m,
                 "tnt_kg": charge.tnt_kg,
                 "modules": len(layout),
-                "load": case.combined(comparison.loads[index]),
-                "unprotected_load": case.combined(comparison.unprotected[index]),
+                "load": case.counted(comparison.loads[index], layout),
+                "unprotected_load": case.counted(comparison.unprotected[index]),
                 "unit": case.scenario.objective.unit,
                 "reduction": float(comparison.case_reductions[index]),
                 "in_range": bool(comparison.in_range[index].all()),
@@ -446,12 +446,12 @@ class LayoutEvaluation:
     @property
     def load(self) -> float:
         """What the scenario's objective makes of all threats, with the barrier, in its unit."""
-        return self.case.combined(self.comparison.loads[0])
+        return self.case.counted(self.comparison.loads[0], self.comparison.layouts[0])
 
     @property
     def unprotected_load(self) -> float:
         """The same without the barrier."""
-        return self.case.combined(self.comparison.unprotected[0])
+        return self.case.counted(self.comparison.unprotected[0])
 
     @property
     def mean_reduction(self) -> float:

@@ -6,7 +6,7 @@ import warnings
 from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
@@ -20,6 +20,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.files import FolderStore
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
+from blast_env.response.damage import BayDamage
 
 
 class BlastKey(NamedTuple):
@@ -198,11 +199,20 @@ def _key_of(text: str) -> BlastKey:
 
 def _encoded(loads: BlastLoads) -> bytes:
     """Return a line of JSON, and the impulses on the modules."""
-    header = [asdict(load) for load in loads.structures]
+    header = {
+        "structures": [asdict(load) for load in loads.structures],
+        "bays": [asdict(bay) for bay in loads.bays],
+    }
     return json.dumps(header).encode() + b"\n" + loads.module_impulse_sim.astype("<f8").tobytes()
 
 
-_STRUCTURES: Final = TypeAdapter(tuple[StructureLoad, ...])
+@dataclass(frozen=True)
+class _Header:
+    structures: tuple[StructureLoad, ...]
+    bays: tuple[BayDamage, ...]
+
+
+_HEADER: Final = TypeAdapter(_Header)
 
 
 def _decoded(content: bytes) -> BlastLoads:
@@ -212,5 +222,6 @@ def _decoded(content: bytes) -> BlastLoads:
         ValueError: If the content is anything else.
     """
     line, _, impulses = content.partition(b"\n")
-    structures = _STRUCTURES.validate_json(line)
-    return BlastLoads(structures, np.frombuffer(impulses, dtype="<f8").astype(np.float64))
+    header = _HEADER.validate_json(line)
+    modules = np.frombuffer(impulses, dtype="<f8").astype(np.float64)
+    return BlastLoads(header.structures, modules, header.bays)

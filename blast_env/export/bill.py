@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import fsum
+from math import fsum, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from blast_env.geometry import Element, Layout, Piece
+from blast_env.geometry import Element, Layout, Measure, Piece
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import ModularPart
 from blast_env.plan import Feature, rounded_m, site_features
@@ -90,7 +90,7 @@ PIECE_COLUMNS: Final = (
 """Of the pieces of a zone with a catalogue."""
 
 BILL_COLUMNS: Final = (
-    Column("item", "", "item of the catalogue, or `module`; `total` is all of them"),
+    Column("item", "", "item or measure of the zone, or `module`; `total` is all of them"),
     Column("description", "", "what it is"),
     Column("count", "", "pieces that the layout takes"),
     Column("in_stock", "", "pieces that there are"),
@@ -142,6 +142,8 @@ def _piece_rows(plan: LayoutPlan) -> Iterator[dict[str, object]]:
     zone = plan.scenario.zone
     items = {item.name: item for item in zone.items}
     for piece, cost in _with_costs(plan):
+        if isinstance(piece, Measure):
+            continue  # the bill has it
         if not isinstance(piece, Piece):
             raise AssertionError("a zone with a catalogue has pieces")
         item, rectangle = items[piece.item], zone.element_rectangle_m(piece)
@@ -221,7 +223,7 @@ def _lines(plan: LayoutPlan) -> Sequence[_Line]:
             item.cost,
         )
         for item in zone.items
-    ]
+    ] + [_Line(each.name, each.description, 1, nan, nan, nan, each.cost) for each in zone.hardening]
 
 
 def write_excel(plan: LayoutPlan, path: Path) -> None:

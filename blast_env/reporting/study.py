@@ -15,7 +15,7 @@ from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError, shortened
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.export.bill import LayoutPlan, bill_of_quantities
-from blast_env.geometry import Element, Layout, Piece, layout_text
+from blast_env.geometry import Element, Layout, Measure, Piece, layout_text
 from blast_env.reporting.figures import Picture, blast_pictures, film_stills
 from blast_env.reporting.loads import (
     UNITS,
@@ -349,6 +349,7 @@ class Runs:
                 float(worth),
             )
             for element, worth in zip(self.layout, worths, strict=True)
+            if not isinstance(element, Measure)
         ]
         return tuple(sorted(items, key=lambda each: -each.worth))
 

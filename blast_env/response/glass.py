@@ -55,6 +55,7 @@ _GRAVITY_M_S2: Final = 9.81
 _NEAR_M: Final = 1.0
 _PANEL_M: Final = 3.0
 _PANEL_LOW_M: Final = 0.6
+_BELOW_1: Final = 1.0 - 1e-9
 _STIFFENING: Final = 3
 """A pane bent to breaking is so much quicker than at rest: its steps are for that."""
 
@@ -268,6 +269,8 @@ class GlazingResponses:
         hit_height_m: Where they hit a panel 3 m behind, above the floor (panes,); below 0 if not.
         condition: `GlazingCondition` of those that break, or `NO_BREAK` where fewer break than the
             limit (panes,).
+        hazard: The condition as a number that grows within it: below 1 no break, from 1 retained,
+            from 2 within 1 m, from 3 within 3 m, from 4 to 5 farther (panes,).
     """
 
     peak_m: FloatArray
@@ -278,6 +281,7 @@ class GlazingResponses:
     flight_m: FloatArray
     hit_height_m: FloatArray
     condition: FloatArray
+    hazard: FloatArray
 
 
 def glazing_responses(
@@ -301,7 +305,7 @@ def glazing_responses(
         raise BlastEnvError(
             f"pressure_pa has shape {pressure_pa.shape}, must be ({len(panes)}, {len(time_s)})"
         )
-    rows = np.zeros((len(panes), 8))
+    rows = np.zeros((len(panes), 9))
     for index, pane in enumerate(panes):
         rows[index] = _one(pane, time_s, pressure_pa[index], limit_probability)
     return GlazingResponses(*rows.T)
@@ -340,7 +344,8 @@ def _one(pane: Pane, time_s: FloatArray, pressure_pa: FloatArray, limit: float) 
     # The net impulse so far is K_LM m v: broken, the pane flies on with it and what is to come.
     left = _impulse_after(time_s, pressure_pa, break_s)
     thrown_m_s = max(system.load_mass_factor * break_m_s + left / pane.mass_kg_m2, 0.0)
-    retained = _is_retained(pane, thrown_m_s, break_m)
+    stretched = _stretched_share(pane, thrown_m_s, break_m)
+    retained = stretched <= 1.0
     speed = 0.0 if retained else thrown_m_s
     flight = speed * np.sqrt(2.0 * pane.middle_m / _GRAVITY_M_S2)
     hit = _hit_height_m(pane, speed)
@@ -351,8 +356,18 @@ def _one(pane: Pane, time_s: FloatArray, pressure_pa: FloatArray, limit: float) 
         if retained
         else flight_condition(flight, hit)
     )
+    # In each condition: how far it is on the way to the next. Risk goes with the power m of a load.
+    shares = {
+        GlazingCondition.NO_BREAK: (probability / limit) ** (1.0 / WEIBULL_M),
+        GlazingCondition.RETAINED: stretched,
+        GlazingCondition.WITHIN_1_M: flight / _NEAR_M,
+        GlazingCondition.WITHIN_3_M: (flight - _NEAR_M) / (_PANEL_M - _NEAR_M),
+    }
+    hazard = min(shares.get(condition, 1.0 - _PANEL_M / max(flight, _PANEL_M)), _BELOW_1)
+    hazard += min(condition, GlazingCondition.LOW_ON_PANEL) - GlazingCondition.NO_BREAK
     return np.array(
-        [peak_m, probability, break_s, speed, float(retained), flight, hit, float(condition)]
+        [peak_m, probability, break_s, speed, retained, flight, hit, condition, hazard],
+        dtype=np.float64,
     )
 
 
@@ -373,24 +388,24 @@ def _hit_height_m(pane: Pane, speed_m_s: float) -> float:
     return height if height > 0.0 else -1.0
 
 
-def _is_retained(pane: Pane, thrown_m_s: float, break_m: float) -> bool:
-    """Return whether an interlayer takes up the motion before it tears.
+def _stretched_share(pane: Pane, thrown_m_s: float, break_m: float) -> float:
+    """Return the motion over what an interlayer takes up before it tears; infinite without one.
 
     A membrane of tension N over sides a and b resists with N pi^2 (1/a^2 + 1/b^2) a unit of its
     deflection, in a shape of half waves; what moves is all its glass.
     """
     if pane.interlayer is None:
-        return False
+        return np.inf
     sides = 1.0 / pane.width_m**2 + 1.0 / pane.height_m**2
     stiffness = pane.interlayer.tension_n_m * np.pi**2 * sides
     tear_m = pane.interlayer.tear_share * pane.short_m
     if break_m >= tear_m:
-        return False
+        return np.inf
     # mean(phi) = 4 / pi^2 and mean(phi^2) = 1 / 4 of half waves
     middle_m_s = thrown_m_s * (4.0 / np.pi**2) / 0.25
     moving = 0.25 * pane.mass_kg_m2 * middle_m_s**2
     taken = 0.25 * stiffness * (tear_m**2 - break_m**2)
-    return bool(moving <= taken)
+    return float(moving / taken)
 
 
 def _impulse_after(time_s: FloatArray, pressure_pa: FloatArray, at_s: float) -> float:

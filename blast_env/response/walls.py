@@ -58,29 +58,34 @@ class Limits:
     source: str
 
     def measure(self, ductility: FloatArray, rotation_deg: FloatArray) -> FloatArray:
-        """Return the damage as a number: below 1 superficial, from 1 moderate, to 4 blowout.
+        """Return the damage as a number: below 1 superficial, from 1 moderate, from 4 blowout.
 
-        Between two limits it goes up evenly, so that a search has something to climb. Where both
-        ductility and rotation have a limit, the one that is passed first decides.
+        Between two limits it goes up evenly, so that a search has something to climb, and beyond
+        the last one towards 5. Where both ductility and rotation have a limit, the one that is
+        passed first decides. A level that only one of them bounds grows with that one.
 
         Args:
             ductility: Largest deflection over that at yield (components,).
             rotation_deg: Largest support rotation (components,).
         """
-        both = [
-            _measure(values, limits)
-            for values, limits in ((ductility, self.ductility), (rotation_deg, self.rotation_deg))
-            if any(limit is not None for limit in limits)
-        ]
-        result: FloatArray = np.max(both, axis=0)
+        result = np.zeros(len(ductility))
+        for values, limits in ((ductility, self.ductility), (rotation_deg, self.rotation_deg)):
+            first = next((level for level, limit in enumerate(limits) if limit is not None), None)
+            if first is not None:
+                measure = _measure(values, limits, first)
+                counts = (measure >= first + 1) | (result >= first)
+                result = np.where(counts, np.maximum(result, measure), result)
         return result
 
 
-def _measure(values: FloatArray, limits: Sequence[float | None]) -> FloatArray:
-    at = [(0.0, 0.0)]
+def _measure(values: FloatArray, limits: Sequence[float | None], first: int) -> FloatArray:
+    at = [(0.0, float(first))]
     at += [(limit, level) for level, limit in enumerate(limits, start=1) if limit is not None]
     known, levels = (np.array(each) for each in zip(*at, strict=True))
-    return np.interp(values, known, levels)
+    measure = np.interp(values, known, levels)
+    if levels[-1] < DamageLevel.BLOWOUT:
+        return measure
+    return measure + 1.0 - known[-1] / np.maximum(values, known[-1])
 
 
 def damage_level(measure: FloatArray) -> list[DamageLevel]:

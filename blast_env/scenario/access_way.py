@@ -76,6 +76,9 @@ def closing_places(
     chains = _Chains.of(way, passable)
     known: dict[tuple[int, int], BoolArray] = {}
     for variant in variants:
+        if variant.is_measure:
+            yield np.zeros_like(passable)
+            continue
         size = variant.rows, variant.columns
         if size not in known:
             known[size] = chains.closed_by(size) if chains.leave_a_way else np.ones_like(passable)

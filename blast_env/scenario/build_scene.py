@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element, Layout, Rectangle
+from blast_env.geometry import Element, Layout, Rectangle, standing
 from blast_env.physics.parameters import SimulationParameters, for_charge
 from blast_env.physics.particles import Balls, air_lattice, explosion_fan
 from blast_env.physics.scene import BlastSite, Charge, Gauge, Scene, StructureOutline
@@ -134,8 +134,9 @@ def build_site(
     drawn = draw_threat(scenario, seed) if charge is None else charge
     charge = charge_against(scenario, placement.layout, drawn)
     structures = tuple(_outline(section) for section in scenario.structures)
-    if placement.layout:
-        structures += (barrier_outline(scenario.zone, placement.layout),)
+    barrier = standing(placement.layout)
+    if barrier:
+        structures += (barrier_outline(scenario.zone, barrier),)
     return BlastSite(
         site_m=scenario.site.rectangle_m,
         charge=charge,

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import index
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple, Self
 
 import numpy as np
 from pydantic import (
@@ -22,11 +22,13 @@ from pydantic import (
 )
 
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
-from blast_env.geometry import Cell, Element, Piece
+from blast_env.geometry import Cell, Element, Measure, Piece
+from blast_env.physics.scene import WALLS
 from blast_env.response.barriers import RigidPiece
+from blast_env.response.facade import Bay
 from blast_env.scenario.barriers import Anchorage, BaseWidth, Friction, Mass, stock_barriers
 from blast_env.scenario.problems import Problem, ScenarioError, unknown_name
-from blast_env.scenario.sections import FOR_PEOPLE, Count, Height, Name, Section
+from blast_env.scenario.sections import FOR_PEOPLE, Count, Height, Name, Section, Storeys, Walls
 from blast_env.units import MODULE_SIDE_M
 
 Cost = Annotated[StrictFloat, Field(gt=0.0, le=1e9)]
@@ -135,6 +137,48 @@ class Item(Section):
         return size[::-1] if turned else size
 
 
+class Hardening(Section):
+    """Better components for some bays of facades, at a price: a part of a layout as an item is.
+
+    Each can be taken once. It covers no cell, and no load depends on it.
+
+    Attributes:
+        name: Name in layouts and tables.
+        description: What it is, for people.
+        structures: On which structures; on all that have a facade unless given.
+        walls: On which walls; on all unless given.
+        storeys: In which storeys, from 1; in all unless given.
+        glazing: Component whose glass the windows there get; sizes and sills stay.
+        wall: Component that takes the place of the wall panels there.
+        cost: What it costs.
+    """
+
+    name: Name
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE] = ""
+    structures: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)] | None = None
+    walls: Walls = WALLS
+    storeys: Storeys | None = None
+    glazing: Name | None = None
+    wall: Name | None = None
+    cost: Cost
+
+    @model_validator(mode="after")
+    def _check_component(self) -> Self:
+        """Refuse a measure that changes nothing."""
+        if self.glazing is None and self.wall is None:
+            problem = Problem("glazing", "missing: glazing, wall or both must be given")
+            raise ScenarioError("hardening", [problem])
+        return self
+
+    def covers(self, bay: Bay) -> bool:
+        """Return whether a bay is one of those that it changes."""
+        return (
+            (self.structures is None or bay.structure in self.structures)
+            and bay.wall in self.walls
+            and (self.storeys is None or bay.storey in self.storeys)
+        )
+
+
 class Variant(NamedTuple):
     """One way to set an item down.
 
@@ -142,8 +186,8 @@ class Variant(NamedTuple):
         item: Index of the item in the catalogue.
         name: Its name; empty for the single module of a zone without a catalogue.
         turned: Whether its length runs upwards.
-        rows: Rows of cells that it covers.
-        columns: Columns of cells that it covers.
+        rows: Rows of cells that it covers; 0 of a measure that hardens facades.
+        columns: Columns of cells that it covers; likewise.
         height_m: Its height; `None` is as high as the air.
         cost: What a piece costs where no cost area says otherwise.
         stops_vehicles: Whether no vehicle gets past it.
@@ -157,6 +201,11 @@ class Variant(NamedTuple):
     height_m: float | None
     cost: float
     stops_vehicles: bool
+
+    @property
+    def is_measure(self) -> bool:
+        """Whether it hardens facades, and covers no cell; its only place is cell (0, 0)."""
+        return self.rows == 0
 
     def cells_at(self, row: int, column: int) -> Iterator[Cell]:
         """Yield the cells that it covers with its lower left one there, row by row."""
@@ -187,11 +236,12 @@ class Catalogue:
 
     Without items the only thing to place is a single module, and the elements of a layout are
     cells; with items they are pieces. Action `variant * rows * columns + row * columns + column`
-    sets a variant down with its lower left cell there; the action after the last one finishes.
+    sets a variant down with its lower left cell there; the action after the last one finishes. Of
+    a measure that hardens facades only the action of cell (0, 0) is ever legal.
 
     Attributes:
         variants: Every way to set an item down: item by item, not turned before turned.
-        names: Names of the items; empty without a catalogue.
+        names: Names of the items, then of the measures; empty without a catalogue.
         stocks: How many pieces there are of each item (of single modules, if there are none).
         shape: Rows and columns of the zone.
     """
@@ -202,8 +252,10 @@ class Catalogue:
     shape: tuple[int, int]
 
     @classmethod
-    def of_items(cls, items: Sequence[Item], shape: tuple[int, int]) -> "Catalogue":
-        """Return the catalogue of a zone with items."""
+    def of_items(
+        cls, items: Sequence[Item], hardening: Sequence[Hardening], shape: tuple[int, int]
+    ) -> "Catalogue":
+        """Return the catalogue of a zone with items, and with measures after them."""
         variants = tuple(
             Variant(
                 number,
@@ -217,8 +269,13 @@ class Catalogue:
             for number, item in enumerate(items)
             for turned in item.orientations
         )
-        names, stocks = (item.name for item in items), (item.stock for item in items)
-        return cls(variants, tuple(names), tuple(stocks), shape)
+        variants += tuple(
+            Variant(number, each.name, False, 0, 0, 0.0, each.cost, False)
+            for number, each in enumerate(hardening, start=len(items))
+        )
+        names = (*(item.name for item in items), *(each.name for each in hardening))
+        stocks = (*(item.stock for item in items), *(1 for _ in hardening))
+        return cls(variants, names, stocks, shape)
 
     @classmethod
     def of_modules(
@@ -247,7 +304,8 @@ class Catalogue:
         if not self.has_items:
             return row, column
         chosen = self.variants[variant]
-        return Piece(row, column, chosen.name, chosen.turned)
+        kind = Measure if chosen.is_measure else Piece
+        return kind(row, column, chosen.name, chosen.turned)
 
     def action(self, element: Element) -> int:
         """Return the number of the action that places an element.
@@ -294,6 +352,8 @@ class Catalogue:
             nearest = suggestion(element.item, self.names) or f"; known: {', '.join(self.names)}"
             return f"is not in the catalogue{nearest}"
         item = self.variants[self._numbers[element.item, False]]
+        if item.is_measure:
+            return "hardens facades: it is not turned"
         if item.rows == item.columns:
             return "is as long as it is thick: it is not turned"
         return "may not be turned: it is not rotatable"
@@ -320,7 +380,7 @@ class Catalogue:
         if not self.has_items:
             return cell_from(given, place)
         if type(given) is Piece and tuple(map(type, given)) == (int, int, str, bool):
-            return given  # the usual case
+            return self._of_its_kind(given)  # the usual case
         known = ", ".join(map(repr, self.names))
         if not isinstance(given, list | tuple):
             raise LayoutError(f"{place}: is {type_word(given)}, {_PIECE}; items: {known}")
@@ -331,7 +391,13 @@ class Catalogue:
         if not (numbers and isinstance(item, str) and isinstance(turned, bool | np.bool_)):
             words = ", ".join(map(type_word, given))
             raise LayoutError(f"{place}: is ({words}), {_PIECE}; items: {known}")
-        return Piece(index(row), index(column), str(item), bool(turned))
+        return self._of_its_kind(Piece(index(row), index(column), str(item), bool(turned)))
+
+    def _of_its_kind(self, piece: Piece) -> Piece:
+        """Return a piece, as a `Measure` if its item hardens facades."""
+        number = self._numbers.get((piece.item, piece.turned))
+        is_measure = number is not None and self.variants[number].is_measure
+        return Measure(*piece) if is_measure else piece
 
     def layout_from(self, layout: Any) -> tuple[Element, ...]:
         """Return a layout as plain values, in its order; see `element_from`.
@@ -394,5 +460,7 @@ def element_text(element: Element) -> str:
     """Return an element for a message: `cell (3, 4)`, `'t_wall' at cell (3, 4), turned`."""
     if not isinstance(element, Piece):
         return cell_text(element)
+    if isinstance(element, Measure):
+        return f"measure {value_text(element.item)}"
     turned = ", turned," if element.turned else ""
     return f"{value_text(element.item)} at {cell_text((element.row, element.column))}{turned}"

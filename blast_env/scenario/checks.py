@@ -16,8 +16,9 @@ from blast_env.physics.parameters import AirParameters, SimulationParameters, fo
 from blast_env.physics.particles import lattice_capacity
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.response.components import Component, Glazing, Wall
-from blast_env.scenario.facade import facade_problems
+from blast_env.scenario.facade import facade_problems, hardening_problems
 from blast_env.scenario.heights import air_height_m, depth_inside_m, is_over
+from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, extent
 from blast_env.scenario.sections import (
     AnySource,
@@ -76,6 +77,9 @@ _COMPONENTS: Final[TypeAdapter[Mapping[str, Glazing | Wall]]] = TypeAdapter(dict
 _SIMULATION: Final = TypeAdapter(SimulationSection)
 
 
+_OBJECTIVE: Final = TypeAdapter(ObjectiveSection)
+
+
 @dataclass(frozen=True)
 class Parts:
     """The sections of a scenario that are sound by themselves.
@@ -89,6 +93,7 @@ class Parts:
         parameters: The parameters of the blast model, if they are sound.
         gauges: The sound gauges, by their index.
         components: The sound components, by name.
+        objective: What counts, if it is sound.
     """
 
     site: Site | None
@@ -99,6 +104,7 @@ class Parts:
     parameters: SimulationParameters | None
     gauges: Mapping[int, GaugeSection]
     components: Mapping[str, Glazing | Wall] = field(default_factory=dict)
+    objective: ObjectiveSection | None = None
 
     @property
     def air_height_m(self) -> float:
@@ -133,6 +139,7 @@ def sound_parts(document: Mapping[str, Any]) -> Parts:
         parameters=None if simulation is None else simulation.parameters,
         gauges=_sound_items(_GAUGE, document.get("gauges")),
         components=_sound(_COMPONENTS, document.get("components", {})) or {},
+        objective=_sound(_OBJECTIVE, document.get("objective", {})),
     )
 
 
@@ -147,7 +154,33 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
         *_height_problems(parts),
         *_gauge_problems(parts),
         *facade_problems(parts.structures, parts.components),
+        *_hardening_problems(parts),
+        *_objective_problems(parts),
     )
+
+
+def _hardening_problems(parts: Parts) -> Iterator[Problem]:
+    """Check measures against the facades that they harden, as far as all structures are sound."""
+    if parts.build_zone is not None and parts.all_structures:
+        measures = parts.build_zone.hardening
+        yield from hardening_problems(parts.structures, parts.components, measures)
+
+
+def _objective_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that there is something whose response can count, and what a target needs."""
+    objective, zone = parts.objective, parts.build_zone
+    if objective is None or not objective.is_response:
+        return
+    facades = [each.facade for each in parts.structures.values() if each.protected]
+    keys = [key for facade in facades if facade is not None for key, _ in facade.names()]
+    wanted = "glazing" if objective.measure == "glazing" else ""
+    if parts.all_structures and not any(key.endswith(wanted) for key in keys):
+        what = "facade with glazing" if wanted else "facade"
+        message = f"is 'response', but no protected structure has a {what}"
+        yield Problem("objective.kind", message)
+    if objective.target is not None and zone is not None and zone.budget is None:
+        message = f"missing: objective.target is {objective.target!r}, costs are shares of a budget"
+        yield Problem("build_zone.budget", message)
 
 
 def check_sources(parts: Parts) -> tuple[Problem, ...]:

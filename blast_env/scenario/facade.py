@@ -14,15 +14,19 @@
     kind = "glazing"
     ...
 
-No result of a blast depends on it, but what the blast does to the building.
+Measures of the build zone may put better components in some bays, at a price (`Hardening`).
+No load depends on a facade, but what the load does to the building.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.response.components import Glazing, Wall, catalogue
-from blast_env.response.facade import FilledBay, divide
+from blast_env.response.damage import Alternatives
+from blast_env.response.facade import Bay, FilledBay, divide
+from blast_env.scenario.catalogue import Hardening
 from blast_env.scenario.problems import Problem, unknown_name
 from blast_env.scenario.sections import AnyStructure, FacadeSection
 
@@ -32,20 +36,74 @@ MOST_BAYS: Final = 5_000
 Components = Mapping[str, Glazing | Wall]
 
 
-def facade_bays(structure: AnyStructure, own: Components) -> tuple[FilledBay, ...]:
-    """Return the bays of a structure with what stands in them; none without a facade.
+@dataclass(frozen=True)
+class NamedBay:
+    """A bay with the names of what stands in it.
 
-    Args:
-        structure: The structure; its facade names sound components.
-        own: The scenario's own components.
-
-    Raises:
-        BlastEnvError: If a bay is empty, or a pane larger than its bay.
+    Attributes:
+        bay: The bay.
+        window: Component of its windows as the facade has it: their sizes and sills.
+        glazing: Component that their glass is of.
+        wall: Component of its wall panel.
     """
+
+    bay: Bay
+    window: str | None
+    glazing: str | None
+    wall: str | None
+
+    def hardened(self, measures: Sequence[Hardening]) -> "NamedBay":
+        """Return it with measures taken; the last one that changes a component counts."""
+        glazing, wall = self.glazing, self.wall
+        for measure in measures:
+            if measure.covers(self.bay):
+                glazing = glazing and (measure.glazing or glazing)
+                wall = wall and (measure.wall or wall)
+        return replace(self, glazing=glazing, wall=wall)
+
+    def filled(self, known: Components) -> FilledBay:
+        """Return it with its components.
+
+        Raises:
+            BlastEnvError: If it is empty, or a pane larger than it.
+        """
+        window, glass, wall = (
+            None if name is None else known[name] for name in (self.window, self.glazing, self.wall)
+        )
+        assert window is None or isinstance(window, Glazing)
+        assert wall is None or isinstance(wall, Wall)
+        if window is not None and self.glazing != self.window:
+            assert isinstance(glass, Glazing)
+            window = with_glass(window, glass)
+        return FilledBay(self.bay, window, wall)
+
+    def alternatives(self, measures: Sequence[Hardening], known: Components) -> Alternatives:
+        """Return what stands in it, and what measures would put there."""
+        reached = [self.hardened([each]) for each in measures]
+        glasses = dict.fromkeys(each.glazing for each in (self, *reached) if each.glazing)
+        walls = dict.fromkeys(each.wall for each in (self, *reached) if each.wall)
+        return Alternatives(
+            self.bay.name,
+            self.bay.structure,
+            {name: replace(self, glazing=name, wall=None).filled(known) for name in glasses},
+            {
+                name: replace(self, window=None, glazing=None, wall=name).filled(known)
+                for name in walls
+            },
+        )
+
+
+def with_glass(window: Glazing, glass: Glazing) -> Glazing:
+    """Return windows with other glass; sizes and sills stay."""
+    kept = {name: getattr(window, name) for name in ("width_m", "height_m", "sill_m")}
+    return glass.model_copy(update=kept)
+
+
+def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
+    """Return the bays of a structure with the names of what stands there; none without a facade."""
     facade = structure.facade
     if facade is None or structure.height_m is None:
         return ()
-    known = {**catalogue(), **own}
     bays = divide(
         structure.name,
         structure.rectangle_m,
@@ -54,17 +112,14 @@ def facade_bays(structure: AnyStructure, own: Components) -> tuple[FilledBay, ..
         facade.storey_m,
         facade.bay_m,
     )
-    filled = []
+    named = []
     for bay in bays:
-        chosen = {"glazing": facade.glazing, "wall": facade.wall}
+        glazing, wall = facade.glazing, facade.wall
         for part in facade.parts:
             if part.covers(bay):
-                chosen = {key: getattr(part, key) or name for key, name in chosen.items()}
-        glazing, wall = (None if name is None else known[name] for name in chosen.values())
-        assert glazing is None or isinstance(glazing, Glazing)
-        assert wall is None or isinstance(wall, Wall)
-        filled.append(FilledBay(bay, glazing, wall))
-    return tuple(filled)
+                glazing, wall = part.glazing or glazing, part.wall or wall
+        named.append(NamedBay(bay, glazing, glazing, wall))
+    return tuple(named)
 
 
 def facade_problems(structures: Mapping[int, AnyStructure], own: Components) -> Iterator[Problem]:
@@ -89,16 +144,53 @@ def facade_problems(structures: Mapping[int, AnyStructure], own: Components) -> 
         if problems:
             continue
         try:
-            bays += len(facade_bays(structure, own))
+            bays += len([bay.filled(known) for bay in named_bays(structure)])
         except BlastEnvError as error:
             yield Problem(where, str(error))
     if bays > MOST_BAYS:
         yield Problem("structures", f"have {bays:,} bays in all, must be at most {MOST_BAYS:,}")
 
 
+def hardening_problems(
+    structures: Mapping[int, AnyStructure], own: Components, measures: Sequence[Hardening]
+) -> Iterator[Problem]:
+    """Yield what is wrong with the measures that harden facades.
+
+    Args:
+        structures: The sound structures, by their index.
+        own: The scenario's own components.
+        measures: The measures.
+    """
+    known = {**catalogue(), **own}
+    names = [each.name for each in structures.values()]
+    bays = [bay for each in structures.values() for bay in named_bays(each)]
+    for index, measure in enumerate(measures):
+        where = f"build_zone.hardening[{index}]"
+        unknown = {i: name for i, name in enumerate(measure.structures or ()) if name not in names}
+        for place, name in unknown.items():
+            problem = unknown_name("structure", name, names)
+            yield Problem(f"{where}.structures[{place}]", problem)
+        if unknown:
+            continue
+        covered = [bay for bay in bays if measure.covers(bay.bay)]
+        for key, what in (("glazing", "windows"), ("wall", "a wall panel")):
+            name = getattr(measure, key)
+            if name is None:
+                continue
+            problems = list(_kind_problem(f"{where}.{key}", name, known))
+            yield from problems
+            if not problems and all(getattr(bay, key) is None for bay in covered):
+                yield Problem(where, f"{measure.name!r} covers no bay with {what}")
+
+
+def _kind_problem(where: str, name: str, known: Components) -> Iterator[Problem]:
+    """Yield that a name is that of no component of the kind that its key asks for."""
+    kind = Glazing if where.endswith("glazing") else Wall
+    fitting = [each for each, component in known.items() if isinstance(component, kind)]
+    if name not in fitting:
+        yield Problem(where, unknown_name("component", name, fitting))
+
+
 def _name_problems(facade: FacadeSection, where: str, known: Components) -> Iterator[Problem]:
     for key, name in facade.names():
-        kind = Glazing if key.endswith("glazing") else Wall
-        fitting = [each for each, component in known.items() if isinstance(component, kind)]
-        if name not in fitting:
-            yield Problem(f"{where}.{key}", unknown_name("component", name, fitting))
+        yield from _kind_problem(f"{where}.{key}", name, known)

@@ -11,7 +11,7 @@ from typing import Any, Final
 from blast_env.documents import MAX_BYTES, DocumentError, parse_json, read_text
 from blast_env.errors import LayoutError, key_path, suggestion, type_word, value_text
 from blast_env.files import write_atomically
-from blast_env.geometry import Element, Layout, Piece
+from blast_env.geometry import Element, Layout, Measure, Piece, standing
 from blast_env.scenario.catalogue import cell_from
 from blast_env.scenario.files import AnyScenario, find_scenario
 from blast_env.scenario.models import Scenario
@@ -24,10 +24,16 @@ CELLS_VERSION: Final = 1
 PIECES_VERSION: Final = 2
 """The version of a file whose layout consists of pieces."""
 
+MEASURES_VERSION: Final = 3
+"""The version of a file whose layout has measures that harden facades, beside pieces."""
+
 _LISTS: Final[Mapping[int, str]] = MappingProxyType(
-    {CELLS_VERSION: "cells", PIECES_VERSION: "pieces"}
+    {CELLS_VERSION: "cells", PIECES_VERSION: "pieces", MEASURES_VERSION: "pieces"}
 )
 """The key of the layout, by the version of the file."""
+
+_MEASURES: Final = "hardening"
+"""The key of the names of the measures, in the last version."""
 
 _OTHER_KEYS: Final = ("scenario", "scenario_hash", "provenance", "version")
 _PIECE_KEYS: Final[Mapping[str, type]] = MappingProxyType(
@@ -141,10 +147,14 @@ class LayoutFile:
 
     def _text(self, path: str | Path) -> str:
         """Return the file as JSON, the cells on one line, or each piece on one."""
-        pieces = [each for each in self.layout if isinstance(each, Piece)]
-        if pieces:
+        pieces = [each for each in standing(self.layout) if isinstance(each, Piece)]
+        measures = [each.item for each in self.layout if isinstance(each, Measure)]
+        if pieces or measures:
+            version = MEASURES_VERSION if measures else PIECES_VERSION
             lines = ",\n".join(f"    {json.dumps(_piece_table(piece))}" for piece in pieces)
-            layout = f'  "version": {PIECES_VERSION},\n  "pieces": [\n{lines}\n  ]'
+            layout = f'  "version": {version},\n  "pieces": [\n{lines}\n  ]'
+            if measures:
+                layout += f',\n  "{_MEASURES}": {json.dumps(measures)}'
         else:
             layout = f'  "cells": {json.dumps([list(cell) for cell in self.layout])}'
         keys: dict[str, Any] = {"scenario": self.scenario, "scenario_hash": self.scenario_hash}
@@ -173,8 +183,8 @@ class LayoutFile:
 def load_layout(path: str | Path, scenario: AnyScenario | None = None) -> Layout:
     """Return the layout of a layout file.
 
-    The file is `[[row, column], ...]`, or a table with `cells` or `pieces` and, if it says so, the
-    scenario that they are for and how they were made; see `LayoutFile`.
+    The file is `[[row, column], ...]`, or a table with `cells`, or `pieces` and `hardening`, and,
+    if it says so, the scenario that they are for and how they were made; see `LayoutFile`.
 
     Args:
         path: The file.
@@ -224,10 +234,11 @@ def _parse(content: Any, source: str) -> LayoutFile:
         return LayoutFile(_cells(content, source, ""))
     version = content.get("version", CELLS_VERSION)
     if type(version) is not int or version not in _LISTS:
-        known = " or ".join(map(str, _LISTS))
-        raise LayoutError(f"{source}: version: is {type_word(version)}, must be {known}")
+        known = ", ".join(map(str, _LISTS))
+        raise LayoutError(f"{source}: version: is {type_word(version)}, must be one of {known}")
     key = _LISTS[version]
-    _check_keys(content, (key, *_OTHER_KEYS), f"{source}: ")
+    measures = (_MEASURES,) if version == MEASURES_VERSION else ()
+    _check_keys(content, (key, *measures, *_OTHER_KEYS), f"{source}: ")
     if key not in content:
         raise LayoutError(f"{source}: {key}: missing")
     name, scenario_hash = content.get("scenario"), content.get("scenario_hash")
@@ -246,7 +257,19 @@ def _parse(content: Any, source: str) -> LayoutFile:
     if not isinstance(provenance, dict):
         raise LayoutError(f"{source}: provenance: is {type_word(provenance)}, must be a table")
     read = _cells if version == CELLS_VERSION else _pieces
-    return LayoutFile(read(content[key], source, key), name, scenario_hash, provenance)
+    layout = read(content[key], source, key)
+    layout += _measures(content.get(_MEASURES, []), f"{source}: {_MEASURES}")
+    return LayoutFile(layout, name, scenario_hash, provenance)
+
+
+def _measures(listed: Any, where: str) -> Layout:
+    """Return the measures of a list of names; `where` it is begins the message of an error."""
+    if not isinstance(listed, list):
+        raise LayoutError(f"{where}: is {type_word(listed)}, must be a list of names")
+    for index, name in enumerate(listed):
+        if not isinstance(name, str):
+            raise LayoutError(f"{where}[{index}]: is {type_word(name)}, must be a string")
+    return tuple(map(Measure.named, listed))
 
 
 def _check_keys(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:

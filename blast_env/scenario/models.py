@@ -5,7 +5,7 @@ heights are above the ground.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
 from typing import Annotated, Any, Final, Self
 
@@ -22,12 +22,13 @@ from pydantic import (
 )
 
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.geometry import Cell
+from blast_env.geometry import Cell, Element, Measure
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.scene import Charge
-from blast_env.response.components import Component
+from blast_env.response.components import Component, Glazing, Wall, catalogue
+from blast_env.response.damage import Alternatives
 from blast_env.response.facade import FilledBay
-from blast_env.scenario.catalogue import RIGID_KEYS
+from blast_env.scenario.catalogue import RIGID_KEYS, Hardening
 from blast_env.scenario.checks import (
     Parts,
     charge_radius_m,
@@ -37,7 +38,7 @@ from blast_env.scenario.checks import (
     sound_parts,
     vehicle_ground,
 )
-from blast_env.scenario.facade import facade_bays
+from blast_env.scenario.facade import NamedBay, named_bays
 from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, ScenarioError, problems_from
@@ -103,12 +104,14 @@ __all__ = [
 
 _LATER_KEYS: Final = (
     *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
+    "hardening",
 )
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
 
 _NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference", "components"}
-"""Sections that do not count for the hash; what `simulation` says is there as parameters."""
+"""Sections that do not count for the hash; what `simulation` says is there as parameters, and
+components count where the response of facades does."""
 
 
 Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
@@ -153,9 +156,33 @@ class Scenario(Section):
     @property
     def bays(self) -> tuple[FilledBay, ...]:
         """The bays of all facades, with what stands in them."""
+        return self.bays_with(())
+
+    def bays_with(self, layout: Iterable[Element]) -> tuple[FilledBay, ...]:
+        """Return the bays of all facades with the measures of a layout taken."""
+        return tuple(bay.filled(self._known) for bay in self.named_bays(layout))
+
+    def named_bays(self, layout: Iterable[Element] = ()) -> tuple[NamedBay, ...]:
+        """Return the names of what stands in the bays, with the measures of a layout taken."""
+        taken = {each.item for each in layout if isinstance(each, Measure)}
+        measures = [each for each in self._hardening if each.name in taken]
         return tuple(
-            bay for structure in self.structures for bay in facade_bays(structure, self.components)
+            bay.hardened(measures) for structure in self.structures for bay in named_bays(structure)
         )
+
+    @property
+    def alternatives(self) -> tuple[Alternatives, ...]:
+        """The bays of all facades with what stands in them, and what measures would put there."""
+        return tuple(bay.alternatives(self._hardening, self._known) for bay in self.named_bays())
+
+    @property
+    def _known(self) -> dict[str, Glazing | Wall]:
+        """The components by name."""
+        return {**catalogue(), **self.components}
+
+    @property
+    def _hardening(self) -> tuple[Hardening, ...]:
+        return () if self.build_zone is None else self.build_zone.hardening
 
     @property
     def zone(self) -> BuildZone:
@@ -219,7 +246,14 @@ class Scenario(Section):
         content = self.model_dump(mode="json", exclude=_NO_INFLUENCE)
         for structure in content["structures"]:
             structure.pop("building", None)
-            structure.pop("facade", None)
+            if not self.objective.is_response:
+                structure.pop("facade", None)
+        if self.objective.is_response and self.components:
+            words = {"title", "source"}
+            content["components"] = {
+                name: each.model_dump(mode="json", exclude=words)
+                for name, each in self.components.items()
+            }
         content["schema_version"] = FIRST_VERSION  # newer keys are there or not, which says it all
         if self.site.air_height_m == default_air_height_m(self.structures, self.build_zone):
             del content["site"]["air_height_m"]
@@ -409,6 +443,7 @@ class Scenario(Section):
             parameters=self.parameters,
             gauges=dict(enumerate(self.gauges)),
             components=self.components,
+            objective=self.objective,
         )
 
 
@@ -423,6 +458,8 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
     for item in content["items"]:
         for key in ("description", *RIGID_KEYS):
             item.pop(key, None)
+    for measure in content["hardening"]:
+        del measure["description"]
     if zone.access_way is not None and zone.access_way.gate is None:
         del content["access_way"]["gate"]
     for key in _LATER_KEYS:

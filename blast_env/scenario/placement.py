@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray
 from blast_env.errors import LayoutError
-from blast_env.geometry import Cell, Element, Layout, Piece
+from blast_env.geometry import Cell, Element, Layout, Measure, Piece
 from blast_env.scenario.access_way import closing_places, is_open
 from blast_env.scenario.catalogue import Catalogue, PlacedModule, cell_text, element_text
 from blast_env.scenario.files import AnyScenario, find_scenario
@@ -285,7 +285,7 @@ class Placement:
     def _taken(self) -> BoolArray:
         """Which cells hold a module, shape (rows, columns)."""
         taken = np.zeros(self._zone.shape, dtype=bool)
-        if self.layout:
+        if self.cells:
             taken[tuple(zip(*self.cells, strict=True))] = True
         return taken
 
@@ -319,6 +319,8 @@ class Placement:
             return True
         if any(catalogue.reason_against(each) is not None for each in self.layout):
             return False
+        if any(isinstance(each, Measure) and each[:2] != (0, 0) for each in self.layout):
+            return False
         if min(self.stock_left, *self.stocks_left) < 0 or len(set(self.cells)) < len(self.cells):
             return False
         if not all(map(zone.has, self.cells)):
@@ -336,6 +338,8 @@ class Placement:
         reason = self.catalogue.reason_against(element)
         if reason is not None:
             return reason
+        if isinstance(element, Measure):
+            return None if element[:2] == (0, 0) else "covers no cell: row and column must be 0"
         size = f"the build zone of {zone.rows} rows and {zone.columns} columns"
         if not zone.has((element[0], element[1])):
             return f"is outside {size}"

@@ -143,7 +143,7 @@ def _sentence(detail: ErrorDetails, annotation: object) -> str:
         key, what, words = _LENGTHS[kind]
         return f"has {len(value)} {what}, must have {words} {context[key]}"
     if kind == "literal_error":
-        known = get_args(annotation)
+        known = get_args(_options(annotation)[0])
         nearest = suggestion(value, known) if isinstance(value, str) else ""
         return f"is {value_text(value)}, must be {alternatives(known)}{nearest}"
     if kind == "value_error":

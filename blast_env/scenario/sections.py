@@ -309,7 +309,12 @@ def _check_faces(faces: tuple[WallName, ...]) -> tuple[WallName, ...]:
     return tuple(wall for wall in WALLS if wall in faces)
 
 
-_Storey = Annotated[StrictInt, Field(ge=1, le=200)]
+Walls = Annotated[tuple[WallName, ...], Field(min_length=1, max_length=4)]
+
+
+Storeys = Annotated[
+    tuple[Annotated[StrictInt, Field(ge=1, le=200)], ...], Field(min_length=1, max_length=200)
+]
 
 
 class FacadePart(Section):
@@ -322,8 +327,8 @@ class FacadePart(Section):
         wall: Name of the component of their walls, in the same way.
     """
 
-    walls: Annotated[tuple[WallName, ...], Field(min_length=1, max_length=4)] = WALLS
-    storeys: Annotated[tuple[_Storey, ...], Field(min_length=1, max_length=200)] | None = None
+    walls: Walls = WALLS
+    storeys: Storeys | None = None
     glazing: Name | None = None
     wall: Name | None = None
 

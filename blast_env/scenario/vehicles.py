@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Element, Rectangle, stacked_runs
+from blast_env.geometry import Element, Rectangle, stacked_runs, standing
 from blast_env.physics.scene import Charge, WallName
 from blast_env.scenario.sections import (
     AnySource,
@@ -140,7 +140,7 @@ def obstacles_of(zone: BuildZone, layout: Iterable[Element]) -> Obstacles:
     """
     stops: list[Rectangle] = []
     solid: list[Rectangle] = []
-    for element in sorted(layout):
+    for element in sorted(standing(layout)):
         into = stops if zone.catalogue.variant(element).stops_vehicles else solid
         into.append(zone.element_rectangle_m(element))
     return Obstacles(tuple(stops), tuple(solid))

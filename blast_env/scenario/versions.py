@@ -21,7 +21,8 @@ NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "site": ("air_height_m",),
     "charge": ("height_m",),
     "structures": ("height_m", "faces", "building", "peak_weight", "facade"),
-    "build_zone": ("height_m", "items"),
+    "objective": ("kind", "measure", "target"),
+    "build_zone": ("height_m", "items", "hardening"),
     "build_zone.access_way": ("gate",),
 }
 """What version 2 added, by section; all of it has a default, which is what version 1 means."""

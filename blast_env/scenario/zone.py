@@ -21,7 +21,15 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Cell, Element, Piece, Rectangle
 from blast_env.response.barriers import RigidPiece
 from blast_env.scenario.access_way import AccessWay, any_in_windows, counts_before
-from blast_env.scenario.catalogue import MOST_ITEMS, Catalogue, Cost, Item, PlacedModule, Variant
+from blast_env.scenario.catalogue import (
+    MOST_ITEMS,
+    Catalogue,
+    Cost,
+    Hardening,
+    Item,
+    PlacedModule,
+    Variant,
+)
 from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
@@ -73,9 +81,14 @@ class _SameItems:
     """The very items of a zone: to compare them takes longer than to make a catalogue of them."""
 
     items: tuple[Item, ...]
+    hardening: tuple[Hardening, ...]
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _SameItems) and other.items is self.items
+        return (
+            isinstance(other, _SameItems)
+            and other.items is self.items
+            and other.hardening is self.hardening
+        )
 
     def __hash__(self) -> int:
         return id(self.items)
@@ -83,7 +96,7 @@ class _SameItems:
 
 @lru_cache(maxsize=64)
 def _catalogue_of(same: _SameItems, shape: tuple[int, int]) -> Catalogue:
-    return Catalogue.of_items(same.items, shape)
+    return Catalogue.of_items(same.items, same.hardening, shape)
 
 
 class BuildZone(Section):
@@ -96,6 +109,8 @@ class BuildZone(Section):
         rows: Number of rows, counted upwards.
         columns: Number of columns, counted to the right.
         items: The catalogue; without one, single modules are placed.
+        hardening: Measures that harden facades, beside the items; of two that change the same
+            component of a bay, the one that stands later here counts.
         stock: How many modules there are to place; with a catalogue, the most pieces that may be
             placed in all, which are all that there are unless it is given.
         keep_outs: Areas in which no cell may be used.
@@ -113,6 +128,7 @@ class BuildZone(Section):
     rows: Count
     columns: Count
     items: Annotated[tuple[Item, ...], Field(max_length=MOST_ITEMS)] = ()
+    hardening: Annotated[tuple[Hardening, ...], Field(max_length=MOST_ITEMS)] = ()
     stock: Annotated[StrictInt, Field(ge=1, le=MOST_STOCK)]
     keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=100)] = ()
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
@@ -132,7 +148,9 @@ class BuildZone(Section):
         items = given.get("items")
         if not isinstance(items, list | tuple) or not items:
             return given
+        measures = given.get("hardening")
         pieces = sum(map(_pieces_of, items))
+        pieces += len(measures) if isinstance(measures, list | tuple) else 0
         # An empty catalogue is an error of its own, `build_zone_problems`.
         return {**given, "stock": min(max(pieces, 1), MOST_STOCK)}
 
@@ -140,7 +158,7 @@ class BuildZone(Section):
     def catalogue(self) -> Catalogue:
         """What can be placed."""
         if self.items:
-            return _catalogue_of(_SameItems(self.items), self.shape)
+            return _catalogue_of(_SameItems(self.items, self.hardening), self.shape)
         return Catalogue.of_modules(self.stock, self.height_m, self.module_cost, self.shape)
 
     @property
@@ -383,6 +401,9 @@ class EmptyZone:
         places = np.zeros((len(variants), *free.shape), dtype=bool)
         taken = counts_before(~free)
         for place, variant in zip(places, variants, strict=True):
+            if variant.is_measure:
+                place[0, 0] = True
+                continue
             anything = any_in_windows(taken, variant.rows, variant.columns)
             place[: anything.shape[0], : anything.shape[1]] = ~anything
         return places
@@ -498,6 +519,9 @@ def _costs(
     if not zone.items:
         return module_costs
     costs = np.full(zone.shape, inf)
+    if variant.is_measure:
+        costs[0, 0] = variant.cost
+        return costs
     rows, columns = zone.rows - variant.rows + 1, zone.columns - variant.columns + 1
     if rows > 0 and columns > 0:
         factors = sum(

@@ -80,6 +80,8 @@ def _key_problems(zone: BuildZone) -> Iterator[Problem]:
             instead = "with a catalogue" if zone.items else "without a catalogue"
             yield Problem(f"{here}.{other}", f"must be left out: {instead} there is {needed}")
     if not zone.items:
+        if zone.hardening:
+            yield Problem("build_zone.hardening", "must be left out: there are no build_zone.items")
         return
     for key in ("module_cost", "height_m"):
         if getattr(zone, key) != BuildZone.model_fields[key].default:
@@ -93,13 +95,15 @@ def _key_problems(zone: BuildZone) -> Iterator[Problem]:
 
 def _item_problems(zone: BuildZone, cells: EmptyZone) -> Iterator[Problem]:
     """Check the names of the items, that they are in stock, and that each fits somewhere."""
-    names = [item.name for item in zone.items]
+    places = [f"build_zone.items[{index}]" for index in range(len(zone.items))]
+    places += [f"build_zone.hardening[{index}]" for index in range(len(zone.hardening))]
+    names = [*(item.name for item in zone.items), *(each.name for each in zone.hardening)]
     for index, name in enumerate(names):
         first = names.index(name)
         if first != index:
-            message = f"is {name!r}, already the name of build_zone.items[{first}]"
-            yield Problem(f"build_zone.items[{index}].name", message)
-    pieces = sum(item.stock for item in zone.items)
+            message = f"is {name!r}, already the name of {places[first]}"
+            yield Problem(f"{places[index]}.name", message)
+    pieces = sum(item.stock for item in zone.items) + len(zone.hardening)
     if pieces == 0:
         yield Problem("build_zone.items", "none is in stock, at least one must have stock above 0")
     elif zone.stock > pieces:

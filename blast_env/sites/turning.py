@@ -1,7 +1,7 @@
 """The same site turned by right angles."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from blast_env.geometry import Rectangle
 from blast_env.physics.scene import WallName
@@ -19,7 +19,10 @@ from blast_env.scenario import (
     VehicleSource,
     find_scenario,
 )
-from blast_env.scenario.sections import Entry, Ground, PointM
+from blast_env.scenario.catalogue import Hardening
+from blast_env.scenario.sections import Entry, FacadePart, Ground, PointM
+
+_Covering = TypeVar("_Covering", FacadePart, Hardening)
 
 _TURNED_WALL: Final[Mapping[WallName, WallName]] = {
     "west": "south",
@@ -97,7 +100,15 @@ def _structure(structure: AnyStructure, height_m: float) -> AnyStructure:
     }
     if not isinstance(structure, ConcreteSquareSection):
         changes |= {"rows": structure.columns, "columns": structure.rows}
+    if structure.facade is not None:
+        parts = tuple(map(_with_walls, structure.facade.parts))
+        changes["facade"] = structure.facade.model_copy(update={"parts": parts})
     return structure.model_copy(update=changes)
+
+
+def _with_walls(part: _Covering) -> _Covering:
+    """Return a part of a facade, or a measure, on the turned walls."""
+    return part.model_copy(update={"walls": tuple(_TURNED_WALL[wall] for wall in part.walls)})
 
 
 def _gauge(gauge: GaugeSection, height_m: float) -> GaugeSection:
@@ -112,6 +123,7 @@ def _zone(zone: BuildZone, height_m: float) -> BuildZone:
         "columns": zone.rows,
         "keep_outs": tuple(_ground(each, height_m) for each in zone.keep_outs),
         "cost_areas": tuple(_ground(each, height_m) for each in zone.cost_areas),
+        "hardening": tuple(map(_with_walls, zone.hardening)),
         "access_way": None if zone.access_way is None else _way(zone.access_way, height_m),
     }
     return zone.model_copy(update=changes)

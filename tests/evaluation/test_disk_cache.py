@@ -240,7 +240,12 @@ def test_what_is_no_cache_is_refused(
         DiskCache("folder", -1)
 
 
-@pytest.mark.parametrize("content", [b"", b"[]", b"not JSON\n", b'[{"name": 3}]\n', b"[]\n1234567"])
+EMPTY = b'{"structures": [], "bays": []}\n'
+
+
+@pytest.mark.parametrize(
+    "content", [b"", EMPTY, b"not JSON\n", b'[{"name": 3}]\n', EMPTY + b"1234567"]
+)
 def test_wrong_content_with_a_right_checksum_counts_as_damaged(
     content: bytes, tmp_path: Path
 ) -> None:
@@ -251,7 +256,7 @@ def test_wrong_content_with_a_right_checksum_counts_as_damaged(
     line, _, _ = path.read_bytes()[32:].partition(b"\n")
     body = line + b"\n" + content
     path.write_bytes(sha256(body).digest() + body)
-    if content == b"[]":  # no structure and no module: of some other scenario
+    if content == EMPTY:  # no structure and no module: of some other scenario
         assert cache.get(key(0)) is not None
     else:
         assert cache.get(key(0)) is None

@@ -85,7 +85,7 @@ def test_damage_between_limits_is_even_and_the_worse_measure_decides() -> None:
     measure = CONCRETE_LIMITS.measure(
         np.array([0.5, 3.0, 3.0, 50.0]), np.array([0.1, 1.0, 3.5, 12.0])
     )
-    assert measure == pytest.approx([0.5, 1.0, 2.5, 4.0])
+    assert measure == pytest.approx([0.5, 1.5, 2.5, 5.0 - 10.0 / 12.0])
     assert damage_level(measure) == [
         DamageLevel.SUPERFICIAL,
         DamageLevel.MODERATE,

@@ -348,8 +348,8 @@ PIECE = {"item": "wall", "row": 5, "column": 1, "turned": True}
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"version": 3, "pieces": []}, "version: is 3, must be 1 or 2"),
-        ({"version": 2.0, "pieces": []}, "version: is 2.0, must be 1 or 2"),
+        ({"version": 4, "pieces": []}, "version: is 4, must be one of 1, 2, 3"),
+        ({"version": 2.0, "pieces": []}, "version: is 2.0, must be one of 1, 2, 3"),
         ({"version": 2, "cells": []}, "cells: unknown key"),
         ({"pieces": []}, "pieces: unknown key"),
         ({"version": 2}, "pieces: missing"),

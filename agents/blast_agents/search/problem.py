@@ -13,7 +13,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
 from blast_env.evaluation.cases import check_distinct
 from blast_env.evaluation.comparison import check_something_arrives
-from blast_env.geometry import Element, Layout, layout_text
+from blast_env.geometry import Element, Layout, layout_text, standing
 from blast_env.runner import check_workers
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.statistics import reductions
@@ -45,7 +45,8 @@ class BlastMeter:
         Raises:
             BudgetError: If the budget does not pay for all of them; none is counted then.
         """
-        asked = {(tuple(sorted(layout)), threat) for layout, threat in pairs} | self._asked
+        asked = {(tuple(sorted(standing(layout))), threat) for layout, threat in pairs}
+        asked |= self._asked
         if len(asked) > self.budget:
             raise BudgetError(
                 f"the search asks for {len(asked):,} blasts in all, the budget is {self.budget:,}"
@@ -155,7 +156,7 @@ class LayoutProblem:
             LayoutError: If the layout does not fit the build zone.
         """
         pairs = [(tuple(layout), threat) for threat in self.threats]
-        return self.case.combined(self.loads(pairs))
+        return self.case.counted(self.loads(pairs), layout)
 
     @cached_property
     def unprotected(self) -> tuple[float, ...]:
@@ -170,7 +171,7 @@ class LayoutProblem:
 
     def reduction(self, candidate: "Candidate") -> float:
         """Return by which share a layout lowers the load under the threats that it has met."""
-        bare = self.case.combined(self.unprotected[: candidate.threats])
+        bare = self.case.counted(self.unprotected[: candidate.threats])
         return reductions(candidate.load, bare).item()
 
 

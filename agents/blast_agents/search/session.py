@@ -15,7 +15,7 @@ from blast_agents.search.problem import (
 )
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Layout
+from blast_env.geometry import Layout, standing
 
 _MOST_REPEATS: Final = 300
 """Questions in a row without a new blast after which there is nothing new to be found."""
@@ -59,6 +59,7 @@ class SearchSession:
         self._limit = min(plan.exploring_blasts, budget)
         self._report = report
         self._known: dict[Layout, tuple[float, ...]] = {}
+        self._met: set[tuple[Layout, int]] = set()
         self._history: list[Candidate] = []
         self._repeats = 0
 
@@ -195,13 +196,24 @@ class SearchSession:
 
     def _affordable(self, layouts: Sequence[Layout], threats: int) -> list[Layout]:
         """Return the first layouts, as many as can meet so many threats with what is left."""
-        left, affordable = self._limit - self.blasts, []
+        asked, affordable = set[tuple[Layout, int]](), list[Layout]()
         for key in layouts:
-            left -= max(0, threats - len(self._known.get(key, ())))
-            if left < 0:
+            asked |= self._new_blasts([key], threats)
+            if len(asked) > self._limit - self.blasts:
                 break
             affordable.append(key)
         return affordable
+
+    def _new_blasts(self, layouts: Sequence[Layout], threats: int) -> set[tuple[Layout, int]]:
+        """Return the blasts that layouts have not met yet: what stands, and the threat's number.
+
+        Measures that harden facades need none of their own.
+        """
+        return {
+            (standing(key), number)
+            for key in layouts
+            for number in range(len(self._known.get(key, ())), threats)
+        } - self._met
 
     def _simulate(self, layouts: Sequence[Layout], threats: int) -> None:
         """Let layouts meet the threats up to a count that they have not met yet."""
@@ -210,13 +222,14 @@ class SearchSession:
             for key in layouts
             for threat in self.problem.threats[len(self._known.get(key, ())) : threats]
         ]
+        new = self._new_blasts(layouts, threats)
+        self._repeats = 0 if new else self._repeats + 1
         if not pairs:
-            self._repeats += 1
             return
-        self._repeats = 0
         for (key, _), load in zip(pairs, self.problem.loads(pairs), strict=True):
             self._known[key] = (*self._known.get(key, ()), load)
-        self.blasts += len(pairs)
+        self._met |= new
+        self.blasts += len(new)
         for key in layouts:
             self._consider(key)
         if self._report is not None:
@@ -238,4 +251,4 @@ class SearchSession:
         return Candidate(self.blasts, key, load, threats, self.problem.cost(key))
 
     def _load(self, key: Layout, threats: int) -> float:
-        return self.problem.case.combined(self._known[key][:threats])
+        return self.problem.case.counted(self._known[key][:threats], key)

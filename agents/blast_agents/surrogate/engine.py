@@ -30,6 +30,8 @@ class SurrogateEngine(Engine):
     `gymnasium.make("BlastBarrier-v0", scenario=..., engine=SurrogateEngine())` has episodes of
     milliseconds. What is trained on it has to be judged by gas dynamics. It tells peaks only where
     the objective counts them, and knows no structure that is not protected: nothing arrives there.
+    Where the response of facades counts, it is that under triangular loads of the guessed impulse
+    and peak, on all bays of a structure alike (`Guess.loads`).
 
     Attributes:
         surrogate: The surrogate; that of the package unless given.
@@ -107,7 +109,8 @@ class SurrogateEngine(Engine):
             )
         )
         modules = [each.rows * each.columns for each in scenario.structures]
-        return BlastLoads(structures, np.repeat(impulse_pa_s, modules))
+        bays = guess.bays(site, 0) if scenario.objective.is_response else ()
+        return BlastLoads(structures, np.repeat(impulse_pa_s, modules), bays)
 
     def _site(self, scenario: Scenario) -> SurrogateSite:
         key = scenario.content_hash

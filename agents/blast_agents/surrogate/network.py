@@ -14,10 +14,12 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from blast_agents.surrogate.walls import FEATURES, Approach, SurrogateSite
 from blast_env.arrays import FloatArray
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
+from blast_env.engines.contract import structure_response
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
+from blast_env.response.damage import BayDamage, triangular_damages
 
 IntArray = NDArray[np.int64]
 
@@ -104,13 +106,22 @@ class Guess(NamedTuple):
     peak_pa: FloatArray | None = None
     peak_spread: FloatArray | None = None
 
-    def loads(self, site: SurrogateSite) -> FloatArray:
+    def loads(self, site: SurrogateSite, layouts: Sequence[Sequence[Element]] = ()) -> FloatArray:
         """Return the load that counts behind each layout, in the objective's unit (layouts,).
+
+        Where the response of facades counts, each bay of a structure gets a triangular load with
+        the impulse and the peak that were guessed for the structure. The peak is the largest one
+        on it, so that the guess of the response is on the safe side.
 
         Args:
             site: The site that was guessed.
+            layouts: The layouts; needed where the response of facades counts.
         """
         load, structures = site.scenario.objective.load, site.protected
+        if site.scenario.objective.is_response:
+            return np.array(
+                [self._response(site, index, each) for index, each in enumerate(layouts)]
+            )
         peak_pa = np.zeros_like(self.impulse_pa_s) if self.peak_pa is None else self.peak_pa
         both = np.stack((self.impulse_pa_s, peak_pa), axis=2).tolist()
         return np.array(
@@ -121,6 +132,27 @@ class Guess(NamedTuple):
                 )
                 for of_layout in both
             ]
+        )
+
+    def bays(self, site: SurrogateSite, index: int) -> tuple[BayDamage, ...]:
+        """Return the damage of the bays behind a layout, by its index, under triangular loads."""
+        assert self.peak_pa is not None
+        found: list[BayDamage] = []
+        for column, structure in enumerate(site.protected):
+            own = [each for each in site.alternatives if each.structure == structure.name]
+            peak_pa, impulse_pa_s = self.peak_pa[index, column], self.impulse_pa_s[index, column]
+            found += triangular_damages(own, float(peak_pa), float(impulse_pa_s)) if own else ()
+        return tuple(found)
+
+    def _response(self, site: SurrogateSite, index: int, layout: Sequence[Element]) -> float:
+        scenario, found = site.scenario, self.bays(site, index)
+        named = scenario.named_bays(layout)
+        return sum(
+            each.weight
+            * structure_response(
+                [bay for bay in found if bay.structure == each.name], named, scenario.objective
+            )[0]
+            for each in site.protected
         )
 
 

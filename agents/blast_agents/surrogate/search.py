@@ -60,7 +60,7 @@ class Guesses:
         if new:
             by_threat = [self._weighted(new, threat) for threat in self.case.threats]
             for layout, loads in zip(new, np.transpose(by_threat), strict=True):
-                self._known[layout] = self.case.combined(loads)
+                self._known[layout] = self.case.counted(loads, layout)
         return np.array([self._known[each] for each in layouts])
 
     @property
@@ -74,7 +74,7 @@ class Guesses:
 
     def _weighted(self, layouts: Sequence[Layout], threat: Threat) -> FloatArray:
         charges = [threat.charge_against(self.case.scenario, each) for each in layouts]
-        return self.surrogate.guess(self.site, layouts, charges).loads(self.site)
+        return self.surrogate.guess(self.site, layouts, charges).loads(self.site, layouts)
 
 
 def improved(

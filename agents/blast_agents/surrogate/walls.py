@@ -10,7 +10,7 @@ from blast_agents.surrogate.ways import SHARES, Ways
 from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element
+from blast_env.geometry import Element, standing
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyStructure, Scenario
 
@@ -105,12 +105,14 @@ class SurrogateSite:
         scenario: The scenario.
         protected: Its protected structures.
         counts_peaks: Whether its objective counts peak overpressures.
+        alternatives: The bays of its facades, where their response counts.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self.protected = tuple(each for each in scenario.structures if each.protected)
         self.counts_peaks = scenario.objective.needs_peaks
+        self.alternatives = scenario.alternatives if scenario.objective.is_response else ()
         air_m = scenario.air_height_m
         self._solids = np.array(
             [[*each.rectangle_m, each.height_m or air_m] for each in scenario.structures]
@@ -134,7 +136,7 @@ class SurrogateSite:
         zone, air_m = self.scenario.zone, self.scenario.air_height_m
         rows = [
             [*zone.element_rectangle_m(each), zone.catalogue.variant(each).height_m or air_m]
-            for each in layout
+            for each in standing(layout)
         ]
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
 

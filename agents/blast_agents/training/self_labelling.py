@@ -289,7 +289,7 @@ def race(judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]
             known[number][layout] += of_layout
         for number, case in enumerate(cases):
             own = known[number]
-            alive[number].sort(key=lambda each: case.combined(own[each]))
+            alive[number].sort(key=lambda each: case.counted(own[each], each))
             alive[number] = alive[number][: ceil(len(alive[number]) / 2)]
         met = upto
     return [*known]
@@ -310,7 +310,7 @@ class Lessons:
     def reduction(self, index: int) -> float:
         """Return by which share a case's label lowers the load; 0 where nothing arrives."""
         label, case = self.labels[index], self.cases[index]
-        return _reduction(case, label.load, label.unprotected)
+        return _reduction(case, label.layout, label.load, label.unprotected)
 
     @property
     def demonstrations(self) -> list[int]:
@@ -348,10 +348,10 @@ class Lessons:
             case, label = self.cases[index], self.labels[index]
             for layout, load in met.items():
                 bare = label.unprotected[: len(load)]
-                tried.append(_reduction(case, load, bare))
+                tried.append(_reduction(case, layout, load, bare))
                 whole = len(load) == len(case.threats)
-                best = case.combined(self.labels[index].load)
-                if whole and case.combined(load) < best:
+                best = case.counted(self.labels[index].load, self.labels[index].layout)
+                if whole and case.counted(load, layout) < best:
                     self.labels[index] = replace(label, layout=layout, load=load)
         return tried
 
@@ -567,7 +567,9 @@ def _sorted(layout: Layout) -> Layout:
     return tuple(sorted(layout))
 
 
-def _reduction(case: Case, load: tuple[float, ...], unprotected: tuple[float, ...]) -> float:
+def _reduction(
+    case: Case, layout: Layout, load: tuple[float, ...], unprotected: tuple[float, ...]
+) -> float:
     """Return a reduction; 0 where nothing arrives without a barrier."""
-    share = reductions(case.combined(load), case.combined(unprotected))
+    share = reductions(case.counted(load, layout), case.counted(unprotected))
     return float(np.nan_to_num(share))

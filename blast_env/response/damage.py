@@ -1,0 +1,132 @@
+"""Damage of bays as numbers, under each component that they have or may get.
+
+A damage grows within its level and from level to level: below 1 it allows a high level of
+protection, from 1 medium, from 2 low, from 3 very low, from 4 to 5 none (`GlazingResponses.hazard`,
+`Limits.measure`). So there is something to climb everywhere. Other components need no new blast:
+what each of them would do is here.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.facade import FilledBay, respond
+
+
+@dataclass(frozen=True)
+class Alternatives:
+    """A bay with what may stand in it.
+
+    Attributes:
+        name: Name of the bay.
+        structure: Name of its structure.
+        glazing: The windows that it may have, by the name of their component.
+        wall: The wall panels that it may have, likewise.
+    """
+
+    name: str
+    structure: str
+    glazing: Mapping[str, FilledBay]
+    wall: Mapping[str, FilledBay]
+
+
+@dataclass(frozen=True)
+class BayDamage:
+    """Damage of one bay under one blast.
+
+    Attributes:
+        name: Name of the bay.
+        structure: Name of its structure.
+        area_m2: Its area.
+        glazed_m2: Area of its panes.
+        damage: By the name of the component that it has or may get.
+    """
+
+    name: str
+    structure: str
+    area_m2: float
+    glazed_m2: float
+    damage: dict[str, float]
+
+
+def bay_damages(
+    bays: Sequence[Alternatives], time_s: FloatArray, pressure_pa: FloatArray
+) -> tuple[BayDamage, ...]:
+    """Return the damage of bays under each of their components.
+
+    Args:
+        bays: The bays.
+        time_s: Times of the histories, ascending (times,).
+        pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
+    """
+    places = [
+        (index, name, filled)
+        for index, bay in enumerate(bays)
+        for name, filled in (*bay.glazing.items(), *bay.wall.items())
+    ]
+    found = respond(
+        [filled for *_, filled in places], time_s, pressure_pa[[index for index, *_ in places]]
+    )
+    damage = np.zeros(len(places))
+    damage[found.glazed] = found.glazing.hazard
+    damage[found.walled] = found.walls.damage
+    of_bays: list[dict[str, float]] = [{} for _ in bays]
+    for (index, name, _), value in zip(places, damage.tolist(), strict=True):
+        of_bays[index][name] = value
+    return tuple(
+        BayDamage(bay.name, bay.structure, *_areas(bay), damages)
+        for bay, damages in zip(bays, of_bays, strict=True)
+    )
+
+
+def triangular_damages(
+    bays: Sequence[Alternatives], peak_pa: float, impulse_pa_s: float
+) -> tuple[BayDamage, ...]:
+    """Return the damage of bays that all have one triangular load: a rough guess without histories.
+
+    Args:
+        bays: The bays.
+        peak_pa: The peak, reached at once; from there it falls straight to 0.
+        impulse_pa_s: The impulse, which says how long that takes.
+    """
+    alike: dict[tuple[object, ...], Alternatives] = {}
+    for bay in bays:
+        alike.setdefault(_kind(bay), bay)
+    end_s = 2.0 * impulse_pa_s / peak_pa if peak_pa > 0.0 else 1e-3
+    time_s = np.array([0.0, end_s, 2.0 * end_s])
+    pressure_pa = np.tile([peak_pa, 0.0, 0.0], (len(alike), 1))
+    found = dict(zip(alike, bay_damages([*alike.values()], time_s, pressure_pa), strict=True))
+    return tuple(
+        BayDamage(bay.name, bay.structure, *_areas(bay), found[_kind(bay)].damage) for bay in bays
+    )
+
+
+def _kind(bay: Alternatives) -> tuple[object, ...]:
+    """Return what its response depends on, beside the load."""
+    height_m = next(iter((*bay.glazing.values(), *bay.wall.values()))).bay.height_m
+    return round(height_m, 6), *bay.glazing, None, *bay.wall
+
+
+def _areas(bay: Alternatives) -> tuple[float, float]:
+    """Return the area of a bay, and of its panes."""
+    filled = (*bay.glazing.values(), *bay.wall.values())
+    glazed_m2 = max((each.glazed_m2 for each in filled), default=0.0)
+    return filled[0].bay.area_m2, glazed_m2
+
+
+def level_of(worst_damage: float) -> LevelOfProtection:
+    """Return the level of protection that the worst damage among components allows."""
+    return LevelOfProtection(max(4 - int(worst_damage), 0))
+
+
+def worst(damages: Iterable[float]) -> float:
+    """Return the largest of damages; 0 of none."""
+    return max(damages, default=0.0)
+
+
+def fails_from(target: LevelOfProtection) -> float:
+    """Return the damage from which a component does not allow a level any more."""
+    return float(5 - target)

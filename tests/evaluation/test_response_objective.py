@@ -1,0 +1,129 @@
+"""The response of facades as what counts: one blast a barrier, rewards, targets, searches."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from blast_agents.search import LayoutProblem, find_search_method
+from blast_agents.surrogate.engine import SurrogateEngine
+
+from blast_env.engines import find_engine
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Case, Threat, evaluate_against
+from blast_env.geometry import Measure
+from blast_env.physics.scene import Charge
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.scenario import Placement
+from tests.catalogue_sites import WALL
+from tests.scenario.test_hardening import TAKEN, glazed_yard
+
+THREAT = Threat(Charge((2.0, 6.0), 5.0), 0)
+DAMAGE = glazed_yard(charges="mean")
+PANELS = Measure.named("panels")
+
+
+@pytest.fixture(scope="module")
+def evaluator() -> BlastEvaluator:
+    """One that has met the empty site and the walls, two blasts."""
+    found = BlastEvaluator(DAMAGE, "gas")
+    found.loads_of_many([((), THREAT), (WALL, THREAT)])
+    return found
+
+
+def test_measures_need_no_blast(evaluator: BlastEvaluator) -> None:
+    before = evaluator.blasts
+    bare, hardened = evaluator.loads_of_many([((), THREAT), ((TAKEN, PANELS), THREAT)])
+    evaluator.loads((*WALL, TAKEN), THREAT)
+    assert evaluator.blasts == before == 2
+    assert hardened.load(DAMAGE.objective) < bare.load(DAMAGE.objective)
+    assert hardened.protected_impulse_pa_s == bare.protected_impulse_pa_s
+
+
+def test_loads_with_measures_are_those_of_a_blast_with_them(evaluator: BlastEvaluator) -> None:
+    """What `result.bays` says of a hardened site, the evaluator works out without a blast."""
+    engine = find_engine("gas")
+    result = engine.blast(DAMAGE, (TAKEN,), 0, THREAT.charge).run()
+    response = result.bay_loads.response  # type: ignore[attr-defined]
+    damage = np.zeros(len(response.bays))
+    damage[response.glazed] = response.glazing.hazard
+    damage[response.walled] = np.maximum(damage[response.walled], response.walls.damage)
+    area_m2 = np.array([each.bay.area_m2 for each in response.bays])
+    loads = evaluator.loads((TAKEN,), THREAT)
+    assert loads.load(DAMAGE.objective) == pytest.approx(area_m2 @ damage / area_m2.sum())
+    assert loads.level == response.level_of_protection
+
+
+def test_cache_keeps_the_damage_of_bays(tmp_path: Path, evaluator: BlastEvaluator) -> None:
+    first = BlastEvaluator(DAMAGE, "surrogate", cache=tmp_path)
+    load = first.loads((TAKEN,), THREAT).load(DAMAGE.objective)
+    second = BlastEvaluator(DAMAGE, "surrogate", cache=tmp_path)
+    assert second.loads((TAKEN,), THREAT).load(DAMAGE.objective) == load
+    assert second.blasts == 0
+    again = pickle.loads(pickle.dumps(evaluator))
+    assert again.loads((TAKEN,), THREAT).load(DAMAGE.objective) == (
+        evaluator.loads((TAKEN,), THREAT).load(DAMAGE.objective)
+    )
+
+
+def test_with_a_target_the_cheapest_layout_that_reaches_it_is_worth_most() -> None:
+    objective = glazed_yard(target="low").objective
+    assert objective.level is LevelOfProtection.LOW
+    damage, area_m2 = np.array([2.9, 3.0, 4.5]), np.array([1.0, 1.0, 2.0])
+    assert objective.response(damage, area_m2) == pytest.approx((1.0 + 2.0 * 2.5) / 4.0)
+    assert objective.response(damage[:1], area_m2[:1]) == 0.0
+    passes, dearer, fails = (objective.counted(*each) for each in ((0, 0.2), (0, 1.0), (1e-6, 0.0)))
+    assert passes < dearer < fails
+
+
+def test_case_counts_the_cost_of_a_layout_that_passes() -> None:
+    scenario = glazed_yard(target="medium")
+    case = Case(scenario, (THREAT,))
+    assert case.counted([0.0], (TAKEN,)) == pytest.approx(5.0 / 20.0)
+    assert case.counted([0.3], (TAKEN,)) == pytest.approx(1.3)
+    assert case.combined([0.3]) == pytest.approx(0.3)
+
+
+def test_rewards_are_what_counts_and_info_says_the_level(tmp_path: Path) -> None:
+    surrogate = SurrogateEngine()
+    env = BlastBarrierEnv(glazed_yard(target="medium"), engine=surrogate, reward="incremental")
+    env.reset(seed=0)
+    catalogue = Placement.empty(glazed_yard(target="medium")).catalogue
+    paid = 0.0
+    for action in (catalogue.action(TAKEN), catalogue.finish):
+        _, reward, terminated, _, info = env.step(action)
+        paid += float(reward)
+    assert terminated
+    assert paid == pytest.approx(-info["response"])
+    assert info["reward_terms"].keys() == {"response", "illegal_actions"}
+    assert info["level_of_protection"] in {each.label for each in LevelOfProtection}
+    assert info["layout"] == (TAKEN,)
+
+
+@pytest.mark.parametrize("method", ["greedy", "annealing", "winners", "genetic", "nsga2", "random"])
+def test_searches_harden_without_spending_blasts_on_it(method: str) -> None:
+    pytest.importorskip("pymoo")
+    scenario = glazed_yard(charges="mean")
+    problem = LayoutProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
+    metered = problem.metered(30)
+    assert metered.unprotected[0] > 0.0
+    result = find_search_method(method).search(metered, 30, 1)
+    assert result.load is not None
+    assert result.load < metered.unprotected[0]
+    assert metered.blasts_run - 1 <= result.blasts <= metered.blasts_run
+    tried = {each.layout for each in result.history}
+    assert any(isinstance(each, Measure) for layout in tried for each in layout)
+
+
+def test_particles_know_no_response() -> None:
+    with pytest.raises(BlastEnvError, match=r"objective.kind is 'response', but engine 'event'"):
+        BlastEvaluator(DAMAGE, "event")
+
+
+def test_evaluation_reports_the_shares_of_the_objective(evaluator: BlastEvaluator) -> None:
+    evaluation = evaluate_against(evaluator, (*WALL, TAKEN), [THREAT])
+    assert evaluation.load < evaluation.unprotected_load <= 5.0
+    assert evaluation.mean_reduction == pytest.approx(
+        1.0 - evaluation.load / evaluation.unprotected_load
+    )
