@@ -8,7 +8,7 @@ for the rejected ones too: a criterion that rejects the wrong ones would show.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import inf
+from math import ceil, inf
 from pathlib import Path
 from time import process_time
 from typing import Annotated, Final
@@ -18,6 +18,10 @@ import typer
 from blast_agents.posts import VEHICLE_RULES
 from blast_agents.rules import expected_charge, random_layout, rules_for
 from blast_agents.search import LayoutProblem
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from blast_env.arrays import FloatArray
 from blast_env.cli.cluster import ClusterAddress, running_on
@@ -25,7 +29,10 @@ from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.geometry import Layout
+from blast_env.plan import INK, STANDING, Feature, Kinds, site_features, without
 from blast_env.rendering.figures import save_figure
+from blast_env.rendering.site_plan import draw_plan, legend_of, write_legend
+from blast_env.rendering.style import count_of, unit_interval
 from blast_env.runner import run_all
 from blast_env.scenario import Placement, Scenario, ScenarioError, SegmentSource, usable_cells
 from blast_env.scenario.zone import distance_m, source_bounds_m
@@ -42,7 +49,6 @@ from blast_env.sites import (
     generate_site,
     visibility_layout,
 )
-from blast_env.sites.contact_sheet import contact_sheet
 from blast_env.sites.criterion import cut_share_of
 from blast_env.sites.generate import AnyRanges, criterion_of
 
@@ -364,6 +370,82 @@ CONDITIONS: Final[Mapping[str, Callable[[Scenario], bool]]] = {
     ),
     "the worst charges count": lambda site: site.objective.charges != "mean",
 }
+
+
+_COLUMNS: Final = 4
+_PANEL_IN: Final = 3.0
+_TITLE_IN: Final = 0.5
+_LEGEND_IN: Final = 0.8
+_FONT: Final = 12.5
+_SCALE_M: Final = 10.0
+
+
+def contact_sheet(sites: Sequence[Scenario]) -> Figure:
+    """Return a picture of sites and what they differ in, four in a row.
+
+    Args:
+        sites: At least one.
+
+    Raises:
+        BlastEnvError: If there is none.
+    """
+    if not sites:
+        raise BlastEnvError("sites: there are none, must be at least one")
+    rows = ceil(len(sites) / _COLUMNS)
+    height_in = rows * (_PANEL_IN + _TITLE_IN) + _LEGEND_IN
+    figure = Figure(figsize=(_COLUMNS * _PANEL_IN, height_in))
+    figure.set_layout_engine("constrained", h_pad=0.08)
+    panels = list(figure.subplots(rows, _COLUMNS, squeeze=False).flat)
+    shown: list[Feature] = []
+    for axes, site in zip(panels, sites, strict=False):
+        features = site_features(site)
+        shown += without(features, Kinds.SITE)
+        _draw_panel(axes, site, features)
+    for axes in panels[len(sites) :]:
+        axes.set_visible(False)
+    scale = Line2D([], [], color=unit_interval(INK), linewidth=3.0, label=f"{_SCALE_M:g} m")
+    write_legend(figure, [*legend_of(shown), scale])
+    return figure
+
+
+def _draw_panel(axes: Axes, site: Scenario, features: Sequence[Feature]) -> None:
+    draw_plan(axes, features)
+    axes.axis("off")
+    axes.set_title(_panel_title(site), fontsize=_FONT, color=unit_interval(INK))
+    for feature in features:
+        height_m = feature.properties.get("height_m")
+        if feature.kind in STANDING and height_m is not None:
+            _write(axes, feature, f"{height_m:g} m")
+        elif feature.kind is Kinds.ACCESS_WAY and site.zone.access_way is not None:
+            _write(axes, feature, f"{site.zone.access_way.width_m:g} m")
+    left, bottom = site.site.rectangle_m.grown(-1.0)[:2]
+    scale = Line2D([left, left + _SCALE_M], [bottom, bottom], color=unit_interval(INK))
+    scale.set_linewidth(3.0)
+    axes.add_line(scale)
+
+
+def _write(axes: Axes, feature: Feature, words: str) -> None:
+    text = axes.text(*feature.bounds_m.centre, words, ha="center", va="center", zorder=6)
+    text.set(fontsize=_FONT - 2.5, color=unit_interval(feature.kind.look.line or INK))
+    text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
+
+
+def _panel_title(site: Scenario) -> str:
+    """Return what cannot be drawn, in two lines."""
+    charge = " or ".join(f"{source.tnt_kg:g}" for source in site.charge) + " kg TNT"
+    zone = site.build_zone
+    if zone is None:
+        return f"{site.name}\n{charge}"
+    budget = "" if zone.budget is None else f", budget {zone.budget:g}"
+    if zone.items:
+        return (
+            f"{site.name}: {count_of('item', len(zone.items))}{budget}\n"
+            f"{charge}, clearance {zone.clearance_m:g} m"
+        )
+    return (
+        f"{site.name}: {count_of('module', zone.stock)}, {charge}\n"
+        f"clearance {zone.clearance_m:g} m{budget}"
+    )
 
 
 if __name__ == "__main__":
