@@ -10,6 +10,7 @@ Coordinates are local: x to the right and y upwards from the lower left corner o
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -28,9 +29,17 @@ from blast_env.scenario import (
     Scenario,
     VehicleSource,
 )
-from blast_env.scenario.build_scene import barrier_outline, vehicle_reach, worst_places
+from blast_env.scenario.build_scene import (
+    barrier_outline,
+    vehicle_drive,
+    vehicle_reach,
+    worst_places,
+)
+from blast_env.scenario.driving import WayPoint
+from blast_env.scenario.reach import squares_of
 from blast_env.scenario.sections import PointM
-from blast_env.scenario.vehicles import nearest_point_m, squares_of
+from blast_env.scenario.vehicles import Impact
+from blast_env.scenario.worst_places import nearest_point_m
 from blast_env.units import MODULE_SIDE_M
 
 PAGE: Final[Colour] = (255, 255, 255)
@@ -176,6 +185,13 @@ class Kinds:
     )
     STAND_OFF: Final = FeatureKind(
         "stand_off", "stand-off", 4.8, Look(INK, 1.4, dashed=True, cad_colour=7), named=""
+    )
+    VEHICLE_WAY: Final = FeatureKind(
+        "vehicle_way",
+        "way of a vehicle, with the largest speeds",
+        4.7,
+        Look(EXPLOSIVE, 1.6, cad_colour=1),
+        named="",
     )
     GAUGE: Final = FeatureKind(
         "gauge", "gauge", 4.9, Look(_GAUGE, 1.6, sign="ring", cad_colour=200)
@@ -489,7 +505,36 @@ def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tupl
         said = {"tnt_kg": source.tnt_kg, "above_ground_m": source.height_m}
         words = "worst place of a vehicle"
         found.append(Feature(Kinds.CHARGE, (place_m,), words, said, words))
+        found += _way_of_vehicle(*vehicle_drive(scenario, source, layout).weakest_way)
     return in_order(found)
+
+
+def _way_of_vehicle(way: Sequence[WayPoint], through: Sequence[Impact]) -> Iterator[Feature]:
+    """Yield the straight parts of a vehicle's way, with its speed at the entry and what it breaks.
+
+    Args:
+        way: Its places and speeds.
+        through: What it breaks through.
+    """
+    if len(way) < 2:
+        return
+    bends = [way[0]]
+    for one, here, other in zip(way, way[1:], way[2:], strict=False):
+        before, after = (np.subtract(b.place_m, a.place_m) for a, b in ((one, here), (here, other)))
+        if abs(before[0] * after[1] - before[1] * after[0]) > 1e-9:
+            bends.append(here)
+    bends.append(way[-1])
+    labels = {bends[0].place_m: f"{bends[0].speed_km_h:.0f} km/h"}
+    for start, end in pairwise(bends):
+        said = {"speed_km_h": round(end.speed_km_h, 1)}
+        label = labels.get(start.place_m, "")
+        yield Feature(Kinds.VEHICLE_WAY, (start.place_m, end.place_m), "way", said, label=label)
+    for impact in through:
+        words = f"{impact.piece.name} gives way"
+        middle = rounded_m(*impact.piece.rectangle.centre)
+        said = {"speed_km_h": round(impact.speed_km_h, 1)}
+        label = f"{impact.speed_km_h:.0f} km/h"
+        yield Feature(Kinds.VEHICLE_WAY, (middle, middle), words, said, label=label)
 
 
 def stand_off_text(scenario: Scenario, layout: Sequence[Element]) -> str:

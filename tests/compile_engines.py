@@ -15,6 +15,8 @@ from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import FaceLoads, Gauges, GroundMap
 from blast_env.physics.gas.solver import GasSolver, Settling
 from blast_env.physics.gas.source import GasCharge, set_charge
+from blast_env.scenario import Scenario
+from tests.scenario.documents import driven_document
 
 
 def event_engine() -> None:
@@ -46,11 +48,18 @@ def surrogate() -> None:
     Ways.between(np.zeros(3), np.array([[9.0, 0.0, 1.0]]), 100.0, piece).shares(piece)
 
 
+def driving() -> None:
+    vehicle = Scenario.from_document(driven_document(), "driven")
+    for source in vehicle.vehicles:
+        assert vehicle.vehicle_ground(source).drive().speeds is not None
+
+
 def main() -> None:
     event_engine()
     gas_engine("single")
     gas_engine("double")
     surrogate()
+    driving()
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from blast_env.cli.command import Command, argument, option
 from blast_env.cli.options import SCENARIO_HELP
 from blast_env.cli.output import print_line
 from blast_env.cli.targets import PICTURES
-from blast_env.scenario import load_layout, load_scenario
+from blast_env.scenario import Placement, load_layout, load_scenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +41,8 @@ class DrawCommand(Command):
         from blast_env.rendering.figures import save_figure
         from blast_env.rendering.site_picture import site_picture
 
+        for sentence in Placement.of(scenario, elements).explain_vehicles():
+            print_line(sentence)
         figure = site_picture(scenario, elements, self.view, self.corner)
         out = Path(f"{scenario.name}.png") if self.out is None else self.out
         print_line(f"wrote {save_figure(figure, out)}")

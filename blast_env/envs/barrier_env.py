@@ -290,6 +290,14 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         """
         return self.placement.explain(element)
 
+    def explain_vehicles(self) -> tuple[str, ...]:
+        """Return a sentence for each vehicle: how near it comes now, by which way, how fast.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If `reset` has not been called.
+        """
+        return self.placement.explain_vehicles()
+
     @property
     def placement(self) -> Placement:
         """The modules or pieces placed so far."""

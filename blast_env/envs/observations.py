@@ -26,8 +26,8 @@ from blast_env.scenario import (
     VehicleSource,
 )
 from blast_env.scenario.build_scene import vehicle_reach, worst_places
+from blast_env.scenario.reach import squares_of
 from blast_env.scenario.sections import PointM
-from blast_env.scenario.vehicles import squares_of
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 

@@ -23,7 +23,7 @@ from blast_env.physics.scene import Charge
 from blast_env.provenance import versions
 from blast_env.scenario import AnyScenario, Scenario, check_layout
 from blast_env.scenario.build_scene import build_site
-from blast_env.scenario.vehicles import stand_off_m
+from blast_env.scenario.worst_places import stand_off_m
 from blast_env.statistics import (
     CVAR_LEVEL,
     Estimate,

@@ -113,10 +113,33 @@ def _charge_limits(scenario: Scenario) -> Iterator[str]:
             "a vehicle brings a charge, to where the layout lets it come: calibrate and simulate "
             "--stand-off refuse it, and --charge puts the charge where no vehicle is"
         )
+    yield from _speed_limits(scenario)
     if len(scenario.charge) == 1 and isinstance(scenario.charge[0], PointSource):
         yield (
             "the charge is always at one place: a hidden threat is no question here, and an agent "
             "trained on it knows no other"
+        )
+
+
+def _speed_limits(scenario: Scenario) -> Iterator[str]:
+    """Yield what is not known of how fast vehicles are, and of what that breaks."""
+    if any(source.motion is None for source in scenario.vehicles):
+        yield (
+            "a vehicle without a speed: whatever stops vehicles stops it, however heavy and fast "
+            "it may be ([charge.motion])"
+        )
+    zone = scenario.build_zone
+    if zone is None or all(source.motion is None for source in scenario.vehicles):
+        return
+    unrated = [each.name for each in zone.items if each.stops_vehicles and not each.crash_rating]
+    if not zone.items:
+        unrated.append("the modules")
+    if zone.access_way and zone.access_way.gate and not zone.access_way.gate.crash_rating:
+        unrated.append("the gate")
+    if unrated:
+        yield (
+            f"no crash rating ({', '.join(unrated)}): stops a vehicle of any mass at any speed "
+            "(crash_rating)"
         )
 
 

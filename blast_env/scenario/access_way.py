@@ -2,14 +2,21 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, StrictFloat
+from pydantic import (
+    AfterValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    StrictFloat,
+    model_serializer,
+)
 
 from blast_env.arrays import BoolArray
 from blast_env.scenario.catalogue import Variant
+from blast_env.scenario.crash_rating import CrashRating
 from blast_env.scenario.sections import Ground, Section
 from blast_env.units import MODULE_SIDE_M
 
@@ -19,6 +26,21 @@ def _check_whole_modules(width_m: float) -> float:
     if abs(width_m - round(width_m / MODULE_SIDE_M) * MODULE_SIDE_M) > 1e-9:
         raise ValueError(f"must be a multiple of {MODULE_SIDE_M:g}, the side of a module")
     return width_m
+
+
+class Gate(Ground):
+    """Where a gate stands.
+
+    Attributes:
+        crash_rating: What it stops; without it, every vehicle.
+    """
+
+    crash_rating: CrashRating | None = None
+
+    @model_serializer(mode="wrap")
+    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out a rating that is not there."""
+        return {key: value for key, value in handler(self).items() if value is not None}
 
 
 class AccessWay(Section):
@@ -38,7 +60,7 @@ class AccessWay(Section):
         StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0), AfterValidator(_check_whole_modules)
     ]
     between: Literal["left_right", "bottom_top"]
-    gate: Ground | None = None
+    gate: Gate | None = None
 
     @property
     def width_cells(self) -> int:

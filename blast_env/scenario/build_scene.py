@@ -25,13 +25,9 @@ from blast_env.scenario import (
     usable_cells,
 )
 from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
-from blast_env.scenario.vehicles import (
-    NOTHING,
-    Obstacles,
-    Reach,
-    WorstPlaces,
-    obstacles_of,
-)
+from blast_env.scenario.reach import Reach
+from blast_env.scenario.vehicles import NOTHING, Drive, Obstacles, obstacles_of
+from blast_env.scenario.worst_places import WorstPlaces
 from blast_env.scenario.zone import TOLERANCE_M, distance_m
 from blast_env.units import UNITS_PER_M, in_units
 from blast_env.values import checked_seed
@@ -90,6 +86,13 @@ def vehicle_reach(
 ) -> Reach:
     """Return where a vehicle gets to; arguments as for `worst_places`."""
     return scenario.vehicle_ground(source).reach(_obstacles(scenario, layout))
+
+
+def vehicle_drive(
+    scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
+) -> Drive:
+    """Return what stops a vehicle and what not; arguments as for `worst_places`."""
+    return scenario.vehicle_ground(source).drive(_obstacles(scenario, layout))
 
 
 def charge_against(scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> Charge:

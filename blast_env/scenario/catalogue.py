@@ -27,6 +27,7 @@ from blast_env.physics.scene import WALLS
 from blast_env.response.barriers import RigidPiece
 from blast_env.response.facade import Bay
 from blast_env.scenario.barriers import Anchorage, BaseWidth, Friction, Mass, stock_barriers
+from blast_env.scenario.crash_rating import CrashRating
 from blast_env.scenario.problems import Problem, ScenarioError, unknown_name
 from blast_env.scenario.sections import FOR_PEOPLE, Count, Height, Name, Section, Storeys, Walls
 from blast_env.units import MODULE_SIDE_M
@@ -64,6 +65,8 @@ class Item(Section):
         base_width_m: Width of its base; without it, its thickness.
         friction: Coefficient of friction with the ground; 0.5 without it.
         anchorage_n: Horizontal force that the anchors of a piece hold; none without it.
+        crash_rating: Which vehicles it stops; without it, every one. Where a vehicle has no speed,
+            it is not heeded.
         from_catalogue: Always `None`: what it stood for is in the others.
     """
 
@@ -80,6 +83,7 @@ class Item(Section):
     base_width_m: BaseWidth | None = None
     friction: Friction | None = None
     anchorage_n: Anchorage | None = None
+    crash_rating: CrashRating | None = None
     from_catalogue: Annotated[str | None, Field(exclude=True)] = None
 
     @model_validator(mode="before")
@@ -108,9 +112,10 @@ class Item(Section):
 
     @model_serializer(mode="wrap")
     def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what is not said of mass, base, friction and anchors."""
+        """Leave out what is not said of mass, base, friction, anchors, and the crash test."""
         dump: dict[str, Any] = handler(self)
-        return {key: dump[key] for key in dump if key not in RIGID_KEYS or dump[key] is not None}
+        optional = {*RIGID_KEYS, "crash_rating"}
+        return {key: dump[key] for key in dump if key not in optional or dump[key] is not None}
 
     @property
     def rigid_piece(self) -> RigidPiece:
@@ -124,6 +129,14 @@ class Item(Section):
             self.friction,
             self.anchorage_n or 0.0,
         )
+
+    @model_validator(mode="after")
+    def _check_rating(self) -> Self:
+        """Refuse a crash rating of what stops no vehicle."""
+        if self.crash_rating is not None and not self.stops_vehicles:
+            message = "must be left out: stops_vehicles is false"
+            raise ScenarioError("item", [Problem("crash_rating", message)])
+        return self
 
     @property
     def orientations(self) -> tuple[bool, ...]:
@@ -191,6 +204,7 @@ class Variant(NamedTuple):
         height_m: Its height; `None` is as high as the air.
         cost: What a piece costs where no cost area says otherwise.
         stops_vehicles: Whether no vehicle gets past it.
+        crash_rating: Which vehicles it stops; `None` is every one.
     """
 
     item: int
@@ -201,6 +215,7 @@ class Variant(NamedTuple):
     height_m: float | None
     cost: float
     stops_vehicles: bool
+    crash_rating: CrashRating | None = None
 
     @property
     def is_measure(self) -> bool:
@@ -265,6 +280,7 @@ class Catalogue:
                 item.height_m,
                 item.cost,
                 item.stops_vehicles,
+                item.crash_rating,
             )
             for number, item in enumerate(items)
             for turned in item.orientations

@@ -20,6 +20,7 @@ from blast_env.scenario.facade import facade_problems, hardening_problems
 from blast_env.scenario.heights import air_height_m, depth_inside_m, is_over
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, extent
+from blast_env.scenario.reach import places_on
 from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
@@ -31,7 +32,7 @@ from blast_env.scenario.sections import (
     Site,
     VehicleSource,
 )
-from blast_env.scenario.vehicles import MOST_PLACES, Obstacles, VehicleGround, places_on
+from blast_env.scenario.vehicles import MOST_PLACES, Obstacles, RatedPiece, VehicleGround
 from blast_env.scenario.versions import MAX_ITEMS
 from blast_env.scenario.zone import (
     TOLERANCE_M,
@@ -364,9 +365,12 @@ def _stopping_problems(
     parts: Parts, key: str, ground: VehicleGround, zone: BuildZone
 ) -> Iterator[Problem]:
     """Check that a barrier can keep a vehicle any further away than the empty site does."""
-    cells = _stopping_cells(empty_zone(_surroundings(parts, zone)))
+    cells = _stopping_cells(empty_zone(_surroundings(parts, zone)), ground.source)
     if not cells.any():
-        yield Problem(key, "nothing can stop the vehicle: no item in stock stops vehicles")
+        message = "nothing can stop the vehicle: no item in stock stops vehicles"
+        if ground.source.motion is not None:
+            message += f", or is rated for {ground.source.motion.mass_kg:g} kg"
+        yield Problem(key, message)
         return
     # Cells side by side leave no gap: a rectangle of them stops a vehicle as they do.
     full = Obstacles(stops=tuple(zone.cells_rectangle_m(*each) for each in stacked_runs(cells)))
@@ -380,12 +384,15 @@ def _stopping_problems(
         yield Problem(key, message)
 
 
-def _stopping_cells(empty: EmptyZone) -> BoolArray:
-    """Return the cells on which something can stand that stops vehicles (rows, columns)."""
+def _stopping_cells(empty: EmptyZone, source: VehicleSource) -> BoolArray:
+    """Return the cells on which something can stand that stops a vehicle (rows, columns)."""
     cells = np.zeros_like(empty.usable)
     rows, columns = cells.shape
     for variant, fits in zip(empty.catalogue.variants, empty.fits, strict=True):
-        if variant.stops_vehicles and empty.catalogue.stocks[variant.item] > 0:
+        rating, motion = variant.crash_rating, source.motion
+        heavy = rating is not None and motion is not None and motion.mass_kg > rating.mass_kg
+        stops = variant.stops_vehicles and not heavy
+        if stops and empty.catalogue.stocks[variant.item] > 0:
             for up, right in variant.cells_at(0, 0):
                 cells[up:, right:] |= fits[: max(rows - up, 0), : max(columns - right, 0)]
     return cells
@@ -395,8 +402,16 @@ def vehicle_ground(parts: Parts, source: VehicleSource) -> VehicleGround:
     """Return what a vehicle meets on the empty site, which must be sound."""
     assert parts.site is not None
     way = None if parts.build_zone is None else parts.build_zone.access_way
-    gates = () if way is None or way.gate is None else (way.gate.rectangle_m,)
-    return VehicleGround(source, parts.site, tuple(parts.structures.values()), gates)
+    closed: tuple[Rectangle, ...] = ()
+    rated: tuple[RatedPiece, ...] = ()
+    if way is not None and way.gate is not None:
+        where, rating = way.gate.rectangle_m, way.gate.crash_rating
+        if rating is None:
+            closed = (where,)
+        else:
+            rated = (RatedPiece(where, rating, "the gate"),)
+    structures = tuple(parts.structures.values())
+    return VehicleGround(source, parts.site, structures, closed, rated, parts.charge_radius_m)
 
 
 def _build_zone_problems(parts: Parts) -> Iterator[Problem]:

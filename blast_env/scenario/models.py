@@ -260,7 +260,8 @@ class Scenario(Section):
         if self.build_zone is not None:
             content["build_zone"] = _without_words(self.build_zone)
         for source in content["charge"]:
-            for area in source.get("keep_outs", ()):
+            slow = (source.get("motion") or {}).get("slow", ())
+            for area in (*source.get("keep_outs", ()), *slow):
                 del area["reason"]
         content["parameters"] = self.parameters.model_dump(mode="json")
         text = json.dumps(_without_negative_zero(content), sort_keys=True, allow_nan=False)
@@ -458,14 +459,25 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
     for item in content["items"]:
         for key in ("description", *RIGID_KEYS):
             item.pop(key, None)
+        _without_test(item)
     for measure in content["hardening"]:
         del measure["description"]
     if zone.access_way is not None and zone.access_way.gate is None:
         del content["access_way"]["gate"]
+    elif zone.access_way is not None:
+        _without_test(content["access_way"]["gate"])
     for key in _LATER_KEYS:
         if getattr(zone, key) == BuildZone.model_fields[key].default:
             del content[key]
     return content
+
+
+def _without_test(content: dict[str, Any]) -> None:
+    """Leave out the words of a crash rating, or the rating where there is none."""
+    if content.get("crash_rating") is None:
+        content.pop("crash_rating", None)
+    else:
+        del content["crash_rating"]["test"]
 
 
 def _without_negative_zero(value: Any) -> Any:

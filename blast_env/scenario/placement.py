@@ -17,6 +17,7 @@ from blast_env.scenario.access_way import closing_places, is_open
 from blast_env.scenario.catalogue import Catalogue, PlacedModule, cell_text, element_text
 from blast_env.scenario.files import AnyScenario, find_scenario
 from blast_env.scenario.models import Scenario
+from blast_env.scenario.vehicles import obstacles_of
 from blast_env.scenario.zone import (
     NO_ZONE,
     BuildZone,
@@ -126,6 +127,14 @@ class Placement:
             return reason
         reason = self._reason_against_cost(element) or self._reason_against_closing(element)
         return None if reason is None else f"{element_text(element)} {reason}"
+
+    def explain_vehicles(self) -> tuple[str, ...]:
+        """Return a sentence for each vehicle: how near it comes now, by which way, how fast."""
+        obstacles = obstacles_of(self._zone, self.layout)
+        return tuple(
+            self.scenario.vehicle_ground(source).explain(obstacles)
+            for source in self.scenario.vehicles
+        )
 
     @cached_property
     def legal(self) -> BoolArray:

@@ -16,10 +16,12 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    SerializerFunctionWrapHandler,
     StrictBool,
     StrictFloat,
     StrictInt,
     ValidationError,
+    model_serializer,
 )
 
 from blast_env.errors import type_word
@@ -54,6 +56,14 @@ Height = Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0)]
 
 
 Count = Annotated[StrictInt, Field(ge=1, le=1000)]
+
+
+VehicleMass = Annotated[StrictFloat, Field(ge=50.0, le=200_000.0)]
+"""Of a vehicle, kg."""
+
+
+Speed = Annotated[StrictFloat, Field(ge=1.0, le=300.0)]
+"""Of a vehicle, km/h."""
 
 
 def _check_text(text: str) -> str:
@@ -261,6 +271,57 @@ class Entry(Section):
         }[side]
 
 
+_SlowSize = Annotated[StrictFloat, Field(ge=2.0, le=2000.0)]
+"""Less would lie between the places at which speeds are worked out."""
+
+
+class SlowArea(Section):
+    """Ground on which a vehicle can be no faster, and why: a speed table, a chicane.
+
+    Attributes:
+        corner_m: Lower left corner.
+        size_m: Its size.
+        speed_km_h: The largest speed on it.
+        reason: What slows the vehicle.
+    """
+
+    corner_m: PointM
+    size_m: tuple[_SlowSize, _SlowSize]
+    speed_km_h: Speed
+    reason: Reason
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The rectangle."""
+        return Rectangle.from_corner(self.corner_m, self.size_m)
+
+
+class Motion(Section):
+    """How a vehicle drives: what decides its speed where it hits a barrier.
+
+    Attributes:
+        mass_kg: Its mass, with the load.
+        max_speed_km_h: Its largest speed.
+        acceleration_m_s2: How fast it gains speed, at any speed.
+        entry_speed_km_h: Its speed when it has just entered the site; without it, the largest.
+        grip: Coefficient of friction between tyres and ground, which limits speed in turns.
+        slow: Ground on which it can be no faster.
+    """
+
+    mass_kg: VehicleMass
+    max_speed_km_h: Speed
+    acceleration_m_s2: Annotated[StrictFloat, Field(ge=0.1, le=20.0)]
+    entry_speed_km_h: Annotated[StrictFloat, Field(ge=0.0, le=300.0)] | None = None
+    grip: Annotated[StrictFloat, Field(ge=0.1, le=2.0)] = 1.0
+    slow: Annotated[tuple[SlowArea, ...], Field(max_length=100)] = ()
+
+    @property
+    def entry_km_h(self) -> float:
+        """Its speed when it has just entered the site, at most the largest."""
+        entry = self.max_speed_km_h if self.entry_speed_km_h is None else self.entry_speed_km_h
+        return min(entry, self.max_speed_km_h)
+
+
 class VehicleSource(ChargeSource):
     """A charge in a vehicle, which goes off at one of the worst places that it can get to.
 
@@ -273,6 +334,7 @@ class VehicleSource(ChargeSource):
         keep_outs: Ground that is closed to it all the same, and why.
         places: How many of the worst places count; the charge goes off at one after the other.
         apart_m: Least distance between two of them; without it, the width.
+        motion: How it drives; without it, whatever stops vehicles stops it at any speed.
     """
 
     kind: Literal["vehicle"]
@@ -282,6 +344,13 @@ class VehicleSource(ChargeSource):
     keep_outs: Annotated[tuple[Area, ...], Field(max_length=100)] = ()
     places: Annotated[StrictInt, Field(ge=1, le=100)] = 4
     apart_m: Length | None = None
+    motion: Motion | None = None
+
+    @model_serializer(mode="wrap")
+    def _without_motion(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out a motion that is not there."""
+        dump: dict[str, Any] = handler(self)
+        return {key: dump[key] for key in dump if key != "motion" or dump[key] is not None}
 
     @property
     def lines_m(self) -> tuple[tuple[PointM, PointM], ...]:

@@ -116,8 +116,36 @@ def driven_document() -> Document:
         keep_outs=[{"corner_m": [7.0, 0.0], "size_m": [1.0, 2.0], "reason": "a pond"}],
         places=3,
         apart_m=2.5,
+        motion={
+            "mass_kg": 3500.0,
+            "max_speed_km_h": 80.0,
+            "acceleration_m_s2": 2.5,
+            "entry_speed_km_h": 30.0,
+            "grip": 0.8,
+            "slow": [
+                {
+                    "corner_m": [1.0, 0.0],
+                    "size_m": [2.0, 8.0],
+                    "speed_km_h": 15.0,
+                    "reason": "a speed table",
+                }
+            ],
+        },
     )
-    return site_document(vehicle, name="driven")
+    document = site_document(vehicle, name="driven")
+    gate = {
+        "corner_m": [4.0, 3.0],
+        "size_m": [0.5, 2.0],
+        "crash_rating": {
+            "mass_kg": 7200.0,
+            "speed_km_h": 48.0,
+            "penetration_m": 0.4,
+            "test": "IWA 14-1, N2A",
+        },
+    }
+    way = {"width_m": 2.0, "between": "left_right", "gate": gate}
+    document["build_zone"] |= {"access_way": way}
+    return document
 
 
 def minimal_document() -> Document:

@@ -14,8 +14,9 @@ from blast_env.geometry import Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, Placement, VehicleCharge
 from blast_env.scenario.build_scene import charge_against, vehicle_reach, worst_places
+from blast_env.scenario.reach import Reach
 from blast_env.scenario.sections import Entry, Site, VehicleSource
-from blast_env.scenario.vehicles import Obstacles, Reach, VehicleGround, ranked
+from blast_env.scenario.vehicles import Obstacles, VehicleGround, ranked
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of
 
 SIDE = 12

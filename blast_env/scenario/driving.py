@@ -1,0 +1,315 @@
+"""How fast a vehicle can be at every place that it gets to: a search over place, direction, speed.
+
+The vehicle is a point with a speed. Along a metre it gains what its acceleration gives,
+v^2 = v0^2 + 2 a s, up to its largest speed, and to turn with radius r it must be no faster than
+v^2 = f g r, where f is the grip of its tyres (UFC 4-022-02, after MIL-HDBK-1013/14, equations 5 and
+6). It brakes at once wherever that helps it.
+
+Places are points 0.5 m apart and directions sixteen. From a point the vehicle goes straight on, or
+turns on an arc, to a neighbouring direction or the one after it, with one of some radii. What is
+tighter than 3.5 m is a turn on the spot, no faster than on that radius. Everything is rounded so
+that speeds come out too high rather than too low: a place counts as open if any place within 0.25 m
+is, a radius as the next larger one of the table, and a run-up is longer by one step.
+
+More obstacles leave fewer steps, so they never make any speed larger.
+"""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import ceil, floor
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Rectangle
+from blast_env.scenario.driving_steps import (
+    DIRECTIONS,
+    LENGTHS,
+    NEVER,
+    SPOT,
+    IntArray32,
+    Labels,
+    all_arcs,
+    passable_places,
+    spread,
+    wide_places,
+)
+from blast_env.scenario.sections import Motion, PointM
+
+GRAVITY_M_S2: Final = 9.81
+
+KM_H_PER_M_S: Final = 3.6
+
+STEP_M: Final = 0.5
+"""How far apart places are."""
+
+_EPSILON_M: Final = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedField:
+    """The largest speeds of a vehicle, by direction and place.
+
+    Attributes:
+        motion: How it drives.
+        half_m: Half of its width.
+        run_up_m: The run-up from standstill that each speed takes (directions, rows, columns),
+            below 0 where it never is; place (row, column) is at `STEP_M * (column, row)`.
+        is_open: Which places are open to its centre (rows, columns).
+        starts: Where it enters (rows, columns).
+    """
+
+    motion: Motion
+    half_m: float
+    run_up_m: Labels
+    is_open: BoolArray
+    starts: BoolArray
+
+    @classmethod
+    def of(
+        cls,
+        motion: Motion,
+        half_m: float,
+        is_open: BoolArray,
+        starts: Sequence[tuple[BoolArray, PointM]],
+    ) -> "SpeedField":
+        """Work the speeds out.
+
+        Args:
+            motion: How the vehicle drives.
+            half_m: Half of its width.
+            is_open: Which places are open to its centre (rows, columns).
+            starts: Where it enters (rows, columns), and the direction into the site there.
+        """
+
+        def label(speed_km_h: float) -> float:
+            return _run_up_m(motion, speed_km_h) / STEP_M
+
+        top = label(motion.max_speed_km_h)
+        most = np.full(is_open.shape, top, dtype=np.float32)
+        for area in motion.slow:
+            inside = places_in(area.rectangle_m.grown(-STEP_M / 2.0))
+            most[inside] = np.minimum(most[inside], label(area.speed_km_h))
+        labels = np.full((len(DIRECTIONS), *is_open.shape), NEVER)
+        entered = np.zeros_like(is_open)
+        for start, inwards in starts:
+            at = start & is_open
+            entered |= at
+            for number, step in enumerate(DIRECTIONS):
+                if step @ inwards > 0:
+                    labels[number][at] = np.minimum(
+                        label(motion.entry_km_h) + LENGTHS[number], most[at]
+                    )
+        per_radius = _per_radius(motion)
+        arcs = all_arcs().up_to(top / per_radius)
+        passable = np.zeros((len(arcs.of), *is_open.shape), dtype=bool)
+        slowed = np.zeros_like(passable) if motion.slow else np.zeros((1, len(is_open), 0), bool)
+        passable_places(is_open, True, arcs.first, arcs.points, passable)
+        if motion.slow:
+            passable_places(most < top, False, arcs.first, arcs.points, slowed)
+        spread(
+            is_open,
+            wide_places(is_open),
+            most,
+            labels,
+            DIRECTIONS,
+            LENGTHS,
+            arcs.of,
+            arcs.ends,
+            arcs.lengths,
+            np.minimum(arcs.radii * per_radius, top).astype(np.float32),
+            passable,
+            slowed,
+            max((label(area.speed_km_h) for area in motion.slow), default=top),
+            min(SPOT * per_radius, top),
+        )
+        return cls(motion, half_m, np.float32(STEP_M) * labels, is_open, entered)
+
+    @property
+    def places_km_h(self) -> FloatArray:
+        """The largest speed at each place, in any direction (rows, columns); NaN where never."""
+        run_up_m = self.run_up_m.max(axis=0).astype(np.float64)
+        return np.where(run_up_m < 0.0, np.nan, self._km_h(run_up_m))
+
+    def impact_km_h(self, rectangle: Rectangle) -> float | None:
+        """Return the largest speed at which the vehicle hits a rectangle; `None` if it does not."""
+        state = self._hit(rectangle)
+        return None if state is None else self._hit_km_h(state)
+
+    def way_to_impact(self, rectangle: Rectangle) -> tuple["WayPoint", ...]:
+        """Return the way to a rectangle on which the vehicle is fastest when it hits it."""
+        state = self._hit(rectangle)
+        if state is None:
+            return ()
+        way = self._way(state)
+        return (*way, way[-1]._replace(speed_km_h=self._hit_km_h(state)))
+
+    def way_to(self, place_m: PointM) -> tuple["WayPoint", ...]:
+        """Return a way to a place, at the largest speed that is possible there."""
+        x, y = (round(each / STEP_M) for each in place_m)
+        _, rows, columns = self.run_up_m.shape
+        near = self.run_up_m[:, max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
+        number, up, right = np.unravel_index(int(near.argmax()), near.shape)
+        if near[number, up, right] < 0.0:
+            return ()
+        row, column = max(y - 1, 0) + int(up), max(x - 1, 0) + int(right)
+        return self._way(int(np.ravel_multi_index((int(number), row, column), (16, rows, columns))))
+
+    def _hit(self, rectangle: Rectangle) -> int | None:
+        """Return the state from which the vehicle hits a rectangle fastest."""
+        left, bottom, right, top = rectangle.grown(self.half_m)
+        _, rows, columns = self.run_up_m.shape
+        low, high = max(floor(bottom / STEP_M) - 3, 0), min(ceil(top / STEP_M) + 4, rows)
+        first, after = max(floor(left / STEP_M) - 3, 0), min(ceil(right / STEP_M) + 4, columns)
+        if low >= high or first >= after:
+            return None
+        y = STEP_M * np.arange(low, high)[:, np.newaxis]
+        x = STEP_M * np.arange(first, after)[np.newaxis, :]
+        slack = STEP_M / 2.0 + _EPSILON_M
+        best, found = -1.0, None
+        for number, (dx, dy) in enumerate(DIRECTIONS):
+            inwards = np.zeros((high - low, after - first), dtype=bool)
+            if dx:
+                inwards |= (x <= left + slack) if dx > 0 else (x >= right - slack)
+            if dy:
+                inwards |= (y <= bottom + slack) if dy > 0 else (y >= top - slack)
+            end_x, end_y = x + STEP_M * dx, y + STEP_M * dy
+            inside = (end_x > left + _EPSILON_M) & (end_x < right - _EPSILON_M)
+            inside = inside & (end_y > bottom + _EPSILON_M) & (end_y < top - _EPSILON_M)
+            own = self.run_up_m[number, low:high, first:after]
+            values = np.where(inwards & inside & (own >= 0.0), own + STEP_M * LENGTHS[number], -1.0)
+            at = int(values.argmax())
+            if values.flat[at] > best:
+                best = float(values.flat[at])
+                row, column = divmod(at, after - first)
+                found = (number * rows + low + row) * columns + first + column
+        return found
+
+    def _hit_km_h(self, state: int) -> float:
+        number = state // self.run_up_m[0].size
+        speed = self._km_h(float(self.run_up_m.flat[state]) + float(STEP_M * LENGTHS[number]))
+        return min(float(speed), self.motion.max_speed_km_h)
+
+    def _km_h(self, run_up_m: FloatArray | float) -> FloatArray:
+        speeds: FloatArray = KM_H_PER_M_S * np.sqrt(
+            2.0 * self.motion.acceleration_m_s2 * np.maximum(run_up_m, 0.0)
+        )
+        return speeds
+
+    def _way(self, state: int) -> tuple["WayPoint", ...]:
+        return tuple(reversed([*self._backwards(state)]))
+
+    def _backwards(self, state: int) -> Iterator["WayPoint"]:
+        """Yield the places of a way from its end to where it enters.
+
+        Where it goes round in circles to become faster, it goes straight to the entry from there.
+        """
+        _, rows, columns = self.run_up_m.shape
+        seen: set[int] = set()
+        following: int | None = state
+        while following is not None and following not in seen:
+            seen.add(following)
+            number, place = divmod(following, rows * columns)
+            row, column = divmod(place, columns)
+            run_up_m = float(self.run_up_m[number, row, column])
+            yield WayPoint((STEP_M * column, STEP_M * row), float(self._km_h(run_up_m)))
+            if self.starts[row, column] and run_up_m <= self._entry_m(number) + _EPSILON_M:
+                return
+            following = self._before(number, row, column)
+        for y, x in self._back_to_entry(row, column):
+            run_up_m = float(self.run_up_m[:, y, x].max())
+            yield WayPoint((STEP_M * x, STEP_M * y), float(self._km_h(run_up_m)))
+
+    def _entry_m(self, number: int) -> float:
+        """Return the run-up of the speed with which it enters in a direction."""
+        return _run_up_m(self.motion, self.motion.entry_km_h) + STEP_M * float(LENGTHS[number])
+
+    def _before(self, number: int, row: int, column: int) -> int | None:
+        """Return a state from which one step makes the vehicle as fast as it is here."""
+        _, rows, columns = self.run_up_m.shape
+        own_m = float(self.run_up_m[number, row, column]) - 1e-3
+        arcs = all_arcs()
+        into = np.flatnonzero(arcs.of[:, 1] == number)
+        steps: list[tuple[int, IntArray32, float, int | None]]
+        steps = [(number, DIRECTIONS[number], float(LENGTHS[number]), None)]
+        steps += [
+            (int(arcs.of[arc, 0]), arcs.ends[arc], float(arcs.lengths[arc]), int(arc))
+            for arc in into
+        ]
+        for one, step, length, arc in steps:
+            x, y = column - int(step[0]), row - int(step[1])
+            if not (0 <= x < columns and 0 <= y < rows):
+                continue
+            before_m = float(self.run_up_m[one, y, x])
+            if before_m < 0.0 or before_m + STEP_M * length < own_m:
+                continue
+            if arc is not None:
+                points = arcs.points[arcs.first[arc] : arcs.first[arc + 1]] + (x, y)
+                inside = (points >= 0).all() and (points < (columns, rows)).all()
+                if not (inside and self.is_open[points[:, 1], points[:, 0]].all()):
+                    continue
+                most_m = STEP_M * float(arcs.radii[arc]) * _per_radius(self.motion)
+                if most_m < own_m:
+                    continue
+            return int((one * rows + y) * columns + x)
+        fastest = int(self.run_up_m[:, row, column].argmax())
+        return None if fastest == number else (fastest * rows + row) * columns + column
+
+    def _back_to_entry(self, row: int, column: int) -> Iterator[tuple[int, int]]:
+        """Yield the open places on a short way from a place to where the vehicle enters."""
+        came: dict[tuple[int, int], tuple[int, int] | None] = {(row, column): None}
+        queue = deque(came)
+        rows, columns = self.is_open.shape
+        while queue:
+            here = queue.popleft()
+            if self.starts[here]:
+                way = [here]
+                while (before := came[way[-1]]) is not None:
+                    way.append(before)
+                yield from reversed(way[:-1])
+                return
+            for up, right in ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
+                there = here[0] + up, here[1] + right
+                inside = 0 <= there[0] < rows and 0 <= there[1] < columns
+                if inside and there not in came and self.is_open[there]:
+                    came[there] = here
+                    queue.append(there)
+
+
+class WayPoint(NamedTuple):
+    """A place on the way of a vehicle.
+
+    Attributes:
+        place_m: Where its centre is.
+        speed_km_h: The largest speed that is possible there in that direction.
+    """
+
+    place_m: PointM
+    speed_km_h: float
+
+
+def places_shape(width_m: float, height_m: float) -> tuple[int, int]:
+    """Return how many rows and columns of places a site has."""
+    return round(height_m / STEP_M) + 1, round(width_m / STEP_M) + 1
+
+
+def _run_up_m(motion: Motion, speed_km_h: float) -> float:
+    """Return the run-up from standstill to a speed."""
+    return float((speed_km_h / KM_H_PER_M_S) ** 2 / (2.0 * motion.acceleration_m_s2))
+
+
+def _per_radius(motion: Motion) -> float:
+    """Return the run-up that the largest speed in a turn takes, over the turn's radius."""
+    return motion.grip * GRAVITY_M_S2 / (2.0 * motion.acceleration_m_s2)
+
+
+def places_in(rectangle: Rectangle) -> tuple[slice, slice]:
+    """Return the places in a closed rectangle."""
+    left, bottom, right, top = rectangle
+    rows = slice(max(ceil(bottom / STEP_M - _EPSILON_M), 0), floor(top / STEP_M + _EPSILON_M) + 1)
+    columns = slice(
+        max(ceil(left / STEP_M - _EPSILON_M), 0), floor(right / STEP_M + _EPSILON_M) + 1
+    )
+    return rows, columns

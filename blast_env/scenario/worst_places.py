@@ -1,0 +1,163 @@
+"""The worst places of a vehicle's charge: those nearest to a wall that counts."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.geometry import Rectangle
+from blast_env.physics.scene import Charge, WallName
+from blast_env.scenario.sections import AnyStructure, PointM, VehicleSource
+
+_EQUAL_M: Final = 1e-6
+"""Distances that differ by less are equal."""
+
+
+@dataclass(frozen=True)
+class WorstPlaces:
+    """Where the charge of a vehicle goes off, the worst place first.
+
+    The first is the place nearest to a wall that counts of a protected structure; each further one
+    is the nearest of those that are at least `VehicleSource.least_apart_m` away from all before it.
+    The charge being the same everywhere, that is the order of the scaled distances. Of places that
+    are as near, the one nearer to the middle of that wall comes first, then the one further to the
+    left, then the lower one.
+
+    Attributes:
+        source: The vehicle.
+        places_m: The places, at most `VehicleSource.places`, at least one.
+        distances_m: How far each is from that wall.
+    """
+
+    source: VehicleSource
+    places_m: tuple[PointM, ...]
+    distances_m: tuple[float, ...]
+
+    @property
+    def stand_off_m(self) -> float:
+        """How near the vehicle's centre gets to a protected structure."""
+        return self.distances_m[0]
+
+    def charge(self, rank: int) -> Charge:
+        """Return the charge at a place; where there are no more of them, from the worst one on."""
+        place_m = self.places_m[rank % len(self.places_m)]
+        return Charge(place_m, self.source.tnt_kg, self.source.height_m)
+
+
+def worst_of(
+    source: VehicleSource, places_m: FloatArray, structures: Sequence[AnyStructure]
+) -> WorstPlaces:
+    """Return the worst of some places.
+
+    Args:
+        source: The vehicle.
+        places_m: Places where its charge may go off, at least one (places, 2).
+        structures: The structures.
+    """
+    distance_m, middle_m = nearest_wall(places_m, structures)
+    left = np.ones(len(places_m), dtype=bool)
+    chosen: list[int] = []
+    while left.any() and len(chosen) < source.places:
+        # np.nonzero keeps the order of the places: by y, then by x.
+        best = np.nonzero(left)[0]
+        for measure in (distance_m, middle_m, places_m[:, 0], places_m[:, 1]):
+            values = measure[best]
+            best = best[values <= values.min() + _EQUAL_M]
+        chosen.append(int(best[0]))
+        apart_m = np.hypot(*(places_m - places_m[best[0]]).T)
+        left &= apart_m >= source.least_apart_m - _EQUAL_M
+    return WorstPlaces(
+        source=source,
+        places_m=tuple((float(x), float(y)) for x, y in places_m[chosen]),
+        distances_m=tuple(float(distance_m[index]) for index in chosen),
+    )
+
+
+def stand_off_m(structures: Iterable[AnyStructure], position_m: PointM) -> float:
+    """Return how far a place is from the nearest wall that counts of a protected structure."""
+    distances_m, _ = nearest_wall(np.array([position_m]), structures)
+    return float(distances_m[0])
+
+
+def nearest_point_m(structures: Iterable[AnyStructure], position_m: PointM) -> PointM:
+    """Return the point of the walls that count of protected structures that is nearest to a place.
+
+    Raises:
+        ValueError: If no structure is protected.
+    """
+    x_m, y_m = position_m
+    walls = [wall for each in structures if each.protected for wall in _walls(each)]
+    points = [
+        (min(max(x_m, left), right), min(max(y_m, bottom), top))
+        for left, bottom, right, top in walls
+    ]
+    return min(points, key=lambda point: hypot(point[0] - x_m, point[1] - y_m))
+
+
+def nearest_wall(
+    places_m: FloatArray, structures: Iterable[AnyStructure]
+) -> tuple[FloatArray, FloatArray]:
+    """Return how far places are from the nearest wall that counts, and from its middle.
+
+    Args:
+        places_m: The places (places, 2).
+        structures: Of them, the protected ones count.
+    """
+    nearest_m, middle_m, most_m = np.full((3, len(places_m)), np.inf)
+    # Many places share few coordinates; so it is cheap to tell to which ones a structure is near.
+    x_m, column = np.unique(places_m[:, 0], return_inverse=True)
+    y_m, row = np.unique(places_m[:, 1], return_inverse=True)
+    protected = [each for each in structures if each.protected]
+
+    def least_m(structure: AnyStructure) -> FloatArray:
+        left, bottom, right, top = structure.rectangle_m
+        across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
+        along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
+        distances_m: FloatArray = np.sqrt((across_m**2)[column] + (along_m**2)[row])
+        return distances_m
+
+    for structure in protected:
+        left, bottom, right, top = structure.rectangle_m
+        # No wall is further away than this from what is nearest to it.
+        diagonal_m = hypot(right - left, top - bottom) + 2.0 * _EQUAL_M
+        np.minimum(most_m, least_m(structure) + diagonal_m, out=most_m)
+    for structure in protected:
+        near = np.flatnonzero(least_m(structure) <= most_m)
+        nearest_m[near], middle_m[near] = _nearer_wall(
+            places_m[near], structure, nearest_m[near], middle_m[near]
+        )
+    return nearest_m, middle_m
+
+
+def _nearer_wall(
+    places_m: FloatArray, structure: AnyStructure, nearest_m: FloatArray, middle_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return `_nearest_wall` of what was nearest so far, and of one more structure."""
+    x_m, y_m = places_m.T
+    for left, bottom, right, top in _walls(structure):
+        across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
+        along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
+        wall_m = np.hypot(across_m, along_m)
+        aside_m = np.hypot(x_m - (left + right) / 2.0, y_m - (bottom + top) / 2.0)
+        nearer = wall_m < nearest_m - _EQUAL_M
+        as_near = np.abs(wall_m - nearest_m) <= _EQUAL_M
+        middle_m = np.where(
+            nearer, aside_m, np.where(as_near, np.minimum(middle_m, aside_m), middle_m)
+        )
+        nearest_m = np.minimum(nearest_m, wall_m)
+    return nearest_m, middle_m
+
+
+def _walls(structure: AnyStructure) -> Iterator[Rectangle]:
+    """Yield the walls whose load counts, as rectangles without a width."""
+    left, bottom, right, top = structure.rectangle_m
+    sides: dict[WallName, Rectangle] = {
+        "west": Rectangle(left, bottom, left, top),
+        "east": Rectangle(right, bottom, right, top),
+        "south": Rectangle(left, bottom, right, bottom),
+        "north": Rectangle(left, top, right, top),
+    }
+    return (sides[wall] for wall in structure.faces)
