@@ -3,7 +3,7 @@
 Places are in any units, y upwards: metres of a drawing, pixels of a frame.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, inf, pi, sin, sqrt
 from typing import Final
@@ -44,66 +44,70 @@ def labels_of(features: Iterable[Feature]) -> tuple[Label, ...]:
     )
 
 
-def solid(features: Iterable[Feature]) -> list[Feature]:
-    """Return what a text should not cover: what stands, and signs."""
-    return [
-        each
+@dataclass(frozen=True)
+class Settled:
+    """A label where it stands.
+
+    Attributes:
+        label: The label.
+        place: What its text fills.
+        leader: A line from what it belongs to, where that is far off.
+    """
+
+    label: Label
+    place: Rectangle
+    leader: tuple[Point, Point] | None
+
+
+def settled_labels(
+    features: Sequence[Feature],
+    labels: Sequence[Label],
+    sizes: Sequence[tuple[float, float]],
+    box: Callable[[Feature], Rectangle],
+    room: Callable[[Feature], Rectangle | None],
+    within: Rectangle,
+    gap: float,
+    far: float,
+    others: Iterable[Rectangle] = (),
+) -> list[Settled]:
+    """Return where labels stand, each as near to its own as the others and what is taken let it.
+
+    Where nothing is free, it is the place that covers least.
+
+    Args:
+        features: What is on the site; no label covers what stands, and signs.
+        labels: The labels, the most important first.
+        sizes: Width and height of each label.
+        box: Gives what a feature takes in the picture.
+        room: Gives where inside of a feature its label may stand, if anywhere.
+        within: Where all are to be.
+        gap: Between a label and its own.
+        far: From where on a label has a leader.
+        others: What else should not be covered.
+    """
+    solid = [
+        box(each)
         for each in features
         if each.kind.level >= Kinds.STRUCTURE.level or len(each.places_m) == 1
     ]
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """A text that wants a place.
-
-    Attributes:
-        own: What it belongs to.
-        size: Its width and height.
-        room: Where inside of that it may stand; nowhere without it.
-    """
-
-    own: Rectangle
-    size: tuple[float, float]
-    room: Rectangle | None = None
+    taken, found = [*solid, *others], list[Settled]()
+    for label, size in zip(labels, sizes, strict=True):
+        own, inside = box(label.feature), room(label.feature)
+        free_of = [each for each in taken if each != own] + [each.place for each in found]
+        tried = [(each, [*free_of, own]) for each in _places_around(own, size, gap)]
+        middle = None if inside is None else _centred(inside.centre, size)
+        if middle is not None and inside is not None and inside.contains(middle):
+            tried.insert(0, (middle, free_of))
+        place = best_place(tried, within)
+        found.append(Settled(label, place, _leader(own, place, far)))
+    return found
 
 
 _RINGS: Final = 12  # around a thing, each half a text higher than the one before
 _DIRECTIONS: Final = 24
 
 
-def settle(
-    wanted: Sequence[Wanted], taken: Iterable[Rectangle], within: Rectangle, gap: float
-) -> list[Rectangle]:
-    """Return a place for each text, as near to its own as the others and what is taken let it.
-
-    Where nothing is free, it is the place that covers least.
-
-    Args:
-        wanted: The texts, the most important first.
-        taken: What should not be covered; inside of its own a text may stand.
-        within: Where all are to be.
-        gap: Between a text and its own.
-    """
-    solid, found = list(taken), list[Rectangle]()
-    for each in wanted:
-        others = [box for box in solid if box != each.own] + found
-        inside = [] if each.room is None else [_centred(each.room.centre, each.size)]
-        places = [box for box in inside if each.room is not None and each.room.contains(box)]
-        around = _places_around(each, gap)
-        found.append(
-            best_place(
-                [
-                    *((box, others) for box in places),
-                    *((box, [*others, each.own]) for box in around),
-                ],
-                within,
-            )
-        )
-    return found
-
-
-def leader(own: Rectangle, place: Rectangle, far: float) -> tuple[Point, Point] | None:
+def _leader(own: Rectangle, place: Rectangle, far: float) -> tuple[Point, Point] | None:
     """Return the shortest line from a thing to its text, if that is far off."""
     ends = [
         (
@@ -137,20 +141,20 @@ def best_place(
     return best
 
 
-def _places_around(wanted: Wanted, gap: float) -> Iterator[Rectangle]:
+def _places_around(own: Rectangle, size: tuple[float, float], gap: float) -> Iterator[Rectangle]:
     """Yield places beside a thing, nearer ones first: above, below, beside, then all around."""
-    (x, y), (width, height) = wanted.own.centre, wanted.size
-    across = (wanted.own.right - wanted.own.left + width) / 2.0 + gap
-    along = (wanted.own.top - wanted.own.bottom + height) / 2.0 + gap
+    (x, y), (width, height) = own.centre, size
+    across = (own.right - own.left + width) / 2.0 + gap
+    along = (own.top - own.bottom + height) / 2.0 + gap
     for dx, dy in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1)):
-        yield _centred((x + dx * across, y + dy * along), wanted.size)
+        yield _centred((x + dx * across, y + dy * along), size)
     for ring in range(_RINGS):
         for step in range(_DIRECTIONS):
             angle = 2.0 * pi * step / _DIRECTIONS
             # Along a rectangle, so that texts slide along the sides of their own.
             right, up = (min(max(sqrt(2.0) * part, -1.0), 1.0) for part in (sin(angle), cos(angle)))
             off = 0.5 * ring * height
-            yield _centred((x + right * (across + off), y + up * (along + off)), wanted.size)
+            yield _centred((x + right * (across + off), y + up * (along + off)), size)
 
 
 def _centred(place: tuple[float, float], size: tuple[float, float]) -> Rectangle:

@@ -36,7 +36,7 @@ from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
-from studies.gas.sites import yard
+from studies.gas.loads import yard
 
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 

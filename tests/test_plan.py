@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from itertools import combinations
+from math import inf
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from blast_env.export import LayoutPlan
 from blast_env.export.dxf import drawing
 from blast_env.export.files import feature_collection
 from blast_env.geometry import Rectangle
-from blast_env.labels import Wanted, labels_of, settle
+from blast_env.labels import Label, labels_of, settled_labels
 from blast_env.plan import (
     Feature,
     FeatureKind,
@@ -109,6 +110,24 @@ def test_no_label_of_a_crowded_site_lies_on_another_on_the_page() -> None:
     assert overlapping(boxes) == 0
 
 
+def places_of_texts(
+    owns: list[Rectangle], size: tuple[float, float], within: Rectangle, *, inside: bool
+) -> list[Rectangle]:
+    """Return where texts of structures stand."""
+    features = [area_feature(Kinds.STRUCTURE, own, "a structure") for own in owns]
+    settled = settled_labels(
+        features,
+        [Label(each.name, each) for each in features],
+        [size] * len(owns),
+        lambda each: each.bounds_m,
+        lambda each: each.bounds_m if inside else None,
+        within,
+        gap=4.0,
+        far=inf,
+    )
+    return [each.place for each in settled]
+
+
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(st.integers(50, 550), st.integers(50, 350)), min_size=1, max_size=8))
 def test_texts_have_places_of_their_own_wherever_their_things_are(
@@ -116,7 +135,7 @@ def test_texts_have_places_of_their_own_wherever_their_things_are(
 ) -> None:
     owns = [Rectangle(x, y, x, y).grown(8.0) for x, y in places]
     within = Rectangle(0.0, 0.0, 600.0, 400.0)
-    boxes = settle([Wanted(own, (90.0, 15.0)) for own in owns], owns, within, 4.0)
+    boxes = places_of_texts(owns, (90.0, 15.0), within, inside=False)
     assert overlapping(boxes) == 0
     assert not any(box.overlaps(own, tolerance=0.5) for box in boxes for own in owns)
     assert all(within.contains(box) for box in boxes)
@@ -124,8 +143,8 @@ def test_texts_have_places_of_their_own_wherever_their_things_are(
 
 def test_a_text_stands_inside_its_own_where_there_is_room() -> None:
     house, shed = Rectangle(0.0, 0.0, 100.0, 40.0), Rectangle(200.0, 0.0, 210.0, 10.0)
-    wanted = [Wanted(each, (60.0, 12.0), each) for each in (house, shed)]
-    first, second = settle(wanted, [house, shed], Rectangle(-50.0, -50.0, 400.0, 100.0), 4.0)
+    within = Rectangle(-50.0, -50.0, 400.0, 100.0)
+    first, second = places_of_texts([house, shed], (60.0, 12.0), within, inside=True)
     assert house.contains(first)
     assert not shed.overlaps(second)
     assert abs(second.centre[0] - 205.0) < 40.0

@@ -13,7 +13,7 @@ from blast_env.app import edits
 from blast_env.app.editor import Ghost
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.geometry import Cell, Layout, Rectangle
-from blast_env.labels import Wanted, labels_of, leader, settle, solid
+from blast_env.labels import labels_of, settled_labels
 from blast_env.physics.structure import Colour
 from blast_env.plan import (
     FAINT,
@@ -236,30 +236,28 @@ def _names(view: PixelView, features: Sequence[Feature]) -> Iterator[str]:
 
     labels = labels_of(features)[::-1]
     lines = [label.text.split("\n") for label in labels]
-    owns = [box(label.feature) for label in labels]
-    rooms = [
-        own if label.feature.kind in STANDING else None
-        for own, label in zip(owns, labels, strict=True)
-    ]
-    wanted = [
-        Wanted(own, (_LETTER_PX * max(map(len, each)) + 4.0, _LINE_PX * len(each)), room)
-        for own, room, each in zip(owns, rooms, lines, strict=True)
-    ]
-    within = Rectangle(0.0, -float(view.height_px), float(view.width_px), 0.0)
-    places = settle(wanted, [box(each) for each in solid(features)], within, 4.0)
-    for label, wish, place, texts in zip(labels, wanted, places, lines, strict=True):
-        kind = label.feature.kind
+    settled = settled_labels(
+        features,
+        labels,
+        [(_LETTER_PX * max(map(len, each)) + 4.0, _LINE_PX * len(each)) for each in lines],
+        box,
+        lambda each: box(each) if each.kind in STANDING else None,
+        Rectangle(0.0, -float(view.height_px), float(view.width_px), 0.0),
+        gap=4.0,
+        far=10.0,
+    )
+    for each, texts in zip(settled, lines, strict=True):
+        kind = each.label.feature.kind
         colour = _hex(INK if kind is Kinds.STRUCTURE else kind.look.line or INK)
-        line = leader(wish.own, place, 10.0)
-        if line is not None:
-            (x0, y0), (x1, y1) = line
+        if each.leader is not None:
+            (x0, y0), (x1, y1) = each.leader
             yield (
                 f'<line x1="{x0:g}" y1="{-y0:g}" x2="{x1:g}" y2="{-y1:g}" stroke="{colour}"'
                 ' stroke-width="0.8"></line>'
             )
-        x, _ = place.centre
+        x, _ = each.place.centre
         for number, text in enumerate(texts):
-            y = -place.top + _LINE_PX * (number + 0.8)
+            y = -each.place.top + _LINE_PX * (number + 0.8)
             yield _text(x, y, text, colour, 13 if number == 0 else 12)
 
 

@@ -358,11 +358,6 @@ class Engine(ABC):
         return made
 
 
-def plain_settings(engine: Engine) -> Mapping[str, Any]:
-    """Return the values of an engine's own options, for records."""
-    return {option.name: getattr(engine, option.name) for option in engine.options}
-
-
 @dataclass(frozen=True)
 class _Row:
     """Where an engine is, and what must be known of it before it is imported.

@@ -5,7 +5,7 @@ Their impulses are in simulation units; a calibration of the scenario turns them
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
@@ -25,12 +25,12 @@ from blast_env.engines.contract import BlastLoads, Engine, StructureLoad, find_e
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.geometry import Element, layout_text
 from blast_env.physics.engine import BallStates, BlastRun, CollisionArray, EndReason
-from blast_env.physics.scene import Charge, Scene
+from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.provenance import versions
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
-from blast_env.scenario.build_scene import build_scene, draw_threat
-from blast_env.values import number_pair, path_of
+from blast_env.scenario.build_scene import build_scene
+from blast_env.values import path_of
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
@@ -185,16 +185,6 @@ class Blast:
     def scene(self) -> Scene:
         """The initial state."""
         return build_scene(self.scenario, self.layout, self.seed, self.charge)
-
-    def with_charge_at(self, position_m: Sequence[float]) -> "Blast":
-        """Return the same blast with the charge at (x, y) and the mass that it had.
-
-        Raises:
-            BlastEnvError: If that is not a pair of finite numbers.
-        """
-        x_m, y_m = number_pair("charge_position_m", position_m)
-        drawn = draw_threat(self.scenario, self.seed) if self.charge is None else self.charge
-        return replace(self, charge=Charge((x_m, y_m), drawn.tnt_kg, drawn.height_m))
 
     @cached_property
     def particle_engine(self) -> ParticleEngine:

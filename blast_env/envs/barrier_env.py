@@ -49,10 +49,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     """Barriers are placed one by one to shield a structure; then a charge goes off.
 
     ## Description
-    A site has structures, some of them protected, places where a charge may be, and a build zone.
-    Each action puts a barrier module, or a piece of the zone's catalogue, on a cell of the zone.
-    When the agent has finished, or the stock is used up, the charge goes off. The less impulse the
-    protected structures take, the better the layout is. The scenario says which layouts are legal.
+    Each action puts a barrier module, or a piece of a catalogue, on a cell of the build zone. When
+    the agent has finished, or the stock is used up, the charge goes off. The less impulse the
+    protected structures take, the better the layout is. The scenario says what is legal.
 
     ## Action space
     `Discrete(variants * rows * columns + 1)`. A variant is an item of the catalogue in one
@@ -71,8 +70,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     and the cost of illegal actions. `info["reward_terms"]` has the terms: `impulse` (`peak` in psi
     or `load` without a unit, where the scenario's objective counts these), `deposit` and
     `illegal_actions`. `reward="terminal"` pays when the charge goes off. Its first step pays a
-    deposit of twice the impulse without a barrier, which comes back at the end: to be cut off by a
-    time limit never pays. `"incremental"` pays each module what it takes off, at once.
+    deposit of twice the impulse without a barrier, back at the end, so that to be cut off never
+    pays. `"incremental"` pays each module what it takes off, at once.
 
     ## Starting state
     No module stands. `threat="visible"` draws one charge and shows it; `"hidden"` draws `threats`
@@ -83,8 +82,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     ## Episode end
     Terminated when the agent finishes, when nothing more can be placed, or after
     `illegal_action_limit` illegal actions. Never truncated by itself. At the end `info` has the
-    impulses with and without the barrier, `reduction`, `layout`, `charges`, `blast_seeds`,
-    `scenario_hash`, `calibration`, and how many blasts were run.
+    impulses with and without the barrier, `reduction`, `layout`, and what repeats the blasts.
 
     ## Arguments
     Those of `__init__`, below.

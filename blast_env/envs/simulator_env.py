@@ -373,62 +373,38 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     `Discrete(1)`: the only action, 0, is to go on.
 
     ## Observation space
-    A dictionary. With an engine of particles:
+    A dictionary. Particles give the first three, gas dynamics all but `particle_counts`:
 
     | key | shape | dtype | meaning | unit |
     |---|---|---|---|---|
-    | `module_impulses` | (modules,) | float64 | impulse on each module so far | simulation units |
+    | `module_impulses` | (modules,) | float64 | on each module so far | simulation units; N s |
     | `particle_counts` | (2,) | int64 | explosive balls and air balls on the site | |
     | `time_s` | (1,) | float64 | time since the detonation | s |
-
-    With `engine="gas"`:
-
-    | key | shape | dtype | meaning | unit |
-    |---|---|---|---|---|
-    | `module_impulses` | (modules,) | float64 | momentum on each module's walls so far | N s |
     | `structure_impulses` | (structures,) | float64 | mean over the walls that count | Pa s |
     | `overpressure` | (rows, columns) | float32 | of the cells 1.5 m above the site | Pa |
     | `gauges` | (gauges,) | float64 | overpressure at the scenario's gauges | Pa |
-    | `time_s` | (1,) | float64 | time since the detonation | s |
 
-    The modules are those of all structures, without the barrier's, in the order of
-    `info["module_ids"]`. Impulses of gas are those of all positive phases; the rows of
-    `overpressure` go upwards, and solids have 0.
+    The modules are those of all structures, without the barrier's, as in `info["module_ids"]`.
+    The rows of `overpressure` go upwards, and solids have 0.
 
     ## Rewards
-    Minus the impulse that the protected structures took in this step, times their weights, in
-    simulation units, or in Pa s with gas. Over an episode it adds up to minus the impulse that
-    `blast_env.simulate` gives for the same scenario, layout and seed: exactly, when the weights
-    are powers of two (they are 1 unless a scenario says otherwise), since recorded impulses of
-    particles are multiples of a power of two; with gas up to rounding.
+    Minus the impulse that the protected structures took in this step, by weight, in simulation
+    units, or in Pa s with gas. Over an episode it adds up to minus what `blast_env.simulate` gives:
+    exactly for particles with weights that are powers of two, with gas up to rounding.
 
     ## Starting state
-    `reset(seed=s)` lays out the blast of the seed `s`, the same as `simulate(..., seed=s)`;
-    without a seed one is drawn. With gas the seed draws the charge alone, and the blast begins
-    when its front is near the first solid: what was before is in the loads and at the gauges.
-    Options: `"layout"`, cells of barrier modules; `"charge_position_m"`, (x, y) of the charge,
-    whose mass is then drawn as before.
+    `reset(seed=s)` lays out the blast of `simulate(..., seed=s)`; without a seed one is drawn.
+    With gas the seed draws the charge alone, and the blast begins when its front is near the first
+    solid: what was before is in the loads and at the gauges. Options: `"layout"`, and
+    `"charge_position_m"`, (x, y) of the charge, whose mass is then drawn as before.
 
     ## Episode end
-    Terminated when the run has ended (`info["end_reason"]` says why); never truncated.
-
-    ## Information
-    `reset`: `seed`, `scenario_hash`, `charge_position_m`, `charge_tnt_kg`, `layout`,
-    `module_ids`. `step`: with particles `collisions`, this step's collisions, each a dictionary
-    (the keys are `blast_env.recording.tables.COLLISION_COLUMNS`), and `impulse_sim`, the weighted
-    impulse so far; with gas `impulse_pa_s`, the same in Pa s. At the end `end_reason` and
-    `digest`.
+    Terminated when the run has ended (`info["end_reason"]` says why); never truncated. `step` tells
+    `collisions` (the keys of `blast_env.recording.tables.COLLISION_COLUMNS`) and `impulse_sim`, or
+    with gas `impulse_pa_s`; at the end also `digest`.
 
     ## Arguments
-    - `scenario`: bundled name, path of a scenario file, a `Scenario` or its plain data.
-    - `layout`: the default layout.
-    - `engine`: name of an engine, or an engine.
-    - `step_s`: simulated time per step, s.
-    - `render_mode`: `None`, `"rgb_array"` or `"human"`; with gas the overpressure in plan and in
-      a vertical section, on a scale that ends at the peak that Kingery and Bulmash have in the
-      open as near to the charge as the nearest structure that counts.
-    - `cell_m`: side of the cells of gas dynamics, m; 0.5 unless given.
-
+    Those of `__init__`, below.
     >>> import gymnasium as gym, blast_env
     >>> env = gym.make("BlastSimulator-v0", scenario="free_field", step_s=0.01)
     >>> observation, info = env.reset(seed=0)
@@ -444,11 +420,8 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     - v0: first version.
 
     ## Notes
-    Particles are two-dimensional and have no negative phase; their impulses are in simulation
-    units until a calibration converts them. A time step of the engine is not cut at the end of a
-    `step`, so that `time_s` runs past a multiple of `step_s` by less than one of them, which are
-    at most `stepping.longest_step_s` (2 ms) long. Gas is three-dimensional and a blast of it has
-    no noise.
+    Particles are two-dimensional and have no negative phase. The engine's last time step, of 2 ms
+    at most, is not cut at the end of a `step`: `time_s` runs past a multiple of `step_s`.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (Gymnasium's declaration)
@@ -466,6 +439,21 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         render_mode: str | None = None,
         cell_m: float | None = None,
     ) -> None:
+        """Make an environment; `gymnasium.make` hands its keywords over to this.
+
+        Args:
+            scenario: Bundled name, path of a scenario file, a `Scenario` or its plain data.
+            layout: The default layout.
+            engine: Name of an engine, or an engine.
+            step_s: Simulated time per step.
+            render_mode: `None`, `"rgb_array"` or `"human"`; with gas the overpressure in plan and
+                in a vertical section, on a scale that ends at the peak that Kingery and Bulmash
+                have in the open as near to the charge as the nearest structure that counts.
+            cell_m: Side of the cells of gas dynamics; 0.5 m unless given.
+
+        Raises:
+            BlastEnvError: If an argument is of no use; the message names it and its bounds.
+        """
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.scenario = find_scenario(scenario)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.labels import Label, Wanted, labels_of, leader, settle, solid
+from blast_env.labels import Label, labels_of, settled_labels
 from blast_env.physics.structure import Colour, ModularObstacle, ModularPart, load_colour
 from blast_env.plan import (
     BARRIER,
@@ -554,21 +554,26 @@ def names_layer(
     plates = [_plate(lettering, label) for label in labels]
     # The outer modules alone bear loads: a name on the inner ones hides nothing.
     ring = MODULE_SIDE_M * view.pixels_per_m
-    wanted = [
-        Wanted(box(label.feature), plate.get_size(), box(label.feature).grown(-ring))
-        for label, plate in zip(labels, plates, strict=True)
-    ]
     site = view.rectangle(view.site_m)
     within = Rectangle(site.left, -site.bottom, site.right, -site.top).grown(-_NAME_GAP_PX)
-    places = settle(wanted, [box(each) for each in solid(features)], within, _NAME_GAP_PX)
+    settled = settled_labels(
+        features,
+        labels,
+        [plate.get_size() for plate in plates],
+        box,
+        lambda each: box(each).grown(-ring),
+        within,
+        gap=_NAME_GAP_PX,
+        far=2.0 * _NAME_GAP_PX,
+    )
     layer = empty_surface(*size_px)
-    for label, wish, place in zip(labels, wanted, places, strict=True):
-        line = leader(wish.own, place, 2.0 * _NAME_GAP_PX)
-        if line is not None:
-            (x0, y0), (x1, y1) = line
-            pygame.draw.aaline(layer, label.feature.kind.look.line or INK, (x0, -y0), (x1, -y1))
-    for plate, place in zip(plates, places, strict=True):
-        layer.blit(plate, (round(place.left), round(-place.top)))
+    for each in settled:
+        if each.leader is not None:
+            (x0, y0), (x1, y1) = each.leader
+            colour = each.label.feature.kind.look.line or INK
+            pygame.draw.aaline(layer, colour, (x0, -y0), (x1, -y1))
+    for plate, each in zip(plates, settled, strict=True):
+        layer.blit(plate, (round(each.place.left), round(-each.place.top)))
     return layer
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
-from blast_env.labels import Wanted, labels_of, leader, settle, solid
+from blast_env.labels import labels_of, settled_labels
 from blast_env.physics.scene import StructureOutline
 from blast_env.physics.structure import LoadColours, ModularObstacle
 from blast_env.plan import (
@@ -320,22 +320,24 @@ def write_names(
     texts = [_text(axes, label.text, label.feature.kind) for label in labels]
     _lay_out(figure)
     pixels_per_pt = figure.dpi / 72.0
-    taken = [_boxes(axes, each, view, pixels_per_pt)[0] for each in solid(features)]
-    taken += _other_texts(axes, texts)
-    wanted = []
-    for text, label in zip(texts, labels, strict=True):
-        own, room = _boxes(axes, label.feature, view, pixels_per_pt)
-        extent = text.get_window_extent()
-        wanted.append(Wanted(own, (extent.width, extent.height), room if inside else None))
-    within = Rectangle(*axes.get_window_extent().extents)
-    places = settle(wanted, taken, within, _GAP_PT * pixels_per_pt)
+    extents = [text.get_window_extent() for text in texts]
+    settled = settled_labels(
+        features,
+        labels,
+        [(extent.width, extent.height) for extent in extents],
+        lambda each: _boxes(axes, each, view, pixels_per_pt)[0],
+        lambda each: _boxes(axes, each, view, pixels_per_pt)[1] if inside else None,
+        Rectangle(*axes.get_window_extent().extents),
+        gap=_GAP_PT * pixels_per_pt,
+        far=_FAR_PT * pixels_per_pt,
+        others=_other_texts(axes, texts),
+    )
     to_data = axes.transData.inverted()
-    for text, wish, place in zip(texts, wanted, places, strict=True):
-        x, y = to_data.transform(place.centre).tolist()
+    for text, each in zip(texts, settled, strict=True):
+        x, y = to_data.transform(each.place.centre).tolist()
         text.set_position((x, y))
-        line = leader(wish.own, place, _FAR_PT * pixels_per_pt)
-        if line is not None:
-            ends = to_data.transform(line)
+        if each.leader is not None:
+            ends = to_data.transform(each.leader)
             axes.add_line(Line2D(*ends.T, color=text.get_color(), linewidth=0.6, zorder=5.9))
 
 

@@ -25,11 +25,9 @@ from blast_env.files import make_folder, write_atomically
 from blast_env.rendering.figures import save_figure
 from blast_env.scenario import Scenario, bundled_scenarios
 from blast_env.tables import markdown_table
-from studies.difficulty.figure import difficulty_figure
+from studies.difficulty.figure import difficulty_figure, items_figure
 from studies.difficulty.items import ItemEffort, ItemResult, ItemStudy, cost_of, pieces_text
-from studies.difficulty.items_figure import items_figure
-from studies.difficulty.outcomes import TaskResult, WayOutcome
-from studies.difficulty.study import DifficultyStudy, Effort
+from studies.difficulty.study import DifficultyStudy, Effort, TaskResult, WayOutcome
 from studies.difficulty.verdict import (
     Criterion,
     difficulty_criteria,

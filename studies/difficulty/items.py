@@ -42,8 +42,7 @@ from blast_env.scenario import (
     VehicleCharge,
     VehicleSource,
 )
-from studies.difficulty.outcomes import TaskResult, WayOutcome
-from studies.difficulty.study import STAND_OFFS
+from studies.difficulty.study import STAND_OFFS, TaskResult, WayOutcome
 
 METHOD: Final = "annealing"
 """The search; it begins with the best of rules, random layouts and random walls."""

@@ -6,7 +6,7 @@ from typing import Final
 
 from blast_env.statistics import Estimate
 from studies.difficulty.items import ItemResult
-from studies.difficulty.outcomes import TaskResult, WayOutcome
+from studies.difficulty.study import TaskResult, WayOutcome
 from studies.noise import Noise
 
 LEAST_REDUCTION, MOST_REDUCTION = 0.15, 0.85

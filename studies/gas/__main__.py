@@ -26,13 +26,19 @@ from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.gas.cells import CellLoads, cell_loads, difference
 from studies.gas.corners import EXPERIMENT, REGIONS, ExperimentalBand, corner_waves
-from studies.gas.ending import Ending, ending
-from studies.gas.handover import load_from_radius
 from studies.gas.judgement import Judgement
 from studies.gas.judgement import judge as judgement
-from studies.gas.loads import impulse_until
+from studies.gas.loads import (
+    BARRIER_M,
+    BUILDING_M,
+    Ending,
+    ending,
+    impulse_until,
+    load_from_radius,
+    with_heights,
+    yard,
+)
 from studies.gas.reference import free_field, wide_wall
-from studies.gas.sites import BARRIER_M, BUILDING_M, with_heights, yard
 from studies.gas.sources import source_ratios, trade_off_figure
 
 CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}

@@ -19,8 +19,8 @@ from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
 from blast_env.units import MODULE_SIDE_M
+from studies.gas.loads import with_heights
 from studies.gas.reference import free_field_gauges
-from studies.gas.sites import with_heights
 
 _MARGIN_M: Final = 10.0
 """Open ground around the block; its size does not matter, the borders being open."""

@@ -3,12 +3,15 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium import spaces
 
 import blast_env
+from blast_env.envs.observations import Observable
 from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.scenario import Placement, Scenario
 from blast_env.units import PA_PER_PSI
 from tests.envs.small import ThinEngine, make, play, same, small_scenario
 
@@ -224,6 +227,31 @@ def test_a_reward_of_ones_own_names_its_terms() -> None:
     assert [step[1] for step in steps[1:]] == [1.0, 2.0, 3.0 - 7.0]
     terms = {"modules": 3.0, "end": -7.0, "illegal_actions": 0.0}
     assert steps[-1][4]["reward_terms"] == terms
+
+
+class CountOfModules:
+    """An observation of a user's: a number, and how it is made for an episode."""
+
+    def space(self, scenario: Scenario) -> spaces.Box:
+        return spaces.Box(0.0, float(scenario.zone.stock), (1,), np.float32)
+
+    def episode(self, observable: Observable) -> "CountOfModules":
+        assert len(observable.sources) == 1  # the charge is visible
+        return self
+
+    def observe(self, placement: Placement) -> np.ndarray:
+        return np.array([len(placement.layout)], dtype=np.float32)
+
+
+def test_an_observation_of_ones_own_is_seen() -> None:
+    env = make(observation=CountOfModules())
+    assert env.observation_space == CountOfModules().space(small_scenario())
+    assert [float(step[0][0]) for step in play(env, seed=1)] == [0.0, 1.0, 2.0, 3.0]
+
+
+def test_an_observation_without_an_episode_is_refused() -> None:
+    with pytest.raises(BlastEnvError, match="or have the method episode"):
+        make(observation=object())
 
 
 def test_a_reward_must_not_name_the_term_of_the_environment() -> None:

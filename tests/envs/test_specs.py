@@ -1,5 +1,6 @@
 """Specifications of environments survive JSON, and vectors can be made in every mode."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.envs.vector import ThreadedVectorEnv
 from blast_env.scenario import Scenario, load_scenario, save_scenario
 from blast_env.sites import SiteSource
@@ -147,3 +149,20 @@ def test_the_specification_of_a_vector_of_threads_survives_json() -> None:
     assert same(again.reset(seed=3), vector.reset(seed=3))
     for each in (vector, again):
         each.close()
+
+
+@pytest.mark.parametrize("kind", [BlastBarrierEnv, BlastSimulatorEnv])
+def test_docstrings_have_the_sections_of_gymnasium_and_at_most_60_lines(kind: type) -> None:
+    text = kind.__doc__ or ""
+    assert len(text.splitlines()) <= 60
+    assert re.findall(r"^ +## (.+)$", text, re.MULTILINE) == [
+        "Description",
+        "Action space",
+        "Observation space",
+        "Rewards",
+        "Starting state",
+        "Episode end",
+        "Arguments",
+        "Version history",
+        "Notes",
+    ]

@@ -14,8 +14,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange
 from blast_env.export import SUFFIXES
 from blast_env.scenario import Placement, save_scenario
-from studies.demo import AGENT, DemoSettings, clear, demonstrate
-from studies.demo_comparison import AgentComparison
+from studies.demo import AGENT, AgentComparison, DemoSettings, clear, demonstrate
 from tests.agents.league_cases import TRAINING, result, standings
 from tests.agents.test_self_labelling import SMALL, wide_yard
 

@@ -11,6 +11,7 @@ from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Placement, Scenario, VehicleCharge
 from studies.difficulty.__main__ import elsewhere_text, item_rows, joint_rows, with_items
+from studies.difficulty.figure import items_figure
 from studies.difficulty.items import (
     POST_RULES,
     RULES,
@@ -22,8 +23,7 @@ from studies.difficulty.items import (
     pieces_text,
     rules_of,
 )
-from studies.difficulty.items_figure import items_figure
-from studies.difficulty.outcomes import TaskResult, WayOutcome
+from studies.difficulty.study import TaskResult, WayOutcome
 from studies.difficulty.verdict import item_criteria, joint_criteria
 from tests.catalogue_sites import yard_document
 from tests.vehicle_sites import gate_site

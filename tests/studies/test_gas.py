@@ -14,10 +14,8 @@ from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from studies.gas.cells import CellLoads, cell_loads, difference
 from studies.gas.corners import BlockGeometry, corner_waves
-from studies.gas.ending import Ending, ending
-from studies.gas.loads import protected_impulse_pa_s
+from studies.gas.loads import Ending, ending, protected_impulse_pa_s, with_heights, yard
 from studies.gas.reference import free_field, wide_wall
-from studies.gas.sites import with_heights, yard
 from studies.gas.sources import CHOSEN, source_ratios, trade_off_figure
 from tests.gas_sites import hut
 

@@ -23,8 +23,7 @@ from studies.difficulty.__main__ import (
     with_section,
 )
 from studies.difficulty.figure import difficulty_figure
-from studies.difficulty.outcomes import TaskResult, WayOutcome
-from studies.difficulty.study import STAND_OFFS, DifficultyStudy, Effort
+from studies.difficulty.study import STAND_OFFS, DifficultyStudy, Effort, TaskResult, WayOutcome
 from studies.difficulty.verdict import difficulty_criteria
 from tests.agents.search_cases import ballistic
 
