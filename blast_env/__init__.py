@@ -15,6 +15,8 @@ from blast_env.envs.registration import register_environments as _register_envir
 from blast_env.provenance import package_version
 
 if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checkers
+    from blast_agents.proposal import propose, search
+
     from blast_env.engines.contract import Engine
     from blast_env.engines.gas import GasBlast, GasResult
     from blast_env.engines.particles import Blast, BlastResult
@@ -47,7 +49,9 @@ _PLACES: Final[Mapping[str, str]] = MappingProxyType(
         "evaluate_layout": "blast_env.evaluation.report",
         "load_layout": "blast_env.scenario",
         "load_scenario": "blast_env.scenario",
+        "propose": "blast_agents.proposal",
         "save_scenario": "blast_env.scenario",
+        "search": "blast_agents.proposal",
         "simulate": "blast_env.engines.simulate",
         "simulate_many": "blast_env.engines.simulate",
         "write_layout": "blast_env.scenario",
@@ -71,7 +75,9 @@ __all__ = [
     "evaluate_layout",
     "load_layout",
     "load_scenario",
+    "propose",
     "save_scenario",
+    "search",
     "simulate",
     "simulate_many",
     "write_layout",

@@ -15,9 +15,8 @@ from typing import Annotated, Final
 
 import numpy as np
 import typer
-from blast_agents.posts import VEHICLE_RULES
-from blast_agents.rules import expected_charge, random_layout, rules_for
-from blast_agents.search import LayoutProblem
+from blast_agents.rules import random_layout
+from blast_agents.search import LayoutProblem, layouts_by_rule
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -146,16 +145,7 @@ def rule_layouts(site: Scenario) -> dict[str, Layout]:
     """
     if not site.zone.items:
         return {}
-    rules = {**rules_for(site), **(VEHICLE_RULES if site.vehicles else {})}
-    layouts: dict[str, Layout] = {}
-    for name, rule in rules.items():
-        try:
-            layout = rule(site, expected_charge(site.charge))
-        except BlastEnvError:  # no line of sight
-            continue
-        if layout:
-            layouts[name] = layout
-    return layouts
+    return {name: layout for name, layout in layouts_by_rule(site).items() if layout}
 
 
 def drawn_sites(seed: int, ranges: AnyRanges) -> Iterator[Scenario]:

@@ -289,10 +289,10 @@ def clear(run: Path) -> None:
 def compare_methods(settings: DemoSettings, trained: TrainingResult) -> AgentComparison:
     """Hold the best weights of the training against the other methods, on unseen threats."""
     scenario = trained.folder.scenario(trained.configuration)
-    agent = replace(TrainedRun.load(settings.run).entry, name=AGENT)
+    agent = replace(TrainedRun.load(settings.run).entry, title=AGENT)
     contest = Contest(
         known_track(scenario, settings.threats, seeds=1, noisy=False),
-        (*standard_entries(methods=(), budgets=(), items=bool(scenario.zone.items)), agent),
+        (*standard_entries([scenario]), agent),
         ResultStore(settings.out / "results"),
         trained.configuration.settings.engine,
     )

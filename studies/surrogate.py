@@ -16,12 +16,11 @@ import typer
 from blast_agents.league import known_track
 from blast_agents.league.trained import TrainedRun, check_runs
 from blast_agents.rules import random_layout
-from blast_agents.search.by_rule import layouts_by_rule
-from blast_agents.search.from_policy import SamplingAgent
+from blast_agents.search import SamplingAgent, layouts_by_rule
 from blast_agents.search.moves import Moves, random_walls
 from blast_agents.surrogate.fitting import Errors, Samples, errors, fit, folds
 from blast_agents.surrogate.network import Check, Fit, Surrogate, load_surrogate
-from blast_agents.surrogate.search import Guesses, SurrogateAgent, improved
+from blast_agents.surrogate.search import Guesses, LearntSearch, improved
 from blast_agents.training import load_agent
 
 from blast_env.cli.cluster import ClusterAddress, running_on
@@ -214,15 +213,16 @@ class LayoutsJudged:
 
 
 def verdict(
-    agent: SurrogateAgent, evaluator: BlastEvaluator, threat: Threat, processes: int = 1
+    search: LearntSearch, evaluator: BlastEvaluator, threat: Threat, processes: int = 1
 ) -> LayoutsJudged:
     """Judge what the surrogate proposes against a charge, and the rules' layouts."""
     scenario = evaluator.scenario
     began_s = perf_counter()
-    proposed = agent.propose(scenario, threat.charge)
+    proposed = search.at_once(scenario, threat.charge)
     ms = MS_PER_S * (perf_counter() - began_s)
     case = Case(scenario, (threat,), charge=threat.charge)
-    bare, guessed = Guesses.of(agent.surrogate, case).loads([(), proposed])
+    assert search.surrogate is not None
+    bare, guessed = Guesses.of(search.surrogate, case).loads([(), proposed])
     rules = layouts_by_rule(scenario, threat.charge)
     reduction, *ruled = reductions_of(evaluator, case, [proposed, *rules.values()], processes)
     return LayoutsJudged(
@@ -264,7 +264,7 @@ def judge(
     A surrogate that is exploited promises more than gas dynamics gives.
     """
     with user_errors(), running_on(cluster):
-        agent = SurrogateAgent(load_surrogate(surrogate), changes)
+        search = LearntSearch(load_surrogate(surrogate), changes=changes)
         rows = []
         for name in scenarios:
             scenario = load_scenario(name)
@@ -273,7 +273,7 @@ def judge(
             found = []
             with progress_bar(scenario.name) as progress:
                 for done, threat in enumerate(threats, start=1):
-                    found.append(verdict(agent, evaluator, threat, processes))
+                    found.append(verdict(search, evaluator, threat, processes))
                     progress(done / len(threats))
             rows.append(_verdict_row(scenario.name, found))
     headers = ("scenario", "surrogate", "it promised", "best rule each", "best single rule", "ms")

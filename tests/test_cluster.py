@@ -121,7 +121,8 @@ def test_a_worker_with_other_code_is_refused(two: Dask, monkeypatch: pytest.Monk
 
 
 def test_a_command_on_a_cluster_prints_what_it_prints_without(two: Dask) -> None:
-    arguments = ["search", "--method", "random", "--budget", "2", "--held-out", "2"]
+    arguments = ["search", "--engine", "event", "--method", "random", "--budget", "2"]
+    arguments += ["--held-out", "2"]
     alone = CliRunner().invoke(app, arguments)
     shared = CliRunner().invoke(app, [*arguments, "--cluster", str(two.file)])
     assert shared.exit_code == 0

@@ -1,11 +1,10 @@
 """Rules of thumb against vehicles: a line of posts, and a wall behind it."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from math import ceil, floor
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -79,12 +78,6 @@ def posts_and_wall(
     source = min(found.vehicles, key=lambda each: _Vehicles.scaled_m(found, each, posts.layout))
     place = worst_places(found, source, posts.layout).charge(0)
     return wall_added_to(posts, place.position_m, NEAR_CHARGE).layout
-
-
-VEHICLE_RULES: Final[Mapping[str, Callable[[AnyScenario, AnyCharge | None], Layout]]] = (
-    MappingProxyType({"line of posts": line_of_posts, "posts and a wall": posts_and_wall})
-)
-"""The two rules that an engineer would try first against a vehicle, by name."""
 
 
 def _line_of_posts(scenario: Scenario) -> Placement:

@@ -1,65 +1,195 @@
-"""Layouts that are proposed, and what proposes them without a blast."""
+"""What the package proposes for a site: `blast_env.propose` and `blast_env.search`."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
-from time import perf_counter, process_time
-from typing import Annotated, ClassVar, Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
 
-from pydantic import ConfigDict, Field
-
+from blast_agents.search.by_rule import BestRuleSearch
+from blast_agents.search.problem import LayoutProblem, Proposer, Report, SearchResult
+from blast_agents.search.registry import find_proposer, layouts_by_rule, proposer_row
+from blast_env.engines import JUDGE, Engine
+from blast_env.envs.episode import find_realisations
+from blast_env.errors import import_extra
+from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
 from blast_env.geometry import Layout
-from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
+from blast_env.physics.scene import Charge
+from blast_env.scenario import AnyCharge, AnyScenario, PointSource, find_scenario
+from blast_env.sites import FAMILIES
+
+HIDDEN_THREATS: Final = 8
+"""Threats that layouts meet where the charge is not known."""
 
 
 @dataclass(frozen=True)
-class Proposal:
-    """A layout that a method proposes, and what that took.
+class Chosen:
+    """A proposer that was chosen for a site.
 
     Attributes:
-        layout: (row, column) of the modules.
-        seconds: Time until the layout was there.
-        blasts: Blasts spent on it, of the engine that judges.
-        other_blasts: Blasts of another engine spent on it, for a method's own purposes.
-        cpu_s: Processor time that it took, of this process.
+        proposer: The proposer.
+        by: What it goes by, in words.
+        budget: Blasts that it takes to do all that it can.
+        source: What repeats the proposal: which weights, surrogate or rules.
     """
 
-    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
+    proposer: Proposer
+    by: str
+    budget: int
+    source: Mapping[str, str]
 
-    layout: Layout
-    seconds: Annotated[float, Field(ge=0.0)]
-    blasts: Annotated[int, Field(ge=0)] = 0
-    other_blasts: Annotated[int, Field(ge=0)] = 0
-    cpu_s: Annotated[float, Field(ge=0.0)] = 0.0
-
-
-class LayoutAgent(Protocol):
-    """Proposes a layout for a site, at once: no blast is simulated."""
-
-    def propose(self, scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
-        """Return a layout that keeps every condition of the build zone; always the same one.
-
-        Args:
-            scenario: The scenario; it has a build zone.
-            charge: Where the charge is, if that is known; otherwise the layout is for all the
-                places where the scenario may have one.
-        """
-
-
-def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
-    """Return a layout that takes no blast, and how long it took."""
-    began_s, began_cpu_s = perf_counter(), process_time()
-    layout = propose()
-    seconds, cpu_s = perf_counter() - began_s, process_time() - began_cpu_s
-    return Proposal(layout, seconds, cpu_s=cpu_s)
+    def propose(
+        self,
+        problem: LayoutProblem,
+        budget: int | None = None,
+        seed: int = 0,
+        report: Report | None = None,
+    ) -> SearchResult:
+        """Return the layout, and in `by` what it comes from; a smaller budget may be given."""
+        blasts = self.budget if budget is None else min(budget, self.budget)
+        result = self.proposer.propose(problem, blasts, seed, report)
+        by = self.by
+        if self.budget:  # which rule is it?
+            rules = layouts_by_rule(problem.scenario, problem.told)
+            by = f"{by}: {next(name for name, each in rules.items() if each == result.layout)}"
+        return replace(result, method=PackageProposer.name, by=by)
 
 
-def propose(agent: LayoutAgent, scenario: AnyScenario, charge: AnyCharge | None) -> Proposal:
-    """Return what an agent proposes, and how long it took.
+def chosen_for(problem: LayoutProblem) -> Chosen:
+    """Return what the package proposes by for a case: the first of these that can.
+
+    1. Weights that were trained for the very scenario, where some come with the package.
+    2. The surrogate, which was fitted to generated sites, where there is a catalogue. On generated
+       sites it is better than the weights for all of them.
+    3. The best rule by gas dynamics: a blast for each rule and threat.
+    """
+    scenario = problem.scenario
+    # Here, because torch and the surrogate take seconds to import, and torch is an extra.
+    with import_extra("agents", "proposals by trained weights"):
+        from blast_agents.surrogate import LearntSearch, packaged_surrogate, search_by
+        from blast_agents.training.packaged import packaged_agent
+
+    found = packaged_agent(scenario, "hidden" if problem.told is None else "visible")
+    if found is not None and found[1].scenario not in FAMILIES:
+        agent, record = found
+        weights = {"weights": record.configuration.scenario_hash[:12]}
+        return Chosen(LearntSearch(agent=agent), f"the weights of {record.scenario}", 0, weights)
+    if scenario.zone.items:
+        surrogate = packaged_surrogate()
+        known = {"surrogate": surrogate.digest}
+        return Chosen(search_by(surrogate), "guesses of gas dynamics", 0, known)
+    blasts = len(layouts_by_rule(scenario, problem.told)) * len(problem.threats)
+    rules = {"method": BestRuleSearch.name}
+    return Chosen(BestRuleSearch(), "the best rule by gas dynamics", blasts, rules)
+
+
+@dataclass(frozen=True)
+class PackageProposer:
+    """Proposes what the package thinks best for a site; see `chosen_for`."""
+
+    name: str = "package"
+
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+    ) -> SearchResult:
+        """Return the layout, and in `by` what it comes from; only the best rule takes blasts."""
+        found = chosen_for(problem).propose(problem, budget, seed, report)
+        return replace(found, budget=budget)
+
+
+def propose(
+    scenario: AnyScenario,
+    charge: AnyCharge | None = None,
+    *,
+    processes: int = 1,
+    report: Report | None = None,
+) -> SearchResult:
+    """Return the layout that the package proposes for a site, in seconds; see `chosen_for`.
 
     Args:
-        agent: The agent.
         scenario: The scenario, or its bundled name or path; it has a build zone.
-        charge: As for `LayoutAgent.propose`.
+        charge: Where the charge is, if that is known; otherwise the layout is for all the places
+            where the scenario may have one.
+        processes: Worker processes for blasts, where it takes some.
+        report: Is told how far it has come.
+
+    Returns:
+        The layout, and in `by` what it comes from.
+
+    Raises:
+        BlastEnvError: If there is no build zone, or nothing is protected.
+        MissingExtraError: If the extra `agents` is not installed.
     """
-    return timed_proposal(partial(agent.propose, find_scenario(scenario), charge))
+    problem = problem_of(scenario, charge, processes)
+    return chosen_for(problem).propose(problem, report=report)
+
+
+def search(
+    scenario: AnyScenario,
+    method: str = "genetic",
+    budget: int | None = None,
+    *,
+    charge: AnyCharge | None = None,
+    threats: int = 16,
+    seed: int = 0,
+    engine: str | Engine = JUDGE,
+    cache: str | Path | None = None,
+    initial: Sequence[Layout] = (),
+    processes: int = 1,
+    report: Report | None = None,
+) -> SearchResult:
+    """Search for the layout with the least load on the protected structures.
+
+    Args:
+        scenario: The scenario, or its bundled name or path; it has a build zone.
+        method: One of `blast_agents.search.proposers()`.
+        budget: Most blasts that may be spent; that of the method unless given.
+        charge: Where the charge is, if that is known; otherwise the layout is for all the places
+            where the scenario may have one.
+        threats: Charges that are drawn of one that is not known.
+        seed: Decides everything that is drawn.
+        engine: Name of the engine, or the engine; gas dynamics unless given.
+        cache: Folder in which blasts are kept.
+        initial: Layouts that the search begins with, beside those that it draws.
+        processes: Worker processes; they change nothing but the time.
+        report: Is told how far it has come.
+
+    Raises:
+        UnknownNameError: If there is no such method, scenario or engine.
+        BlastEnvError: If there is no build zone, nothing arrives at what is protected, or the
+            method cannot do anything with the budget.
+    """
+    found = find_scenario(scenario)
+    evaluator = BlastEvaluator(found, engine, cache=cache)
+    if charge is None:
+        case = practice_hidden(found, threats, 1, seed)
+    else:
+        realisations = find_realisations(None, "visible", evaluator.engine)
+        case = practice_visible(found, charge, realisations, seed)
+    problem = LayoutProblem(evaluator, case, processes)
+    proposer = find_proposer(method, tuple(tuple(each) for each in initial))
+    blasts = proposer_row(method).budget if budget is None else budget
+    return proposer.propose(problem, blasts, seed, report)
+
+
+def problem_of(
+    scenario: AnyScenario,
+    charge: AnyCharge | None,
+    processes: int = 1,
+    cache: str | Path | None = None,
+) -> LayoutProblem:
+    """Return what a proposal is asked and judged by: gas dynamics, and threats nobody has met.
+
+    A charge that has only one place is known, whether it is given or not.
+    """
+    found = find_scenario(scenario)
+    only = found.charge[0]
+    if charge is None and len(found.charge) == 1 and isinstance(only, PointSource):
+        charge = Charge(only.position_m, only.tnt_kg, only.height_m)
+    first = SeedRange.JUDGEMENT.value.start
+    if charge is not None:
+        case = Case(found, (Threat(charge, first),), charge=charge)
+    else:
+        threats = draw_threats(found, range(first, first + HIDDEN_THREATS))
+        case = Case(found, one_of_each_charge(threats))
+    return LayoutProblem(BlastEvaluator(found, JUDGE, cache=cache), case, processes)

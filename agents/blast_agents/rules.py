@@ -1,10 +1,14 @@
-"""Layouts by hand: rules of thumb, and random layouts."""
+"""Layouts by hand: rules of thumb, and random layouts.
+
+A rule takes a scenario and a charge, and gives a layout without a blast. `None` for the charge: it
+is not known, and the layout is against all places where it may be, or against the middle of them.
+`blast_agents.search.registry` lists the rules.
+"""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot
-from types import MappingProxyType
 from typing import Final, Literal
 
 import numpy as np
@@ -49,7 +53,10 @@ WallKind = Literal["high", "long"]
 
 
 def line_of_sight_wall(
-    scenario: AnyScenario, charge: AnyCharge, share: float = 0.5, kind: WallKind = "high"
+    scenario: AnyScenario,
+    charge: AnyCharge | None,
+    share: float = 0.5,
+    kind: WallKind = "high",
 ) -> Layout:
     """Return a wall across the line of sight from a charge to the protected structures.
 
@@ -69,8 +76,9 @@ def line_of_sight_wall(
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
-        charge: Where the charge is; its mass plays no part. See `expected_charge` for one whose
-            place is not known, as that of a vehicle: the middle of its first entry stands for it.
+        charge: Where the charge is; its mass plays no part. The middle of where it may be stands
+            for one that is not known (`expected_charge`), and the middle of its first entry for a
+            vehicle.
         share: How far through the build zone: 0 as near to the charge as a module can stand on
             the line of sight (or, where none can, beside it), 1 as near to the structures.
         kind: What is built first where there is a catalogue.
@@ -83,12 +91,14 @@ def line_of_sight_wall(
         BlastEnvError: If the scenario has no build zone, `share` is not from 0 to 1, or the charge
             is in the middle of the protected structures.
     """
-    return wall_added_to(Placement.empty(scenario), _place_m(charge), share, kind).layout
+    placement = Placement.empty(scenario)
+    return wall_added_to(placement, _place_m(placement, charge), share, kind).layout
 
 
-def _place_m(charge: AnyCharge) -> PointM:
-    """Return where a charge is, of a vehicle the middle of its first entry."""
-    return expected_charge([source_of(charge)]).position_m
+def _place_m(placement: Placement, charge: AnyCharge | None) -> PointM:
+    """Return where a charge is: the middle, where it may be in more than one place."""
+    sources = placement.scenario.charge if charge is None else (source_of(charge),)
+    return expected_charge(sources).position_m
 
 
 def wall_added_to(
@@ -152,39 +162,39 @@ def _preferred(placement: Placement, lies_along: BoolArray, kind: WallKind) -> l
     return sorted(longer or numbers, key=rank)
 
 
-def wall_near_charge(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+def wall_near_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return the line-of-sight wall as near to the charge as a module can stand."""
     return line_of_sight_wall(scenario, charge, NEAR_CHARGE)
 
 
-def wall_near_building(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+def wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return the line-of-sight wall as near to the protected structures as a module can stand."""
     return line_of_sight_wall(scenario, charge, NEAR_BUILDING)
 
 
-def long_wall_near_charge(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+def long_wall_near_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return `wall_near_charge` of the items that make most length for their cost."""
     return line_of_sight_wall(scenario, charge, NEAR_CHARGE, "long")
 
 
-def long_wall_near_building(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+def long_wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return `wall_near_building` of the items that make most length for their cost."""
     return line_of_sight_wall(scenario, charge, NEAR_BUILDING, "long")
 
 
-def ring_around_charge(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+def ring_around_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return a wall that bends around the charge, as near to it as the build zone lets it stand.
 
     Raises:
         BlastEnvError: As for `line_of_sight_wall`.
     """
     placement = Placement.empty(scenario)
-    (x_m, y_m), radius_m = _place_m(charge), placement.scenario.charge_radius_m
+    (x_m, y_m), radius_m = _place_m(placement, charge), placement.scenario.charge_radius_m
     around = Rectangle(x_m, y_m, x_m, y_m).grown(radius_m)
     return _ring(placement, around, _protected_middle_m(placement.scenario))
 
 
-def ring_around_building(scenario: AnyScenario, charge: AnyCharge) -> Layout:
+def ring_around_building(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return a wall around the protected structure nearest to a charge, as near as it may stand.
 
     It begins on the side of the charge and goes round both ways.
@@ -194,7 +204,7 @@ def ring_around_building(scenario: AnyScenario, charge: AnyCharge) -> Layout:
     """
     placement = Placement.empty(scenario)
     protected = [each.rectangle_m for each in placement.scenario.structures if each.protected]
-    x_m, y_m = _place_m(charge)
+    x_m, y_m = _place_m(placement, charge)
     here = Rectangle(x_m, y_m, x_m, y_m)
     nearest = min(protected, key=lambda rectangle: _gap_m(rectangle, here))
     return _ring(placement, nearest, (x_m, y_m))
@@ -214,33 +224,6 @@ def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     if charge is not None:
         found = found.model_copy(update={"charge": (source_of(charge),)})
     return visibility_layout(found, Visibility.of(found))
-
-
-Rule = Callable[[AnyScenario, AnyCharge], Layout]
-"""Gives a layout for a charge, without a blast."""
-
-
-RULES: Final[Mapping[str, Rule]] = MappingProxyType(
-    {"wall near the charge": wall_near_charge, "wall near the building": wall_near_building}
-)
-"""The two rules that an engineer would try first, by name."""
-
-
-ITEM_RULES: Final[Mapping[str, Rule]] = MappingProxyType(
-    {
-        **RULES,
-        "long wall near the charge": long_wall_near_charge,
-        "long wall near the building": long_wall_near_building,
-        "ring around the charge": ring_around_charge,
-        "ring around the building": ring_around_building,
-    }
-)
-"""The rules where there is a catalogue: the walls of `RULES` are of the highest items there."""
-
-
-def rules_for(scenario: AnyScenario) -> Mapping[str, Rule]:
-    """Return the rules for a scenario by name: more of them where items can be chosen."""
-    return ITEM_RULES if Placement.empty(scenario).catalogue.has_items else RULES
 
 
 def expected_charge(sources: Sequence[AnySource]) -> Charge:

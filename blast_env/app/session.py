@@ -14,6 +14,7 @@ from blast_env.app.cost import CostGuess, cost_of_blast
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
+from blast_env.app.offers import title_of
 from blast_env.app.records import (
     BlastRecord,
     EngineRecord,
@@ -199,7 +200,7 @@ class Session:
             is_run=is_run,
             cache=str(self.work.cache),
         )
-        return self._begin(task, f"proposal: {Path(proposer).name if is_run else proposer}")
+        return self._begin(task, f"proposal: {title_of(proposer)}")
 
     def search(self, method: str, budget: int, *, from_layout: bool = False) -> Path:
         """Search for a layout against the chosen threats.

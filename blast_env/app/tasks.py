@@ -10,17 +10,12 @@ from pathlib import Path
 from time import monotonic, time
 from typing import Final
 
-from blast_agents.search import (
-    LayoutProblem,
-    Progress,
-    find_search_method,
-)
-from blast_agents.search.by_rule import BestRuleSearch
-from blast_agents.surrogate import SurrogateAgent, packaged_surrogate
+from blast_agents.proposal import chosen_for
+from blast_agents.search import LayoutProblem, Progress, find_proposer
 
 from blast_env.app import placing
 from blast_env.app.blasts import run_blasts, warm_engines
-from blast_env.app.offers import PACKAGED, proposed
+from blast_env.app.offers import PACKAGED, proposed, title_of
 from blast_env.app.work import (
     BlastTask,
     FilmTask,
@@ -37,9 +32,7 @@ from blast_env.engines import JUDGE, find_engine
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.geometry import Layout
 from blast_env.scenario import Scenario
-from blast_env.sites import FAMILIES
 
-_MOST_RULES: Final = 20
 _LEAST_PAUSE_S: Final = 0.1
 _REALISATIONS: Final = 8  # of the particle model, divided among the charges
 
@@ -108,45 +101,31 @@ def run_task(folder: Path) -> None:
 
 def _propose(task: ProposalTask, teller: Teller) -> None:
     scenario = scenario_of(task.scenario)
-    layout = _proposed(task, scenario)
+    layout = _proposed(task, scenario, teller)
     words = placing.counted(scenario, layout)
-    text = f"{words}, proposed by {Path(task.proposer).name}"
+    text = f"{words}, proposed by {title_of(task.proposer)}"
     teller.tell(state="done", share=1.0, text=text, layout=placing.plain(layout))
 
 
-def _proposed(task: ProposalTask, scenario: Scenario) -> Layout:
+def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> Layout:
     known = [each.charge for each in task.threats]
     if task.is_run:
         from blast_agents.training import load_agent  # torch takes seconds to import
 
         agent = load_agent(task.proposer)
         return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None))
-    if task.proposer == PACKAGED:
-        return _packaged(task, scenario)
-    return proposed(task.proposer, scenario, known)
-
-
-def _packaged(task: ProposalTask, scenario: Scenario) -> Layout:
-    """Return what the package proposes: its weights, its surrogate, or the best rule by gas."""
-    from blast_agents.training.packaged import packaged_agent  # torch takes seconds to import
-
-    known = [each.charge for each in task.threats]
-    charge = known[0] if len(known) == 1 else None
-    found = packaged_agent(scenario, "hidden" if charge is None else "visible")
-    if found is not None and found[1].scenario not in FAMILIES:
-        return tuple(found[0].propose(scenario, charge))
-    if scenario.zone.items:
-        return tuple(SurrogateAgent(packaged_surrogate()).propose(scenario, charge))
+    if task.proposer != PACKAGED:
+        return proposed(task.proposer, scenario, known)
     case = Case(scenario, tuple(Threat(each, SeedRange.SEARCH.value.start) for each in known))
     problem = LayoutProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache or None), case)
-    method = BestRuleSearch()
-    return tuple(method.search(problem, _MOST_RULES * len(known), 0, lambda _: None).layout)
+    report: Callable[[Progress], None] = lambda progress: teller.share(progress.share)  # noqa: E731
+    return chosen_for(problem).propose(problem, report=report).layout
 
 
 def _search(task: SearchTask, teller: Teller) -> None:
     scenario = scenario_of(task.scenario)
     begin_with = placing.layout_from(scenario, task.begin_with)
-    method = find_search_method(task.method, (begin_with,) if begin_with else ())
+    method = find_proposer(task.method, (begin_with,) if begin_with else ())
     engine = find_engine(task.engine.name, task.engine.cell_m)
     problem = LayoutProblem(
         BlastEvaluator(scenario, engine, cache=task.cache), practice_case(scenario, task)
@@ -167,7 +146,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
         elif teller.is_due:
             teller.tell(share=share, text=text)
 
-    result = method.search(problem, task.budget, 0, report)
+    result = method.propose(problem, task.budget, 0, report)
     if result.load is None:
         raise KeyboardInterrupt
     reduction = 100.0 * problem.reduction(result.history[-1])

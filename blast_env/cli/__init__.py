@@ -36,8 +36,8 @@ class _Commands(LazyGroup):
             "Say what charges do to the buildings: panes, panels, level of protection.",
         ),
         "search": (
-            "blast_env.cli.search:search",
-            "Search for the layout with the least impulse on the protected structures.",
+            "blast_env.cli.search:SearchCommand",
+            "Search for the layout with the least load on the protected structures.",
         ),
         "bench": (
             "blast_env.cli.bench:BenchCommand",
@@ -48,11 +48,11 @@ class _Commands(LazyGroup):
             "Train an agent that proposes layouts, or go on with a training that was interrupted.",
         ),
         "league": (
-            "blast_env.cli.league:league",
+            "blast_env.cli.league:LeagueCommand",
             "Compare searches, rules and trained agents on the same held-out cases and seeds.",
         ),
         "propose": (
-            "blast_env.cli.propose:propose",
+            "blast_env.cli.propose:ProposeCommand",
             "Propose a layout for any site in a second or a few; no blast is run for it.",
         ),
         "report": (

@@ -6,11 +6,12 @@ Imports torch, so the command imports this module only when it is asked for a ru
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-from blast_agents.proposal import propose
+from blast_agents.search import timed_proposal
 from blast_agents.training import TrainedAgent, TrainingSettings, load_agent, newest_weights
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.environments import training_source
@@ -111,8 +112,8 @@ def _report_hidden(
         _engine(settings, options),
         cache=options.cache,
     )
-    proposal = propose(agent, source.scenario, None)
-    plan = LayoutPlan(source.scenario, proposal.layout, provenance=provenance)
+    layout = agent.propose(source.scenario)
+    plan = LayoutPlan(source.scenario, layout, provenance=provenance)
     report_layout(plan, evaluator, options)
 
 
@@ -128,7 +129,8 @@ def _report_cases(
     options.prepare_files(len(seeds))
     cases = [_fixed(case, options) for case in unseen_cases(settings, source, seeds)]
     evaluators = Evaluators(_engine(settings, options), options.cache)
-    proposals = [propose(agent, each.scenario, each.charge) for each in cases]
+    told = [(each.scenario, each.charge) for each in cases]
+    proposals = [timed_proposal(partial(agent.propose, *each)) for each in told]
     with progress_bar(f"{2 * len(cases)} blasts in {_place(settings, cases)}") as progress:
         comparison = compare(
             evaluators,

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
-
-import typer
+from typing import Final
 
 from blast_env.cli.cluster import CLUSTER_HELP
 from blast_env.cli.command import FOLDER, Command, option
@@ -109,30 +107,3 @@ def fixed_charge(
     if not isinstance(charge, VehicleCharge):
         scenario.with_charge(charge)  # refuses a place that is not clear
     return charge
-
-
-ChargePlace = Annotated[
-    tuple[float, float] | None,
-    typer.Option("--charge", metavar="X Y", help="Where the charge is, m, instead of drawing it."),
-]
-
-TntMass = Annotated[
-    float | None,
-    typer.Option("--tnt-kg", metavar="KG", help="Its mass, kg TNT, instead of the scenario's."),
-]
-
-CellSide = Annotated[float | None, typer.Option("--cell", help=CELL_HELP)]
-
-Processes = Annotated[int, typer.Option(min=1, help="Worker processes.")]
-
-CacheFolder = Annotated[
-    Path | None, typer.Option(help="Folder in which blasts are kept for the next run.")
-]
-
-CvarLevel = Annotated[float, typer.Option(help=CVAR_HELP)]
-
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, in short.")]
-
-JsonAll = Annotated[
-    bool, typer.Option("--json-all", help="Print as JSON all that there is to know of it.")
-]

@@ -1,67 +1,42 @@
 """`blast-env propose`: a layout from what comes with the package, weights or a surrogate."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Final
+from typing import Final
 
-import typer
-from blast_agents.proposal import LayoutAgent
+from blast_agents.proposal import Chosen, chosen_for, problem_of
 from blast_agents.rules import expected_charge
-from blast_agents.search.by_rule import layouts_by_rule
-from blast_agents.surrogate import SurrogateAgent, packaged_surrogate
+from blast_agents.search import LayoutProblem, Progress, SearchResult, layouts_by_rule
 
-from blast_env.cli.options import ChargePlace, Processes, TntMass
+from blast_env.cli.command import argument, option
+from blast_env.cli.options import SCENARIO_HELP, ChargeOptions, ProcessOptions
 from blast_env.cli.output import (
     make_table,
     print_line,
     progress_bar,
     result_console,
     save_pictures,
-    user_errors,
 )
 from blast_env.cli.pictures import save_layout_picture
-from blast_env.cli.targets import FileTarget, checked_targets
-from blast_env.engines import JUDGE
-from blast_env.errors import BlastEnvError, import_extra
-from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
-from blast_env.evaluation.cases import one_of_each_charge
+from blast_env.cli.search import print_cost
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import Case
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
-from blast_env.scenario import (
-    LayoutFile,
-    Placement,
-    PointSource,
-    Scenario,
-    load_scenario,
-)
+from blast_env.scenario import LayoutFile, Placement, Scenario, load_scenario
 from blast_env.scenario.zone import source_bounds_m
-from blast_env.sites import FAMILIES
 from blast_env.statistics import reductions
 from blast_env.units import MS_PER_S
-
-_HIDDEN_THREATS: Final = 8
-"""Threats that layouts meet where the charge is not known."""
 
 _PROPOSAL: Final = "this proposal"
 _NOTHING: Final = "no barrier"
 
 
-def propose(
-    scenario: Annotated[str, typer.Argument(help="Bundled name, or a scenario file.")],
-    charge: ChargePlace = None,
-    tnt_kg: TntMass = None,
-    verify: Annotated[
-        bool,
-        typer.Option("--verify", help="Judge it by gas dynamics, beside no barrier and all rules."),
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option(help="JSON file for the layout; its picture is drawn beside it.")
-    ] = None,
-    processes: Processes = 1,
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class ProposeCommand(ChargeOptions, ProcessOptions):
     """Propose a layout for any site in a second or a few; no blast is run for it.
 
     It comes from weights that were trained for the very scenario, if some come with the package; if
@@ -70,149 +45,115 @@ def propose(
     blast of gas dynamics for each rule and threat. Without --charge it is for all places where the
     charge may be.
     """
-    with user_errors(), checked_targets({"--out": FileTarget(out, (".json",))}):
-        chosen = load_scenario(scenario)
-        chosen.zone  # noqa: B018  # refuses a scenario without one
-        told = _charge(chosen, charge, tnt_kg)
-        case = _case(chosen, told)
-        evaluator = BlastEvaluator(chosen, JUDGE)
-        proposal = (
-            _by_weights(chosen, told)
-            or _by_surrogate(chosen, told)
-            or _by_best_rule(evaluator, case, processes)
-        )
-        layout = proposal.layout
-        placement = Placement.of(chosen, layout)
-        cost = "" if chosen.zone.budget is None else f", cost {placement.cost:g}"
-        print_line(f"{chosen.name}: {layout_counts(layout)}{cost}, by {proposal.how}")
-        if verify:
-            rules = layouts_by_rule(chosen, told)
-            loads = _loads(evaluator, case, {_NOTHING: (), **rules, _PROPOSAL: layout}, processes)
-            _print_verdict(loads, case)
-        if verify or evaluator.blasts:
-            print_line(evaluator.engine.describe())
-        if out is not None:
-            provenance = {**proposal.provenance, "command": command(), "versions": versions()}
-            written = [LayoutFile.of(chosen, layout, provenance).save(out)]
-            picture = out.with_suffix(".png")
-            written += save_pictures(lambda: [save_layout_picture(chosen, layout, picture)])
-            for path in written:
-                print_line(f"wrote {path}")
 
+    scenario: str = argument(SCENARIO_HELP)
+    verify: bool = option(False, "Judge it by gas dynamics, beside no barrier and the rules.")
+    budget: int | None = option(
+        None,
+        "Most blasts of gas dynamics, for --verify or for the best rule; fewer rules, then fewer "
+        "charges are compared.",
+        show_default="all that there are to run",
+        min=2,
+    )
+    out: Path | None = option(
+        None, "JSON file for the layout; its picture is drawn beside it.", writes=(".json",)
+    )
 
-def _charge(
-    scenario: Scenario, place_m: tuple[float, float] | None, tnt_kg: float | None
-) -> Charge | None:
-    """Return the charge if it is known: given, or the only place where the scenario has one."""
-    if place_m is None:
-        if tnt_kg is not None:
-            raise BlastEnvError("--tnt-kg is given without --charge: where is it?")
-        only = scenario.charge[0]
-        if len(scenario.charge) > 1 or not isinstance(only, PointSource):
+    def __call__(self) -> None:
+        """Propose, judge the proposal if that is asked for, and write it."""
+        scenario = load_scenario(self.scenario)
+        scenario.zone  # noqa: B018  # refuses a scenario without one
+        problem = problem_of(scenario, self._charge(scenario), self.processes)
+        chosen, result = self._proposed(problem)
+        placement = Placement.of(scenario, result.layout)
+        cost = "" if scenario.zone.budget is None else f", cost {placement.cost:g}"
+        print_line(f"{scenario.name}: {layout_counts(result.layout)}{cost}, by {result.by}")
+        if self.verify:
+            self._verify(problem, result.layout)
+        engine = problem.evaluator.engine
+        print_line(engine.describe() if problem.evaluator.blasts else "no blast was run")
+        if self.out is not None:
+            self._write(scenario, result.layout, chosen.source, self.out)
+
+    def _charge(self, scenario: Scenario) -> Charge | None:
+        """Return the charge if the user says where it is."""
+        if self.charge_m is None:
+            if self.tnt_kg is not None:
+                raise BlastEnvError("--tnt-kg is given without --charge: where is it?")
             return None
-        return Charge(only.position_m, only.tnt_kg, only.height_m)
-    middle = expected_charge(scenario.charge)
-    charge = Charge(place_m, middle.tnt_kg if tnt_kg is None else tnt_kg, middle.height_m)
-    scenario.with_possible_charges((charge,))  # refuses one that is not clear, or out of bounds
-    bounds = [source_bounds_m(source) for source in scenario.charge]
-    if not any(
-        each.left <= place_m[0] <= each.right and each.bottom <= place_m[1] <= each.top
-        for each in bounds
-    ):
-        print_line(
-            f"note: {scenario.name} never has a charge at ({place_m[0]:g}, {place_m[1]:g}) m: "
-            "--verify the proposal"
-        )
-    return charge
+        middle = expected_charge(scenario.charge)
+        tnt_kg = middle.tnt_kg if self.tnt_kg is None else self.tnt_kg
+        (x_m, y_m), charge = self.charge_m, Charge(self.charge_m, tnt_kg, middle.height_m)
+        scenario.with_possible_charges((charge,))  # refuses one that is not clear, or out of bounds
+        bounds = [source_bounds_m(source) for source in scenario.charge]
+        if not any(
+            each.left <= x_m <= each.right and each.bottom <= y_m <= each.top for each in bounds
+        ):
+            print_line(
+                f"note: {scenario.name} never has a charge at ({x_m:g}, {y_m:g}) m: --verify the "
+                "proposal"
+            )
+        return charge
 
+    def _proposed(self, problem: LayoutProblem) -> tuple[Chosen, SearchResult]:
+        """Return the proposal, with the time that it took where it took no blast."""
+        chosen = chosen_for(problem)
+        if chosen.budget:
+            print_line(
+                "note: single modules are placed, of which the surrogate knows nothing; the best "
+                "rule is proposed"
+            )
+            budget = chosen.budget if self.budget is None else min(self.budget, chosen.budget)
+            print_cost(problem.evaluator, problem.case, budget)
+        elif self.budget is not None and not self.verify:
+            raise BlastEnvError("--budget is for --verify: the proposal itself takes no blast here")
+        began_s = perf_counter()
+        with progress_bar(f"proposal for {problem.scenario.name}") as progress:
 
-def _case(scenario: Scenario, charge: Charge | None) -> Case:
-    """Return what layouts are judged on: the charge, or threats that no training has met."""
-    first = SeedRange.JUDGEMENT.value.start
-    if charge is not None:
-        return Case(scenario, (Threat(charge, first),), charge=charge)
-    threats = draw_threats(scenario, range(first, first + _HIDDEN_THREATS))
-    return Case(scenario, one_of_each_charge(threats))
+            def report(state: Progress) -> None:
+                progress(state.share)
 
+            result = chosen.propose(problem, self.budget, report=report)
+        if chosen.budget:
+            return chosen, result
+        ms = MS_PER_S * (perf_counter() - began_s)
+        words = "" if self.verify else " (--verify says what it is worth)"
+        return chosen, replace(result, by=f"{result.by}{words}, in {ms:,.0f} ms")
 
-@dataclass(frozen=True)
-class _Proposal:
-    """A layout, and where it comes from: for people, and for the layout's file."""
+    def _verify(self, problem: LayoutProblem, layout: Layout) -> None:
+        """Let gas dynamics judge a proposal beside no barrier and rules, within the budget."""
+        case, rules = problem.case, layouts_by_rule(problem.scenario, problem.told)
+        layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}
+        if self.budget is not None:
+            case = replace(case, threats=case.threats[: max(self.budget // 2, 1)])
+            most = self.budget // len(case.threats)
+            distinct = list(dict.fromkeys(layouts.values()))[:most]
+            layouts = {name: each for name, each in layouts.items() if each in distinct}
+        print_cost(problem.evaluator, case, len({*layouts.values()}) * len(case.threats))
+        pairs = [(each, threat) for each in layouts.values() for threat in case.threats]
+        with progress_bar(f"{len(set(pairs))} blasts of gas dynamics") as progress:
+            found = problem.evaluator.loads_of_many(pairs, problem.processes, progress)
+        loads = iter(each.load(case.scenario.objective) for each in found)
+        by_name = {
+            name: case.counted([next(loads) for _ in case.threats], each)
+            for name, each in layouts.items()
+        }
+        _print_verdict(by_name, case)
+        left_out = [name for name in rules if name not in layouts]
+        if left_out:
+            print_line(f"note: not compared for want of blasts: {', '.join(left_out)}")
+        if len(case.threats) < len(problem.threats):
+            print_line(f"note: {len(case.threats)} of {len(problem.threats)} charges were met")
 
-    layout: Layout
-    how: str
-    provenance: Mapping[str, object]
-
-
-def _by_weights(scenario: Scenario, charge: Charge | None) -> _Proposal | None:
-    """Return what the weights that come with the package propose, if there are some."""
-    # Here, because torch takes seconds to start, and is an extra.
-    with import_extra("agents", "proposals by trained weights"):
-        from blast_agents.training.packaged import packaged_agent
-
-    found = packaged_agent(scenario, "hidden" if charge is None else "visible")
-    if found is None or found[1].scenario in FAMILIES:  # there the surrogate's are better
-        return None
-    agent, record = found
-    return _timed(
-        agent,
-        scenario,
-        charge,
-        f"the weights of {record.scenario}",
-        {"weights": record.configuration.scenario_hash[:12]},
-    )
-
-
-def _by_surrogate(scenario: Scenario, charge: Charge | None) -> _Proposal | None:
-    """Return what the surrogate proposes that comes with the package, if it can."""
-    if not scenario.zone.items:
-        print_line(
-            "note: single modules are placed, of which the surrogate knows nothing; the best rule "
-            "is proposed"
-        )
-        return None
-    surrogate = packaged_surrogate()
-    return _timed(
-        SurrogateAgent(surrogate),
-        scenario,
-        charge,
-        "guesses of gas dynamics (--verify says what it is worth)",
-        {"surrogate": surrogate.digest},
-    )
-
-
-def _timed(
-    agent: LayoutAgent,
-    scenario: Scenario,
-    charge: Charge | None,
-    how: str,
-    provenance: Mapping[str, object],
-) -> _Proposal:
-    began_s = perf_counter()
-    layout = tuple(sorted(agent.propose(scenario, charge)))
-    ms = MS_PER_S * (perf_counter() - began_s)
-    return _Proposal(layout, f"{how}, in {ms:,.0f} ms", provenance)
-
-
-def _by_best_rule(evaluator: BlastEvaluator, case: Case, processes: int) -> _Proposal:
-    rules = layouts_by_rule(case.scenario, case.charge)
-    loads = _loads(evaluator, case, {_NOTHING: (), **rules}, processes)
-    name = min(rules, key=lambda rule: loads[rule])
-    return _Proposal(rules[name], f"the best rule by gas dynamics: {name}", {"rule": name})
-
-
-def _loads(
-    evaluator: BlastEvaluator, case: Case, layouts: Mapping[str, Layout], processes: int
-) -> dict[str, float]:
-    """Return the load that counts with each layout, by gas dynamics, in the objective's unit."""
-    objective = case.scenario.objective
-    pairs = [(layout, threat) for layout in layouts.values() for threat in case.threats]
-    with progress_bar(f"{len(set(pairs))} blasts of gas dynamics") as progress:
-        loads = iter(evaluator.loads_of_many(pairs, processes, progress))
-    return {
-        name: case.counted([next(loads).load(objective) for _ in case.threats], layout)
-        for name, layout in layouts.items()
-    }
+    def _write(
+        self, scenario: Scenario, layout: Layout, source: Mapping[str, str], out: Path
+    ) -> None:
+        provenance = {**source, "command": command(), "versions": versions()}
+        written = [LayoutFile.of(scenario, layout, provenance).save(out)]
+        picture = out.with_suffix(".png")
+        written += save_pictures(lambda: [save_layout_picture(scenario, layout, picture)])
+        for path in written:
+            print_line(f"wrote {path}")
 
 
 def _print_verdict(loads: Mapping[str, float], case: Case) -> None:

@@ -1,37 +1,35 @@
-"""What `blast-env search` prints and writes."""
+"""`blast-env search`: the layout with the least load, for a budget of blasts."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import typer
 from blast_agents.search import (
-    SEARCH_METHODS,
     LayoutProblem,
-    SearchMethod,
+    Proposer,
     SearchResult,
-    find_search_method,
+    find_proposer,
+    proposers,
 )
 from blast_agents.search import Progress as SearchProgress
-from blast_agents.surrogate import (
-    Surrogate,
-    SurrogateSearch,
-    load_surrogate,
-    packaged_surrogate,
-)
+from blast_agents.search.registry import DEFAULT_BUDGET, check_suits, proposer_row
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.cluster import running_on
+from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import (
-    CacheFolder,
-    CellSide,
-    ChargePlace,
-    CvarLevel,
-    Processes,
-    TntMass,
-    fixed_charge,
+    CELL_HELP,
+    CVAR_HELP,
+    ENGINE_HELP,
+    SCENARIO_HELP,
+    CacheOptions,
+    ChargeOptions,
+    ClusterOptions,
+    ProcessOptions,
 )
 from blast_env.cli.output import (
     make_table,
@@ -42,14 +40,12 @@ from blast_env.cli.output import (
     resume_with_cache,
     save_pictures,
     show_interruption,
-    user_errors,
 )
 from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
-from blast_env.cli.targets import checked_targets
-from blast_env.engines import Engine, find_engine
+from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.envs.strategies import HiddenThreat
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
     Case,
@@ -59,39 +55,178 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_against,
 )
-from blast_env.evaluation.cases import practice_hidden, practice_visible
+from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.provenance import command, versions
-from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario, write_layout
+from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
 from blast_env.statistics import CVAR_LEVEL, ConditionalValueAtRisk, WorstRisk, reductions
 from blast_env.tables import write_csv
+
+if TYPE_CHECKING:
+    from blast_agents.surrogate import Surrogate
 
 ThreatName = Literal["visible", "hidden"]
 
 LAYOUT_NAME: Final = "layout.json"
 """File of the layout in the folder of `--out`."""
 
+_SURROGATE: Final = "surrogate"
+_NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "surrogate")
+"""Options that change nothing of what is found, or are said in another way."""
 
-@dataclass(frozen=True)
-class SearchOptions:
-    """What the command was called with; see `search`."""
 
-    method: str
-    scenario: str
-    budget: int
-    seed: int
-    threat: ThreatName
-    threats: int | None
-    realisations: int | None
-    charge_position_m: tuple[float, float] | None
-    tnt_kg: float | None
-    risk: str | None
-    cvar_level: float
-    engine: str
-    cell_m: float | None
-    start_from: tuple[str, ...]
-    surrogate: str | None  # its digest
+@dataclass(frozen=True, kw_only=True)
+class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions):
+    """Search for the layout with the least load on the protected structures.
+
+    Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats that
+    the search has not met; those blasts do not count.
+    """
+
+    method: str = option("genetic", f"{', '.join(proposers())}.")
+    scenario: str = option("courtyard", SCENARIO_HELP)
+    budget: int = option(DEFAULT_BUDGET, "Most blasts that may be spent.", min=1)
+    seed: int = option(0, "Decides threats and search.", min=0)
+    threat: ThreatName = option(
+        "visible", "One charge that is known, or a layout for wherever it may be."
+    )
+    threats: int | None = option(None, "Charges of a hidden threat; 16 unless given.", min=1)
+    realisations: int | None = option(
+        None,
+        "Blasts of particles a charge; 2 (visible) or 1 (hidden) unless given.",
+        min=1,
+    )
+    risk: str | None = option(
+        None,
+        "mean, cvar or worst, over the charges.",
+        show_default="as the scenario's objective says",
+    )
+    cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
+    engine: str = option(JUDGE, ENGINE_HELP)
+    cell_m: float | None = option(None, CELL_HELP)
+    start_from: tuple[Path, ...] = option((), "Layout file to begin with; more than one will do.")
+    surrogate: Path | None = option(
+        None,
+        "File of the surrogate for --method surrogate (studies.surrogate fit).",
+        show_default="the package's",
+    )
+    held_out: int = option(32, "Threats that the result is checked on at the end.", min=1)
+    out: Path | None = option(
+        None, "Folder for layout, its plan, history, front and figure.", writes=FOLDER
+    )
+
+    def __call__(self) -> None:
+        """Search, check the result, and write what came of it."""
+        with running_on(self.cluster):
+            engine = find_engine(self.engine, self.cell_m)
+            evaluator = BlastEvaluator(load_scenario(self.scenario), engine, cache=self.cache)
+            if self.out is not None:
+                make_folder(self.out)
+            method, surrogate = self._method(evaluator.scenario)
+            run = self._run(method, evaluator)
+            if run.result.interrupted and not run.result.history:
+                raise KeyboardInterrupt  # nothing was found that could be kept
+            checked = self._check(run)
+            print_search(run, checked)
+            if self.out is not None:
+                options = {**self._options(), "surrogate": surrogate}
+                write_search(run, options, checked, self.out)
+        if run.result.interrupted:
+            layout = None if self.out is None else self.out / LAYOUT_NAME
+            show_interruption(
+                "the best layout so far was kept",
+                "" if layout is None else f"--start-from {layout} begins with it",
+                resume_with_cache(self.cache),
+            )
+            raise typer.Exit(130)
+
+    def _options(self) -> dict[str, Any]:
+        """Return the options that decide what is found, as plain data."""
+        named = {each.name: getattr(self, each.name) for each in fields(self)}
+        named["start_from"] = [str(path) for path in self.start_from]
+        return {name: each for name, each in named.items() if name not in _NOT_OF_THE_SEARCH}
+
+    def _method(self, scenario: Scenario) -> "tuple[Proposer, str | None]":
+        """Return the method, and the digest of its surrogate if it has one."""
+        if self.surrogate is not None and self.method != _SURROGATE:
+            raise BlastEnvError(f"--surrogate is for --method {_SURROGATE}, not {self.method}")
+        proposer_row(self.method)  # refuses an unknown one
+        guessing = self._surrogate() if self.method == _SURROGATE else None
+        check_suits(self.method, scenario)
+        initial = tuple(load_layout(path, scenario) for path in self.start_from)
+        if guessing is None or initial:
+            return find_proposer(self.method, initial), None
+        # Here, because it takes half a second to import.
+        from blast_agents.surrogate import search_by
+
+        return search_by(guessing), guessing.digest
+
+    def _surrogate(self) -> "Surrogate":
+        # Here, because it takes half a second to import.
+        from blast_agents.surrogate import load_surrogate, packaged_surrogate
+
+        return packaged_surrogate() if self.surrogate is None else load_surrogate(self.surrogate)
+
+    def _run(self, method: Proposer, evaluator: BlastEvaluator) -> "SearchRun":
+        case = self._practice(evaluator.scenario, evaluator.engine)
+        problem = LayoutProblem(evaluator, case, self.processes)
+        print_cost(evaluator, case, self.budget)
+        problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
+        hits, begun_s = evaluator.cache_hits, perf_counter()
+        result = self._with_progress(method, problem)
+        return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)
+
+    def _practice(self, scenario: Scenario, engine: Engine) -> Case:
+        """Return what the search may spend its blasts on."""
+        model = find_threat_model(self.threat, self.threats)
+        realisations = find_realisations(self.realisations, self.threat, engine)
+        risk = find_risk(self.risk, self.cvar_level)
+        if not isinstance(model, HiddenThreat):
+            # The charge that is known is always that of the search's own seed.
+            charge = self.fixed(scenario, scenario.sample_charge(np.random.default_rng(self.seed)))
+            return practice_visible(scenario, charge, realisations, self.seed, risk)
+        for flag, value in (("--charge", self.charge_m), ("--tnt-kg", self.tnt_kg)):
+            if value is not None:
+                raise BlastEnvError(f"{flag} is for a visible threat: a hidden one is drawn")
+        return practice_hidden(scenario, model.threats, realisations, self.seed, risk)
+
+    def _with_progress(self, method: Proposer, problem: LayoutProblem) -> SearchResult:
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("blasts, best reduction {task.fields[best]}"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=message_console(), transient=True) as progress:
+            label = f"{method.name} search in {problem.scenario.name}"
+            task = progress.add_task(label, total=self.budget, best="-")
+
+            def report(state: SearchProgress) -> None:
+                best = "-" if state.best is None else percent(problem.reduction(state.best))
+                progress.update(task, completed=state.blasts, best=best)
+
+            return method.propose(problem, self.budget, self.seed, report)
+
+    def _check(self, run: "SearchRun") -> LayoutEvaluation:
+        """Evaluate the layout on threats that judge: the search has met none of them."""
+        problem, seeds = run.problem, SeedRange.JUDGEMENT.seeds(0, self.held_out)
+        if self.threat == "hidden":
+            threats = draw_threats(problem.scenario, seeds)
+        else:
+            threats = tuple(Threat(problem.threats[0].charge, seed) for seed in seeds)
+        if not problem.evaluator.engine.has_noise:  # each charge is one blast
+            threats = one_of_each_charge(threats)
+        with progress_bar(f"check on {len(threats)} other threats") as progress:
+            return evaluate_against(
+                problem.evaluator,
+                run.result.layout,
+                threats,
+                problem.processes,
+                cvar_level=self.cvar_level,
+                progress=progress,
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +244,25 @@ class SearchRun:
     result: SearchResult
     seconds: float
     cache_hits: int
+
+
+def print_cost(evaluator: BlastEvaluator, case: Case, blasts: int) -> None:
+    """Say what blasts of gas dynamics cost before they begin.
+
+    Args:
+        evaluator: Will run them.
+        case: Its threats are what layouts meet.
+        blasts: How many there will be at most.
+    """
+    # Here, because they import Numba.
+    from blast_env.app.cost import cost_of_blast, cost_words
+    from blast_env.engines.gas import GasEngine
+
+    engine = evaluator.engine
+    if not isinstance(engine, GasEngine) or not blasts:
+        return
+    costs = [cost_of_blast(case.scenario, each.charge, engine.cell_m) for each in case.threats]
+    print_line(f"up to {cost_words([costs[i % len(costs)] for i in range(blasts)])}")
 
 
 def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
@@ -147,7 +301,7 @@ def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
 
 
 def write_search(
-    run: SearchRun, options: SearchOptions, checked: LayoutEvaluation, out: Path
+    run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation, out: Path
 ) -> None:
     """Write the layout, the history, the front and a figure, as far as there are such."""
     result = run.result
@@ -176,14 +330,14 @@ def _save_figure(run: SearchRun, out: Path) -> list[Path]:
 
 
 def _provenance(
-    run: SearchRun, options: SearchOptions, checked: LayoutEvaluation
+    run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation
 ) -> dict[str, Any]:
     """Return what repeats the search, and what came out."""
     result, problem = run.result, run.problem
     low, high = (None if np.isnan(end) else float(end) for end in checked.ci95)
     return {
         "command": command(),
-        "options": asdict(options),
+        "options": options,
         "threats": [
             {
                 "charge_position_m": charge.position_m,
@@ -223,208 +377,3 @@ def _risk_text(problem: LayoutProblem) -> str:
 def percent(share: float) -> str:
     """Return a share for people."""
     return f"{100.0 * share:.1f} %"
-
-
-def search(
-    method: Annotated[
-        str,
-        typer.Option(
-            help="random, greedy, annealing, genetic, nsga2, exhaustive, or a rule: "
-            "(long_)wall_near_charge, (long_)wall_near_building, ring_around_charge, "
-            "ring_around_building, line_of_posts, posts_and_wall or sight_lines; with a catalogue "
-            "also surrogate: guesses of gas dynamics say what gets a blast."
-        ),
-    ] = "genetic",
-    scenario: Annotated[str, typer.Option(help="Bundled name, or a scenario file.")] = "courtyard",
-    budget: Annotated[int, typer.Option(min=1, help="Most blasts that may be spent.")] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Decides threats and search.")] = 0,
-    threat: Annotated[
-        ThreatName,
-        typer.Option(help="One charge that is known, or a layout for wherever it may be."),
-    ] = "visible",
-    threats: Annotated[
-        int | None, typer.Option(min=1, help="Charges of a hidden threat; 16 unless given.")
-    ] = None,
-    realisations: Annotated[
-        int | None,
-        typer.Option(min=1, help="Blasts a charge; 2 (visible) or 1 (hidden) unless given."),
-    ] = None,
-    charge: ChargePlace = None,
-    tnt_kg: TntMass = None,
-    risk: Annotated[
-        str | None,
-        typer.Option(
-            help="mean, cvar or worst, over the charges.",
-            show_default="as the scenario's objective says",
-        ),
-    ] = None,
-    cvar_level: CvarLevel = CVAR_LEVEL,
-    engine: Annotated[
-        str, typer.Option(help="event or pymunk (particles), or gas (gas dynamics).")
-    ] = "event",
-    cell: CellSide = None,
-    processes: Processes = 1,
-    cluster: ClusterAddress = None,
-    start_from: Annotated[
-        list[Path] | None, typer.Option(help="Layout file to begin with; more than one will do.")
-    ] = None,
-    surrogate: Annotated[
-        Path | None,
-        typer.Option(
-            help="File of the surrogate for --method surrogate (studies.surrogate fit).",
-            show_default="the package's",
-        ),
-    ] = None,
-    held_out: Annotated[
-        int, typer.Option(min=1, help="Threats that the result is checked on at the end.")
-    ] = 32,
-    cache: CacheFolder = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for layout, its plan, history, front and figure.")
-    ] = None,
-) -> None:
-    """Search for the layout with the least impulse on the protected structures.
-
-    Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats that
-    the search has not met; those blasts do not count.
-    """
-    with (
-        user_errors(lambda: resume_with_cache(cache)),
-        checked_targets(folders={"--out": out, "--cache": cache}),
-        running_on(cluster),
-    ):
-        guessing = _surrogate(method, surrogate)
-        options = SearchOptions(
-            method=method,
-            scenario=scenario,
-            budget=budget,
-            seed=seed,
-            threat=threat,
-            threats=threats,
-            realisations=realisations,
-            charge_position_m=charge,
-            tnt_kg=tnt_kg,
-            risk=risk,
-            cvar_level=cvar_level,
-            engine=engine,
-            cell_m=cell,
-            start_from=tuple(str(path) for path in start_from or ()),
-            surrogate=None if guessing is None else guessing.digest,
-        )
-        evaluator = BlastEvaluator(load_scenario(scenario), find_engine(engine, cell), cache=cache)
-        if out is not None:
-            make_folder(out)
-        chosen = _method(options, guessing, evaluator.scenario)
-        run = _run(chosen, options, evaluator, processes)
-        if run.result.interrupted and not run.result.history:
-            raise KeyboardInterrupt  # nothing was found that could be kept
-        checked = _check(run, options, held_out)
-        print_search(run, checked)
-        if out is not None:
-            write_search(run, options, checked, out)
-    if run.result.interrupted:
-        layout = None if out is None else out / LAYOUT_NAME
-        show_interruption(
-            "the best layout so far was kept",
-            "" if layout is None else f"--start-from {layout} begins with it",
-            resume_with_cache(cache),
-        )
-        raise typer.Exit(130)
-
-
-def _surrogate(method: str, path: Path | None) -> Surrogate | None:
-    """Return the surrogate of a method that has one."""
-    if method == SurrogateSearch.name:
-        return packaged_surrogate() if path is None else load_surrogate(path)
-    if path is not None:
-        raise BlastEnvError(f"--surrogate is for --method {SurrogateSearch.name}, not {method}")
-    return None
-
-
-def _method(
-    options: SearchOptions, surrogate: Surrogate | None, scenario: Scenario
-) -> SearchMethod:
-    initial = tuple(load_layout(path, scenario) for path in options.start_from)
-    if surrogate is None:
-        known = (*SEARCH_METHODS, SurrogateSearch.name)
-        if options.method not in known:
-            raise UnknownNameError("search method", options.method, known)
-        return find_search_method(options.method, initial)
-    if initial:
-        raise BlastEnvError(f"{options.method} begins with no layouts: leave --start-from out")
-    if not scenario.zone.items:
-        raise BlastEnvError(
-            f"{scenario.name} has no catalogue (build_zone.items): the surrogate knows nothing of "
-            "single modules"
-        )
-    return SurrogateSearch(surrogate, surrogate.digest)
-
-
-def _run(
-    method: SearchMethod, options: SearchOptions, evaluator: BlastEvaluator, processes: int
-) -> SearchRun:
-    scenario = evaluator.scenario
-    problem = LayoutProblem(evaluator, _practice(scenario, options, evaluator.engine), processes)
-    problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
-    hits, begun_s = evaluator.cache_hits, perf_counter()
-    result = _with_progress(method, problem, options)
-    return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)
-
-
-def _practice(scenario: Scenario, options: SearchOptions, engine: Engine) -> Case:
-    """Return what the search may spend its blasts on."""
-    model = find_threat_model(options.threat, options.threats)
-    realisations = find_realisations(options.realisations, options.threat, engine)
-    risk = find_risk(options.risk, options.cvar_level)
-    if not isinstance(model, HiddenThreat):
-        charge = _visible_charge(scenario, options)
-        return practice_visible(scenario, charge, realisations, options.seed, risk)
-    for option, value in (("--charge", options.charge_position_m), ("--tnt-kg", options.tnt_kg)):
-        if value is not None:
-            raise BlastEnvError(f"{option} is for a visible threat: a hidden one is drawn")
-    return practice_hidden(scenario, model.threats, realisations, options.seed, risk)
-
-
-def _visible_charge(scenario: Scenario, options: SearchOptions) -> AnyCharge:
-    """Return the charge that is known: always that of the search's own seed."""
-    drawn = scenario.sample_charge(np.random.default_rng(options.seed))
-    return fixed_charge(scenario, drawn, options.charge_position_m, options.tnt_kg)
-
-
-def _with_progress(
-    method: SearchMethod, problem: LayoutProblem, options: SearchOptions
-) -> SearchResult:
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("blasts, best reduction {task.fields[best]}"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=message_console(), transient=True) as progress:
-        label = f"{method.name} search in {problem.scenario.name}"
-        task = progress.add_task(label, total=options.budget, best="-")
-
-        def report(state: SearchProgress) -> None:
-            best = "-" if state.best is None else percent(problem.reduction(state.best))
-            progress.update(task, completed=state.blasts, best=best)
-
-        return method.search(problem, options.budget, options.seed, report)
-
-
-def _check(run: SearchRun, options: SearchOptions, held_out: int) -> LayoutEvaluation:
-    """Evaluate the layout on threats that judge: the search has met none of them."""
-    problem, seeds = run.problem, SeedRange.JUDGEMENT.seeds(0, held_out)
-    if options.threat == "visible":
-        threats = tuple(Threat(problem.charge, seed) for seed in seeds)
-    else:
-        threats = draw_threats(problem.scenario, seeds)
-    with progress_bar(f"check on {held_out} other threats") as progress:
-        return evaluate_against(
-            problem.evaluator,
-            run.result.layout,
-            threats,
-            problem.processes,
-            cvar_level=options.cvar_level,
-            progress=progress,
-        )

@@ -16,16 +16,16 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
-from blast_agents.posts import VEHICLE_RULES
+from blast_agents.posts import line_of_posts, posts_and_wall
 from blast_agents.rules import (
-    Rule,
     expected_charge,
     line_of_sight_wall,
     random_layout,
     ring_around_building,
     ring_around_charge,
 )
-from blast_agents.search import LayoutProblem, find_search_method
+from blast_agents.search import LayoutProblem, find_proposer
+from blast_agents.search.registry import Rule
 
 from blast_env.arrays import FloatArray
 from blast_env.engines import Engine
@@ -91,8 +91,8 @@ RULES: Final[Mapping[str, NamedRule]] = MappingProxyType(
 
 POST_RULES: Final[Mapping[str, NamedRule]] = MappingProxyType(
     {
-        name: NamedRule(rule, buys)
-        for (name, rule), buys in zip(VEHICLE_RULES.items(), (Purchase.DISTANCE, None), strict=True)
+        "line of posts": NamedRule(line_of_posts, Purchase.DISTANCE),
+        "posts and a wall": NamedRule(posts_and_wall, None),
     }
 )
 
@@ -326,8 +326,8 @@ class ItemStudy:
         tried = [self.places[round(each)] for each in chosen]
         case = Case(self._scenario, tuple(tried))
         problem = LayoutProblem(self.evaluator, case, self._processes)
-        method = find_search_method(METHOD, _distinct(starts))
-        result = method.search(problem, effort.budget, 0, lambda _: self._report(0.0))
+        method = find_proposer(METHOD, _distinct(starts))
+        result = method.propose(problem, effort.budget, 0, lambda _: self._report(0.0))
         history = [each.layout for each in result.history[-effort.finalists :]]
         return history or [result.layout], result.blasts
 
@@ -336,8 +336,8 @@ class ItemStudy:
         scenario = self._scenario
         starts = tuple(each.rule(scenario, place.charge) for each in self._rules.values())
         problem = LayoutProblem(self.evaluator, Case(scenario, (place,)), self._processes)
-        method = find_search_method(METHOD, _distinct(starts))
-        return method.search(
+        method = find_proposer(METHOD, _distinct(starts))
+        return method.propose(
             problem, self._effort.place_budget, 0, lambda _: self._report(0.0)
         ).layout
 

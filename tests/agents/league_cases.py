@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from blast_agents.league import Result, Standings, Track, Training, known_track
-from blast_agents.proposal import Proposal
-from blast_agents.rules import expected_charge, line_of_sight_wall
-from blast_agents.search import Layout
+from blast_agents.rules import line_of_sight_wall
+from blast_agents.search import LayoutProblem, Proposal, Report, SearchResult
 
 from blast_env.scenario import AnyCharge, Scenario, SegmentSource
 from tests.agents.search_cases import small_scenario
@@ -25,11 +24,14 @@ def road_scenario(stock: int = 3) -> Scenario:
 class WallAgent:
     """Proposes a wall in the middle of the zone, and remembers what it was told."""
 
+    name: str = "agent"
     told: list[AnyCharge | None] = field(default_factory=list, repr=False, compare=False)
 
-    def propose(self, scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
-        self.told.append(charge)
-        return line_of_sight_wall(scenario, charge or expected_charge(scenario.charge), 0.5)
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+    ) -> SearchResult:
+        self.told.append(problem.told)
+        return SearchResult(line_of_sight_wall(problem.scenario, problem.told, 0.5))
 
 
 def result(

@@ -2,9 +2,22 @@
 
 import numpy as np
 import pytest
-from blast_agents.league import Rule, VisibilityLayout
-from blast_agents.rules import ITEM_RULES, RULES, line_of_sight_wall, random_layout, rules_for
-from blast_agents.search import Layout, LayoutProblem, find_search_method
+from blast_agents.rules import (
+    line_of_sight_wall,
+    random_layout,
+    ring_around_building,
+    ring_around_charge,
+    wall_near_building,
+    wall_near_charge,
+)
+from blast_agents.search import (
+    Layout,
+    LayoutProblem,
+    ProposerKind,
+    find_proposer,
+    layouts_by_rule,
+    proposers,
+)
 from blast_agents.search.moves import Moves, random_part, random_walls
 from blast_agents.search.operators import cut, individual, layout_of, mixed, repaired
 from hypothesis import given, settings
@@ -42,24 +55,27 @@ def heights_m(scenario: Scenario, layout: Layout) -> list[float | None]:
 # --- Rules.
 
 
-@pytest.mark.parametrize("rule", ITEM_RULES)
 @pytest.mark.parametrize("name", YARDS)
-def test_every_rule_gives_a_legal_layout_of_pieces(name: str, rule: str) -> None:
-    layout = ITEM_RULES[rule](YARDS[name], CHARGE)
-    assert layout
-    assert Placement.of(YARDS[name], layout).layout == layout
-    assert ITEM_RULES[rule](YARDS[name], CHARGE) == layout
+def test_every_rule_gives_a_legal_layout_of_pieces(name: str) -> None:
+    layouts = layouts_by_rule(YARDS[name], CHARGE)
+    assert len(layouts) == 7
+    for layout in layouts.values():
+        assert layout
+        assert Placement.of(YARDS[name], layout).layout == layout
+    assert layouts_by_rule(YARDS[name], CHARGE) == layouts
 
 
-def test_without_a_catalogue_there_are_two_rules_as_before() -> None:
-    assert rules_for(site()) is RULES
-    assert rules_for(yard()) is ITEM_RULES
+def test_without_a_catalogue_there_are_two_walls_as_before() -> None:
+    few, all_of_them = (proposers(ProposerKind.RULE, suiting=[each]) for each in (site(), yard()))
+    assert list(few) == ["wall_near_charge", "wall_near_building", "sight_lines"]
+    assert len(all_of_them) == 7
+    assert set(few) < set(all_of_them)
 
 
 def test_walls_lie_across_the_line_of_sight() -> None:
     """Turned where the charge is in the west, not turned where it is in the south."""
-    for name in ("wall near the charge", "wall near the building"):
-        layout = RULES[name](yard(), CHARGE)
+    for rule in (wall_near_charge, wall_near_building):
+        layout = rule(yard(), CHARGE)
         assert [each for each in layout if isinstance(each, Piece) and each.turned] == [*layout]
         rows = sorted(row for row, _ in Placement.of(yard(), layout).cells)
         assert rows == list(range(rows[0], rows[0] + 9))
@@ -100,7 +116,7 @@ def test_a_ring_bends_around_the_building() -> None:
         clearance_m=0.5,
         budget=None,
     )
-    layout = ITEM_RULES["ring around the building"](scenario, CHARGE)
+    layout = ring_around_building(scenario, CHARGE)
     turned = [each.turned for each in layout if isinstance(each, Piece)]
     assert turned[:2] == [True, True]
     assert turned.count(False) >= 2
@@ -113,7 +129,7 @@ def test_a_ring_bends_around_the_building() -> None:
 
 def test_a_ring_of_single_modules_stands_around_the_charge() -> None:
     scenario = site(charge_m=(20.0, 20.0), stock=12)
-    layout = ITEM_RULES["ring around the charge"](scenario, scenario.sample_charge(RNG()))
+    layout = ring_around_charge(scenario, scenario.sample_charge(RNG()))
     rectangles = [scenario.zone.element_rectangle_m(each) for each in layout]
     away_m = [max(abs(x - 20.0), abs(y - 20.0)) for x, y in (each.centre for each in rectangles)]
     assert len(away_m) == 12
@@ -219,17 +235,17 @@ def problem() -> LayoutProblem:
 
 @pytest.mark.parametrize("method", ["random", "greedy", "annealing", "genetic", "nsga2"])
 def test_searches_find_layouts_of_pieces(problem: LayoutProblem, method: str) -> None:
-    result = find_search_method(method).search(problem, 60, 0)
+    result = find_proposer(method).propose(problem, 60, 0)
     assert Placement.of(problem.scenario, result.layout).layout == result.layout
     assert any(isinstance(each, Piece) and each.item == "wall" for each in result.layout)
     assert result.blasts <= 60
     assert result.load is not None
     assert result.load < 0.8 * problem.load(())
-    assert find_search_method(method).search(problem, 60, 0).layout == result.layout
+    assert find_proposer(method).propose(problem, 60, 0).layout == result.layout
 
 
 def test_the_front_is_over_the_cost(problem: LayoutProblem) -> None:
-    result = find_search_method("nsga2").search(problem, 80, 1)
+    result = find_proposer("nsga2").propose(problem, 80, 1)
     costs = [each.cost for each in result.front]
     assert costs == sorted(set(costs))
     assert costs[0] == 0.0
@@ -249,15 +265,14 @@ def test_exhaustive_search_tries_every_layout_once() -> None:
     ).model_copy(update={"calibration": CALIBRATION})
     case = visible_case(scenario, CHARGE, [1])
     problem = LayoutProblem(BlastEvaluator(scenario, "event"), case)
-    result = find_search_method("exhaustive").search(problem, 100, 0)
+    result = find_proposer("exhaustive").propose(problem, 100, 0)
     assert result.blasts == 1 + 3 + 2 + 2
 
 
-def test_league_entries_propose_pieces() -> None:
-    case = visible_case(yard(), CHARGE, [1])
-    rule = ITEM_RULES["ring around the building"]
-    assert Rule(rule, "ring").propose(case) == rule(yard(), CHARGE)
-    layout = VisibilityLayout().propose(case)
+def test_rules_by_name_propose_pieces(problem: LayoutProblem) -> None:
+    layout = find_proposer("ring_around_building").propose(problem, 0).layout
+    assert layout == tuple(sorted(ring_around_building(problem.scenario, CHARGE)))
+    layout = find_proposer("sight_lines").propose(problem, 0).layout
     assert Placement.of(yard(), layout).layout == layout
 
 

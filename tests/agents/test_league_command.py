@@ -121,8 +121,8 @@ def test_a_run_says_what_it_is_for_and_what_it_cost(run: Path) -> None:
     assert not trained.is_for(sites_track([next(iter(SiteSource.held_out(1)))], 1))
     rollouts, evaluations = (pd.read_csv(run / f"{n}.csv") for n in ("rollouts", "evaluations"))
     selection = (len(evaluations) + 1) * 2  # two cases each, and the same without a barrier
-    assert trained.entry.training.blasts == rollouts["blasts"].iloc[-1] + selection
-    assert trained.entry.training.seconds > 0.0
+    assert trained.training.blasts == rollouts["blasts"].iloc[-1] + selection
+    assert trained.training.seconds > 0.0
 
 
 def test_an_agent_for_none_of_the_tracks_is_refused(run: Path, tmp_path: Path) -> None:

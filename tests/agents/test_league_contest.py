@@ -12,14 +12,11 @@ from shutil import copytree
 import numpy as np
 import pytest
 from blast_agents.league import (
-    Agent,
+    NO_BARRIER,
     Contest,
-    NoBarrier,
+    LeagueEntry,
     ResultStore,
-    Rule,
-    Search,
     Standings,
-    VisibilityLayout,
     hidden_track,
     known_track,
     standard_entries,
@@ -29,16 +26,18 @@ from blast_agents.league.tracks import practice_of
 from blast_agents.rules import wall_near_charge
 from blast_agents.search import (
     LayoutProblem,
+    ProposerKind,
     RandomSearch,
     Report,
     SearchResult,
-    find_search_method,
+    find_proposer,
 )
 from blast_agents.search.methods import every_layout
 
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, evaluate_against
+from blast_env.evaluation.cases import visible_case
 from blast_env.files import FolderStore
 from blast_env.physics.scene import Charge
 from blast_env.scenario import PointSource
@@ -58,11 +57,11 @@ class CountedSearch:
     calls: list[int] = field(default_factory=list, repr=False, compare=False)
     name: str = "counted"
 
-    def search(
-        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
         self.calls.append(seed)
-        found = RandomSearch(batch=2).search(problem, budget, seed, report)
+        found = RandomSearch(batch=2).propose(problem, budget, seed, report)
         return replace(found, interrupted=self.interrupted)
 
 
@@ -79,11 +78,11 @@ class Cheat:
     past_the_meter: bool = False
     name: str = "cheat"
 
-    def search(
+    def propose(
         self,
         problem: LayoutProblem,
         budget: int,
-        seed: int,
+        seed: int = 0,
         report: Report | None = None,
     ) -> SearchResult:
         layouts = tuple(islice(every_layout(problem), self.layouts))
@@ -92,18 +91,18 @@ class Cheat:
             problem.evaluator.loads_of_many(pairs)
         else:
             problem.loads(pairs)
-        return SearchResult(self.name, layouts[-1], None, 1, 1, budget, seed, (), False)
+        return SearchResult(layouts[-1], self.name, blasts=1, budget=budget, seed=seed)
 
 
 @pytest.mark.parametrize("past_the_meter", [False, True])
 def test_a_league_counts_blasts_itself(tmp_path: Path, past_the_meter: bool) -> None:
     """What a method says of its blasts enters no table; beyond the budget there is no result."""
     threats = len(practice_of(TRACK.cases[0]).threats)
-    honest = Search(Cheat(3, past_the_meter), 3 * threats)
-    _, result = Contest(TRACK, (NoBarrier(), honest), store(tmp_path)).play().results
+    honest = LeagueEntry(Cheat(3, past_the_meter), 3 * threats)
+    _, result = Contest(TRACK, (NO_BARRIER, honest), store(tmp_path)).play().results
     assert [each.blasts for each in result.proposals] == [3 * threats] * len(TRACK.cases)
-    beyond = Search(Cheat(3, past_the_meter), 3 * threats - 1)
-    contest = Contest(TRACK, (NoBarrier(), beyond), store(tmp_path))
+    beyond = LeagueEntry(Cheat(3, past_the_meter), 3 * threats - 1)
+    contest = Contest(TRACK, (NO_BARRIER, beyond), store(tmp_path))
     named = f"cheat, {3 * threats - 1} blasts.* {3 * threats} blasts.*budget is {3 * threats - 1}"
     with pytest.raises(BlastEnvError, match=named):
         contest.play()
@@ -117,8 +116,8 @@ def store(folder: Path) -> ResultStore:
 def test_every_entry_meets_the_same_threats_as_no_barrier(tmp_path: Path) -> None:
     """The numbers are those of an evaluation of each layout against none on the held-out seeds."""
     entries = (
-        *standard_entries(["random"], [BUDGET]),
-        Agent(WallAgent(), "wall agent", TRAINING),
+        *standard_entries([SCENARIO], ["random"], [BUDGET]),
+        LeagueEntry(WallAgent("wall agent"), kind=ProposerKind.LEARNT, training=TRAINING),
     )
     standings = Contest(TRACK, entries, store(tmp_path)).play()
     assert [result.name for result in standings.results] == [
@@ -144,11 +143,11 @@ def test_every_entry_meets_the_same_threats_as_no_barrier(tmp_path: Path) -> Non
 
 def test_a_search_finds_what_it_finds_alone(tmp_path: Path) -> None:
     """On the threats for searching, with the budget, and with the case's seed."""
-    entries = (NoBarrier(), Search(find_search_method("genetic"), BUDGET))
+    entries = (NO_BARRIER, LeagueEntry(find_proposer("genetic"), BUDGET))
     proposals = Contest(TRACK, entries, store(tmp_path)).play().results[1].proposals
     for case, proposal in zip(TRACK.cases, proposals, strict=True):
         problem = LayoutProblem(BlastEvaluator(SCENARIO), practice_of(case))
-        expected = find_search_method("genetic").search(problem, BUDGET, case.seed)
+        expected = find_proposer("genetic").propose(problem, BUDGET, case.seed)
         assert proposal.layout == expected.layout
         assert 0 < proposal.blasts == expected.blasts <= BUDGET
         assert proposal.seconds > 0.0
@@ -156,7 +155,7 @@ def test_a_search_finds_what_it_finds_alone(tmp_path: Path) -> None:
 
 def test_an_agent_is_told_the_charge_only_where_it_is_known(tmp_path: Path) -> None:
     agent = WallAgent()
-    entries = (NoBarrier(), Agent(agent, "agent", TRAINING))
+    entries = (NO_BARRIER, LeagueEntry(agent, kind=ProposerKind.LEARNT, training=TRAINING))
     Contest(TRACK, entries, store(tmp_path)).play()
     assert agent.told[-3:] == [case.charge for case in TRACK.cases]
     agent.told.clear()
@@ -168,7 +167,9 @@ def test_a_rule_stands_in_the_middle_of_a_hidden_threat() -> None:
     (case,) = hidden_track(SCENARIO, 1).cases
     first = practice_of(case).threats[0].charge
     middle = Charge((5.0, 20.0), first.tnt_kg, first.height_m)
-    assert Rule(wall_near_charge, "rule").propose(case) == wall_near_charge(SCENARIO, middle)
+    problem = LayoutProblem(BlastEvaluator(SCENARIO), practice_of(case))
+    layout = find_proposer("wall_near_charge").propose(problem, 0).layout
+    assert layout == tuple(sorted(wall_near_charge(SCENARIO, middle)))
 
 
 def test_lines_of_sight_are_cut_before_the_charge_or_before_all_its_places() -> None:
@@ -176,10 +177,15 @@ def test_lines_of_sight_are_cut_before_the_charge_or_before_all_its_places() -> 
     scenario = load_scenario("courtyard")
     place = PointSource(position_m=(5.0, 10.0), tnt_kg=100.0)
     (hidden,) = hidden_track(scenario, 1).cases
-    known = replace(hidden, charge=Charge(place.position_m, place.tnt_kg))
+    known = visible_case(scenario, Charge(place.position_m, place.tnt_kg), [1])
     lines_of_one = Visibility.of(scenario.model_copy(update={"charge": (place,)}))
     lines_of_all = Visibility.of(scenario)
-    of_one, of_all = (VisibilityLayout().propose(case) for case in (known, hidden))
+    of_one, of_all = (
+        find_proposer("sight_lines")
+        .propose(LayoutProblem(BlastEvaluator(scenario), case), 0)
+        .layout
+        for case in (known, hidden)
+    )
     assert lines_of_one.cut_share(of_one) > lines_of_one.cut_share(of_all)
     assert lines_of_all.cut_share(of_all) > lines_of_all.cut_share(of_one)
 
@@ -187,7 +193,7 @@ def test_lines_of_sight_are_cut_before_the_charge_or_before_all_its_places() -> 
 def test_an_interrupted_league_goes_on(tmp_path: Path) -> None:
     """After two of three searches: one is left, and all comes out as if nothing had happened."""
     counted = CountedSearch()
-    entries = (NoBarrier(), Search(counted, BUDGET))
+    entries = (NO_BARRIER, LeagueEntry(counted, BUDGET))
     shares: list[float] = []
 
     def interrupt(share: float) -> None:
@@ -210,7 +216,7 @@ def test_an_interrupted_league_goes_on(tmp_path: Path) -> None:
 
 def test_what_is_finished_is_not_done_again(tmp_path: Path) -> None:
     counted = CountedSearch()
-    entries = (NoBarrier(), Search(counted, BUDGET))
+    entries = (NO_BARRIER, LeagueEntry(counted, BUDGET))
     first = Contest(TRACK, entries, store(tmp_path)).play()
     second = Contest(TRACK, entries, store(tmp_path))
     assert second.outlook().blasts == 0
@@ -227,20 +233,20 @@ def test_a_result_of_something_else_is_not_taken() -> None:
     case = TRACK.cases[0]
     other = road_scenario(stock=2)
     keys = {
-        search_key(case, Search(RandomSearch(), 6), "event"),
-        search_key(case, Search(RandomSearch(batch=4), 6), "event"),
-        search_key(case, Search(RandomSearch(), 7), "event"),
-        search_key(replace(case, seed=9), Search(RandomSearch(), 6), "event"),
-        search_key(TRACK.cases[1], Search(RandomSearch(), 6), "event"),
-        search_key(replace(case, scenario=other), Search(RandomSearch(), 6), "event"),
-        search_key(case, Search(RandomSearch(), 6), "pymunk"),
+        search_key(case, LeagueEntry(RandomSearch(), 6), "event"),
+        search_key(case, LeagueEntry(RandomSearch(batch=4), 6), "event"),
+        search_key(case, LeagueEntry(RandomSearch(), 7), "event"),
+        search_key(replace(case, seed=9), LeagueEntry(RandomSearch(), 6), "event"),
+        search_key(TRACK.cases[1], LeagueEntry(RandomSearch(), 6), "event"),
+        search_key(replace(case, scenario=other), LeagueEntry(RandomSearch(), 6), "event"),
+        search_key(case, LeagueEntry(RandomSearch(), 6), "pymunk"),
     }
     assert len(keys) == 7
 
 
 def test_a_key_is_the_same_in_every_process() -> None:
     """A method's settings may hold functions; where these lie in memory does not matter."""
-    key = search_key(TRACK.cases[0], Search(find_search_method("genetic"), 6), "event")
+    key = search_key(TRACK.cases[0], LeagueEntry(find_proposer("genetic"), 6), "event")
     assert "random_walls" in key.method
     assert " at 0x" not in key.method
 
@@ -259,9 +265,9 @@ def test_the_code_of_a_method_counts_wherever_it_is(tmp_path: Path) -> None:
         with pytest.MonkeyPatch.context() as patch:
             patch.setitem(sys.modules, "own", own)
             spec.loader.exec_module(own)
-            codes.append(search_key(TRACK.cases[0], Search(own.Own(), 6), "event").code)
+            codes.append(search_key(TRACK.cases[0], LeagueEntry(own.Own(), 6), "event").code)
     assert codes[0] == codes[1] != codes[2]
-    assert search_key(TRACK.cases[0], Search(RandomSearch(), 6), "event").code not in codes
+    assert search_key(TRACK.cases[0], LeagueEntry(RandomSearch(), 6), "event").code not in codes
 
 
 @dataclass(frozen=True)
@@ -284,7 +290,7 @@ class Played:
         return Contest(TRACK, FINISHED, store(folder))
 
 
-FINISHED = (NoBarrier(), Search(RandomSearch(), BUDGET))
+FINISHED = (NO_BARRIER, LeagueEntry(RandomSearch(), BUDGET))
 
 
 @pytest.fixture(scope="module")
@@ -332,7 +338,7 @@ def test_a_result_with_a_right_checksum_that_does_not_fit_is_done_again(
 
 def test_what_an_interrupted_search_has_is_not_its_answer(tmp_path: Path) -> None:
     """Searches end at Ctrl-C with the best so far; the league must not take that for more."""
-    entries = (NoBarrier(), Search(CountedSearch(interrupted=True), BUDGET))
+    entries = (NO_BARRIER, LeagueEntry(CountedSearch(interrupted=True), BUDGET))
     contest = Contest(TRACK, entries, store(tmp_path))
     with pytest.raises(KeyboardInterrupt):
         contest.play()
@@ -341,7 +347,7 @@ def test_what_an_interrupted_search_has_is_not_its_answer(tmp_path: Path) -> Non
 
 def test_processes_change_nothing(tmp_path: Path) -> None:
     track = known_track(SCENARIO, 2, 1)
-    entries = standard_entries(["random"], [BUDGET])
+    entries = standard_entries([SCENARIO], ["random"], [BUDGET])
     one, two = (
         Contest(track, entries, store(tmp_path / str(processes))).play(processes)
         for processes in (1, 2)
@@ -353,30 +359,30 @@ def test_processes_change_nothing(tmp_path: Path) -> None:
 def test_bad_input_is_refused(tmp_path: Path) -> None:
     kept = store(tmp_path)
     with pytest.raises(BlastEnvError, match="'no barrier' is there twice"):
-        Contest(TRACK, (NoBarrier(), NoBarrier()), kept)
+        Contest(TRACK, (NO_BARRIER, NO_BARRIER), kept)
     with pytest.raises(BlastEnvError, match="no barrier is not among"):
-        Contest(TRACK, (Search(RandomSearch(), 6),), kept)
-    with pytest.raises(BlastEnvError, match="budget is 0 blasts"):
-        Search(RandomSearch(), 0)
+        Contest(TRACK, (LeagueEntry(RandomSearch(), 6),), kept)
+    with pytest.raises(BlastEnvError, match="budget is -1 blasts"):
+        LeagueEntry(RandomSearch(), -1)
     with pytest.raises(BlastEnvError, match="did you mean 'genetic'"):
-        standard_entries(["genetik"], [6])
+        standard_entries([SCENARIO], ["genetik"], [6])
     with pytest.raises(BlastEnvError, match="processes is 0"):
-        Contest(TRACK, (NoBarrier(),), kept).play(0)
+        Contest(TRACK, (NO_BARRIER,), kept).play(0)
     (tmp_path / "file").touch()
     with pytest.raises(BlastEnvError, match="cannot be a folder"):
         ResultStore(tmp_path / "file")
 
 
 def test_a_cheaper_engine_s_best_layouts_are_judged_by_the_judge(tmp_path: Path) -> None:
-    search = Search(find_search_method("random"), 3, first_engine="pymunk", finalists=2)
+    search = LeagueEntry(find_proposer("random"), 3, first_engine="pymunk", finalists=2)
     assert search.name == "random, 3 blasts of pymunk, the best 2 judged"
-    entries = (NoBarrier(), search, Search(find_search_method("random"), 3))
+    entries = (NO_BARRIER, search, LeagueEntry(find_proposer("random"), 3))
     track = known_track(SCENARIO, 1, 1)
     _, staged, plain = Contest(track, entries, store(tmp_path)).play().results
     for case, proposal in zip(track.cases, staged.proposals, strict=True):
         practice = practice_of(case)
         first = LayoutProblem(BlastEvaluator(SCENARIO, "pymunk"), practice)
-        found = find_search_method("random").search(first, 3, case.seed)
+        found = find_proposer("random").propose(first, 3, case.seed)
         finalists = {each.layout for each in found.history[-2:]}
         assert proposal.layout in finalists
         judge = LayoutProblem(BlastEvaluator(SCENARIO), practice)

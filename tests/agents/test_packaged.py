@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 import pytest
 import torch
-from blast_agents.surrogate import SurrogateAgent, packaged_surrogate, site_of
+from blast_agents.surrogate import LearntSearch, packaged_surrogate, site_of
 from blast_agents.surrogate.fitting import elements
 from blast_agents.training import load_agent, packaged, train
 from blast_agents.training.packaged import LeagueResult, pack, packaged_agent, records
@@ -177,7 +177,7 @@ def test_without_weights_the_surrogate_proposes_and_no_blast_is_run(
     assert done.exit_code == 0, done.output
     assert "by guesses of gas dynamics (--verify says what it is worth)" in done.output
     surrogate = packaged_surrogate()
-    wanted = SurrogateAgent(surrogate).propose(site, CHARGE)
+    wanted = LearntSearch(surrogate).at_once(site, CHARGE)
     layout = LayoutFile.load(out)
     assert layout.layout_for(site) == tuple(sorted(wanted))
     assert layout.provenance["surrogate"] == surrogate.digest

@@ -105,8 +105,7 @@ def test_without_a_vehicle_there_is_no_line_of_posts() -> None:
 
 
 def test_the_rules_enter_a_league_only_where_there_are_vehicles() -> None:
-    names = [entry.name for entry in standard_entries([], [], vehicles=True)]
+    names = [entry.name for entry in standard_entries([gate_site()])]
     assert {"line of posts", "posts and a wall"} <= set(names)
-    assert not {"line of posts", "posts and a wall"} & {
-        entry.name for entry in standard_entries([], [])
-    }
+    both = standard_entries([gate_site(), load_scenario("courtyard")])
+    assert not {"line of posts", "posts and a wall"} & {entry.name for entry in both}

@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 from blast_agents.rules import wall_near_building, wall_near_charge
 from blast_agents.search import (
-    SEARCH_METHODS,
     GeneticSearch,
     Layout,
     LayoutProblem,
+    ProposerKind,
     SearchResult,
-    find_search_method,
+    find_proposer,
+    layouts_by_rule,
+    proposers,
 )
-from blast_agents.search.by_rule import RULE_SEARCHES, layouts_by_rule
-from blast_agents.search.from_policy import PolicySearch
 from blast_agents.search.methods import every_layout
+from blast_agents.surrogate import LearntSearch
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
@@ -40,7 +41,7 @@ def problem() -> LayoutProblem:
 
 @pytest.fixture(scope="module")
 def optimum(problem: LayoutProblem) -> SearchResult:
-    return find_search_method("exhaustive").search(problem, ALL_BLASTS, 0)
+    return find_proposer("exhaustive").propose(problem, ALL_BLASTS, 0)
 
 
 def gap(problem: LayoutProblem, result: SearchResult, optimum: SearchResult) -> float:
@@ -82,19 +83,19 @@ def test_gaps_to_the_optimum(
 
     The optimum takes 86 % off the impulse; one random layout after the other would do too on 299.
     """
-    method = find_search_method(name)
-    gaps = [gap(problem, method.search(problem, budget, seed), optimum) for seed in SEEDS]
+    method = find_proposer(name)
+    gaps = [gap(problem, method.propose(problem, budget, seed), optimum) for seed in SEEDS]
     assert min(gaps) >= 0.0
     assert float(np.mean(gaps)) <= most
 
 
 def test_exhaustive_search_is_for_small_instances(problem: LayoutProblem) -> None:
     with pytest.raises(BlastEnvError, match=r"299 layouts \(12 .* 598 blasts; the budget is 597"):
-        find_search_method("exhaustive").search(problem, ALL_BLASTS - 1, 0)
+        find_proposer("exhaustive").propose(problem, ALL_BLASTS - 1, 0)
     scenario = ballistic("courtyard")
     large = LayoutProblem(BlastEvaluator(scenario, "event"), Case(scenario, problem.threats, 2))
     with pytest.raises(BlastEnvError, match=r"e\+\d\d layouts .* for small instances"):
-        find_search_method("exhaustive").search(large, 1000, 0)
+        find_proposer("exhaustive").propose(large, 1000, 0)
 
 
 def test_exhaustive_search_leaves_out_what_is_not_legal() -> None:
@@ -112,15 +113,15 @@ def test_exhaustive_search_leaves_out_what_is_not_legal() -> None:
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_the_seed_decides_everything(name: str, problem: LayoutProblem) -> None:
-    method = find_search_method(name)
-    assert method.search(problem, 20, 3) == method.search(problem, 20, 3)
-    histories = {method.search(problem, 20, seed).history for seed in range(4)}
+    method = find_proposer(name)
+    assert method.propose(problem, 20, 3) == method.propose(problem, 20, 3)
+    histories = {method.propose(problem, 20, seed).history for seed in range(4)}
     assert len(histories) > 1
 
 
 def test_the_number_of_processes_changes_nothing(problem: LayoutProblem) -> None:
     fresh = small_problem(processes=2)
-    assert GeneticSearch().search(fresh, 24, 1) == GeneticSearch().search(problem, 24, 1)
+    assert GeneticSearch().propose(fresh, 24, 1) == GeneticSearch().propose(problem, 24, 1)
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -129,7 +130,7 @@ def test_blasts_are_counted_and_never_exceed_the_budget(name: str, budget: int) 
     """Distinct pairs that were asked for; nearly all of the budget is spent."""
     asked: list[tuple[Layout, Threat]] = []
     watched = WatchedEvaluator(small_scenario(), asked.extend)
-    result = find_search_method(name).search(small_problem(watched), budget, 0)
+    result = find_proposer(name).propose(small_problem(watched), budget, 0)
     assert result.blasts == len(asked) == len(set(asked)) <= budget
     assert result.blasts >= 0.7 * budget
     assert result.budget == budget
@@ -137,7 +138,7 @@ def test_blasts_are_counted_and_never_exceed_the_budget(name: str, budget: int) 
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_histories_say_what_was_best_when(name: str, problem: LayoutProblem) -> None:
-    result = find_search_method(name).search(problem, 60, 2)
+    result = find_proposer(name).propose(problem, 60, 2)
     for earlier, later in pairwise(result.history):
         assert earlier.blasts < later.blasts
         more = later.threats > earlier.threats
@@ -153,8 +154,8 @@ def test_histories_say_what_was_best_when(name: str, problem: LayoutProblem) -> 
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_an_interruption_keeps_the_best_so_far(name: str, problem: LayoutProblem) -> None:
-    interrupted = find_search_method(name).search(_interrupted_after(30), 100, 0)
-    whole = find_search_method(name).search(problem, 100, 0)
+    interrupted = find_proposer(name).propose(_interrupted_after(30), 100, 0)
+    whole = find_proposer(name).propose(problem, 100, 0)
     assert interrupted.interrupted
     assert not whole.interrupted
     assert 0 < interrupted.blasts <= 30
@@ -164,7 +165,7 @@ def test_an_interruption_keeps_the_best_so_far(name: str, problem: LayoutProblem
 
 
 def test_an_interruption_before_the_first_blast_leaves_the_empty_layout() -> None:
-    result = find_search_method("genetic").search(_interrupted_after(0), 100, 0)
+    result = find_proposer("genetic").propose(_interrupted_after(0), 100, 0)
     assert (result.layout, result.load, result.blasts) == ((), None, 0)
     assert result.interrupted
 
@@ -188,7 +189,7 @@ def test_layouts_are_legal_on_real_sites(method: str, name: str) -> None:
     scenario = ballistic(name)
     evaluator = BlastEvaluator(scenario, "event")
     problem = LayoutProblem(evaluator, practice_hidden(scenario, 3, 1, 0))
-    result = find_search_method(method).search(problem, 10, 0)
+    result = find_proposer(method).propose(problem, 10, 0)
     assert Placement.of(scenario, result.layout).cells == result.layout == (*sorted(result.layout),)
 
 
@@ -197,7 +198,7 @@ def test_it_ends_when_there_is_nothing_new_left(name: str) -> None:
     """Two cells and one module make three layouts, whatever the budget."""
     evaluator = BlastEvaluator(small_scenario(rows=2, columns=1, stock=1), "event")
     problem = small_problem(evaluator)
-    result = find_search_method(name).search(problem, 1000, 0)
+    result = find_proposer(name).propose(problem, 1000, 0)
     assert result.blasts <= 6
     assert result.layout in (((0, 0),), ((1, 0),))
 
@@ -207,8 +208,8 @@ def test_it_can_begin_with_given_layouts(name: str, optimum: SearchResult) -> No
     """They are among the first that are assessed, and a good one is not simply lost."""
     asked: list[list[tuple[Layout, Threat]]] = []
     watched = small_problem(WatchedEvaluator(small_scenario(), asked.append))
-    method = find_search_method(name, (optimum.layout,))
-    result = method.search(watched, 40, 0)
+    method = find_proposer(name, (optimum.layout,))
+    result = method.propose(watched, 40, 0)
     assert method.name == result.method == name
     assert optimum.layout in {layout for layout, _ in asked[0]}
     assert gap(watched, result, optimum) <= 0.03
@@ -217,12 +218,12 @@ def test_it_can_begin_with_given_layouts(name: str, optimum: SearchResult) -> No
 @pytest.mark.parametrize("name", ["greedy", "exhaustive", "wall_near_charge"])
 def test_some_begin_with_none(name: str) -> None:
     with pytest.raises(BlastEnvError, match=f"{name} begins with no layouts"):
-        find_search_method(name, (((0, 0),),))
+        find_proposer(name, (((0, 0),),))
 
 
 def test_a_misspelt_method_is_told_the_nearest() -> None:
     with pytest.raises(UnknownNameError, match="no search method 'genetik', did you mean 'genet"):
-        find_search_method("genetik")
+        find_proposer("genetik")
 
 
 @pytest.mark.parametrize(
@@ -232,23 +233,24 @@ def test_a_misspelt_method_is_told_the_nearest() -> None:
 def test_rules_spend_nothing(
     name: str, rule: Callable[..., Layout], problem: LayoutProblem
 ) -> None:
-    result = find_search_method(name).search(problem, 0, 0)
+    result = find_proposer(name).propose(problem, 0, 0)
     assert result.blasts == 0
     assert result.load is None
-    assert set(result.layout) == set(rule(problem.scenario, problem.charge))
+    assert set(result.layout) == set(rule(problem.scenario, problem.told))
 
 
 def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
     problem = LayoutProblem(evaluator, practice_hidden(scenario, 8, 1, 0))
-    assert isinstance(problem.charge, Charge)
-    assert problem.charge.position_m == pytest.approx((5.0, 15.0))
+    middle = Charge((5.0, 15.0), 100.0)
+    found = find_proposer("wall_near_charge").propose(problem, 0)
+    assert found.layout == tuple(sorted(wall_near_charge(scenario, middle)))
 
 
 def test_the_front_is_near_the_true_one(problem: LayoutProblem, optimum: SearchResult) -> None:
     """For each number of modules the gap to the best layout with at most as many."""
-    result = find_search_method("nsga2").search(problem, ALL_BLASTS // 2, 1)
+    result = find_proposer("nsga2").propose(problem, ALL_BLASTS // 2, 1)
     bare_pa_s = problem.load(())
     layouts = list(every_layout(problem))
     assert [len(each.layout) for each in result.front] == [0, 1, 2, 3]
@@ -261,15 +263,16 @@ def test_the_front_is_near_the_true_one(problem: LayoutProblem, optimum: SearchR
     assert len(result.front_table()) == 4
 
 
-def test_every_method_has_its_name() -> None:
-    assert all(name == method.name for name, method in SEARCH_METHODS.items())
-    rules = {rule.name for rule in RULE_SEARCHES}
-    assert {*DRAWN, *FROM_RULES, "exhaustive", "best_rule", *rules} == set(SEARCH_METHODS)
+def test_every_proposer_has_its_name_and_a_title_of_its_own() -> None:
+    rows = proposers()
+    assert all(find_proposer(name).name == name for name in rows)
+    assert len({row.title for row in rows.values()}) == len(rows)
+    assert {*DRAWN, *FROM_RULES, "exhaustive", "best_rule"} == set(proposers(ProposerKind.SEARCH))
 
 
 def test_the_best_rule_is_chosen_by_a_blast_each(problem: LayoutProblem) -> None:
     layouts = set(layouts_by_rule(problem.scenario, problem.told).values())
-    result = find_search_method("best_rule").search(problem, 100, 0)
+    result = find_proposer("best_rule").propose(problem, 100, 0)
     assert result.blasts == len(layouts) * len(problem.threats)
     assert result.layout in layouts
     assert problem.load(result.layout) == min(map(problem.load, layouts))
@@ -281,8 +284,8 @@ def test_what_begins_with_the_rules_is_never_worse(problem: LayoutProblem, name:
     (threat, *_) = problem.threats
     case = replace(problem.case, threats=(threat,), realisations=1)
     alone = LayoutProblem(problem.evaluator, case)
-    best = find_search_method("best_rule").search(alone, 9, 0)
-    found = find_search_method(name).search(alone, 20, 0)
+    best = find_proposer("best_rule").propose(alone, 9, 0)
+    found = find_proposer(name).propose(alone, 20, 0)
     assert found.method == name
     assert alone.load(found.layout) <= alone.load(best.layout)
 
@@ -304,13 +307,13 @@ class OneLayoutAgent:
 
 def test_a_search_from_a_policy_ends_no_worse_than_it_and_the_rules(problem: LayoutProblem) -> None:
     agent = OneLayoutAgent(((0, 0), (1, 0)))
-    search = PolicySearch(agent, digest="one")
-    result = search.search(problem, 60, 0)
-    rules = find_search_method("best_rule").search(problem, 100, 0)
+    search = LearntSearch(agent=agent, digest="one")
+    result = search.propose(problem, 60, 0)
+    rules = find_proposer("best_rule").propose(problem, 100, 0)
     bound = min(problem.load(agent.layout), problem.load(rules.layout))
     assert problem.load(result.layout) <= 1.02 * bound  # by one threat of two at first
     assert result.blasts <= 60
-    assert result == search.search(problem, 60, 0)
+    assert result == search.propose(problem, 60, 0)
     assert "OneLayoutAgent" not in repr(search)
 
 
@@ -322,7 +325,7 @@ def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
     for seed in (0, 1):
         problem = LayoutProblem(evaluator, practice_hidden(scenario, 1, 2, seed))
         genetic, drawn = (
-            problem.load(find_search_method(name).search(problem, 100, seed).layout)
+            problem.load(find_proposer(name).propose(problem, 100, seed).layout)
             for name in ("genetic", "random")
         )
         better_pa_s.append(drawn - genetic)

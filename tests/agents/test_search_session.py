@@ -4,11 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from blast_agents.search.problem import (
-    LayoutProblem,
-    Plan,
-)
-from blast_agents.search.session import SearchEndedError, SearchSession
+from blast_agents.search.problem import LayoutProblem
+from blast_agents.search.session import Plan, SearchEndedError, SearchSession
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -111,7 +108,7 @@ def test_a_layout_that_has_met_more_threats_goes_before(problem: LayoutProblem) 
 def test_the_lucky_one_is_found_out(problem: LayoutProblem) -> None:
     """With blasts enough for all, the choice is the one by all threats, not by the first."""
     it = SearchSession(problem, 100, Plan(1, 12))
-    it.run(lambda: _ask(it))
+    it.run(lambda: _ask(it), it.confirm_best)
     assert it.best is not None
     impulses = {layout: problem.load(layout) for layout in LAYOUTS}
     assert it.best.threats == 4

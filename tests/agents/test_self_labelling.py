@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from blast_agents.league.trained import TrainedRun
-from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.search.registry import layouts_by_rule
 from blast_agents.training import load_agent, load_hyperparameters, resume, train
 from blast_agents.training.agent import TrainedAgent, fitted, policy_for
 from blast_agents.training.cases import Selection, training_cases
@@ -291,7 +291,7 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
     assert last.reward >= first.reward
     assert last.episodes <= 6
     (evaluation,) = result.progress.evaluations
-    cost = TrainedRun.load(tmp_path / "run").entry.training
+    cost = TrainedRun.load(tmp_path / "run").training
     assert cost.blasts == 2 * chosen.evaluation_cases  # to choose the weights; guesses are none
     assert not (tmp_path / "run" / "blasts").exists()
     selection = Selection.of(chosen, SingleScenario(wide_yard()))

@@ -14,7 +14,7 @@ from blast_agents.policies.features import (
     ZoneView,
 )
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
-from blast_agents.rules import RULES
+from blast_agents.rules import wall_near_charge
 from blast_agents.training.agent import logits_of
 
 import blast_env  # noqa: F401
@@ -188,7 +188,7 @@ def test_a_rule_s_wall_covers_the_bearings_to_the_facade() -> None:
     """What is left open of the facade is what a policy has to see shrink."""
     scenario = load_scenario("courtyard")
     charge = Charge((5.0, 10.0), 100.0)
-    layout = RULES["wall near the charge"](scenario, charge)
+    layout = wall_near_charge(scenario, charge)
     env = environment()
     bare = zone_view(observed(env, charge.position_m), 40, 16).site[0, OPEN_FACADE]
     wall = zone_view(observed(env, charge.position_m, layout=layout[:8]), 40, 16)

@@ -14,7 +14,7 @@ import pytest
 from blast_agents.league.trained import TrainedRun
 from blast_agents.rules import random_layout
 from blast_agents.search import LayoutProblem
-from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.search.registry import layouts_by_rule
 from blast_agents.surrogate.engine import SurrogateEngine
 from blast_agents.surrogate.fitting import MEMBERS, Samples, elements, errors, fit, folds
 from blast_agents.surrogate.network import (
@@ -28,9 +28,7 @@ from blast_agents.surrogate.network import (
 )
 from blast_agents.surrogate.search import (
     Guesses,
-    RankedAgent,
-    SurrogateAgent,
-    SurrogateSearch,
+    LearntSearch,
     improved,
 )
 from blast_agents.surrogate.walls import FEATURES, WallPoints, site_of
@@ -419,11 +417,11 @@ def test_a_search_by_guesses_is_never_worse_than_what_it_begins_with() -> None:
         assert Placement.of(YARD, layout).layout == layout
 
 
-def test_the_agent_proposes_the_same_legal_layout_again() -> None:
-    agent = SurrogateAgent(by_hand(), changes=8)
+def test_without_a_blast_it_proposes_the_same_legal_layout_again() -> None:
+    agent = LearntSearch(by_hand(), changes=8)
     for charge in (None, Charge((1.5, 5.0), 5.0)):
-        layout = agent.propose(YARD, charge)
-        assert layout == agent.propose(YARD, charge)
+        layout = agent.at_once(YARD, charge)
+        assert layout == agent.at_once(YARD, charge)
         assert Placement.of(YARD, layout).layout == layout
         assert layout
 
@@ -445,14 +443,14 @@ def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
     charge: Charge | None,
 ) -> None:
     surrogate, drawing = by_hand(), Drawing()
-    proposed = RankedAgent(drawing, surrogate, drawn=3).propose(YARD, charge)
+    proposed = LearntSearch(surrogate, drawing, ranked=3).at_once(YARD, charge)
     drawn = [tuple(sorted(each)) for each in drawing.sample(YARD, charge, 3)]
     met = case() if charge is None else Case(YARD, (Threat(charge, 0),))
     likes = Guesses.of(surrogate, met).loads([(), *drawn])
     if charge is not None:
         assert proposed == [(), *drawn][int(likes.argmin())]
     assert proposed in drawn  # a wall is better than none
-    assert RankedAgent(drawing, surrogate, drawn=1).propose(YARD, charge) == drawn[0]
+    assert LearntSearch(surrogate, drawing, ranked=1).at_once(YARD, charge) == drawn[0]
 
 
 def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
@@ -460,18 +458,18 @@ def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
     problem = LayoutProblem(BlastEvaluator(YARD, FAST), case())
     ruled = {tuple(sorted(each)) for each in layouts_by_rule(YARD, problem.told).values()}
     budget = 3 * len(ruled)
-    method = SurrogateSearch(by_hand(), "digest", guesses=12, drawn=4)
-    result = method.search(problem, budget, 0)
+    method = LearntSearch(by_hand(), digest="digest", guesses=12, drawn=4)
+    result = method.propose(problem, budget, 0)
     assert result.blasts <= budget
     assert result.load is not None
     assert result.load <= min(map(problem.load, ruled))
-    assert result == method.search(problem, budget, 0)
+    assert result == method.propose(problem, budget, 0)
     assert replace(method, guesses=13) != method
     # From an agent it begins with what that proposes, whatever the surrogate thinks of it.
     assert result.layout != Drawing().propose(YARD)
-    first = replace(method, agent=Drawing()).search(problem, 1, 0)
+    first = replace(method, agent=Drawing()).propose(problem, 1, 0)
     assert (first.layout, first.blasts) == (Drawing().propose(YARD), 1)
-    guided = replace(method, agent=Drawing()).search(problem, budget, 0)
+    guided = replace(method, agent=Drawing()).propose(problem, budget, 0)
     assert guided.load is not None
     assert guided.load <= min(map(problem.load, Drawing().sample(YARD, problem.told, 3)))
 
@@ -495,8 +493,8 @@ class WrongBy(LayoutProblem):
 def test_against_a_hidden_charge_it_chooses_by_all_places_though_few_are_met() -> None:
     problem = WrongBy(BlastEvaluator(YARD, FAST), case(10))
     assert problem.told is None
-    method = SurrogateSearch(by_hand(), "digest", guesses=30, drawn=4)
-    result = method.search(problem, 40, 0)
+    method = LearntSearch(by_hand(), digest="digest", guesses=30, drawn=4)
+    result = method.propose(problem, 40, 0)
     assert result.blasts == sum(problem.met.values()) <= 40
     assert result.threats == 10  # the chosen one has met all
     assert set(problem.met.values()) == {4, 10}
@@ -574,10 +572,10 @@ def test_what_the_surrogate_picks_from_draws_is_what_it_likes_best_of_just_these
 
 def test_a_verdict_holds_promise_and_rules_against_blasts() -> None:
     evaluator = BlastEvaluator(YARD, FAST)
-    agent, threat = SurrogateAgent(by_hand(), changes=2), draw_threats(YARD, [3])[0]
+    agent, threat = LearntSearch(by_hand(), changes=2), draw_threats(YARD, [3])[0]
     found = verdict(agent, evaluator, threat)
     bare = evaluator.loads((), threat).protected_impulse_pa_s
-    proposed = evaluator.loads(agent.propose(YARD, threat.charge), threat)
+    proposed = evaluator.loads(agent.at_once(YARD, threat.charge), threat)
     assert found.reduction == pytest.approx(1.0 - proposed.protected_impulse_pa_s / bare)
     assert set(found.rules) == set(layouts_by_rule(YARD, threat.charge))
     assert found.promised < 1.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 from blast_agents.policies.spatial import SpatialPolicy
-from blast_agents.proposal import LayoutAgent
+from blast_agents.search import LayoutAgent
 from blast_agents.training import TrainedAgent, load_agent, load_archive, train
 from blast_agents.training.agent import logits_of, make_model, policy_for
 from blast_agents.training.checkpoint import Checkpoint

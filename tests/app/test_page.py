@@ -140,7 +140,7 @@ def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
         selects = user.find(kind=ui.select).elements
         (proposer,) = (each for each in selects if each.props["label"] == "by")
         assert next(iter(proposer.options)) == f"rule {offers.PACKAGED}"
-        proposer.value = "rule wall near the charge"
+        proposer.value = "rule wall_near_charge"
         user.find(marker="propose").click()
         await user.should_see("take it")
         user.find("take it").click()

@@ -7,7 +7,6 @@ from pathlib import Path
 from time import monotonic, sleep
 
 import pytest
-from blast_agents.posts import VEHICLE_RULES
 
 from blast_env import reporting
 from blast_env.app import blasts, offers
@@ -256,7 +255,7 @@ def test_keys_know_what_a_result_depends_on() -> None:
     assert len(others | {key}) == 5
 
 
-@pytest.mark.parametrize("proposer", offers.proposers(load_scenario("courtyard"))[1:])
+@pytest.mark.parametrize("proposer", offers.rules(load_scenario("courtyard")))
 def test_a_proposal_can_be_taken(tmp_path: Path, proposer: str) -> None:
     session = session_on(tmp_path, BALLISTIC_COURTYARD)
     session.propose(proposer)
@@ -270,7 +269,8 @@ def test_a_proposal_can_be_taken(tmp_path: Path, proposer: str) -> None:
 def test_what_is_best_is_offered_first(tmp_path: Path) -> None:
     session = Sessions(WorkFolder(tmp_path), Here()).new(hut(), "begin")
     assert session.engine == EngineRecord(name="gas", cell_m=0.5)
-    assert offers.proposers(hut())[0] == offers.PACKAGED
+    assert next(iter(offers.offered(hut()))) == f"rule {offers.PACKAGED}"
+    assert offers.offered(load_scenario("free_field")) == {}
     session.propose(offers.PACKAGED)  # modules: the best rule by gas
     status = state_of(session)
     assert status.state == "done", status.text
@@ -318,7 +318,7 @@ def test_what_cannot_be_begun_is_refused_at_once(tmp_path: Path) -> None:
     with pytest.raises(BlastEnvError, match="no build zone"):
         session.search("random", 10)
     with pytest.raises(BlastEnvError, match="no build zone"):
-        session.propose("wall near the charge")
+        session.propose("wall_near_charge")
     courtyard = session_on(tmp_path, load_scenario("courtyard"))
     with pytest.raises(BlastEnvError, match="budget is 0"):
         courtyard.search("random", 0)
@@ -344,9 +344,10 @@ def test_a_vehicle_is_where_the_layout_lets_it_come(tmp_path: Path) -> None:
     assert nearest.name == "charge 1, as near as it comes"
     session = session_on(tmp_path, site)
     assert session.threats == (nearest.name,)
-    assert {"line of posts", "posts and a wall"} < set(offers.proposers(site))
-    assert not set(VEHICLE_RULES) & set(offers.proposers(hut()))
-    session.propose("line of posts")
+    against = {"rule line_of_posts", "rule posts_and_wall"}
+    assert against < set(offers.offered(site))
+    assert not against & set(offers.offered(hut()))
+    session.propose("line_of_posts")
     session.take(state_of(session), 0)
     session.engine = EngineRecord(name="gas", cell_m=0.5)
     session.blast([0])

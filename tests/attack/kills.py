@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from blast_agents.league import Contest, NoBarrier, ResultStore, standard_entries
+from blast_agents.league import Contest, LeagueEntry, ResultStore, standard_entries
+from blast_agents.league.entries import NoBarrier
 from blast_agents.league.report import write_league
 from blast_agents.league.tracks import known_track
 from blast_agents.training import resume, train
@@ -93,7 +94,7 @@ def _command(*arguments: str | Path) -> None:
 def _search(folder: Path) -> None:
     options = ("--method", "random", "--budget", "6", "--held-out", "2", "--seed", "1")
     where = ("--cache", folder / "cache", "--out", folder / "out")
-    _command("search", *options, *where)
+    _command("search", "--engine", "event", *options, *where)
 
 
 _WALL: Final = Path(__file__).with_name("wall.json")
@@ -116,7 +117,10 @@ def _files(folder: Path) -> dict[str, bytes]:
 
 def _league(folder: Path) -> None:
     track = known_track(road_scenario(), 2, 2)
-    entries = (*standard_entries(["random"], [4]), NoBarrier("nothing"))
+    entries = (
+        *standard_entries([road_scenario()], ["random"], [4]),
+        LeagueEntry(NoBarrier("nothing")),
+    )
     contest = Contest(track, entries, ResultStore(folder / "results"))
     write_league([contest.play()], folder, "command")
 

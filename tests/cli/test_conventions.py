@@ -153,7 +153,7 @@ def test_the_charge_is_named_alike_everywhere(site: Path, layout: Path, tmp_path
     assert place in shown
     assert "means over 2 threats" in shown
     options = ("--method", "random", "--budget", 4, "--held-out", 2, "--out", tmp_path / "out")
-    result = run("search", "--scenario", site, *options, *CHARGE)
+    result = run("search", "--scenario", site, *options, *CHARGE, "--engine", "event")
     assert result.exit_code == 0, result.output
     threats = LayoutFile.load(tmp_path / "out" / "layout.json").provenance["threats"]
     assert {(*each["charge_position_m"], each["tnt_kg"]) for each in threats} == {(5.0, 19.0, 60.0)}
@@ -174,7 +174,7 @@ def test_each_command_says_engine_and_preset(site: Path, layout: Path) -> None:
     for arguments in (
         ("simulate", site, "--engine", "event"),
         ("evaluate", *given, "--layout", layout, "--seeds", 1, "--engine", "event"),
-        ("search", *given, "--method", "wall_near_charge", "--held-out", 1),
+        ("search", *given, "--method", "wall_near_charge", "--held-out", 1, "--engine", "event"),
     ):
         assert "engine event 1 (numba" in run(*arguments).stdout
         assert "preset ballistic" in " ".join(run(*arguments).stdout.split())
@@ -187,7 +187,7 @@ def test_the_steps_of_the_event_engine_are_events(site: Path) -> None:
 
 def test_sight_lines_are_a_method_of_search(site: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    options = ("--method", "sight_lines", "--held-out", 1, "--out", out)
+    options = ("--method", "sight_lines", "--held-out", 1, "--engine", "event", "--out", out)
     result = run("search", "--scenario", site, *options)
     assert result.exit_code == 0, result.output
     scenario = load_scenario(site)
@@ -279,6 +279,7 @@ def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(EventRun, "advance", interrupt)
 
 
+SEARCH = ("search", "--engine", "event")
 EVALUATE = ("evaluate", "--layout", "LAYOUT", "--engine", "event")
 
 
@@ -286,8 +287,8 @@ EVALUATE = ("evaluate", "--layout", "LAYOUT", "--engine", "event")
 @pytest.mark.parametrize(
     ("arguments", "resume"),
     [
-        (("search", "--out", "a/b"), "with --cache FOLDER the blasts would have been kept"),
-        (("search", "--out", "a", "--cache", "c/d"), "the same command goes on with the blasts"),
+        ((*SEARCH, "--out", "a/b"), "with --cache FOLDER the blasts would have been kept"),
+        ((*SEARCH, "--out", "a", "--cache", "c/d"), "the same command goes on with the blasts"),
         ((*EVALUATE, "--out", "a/b"), "with --cache FOLDER the blasts"),
         ((*EVALUATE, "--cache", "c"), "the same command goes on"),
         (("league", "--out", "a", "--methods", "random"), "the same command goes on"),

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from blast_agents.search import LayoutProblem, find_search_method
-from blast_agents.surrogate import SurrogateSearch, packaged_surrogate
+from blast_agents.search import LayoutProblem, find_proposer
+from blast_agents.surrogate import packaged_surrogate, search_by
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario
@@ -32,7 +32,9 @@ def site(tmp_path: Path) -> Path:
 
 
 def search(*arguments: str | Path | float) -> Result:
-    return CliRunner().invoke(app, ["search", *(str(argument) for argument in arguments)])
+    """Run the command, by particles unless an engine is named."""
+    engine = () if "--engine" in arguments else ("--engine", "event")
+    return CliRunner().invoke(app, ["search", *map(str, (*arguments, *engine))])
 
 
 def test_it_has_help_and_is_listed() -> None:
@@ -49,7 +51,7 @@ def test_it_finds_what_the_library_finds_and_writes_all_files(site: Path, tmp_pa
     assert result.exit_code == 0, result.output
     evaluator = BlastEvaluator(load_scenario(site), "event")
     problem = LayoutProblem(evaluator, practice_visible(evaluator.scenario, CHARGE, 2, 3))
-    expected = find_search_method("nsga2").search(problem, 60, 3)
+    expected = find_proposer("nsga2").propose(problem, 60, 3)
     assert load_layout(out / "layout.json", evaluator.scenario) == expected.layout
     assert f"{expected.blasts} of 60 blasts spent" in result.stdout
     assert f"{problem.load(expected.layout):,.0f}" in result.stdout
@@ -103,7 +105,7 @@ def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
     assert provenance["options"]["surrogate"] == found.digest
     case = practice_visible(scenario, scenario.sample_charge(np.random.default_rng(0)), 1, 0)
     problem = LayoutProblem(BlastEvaluator(scenario, "gas"), case)
-    expected = SurrogateSearch(found, found.digest).search(problem, 1, 0)
+    expected = search_by(found).propose(problem, 1, 0)
     assert load_layout(out / "layout.json", scenario) == expected.layout != ()
 
 

@@ -12,9 +12,6 @@ from tests.agents.search_cases import small_scenario
 SLOW = ("matplotlib", "numba", "pandas", "pyarrow", "pymunk", "scipy", "torch", "xlsxwriter")
 """What takes a tenth of a second or more to import."""
 
-LATER = ("search", "bench", "league", "propose")
-"""Commands that still import what they work with at once."""
-
 NOT_ON_WINDOWS = ("fcntl", "grp", "pwd", "resource", "syslog", "termios")
 
 
@@ -52,8 +49,6 @@ LISTED = f"""
 import sys, typer
 from blast_env.cli import app
 for name, command in typer.main.get_command(app).commands.items():
-    if name in {LATER}:
-        continue
     assert "blast_env.cli." + name not in sys.modules, name
     command.loaded
     found = [each for each in {SLOW} if each in sys.modules]

@@ -67,6 +67,7 @@ _LEAGUE_AGENTS: Final = {
 
 GIVEN: Final = (
     Given(("docs/start.md",), "depot.toml", "docs/data/depot.toml"),
+    Given(("docs/researchers/league.md",), "own_optimiser.py", "docs/data/own_optimiser.py"),
     Given(
         ("docs/howto/pictures.md", "docs/engineers/gas.md", "docs/howto/cluster.md"),
         "wall.json",
@@ -322,11 +323,13 @@ SMALLER: Final[dict[str, str]] = {
     " --run out/hotel --run out/hotel_ppo --surrogate out/hotel.json --out out/hotel_league": (
         "--seeds 1 --methods best_rule --budgets 2 --agent-search 2"
     ),
+    "blast-env league --budgets 50 --methods random,genetic --method own_optimiser:Descent"
+    " --scenario courtyard --out out/own": f"{_LEAGUE} --methods random",
     "blast-env search --method genetic --budget 200 --seed 0 --charge 5 12 --out out/search": (
-        "--budget 20 --held-out 2"
+        "--budget 8 --held-out 1"
     ),
     "blast-env search --method nsga2 --threat hidden --threats 16 --budget 1000 --processes 2"
-    " --out out/front": "--budget 40 --held-out 2",
+    " --out out/front": "--engine event --budget 40 --held-out 2",
     "blast-env train --algo maskable_ppo --scenario courtyard --run runs/courtyard": _TRAIN,
     "blast-env train --algo self_labelling --engine gas --scenario visitor_entrance"
     " --run runs/own_best": _LABEL,

@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 import gymnasium as gym
 import pytest
-from blast_agents.search import LayoutProblem, find_search_method
+from blast_agents.search import LayoutProblem, find_proposer
 
 import blast_env
 from blast_env.engines import contract, find_engine
@@ -68,7 +68,7 @@ def test_layouts_are_evaluated_and_reported_with_it() -> None:
 def test_a_search_uses_up_the_stock_with_it() -> None:
     evaluator = BlastEvaluator(COURTYARD, "shade")
     problem = LayoutProblem(evaluator, Case(COURTYARD, draw_threats(COURTYARD, range(1))))
-    found = find_search_method("random").search(problem, 8, seed=0)
+    found = find_proposer("random").propose(problem, 8, seed=0)
     best = max(found.history, key=lambda each: len(each.layout))
     assert found.load == pytest.approx(problem.load(()) * 0.9 ** len(best.layout))
     assert evaluator.blasts <= 9

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blast_agents.search import LayoutProblem, find_search_method
+from blast_agents.search import LayoutProblem, find_proposer
 from blast_agents.surrogate.engine import SurrogateEngine
 
 from blast_env.engines import find_engine
@@ -108,7 +108,7 @@ def test_searches_harden_without_spending_blasts_on_it(method: str) -> None:
     problem = LayoutProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
     metered = problem.metered(30)
     assert metered.unprotected[0] > 0.0
-    result = find_search_method(method).search(metered, 30, 1)
+    result = find_proposer(method).propose(metered, 30, 1)
     assert result.load is not None
     assert result.load < metered.unprotected[0]
     assert metered.blasts_run - 1 <= result.blasts <= metered.blasts_run

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from blast_agents.proposal import propose
 from blast_agents.rules import random_layout, wall_near_charge
+from blast_agents.search import layouts_by_rule
 
 import blast_env
 from blast_env.errors import BlastEnvError
@@ -18,10 +18,8 @@ from blast_env.evaluation import BlastEvaluator, Case, Evaluators, Threat, draw_
 from blast_env.export import LayoutPlan
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
-    AnyCharge,
     LayoutFile,
     Placement,
-    Scenario,
     ScenarioError,
     check_layout,
     scenario_hash,
@@ -111,7 +109,7 @@ def test_no_public_function_insists_on_a_loaded_scenario(module_name: str) -> No
         lambda it: blast_env.Blast(it, seed=3).scenario,
         lambda it: wall_near_charge(it, CHARGE),
         lambda it: random_layout(it, np.random.default_rng(0)),
-        lambda it: propose(_Nowhere(), it, CHARGE).layout,
+        lambda it: layouts_by_rule(it, CHARGE),
         lambda it: SiteMeasures.of(it),
         lambda it: turned(it, 1),
     ],
@@ -121,18 +119,6 @@ def test_name_path_and_scenario_mean_the_same(call: Callable[[Any], Any], tmp_pa
     blast_env.save_scenario(NAME, path)
     plain = COURTYARD.model_dump(mode="json", exclude_none=True)
     assert call(NAME) == call(str(path)) == call(path) == call(plain) == call(COURTYARD)
-
-
-class _Nowhere:
-    """Proposes nothing; every scenario it is asked about has been loaded."""
-
-    def propose(
-        self,
-        scenario: Scenario,
-        charge: AnyCharge | None = None,
-    ) -> tuple[tuple[int, int], ...]:
-        assert isinstance(scenario, Scenario)
-        return ()
 
 
 def test_blasts_and_evaluations_of_a_path(tmp_path: Path) -> None:

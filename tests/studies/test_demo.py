@@ -7,8 +7,8 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-from blast_agents.league import RandomLayout
-from blast_agents.rules import ITEM_RULES
+from blast_agents.league.entries import RandomLayout
+from blast_agents.search import ProposerKind, proposers
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange
@@ -52,7 +52,9 @@ def test_it_trains_compares_and_films(first: tuple[DemoSettings, AgentComparison
     assert "judged by the engine gas" in printed
     assert sum(line.startswith("  after") for line in printed.splitlines()) == 2
     names = [each.name for each in comparison.standings.results]
-    by_rule = [*ITEM_RULES, "most sight lines cut"]
+    by_rule = [
+        row.title for row in proposers(ProposerKind.RULE).values() if "posts" not in row.title
+    ]
     assert names == ["no barrier", "random layout", *by_rule, AGENT]
     assert all(name in printed for name in (*names, "best rule for each case"))
     files = ["run/learning_curve.png", "side_by_side.mp4", "facade.png", "site.png", "loads.xlsx"]

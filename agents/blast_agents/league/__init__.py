@@ -2,14 +2,12 @@
 
 from blast_agents.league.contest import Contest, Outlook
 from blast_agents.league.entries import (
-    Agent,
-    Entry,
-    NoBarrier,
+    NO_BARRIER,
+    LeagueEntry,
     RandomLayout,
-    Rule,
-    Search,
     Training,
-    VisibilityLayout,
+    own_proposer,
+    searches,
     standard_entries,
 )
 from blast_agents.league.standings import LeagueVerdict, Result, Standings, verdicts
@@ -25,25 +23,23 @@ from blast_agents.league.tracks import (
 )
 
 __all__ = [
+    "NO_BARRIER",
     "TRACKS",
-    "Agent",
     "Contest",
-    "Entry",
+    "LeagueEntry",
     "LeagueVerdict",
-    "NoBarrier",
     "Outlook",
     "RandomLayout",
     "Result",
     "ResultStore",
-    "Rule",
-    "Search",
     "Standings",
     "Track",
     "Training",
-    "VisibilityLayout",
     "find_tracks",
     "hidden_track",
     "known_track",
+    "own_proposer",
+    "searches",
     "sites_track",
     "standard_entries",
     "vehicle_track",

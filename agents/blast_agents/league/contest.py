@@ -2,82 +2,96 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from time import perf_counter, process_time
 from typing import TypeVar
 
 import numpy as np
 
-from blast_agents.league.entries import (
-    Agent,
-    Entry,
-    Instant,
-    NoBarrier,
-    Rule,
-    Search,
-    VisibilityLayout,
-)
+from blast_agents.league.entries import NO_BARRIER, LeagueEntry
 from blast_agents.league.standings import Result, Standings
 from blast_agents.league.store import ResultStore, evaluation_key, search_key
 from blast_agents.league.tracks import Track, practice_of
-from blast_agents.proposal import Proposal, timed_proposal
-from blast_agents.search import BlastMeter, BudgetError, LayoutProblem, SearchResult
+from blast_agents.search import (
+    BlastMeter,
+    BudgetError,
+    LayoutProblem,
+    Proposal,
+    ProposerKind,
+    SearchResult,
+    timed_proposal,
+)
 from blast_env.engines import Engine, find_engine
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, Case, Objective
 from blast_env.geometry import Layout
 from blast_env.runner import as_completed, check_workers
+from blast_env.scenario import check_layout
 
 Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, eq=False)
 class SearchJob:
-    """Lets a search find its layout for a case.
+    """Lets an entry propose for a case.
 
     Attributes:
         case: The case.
-        search: The search.
+        entry: The entry.
         engine: Name of the engine, or the engine.
     """
 
     case: Case
-    search: Search
+    entry: LeagueEntry
     engine: str | Engine
 
     @property
     def blasts(self) -> int:
         """Most blasts that it takes."""
-        return self.search.budget
+        return self.entry.budget
 
     def __call__(self) -> Proposal:
-        """Return what the search proposes; it shares no blast with any other.
+        """Return what a search proposes; it shares no blast with any other.
 
         Its blasts are those that the problem has counted, whatever the method says of them.
 
         Raises:
-            BlastEnvError: If the method runs more blasts than its budget.
+            BlastEnvError: If the method runs more blasts than its budget, or its layout may not be
+                built.
             KeyboardInterrupt: If the search was interrupted: what it has by then is not its
                 answer.
         """
         practice = practice_of(self.case)
-        engine = self.search.first_engine or self.engine
+        engine = self.entry.first_engine or self.engine
         # What the first blast of a process has to load is no part of the search's time.
         for each in {engine, self.engine}:
             BlastEvaluator(practice.scenario, each).loads((), practice.threats[0])
         began_s, began_cpu_s = perf_counter(), process_time()
-        problem = self._problem(engine, BlastMeter(self.search.budget))
+        problem = self._problem(engine, BlastMeter(self.entry.budget))
         result = self._result(problem)
         layout, blasts, other_blasts = result.layout, problem.blasts_run, 0
-        if self.search.first_engine is not None:
+        if self.entry.first_engine is not None:
             layout, blasts, other_blasts = *self._judged(result), problem.blasts_run
-        return Proposal(
-            layout=tuple(sorted(layout)),
-            seconds=perf_counter() - began_s,
-            blasts=blasts,
-            other_blasts=other_blasts,
-            cpu_s=process_time() - began_cpu_s,
-        )
+        seconds, cpu_s = perf_counter() - began_s, process_time() - began_cpu_s
+        found = Proposal(tuple(sorted(layout)), seconds, blasts, other_blasts, cpu_s)
+        return self._checked(found)
+
+    def at_once(self) -> Proposal:
+        """Return what is proposed without a blast, and how long that took.
+
+        Raises:
+            BlastEnvError: If a blast is run, or the layout may not be built.
+        """
+        problem = self._problem(self.engine, BlastMeter(0))
+        found = timed_proposal(lambda: self._result(problem).layout)
+        return self._checked(replace(found, layout=tuple(sorted(found.layout))))
+
+    def _checked(self, proposal: Proposal) -> Proposal:
+        try:
+            check_layout(self.case.scenario, proposal.layout)
+        except LayoutError as error:
+            raise BlastEnvError(f"{self.entry.name}, case {self.case.name!r}: {error}") from None
+        return proposal
 
     def _problem(self, engine: str | Engine, meter: BlastMeter) -> LayoutProblem:
         practice = practice_of(self.case)
@@ -88,24 +102,24 @@ class SearchJob:
 
     def _result(self, problem: LayoutProblem) -> SearchResult:
         """Return what the method finds, unless it went round the meter."""
-        method, budget = self.search.method, self.search.budget
+        entry, case = self.entry, self.case
         try:
-            result = method.search(problem, budget, self.case.seed)
-        except BudgetError as error:
-            raise BudgetError(f"{self.search.name}, case {self.case.name!r}: {error}") from None
+            result = entry.proposer.propose(problem, entry.budget, case.seed)
+        except (BudgetError, LayoutError) as error:
+            raise BlastEnvError(f"{entry.name}, case {case.name!r}: {error}") from None
         if result.interrupted:
             raise KeyboardInterrupt
-        if problem.blasts_run > budget:
+        if problem.blasts_run > entry.budget:
             raise BudgetError(
-                f"{self.search.name}, case {self.case.name!r}: {problem.blasts_run:,} blasts were "
-                f"run, the budget is {budget:,}"
+                f"{entry.name}, case {case.name!r}: {problem.blasts_run:,} blasts were run, the "
+                f"budget is {entry.budget:,}"
             )
         return result
 
     def _judged(self, result: SearchResult) -> tuple[Layout, int]:
         """Return the best of a search's last best layouts by the judge, and its blasts for that."""
-        latest = [each.layout for each in reversed(result.history)]
-        finalists = list(dict.fromkeys(latest))[: self.search.finalists]
+        latest = [each.layout for each in reversed(result.history)] or [result.layout]
+        finalists = list(dict.fromkeys(latest))[: self.entry.finalists]
         meter = BlastMeter(len(finalists) * len(practice_of(self.case).threats))
         best = min(finalists, key=self._problem(self.engine, meter).load)
         return best, meter.blasts
@@ -134,16 +148,6 @@ class EvaluationJob:
         """Return the loads that count, in the unit of the objective, one a held-out threat."""
         evaluator = BlastEvaluator(self.case.scenario, self.engine)
         return Objective(evaluator, self.case).counted_loads(self.layout)
-
-
-def propose_at_once(entry: Instant, cases: Sequence[Case]) -> tuple[Proposal, ...]:
-    """Return an entry's proposals, none of which takes a blast.
-
-    The time of one more proposal before these is not counted: it loads what has to be loaded.
-    """
-    entry.propose(cases[0])
-    proposals = [timed_proposal(partial(entry.propose, case)) for case in cases]
-    return tuple(replace(each, layout=tuple(sorted(each.layout))) for each in proposals)
 
 
 def _done(job: Callable[[], Found]) -> Found:
@@ -185,7 +189,7 @@ class Contest:
 
     Attributes:
         track: The cases.
-        entries: No barrier among them; their names differ.
+        entries: `NO_BARRIER` among them; their names differ.
         store: Keeps the results.
         engine: Name of the engine, or the engine.
 
@@ -194,7 +198,7 @@ class Contest:
     """
 
     track: Track
-    entries: tuple[Entry, ...]
+    entries: tuple[LeagueEntry, ...]
     store: ResultStore
     engine: str | Engine = "event"
 
@@ -204,17 +208,22 @@ class Contest:
         for name in names:
             if names.count(name) > 1:
                 raise BlastEnvError(f"entry {name!r} is there twice, must be none twice")
-        if not any(isinstance(entry, NoBarrier) for entry in self.entries):
+        if NO_BARRIER not in self.entries:
             raise BlastEnvError("no barrier is not among the entries: it is what others refer to")
 
     @cached_property
     def _instant(self) -> Mapping[str, tuple[Proposal, ...]]:
-        """The proposals, one a case, of the entries that spend no blast, by name."""
-        return {
-            entry.name: propose_at_once(entry, self.track.cases)
-            for entry in self.entries
-            if not isinstance(entry, Search)
-        }
+        """The proposals, one a case, of the entries that spend no blast, by name.
+
+        The time of one more proposal before these is not counted: it loads what has to be loaded.
+        """
+        proposals = {}
+        for entry in self.entries:
+            if not entry.budget:
+                jobs = [SearchJob(case, entry, self.engine) for case in self.track.cases]
+                jobs[0].at_once()
+                proposals[entry.name] = tuple(job.at_once() for job in jobs)
+        return proposals
 
     def outlook(self) -> Outlook:
         """Return what is still to be simulated.
@@ -223,7 +232,7 @@ class Contest:
             CalibrationError: If a scenario has no calibration for the engine.
             UnknownNameError: If there is no such engine.
         """
-        searches = [entry for entry in self.entries if isinstance(entry, Search)]
+        searches = [entry for entry in self.entries if entry.budget]
         missing = self._missing_searches()
         held_out = sum(len(job.case.threats) for job in missing)
         return Outlook(
@@ -249,7 +258,7 @@ class Contest:
         searches = self._missing_searches()
         for index, proposal in as_completed(_done, searches, processes):
             job = searches[index]
-            self.store.keep_proposal(search_key(job.case, job.search, self.engine), proposal)
+            self.store.keep_proposal(search_key(job.case, job.entry, self.engine), proposal)
             meter.add(job.blasts)
         evaluations = self._missing_evaluations()
         for index, loads in as_completed(_done, evaluations, processes):
@@ -264,7 +273,7 @@ class Contest:
         jobs = [
             SearchJob(case, entry, self.engine)
             for entry in self.entries
-            if isinstance(entry, Search)
+            if entry.budget
             for case in self.track.cases
             if self._found(case, entry) is None
         ]
@@ -285,13 +294,13 @@ class Contest:
             if self._loads(cases[index], layout) is None
         ]
 
-    def _proposals(self, entry: Entry) -> Sequence[Proposal | None]:
+    def _proposals(self, entry: LeagueEntry) -> Sequence[Proposal | None]:
         """Return what an entry proposes, one a case; `None` where it has not searched yet."""
-        if not isinstance(entry, Search):
+        if not entry.budget:
             return self._instant[entry.name]
         return [self._found(case, entry) for case in self.track.cases]
 
-    def _found(self, case: Case, entry: Search) -> Proposal | None:
+    def _found(self, case: Case, entry: LeagueEntry) -> Proposal | None:
         return self.store.proposal(search_key(case, entry, self.engine), case.scenario)
 
     def _loads(self, case: Case, layout: Layout) -> tuple[float, ...] | None:
@@ -299,12 +308,8 @@ class Contest:
 
     def _standings(self) -> Standings:
         results = tuple(self._results())
-        bare = next(
-            result
-            for entry, result in zip(self.entries, results, strict=True)
-            if isinstance(entry, NoBarrier)
-        )
-        return Standings(self.track, results, bare.loads, _engine_words(self.engine))
+        bare = results[self.entries.index(NO_BARRIER)]
+        return Standings(self.track, results, bare.loads, find_engine(self.engine).words)
 
     def _results(self) -> Iterator[Result]:
         for entry in self.entries:
@@ -315,12 +320,11 @@ class Contest:
             ]
             yield Result(
                 name=entry.name,
-                method=entry.method.name if isinstance(entry, Search) else entry.name,
-                budget=entry.budget if isinstance(entry, Search) else 0,
-                training=entry.training if isinstance(entry, Agent) else None,
-                is_rule=isinstance(entry, Rule | VisibilityLayout),
-                has_learnt=isinstance(entry, Agent)
-                or (isinstance(entry, Search) and entry.has_learnt),
+                method=entry.method,
+                budget=entry.budget,
+                training=entry.training,
+                is_rule=entry.kind is ProposerKind.RULE,
+                has_learnt=entry.kind is ProposerKind.LEARNT,
                 proposals=proposals,
                 loads=np.array(loads, dtype=np.float64),
             )
@@ -336,8 +340,3 @@ class _Meter:
         self._done += blasts
         if self._show is not None:
             self._show(min(self._done / max(self._blasts, 1), 1.0))
-
-
-def _engine_words(engine: str | Engine) -> str:
-    """Return what people call an engine: its name, with the cells that it has."""
-    return find_engine(engine).words

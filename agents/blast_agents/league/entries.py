@@ -1,27 +1,31 @@
-"""What takes part in a league."""
+"""What takes part in a league: proposers, each with a budget."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
-import numpy as np
-
-from blast_agents.posts import VEHICLE_RULES
-from blast_agents.proposal import LayoutAgent
-from blast_agents.rules import ITEM_RULES, RULES, expected_charge, random_layout, sight_lines
-from blast_agents.search import SearchMethod, find_search_method
-from blast_agents.search.by_rule import MOST_SIGHT_LINES
+from blast_agents.rules import random_layout
+from blast_agents.search import (
+    LayoutProblem,
+    Proposer,
+    ProposerKind,
+    Report,
+    SearchResult,
+    find_proposer,
+)
+from blast_agents.search.registry import proposer_row, proposers
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case
-from blast_env.geometry import Layout
-from blast_env.scenario import AnyCharge, Scenario
+from blast_env.scenario import Scenario
+from blast_env.values import generator
 
 
 @dataclass(frozen=True)
 class Training:
-    """What an agent cost before its first case.
+    """What has learnt cost so much before its first case.
 
     Attributes:
-        blasts: Blasts simulated, with those that its best weights were chosen by.
+        blasts: Blasts simulated, with those that the best weights were chosen by.
         seconds: Time that it took.
     """
 
@@ -35,9 +39,15 @@ class NoBarrier:
 
     name: str = "no barrier"
 
-    def propose(self, case: Case) -> Layout:  # noqa: ARG002
+    def propose(
+        self,
+        problem: LayoutProblem,  # noqa: ARG002
+        budget: int = 0,  # noqa: ARG002
+        seed: int = 0,  # noqa: ARG002
+        report: Report | None = None,  # noqa: ARG002
+    ) -> SearchResult:
         """Return the empty layout."""
-        return ()
+        return SearchResult(())
 
 
 @dataclass(frozen=True)
@@ -46,108 +56,66 @@ class RandomLayout:
 
     name: str = "random layout"
 
-    def propose(self, case: Case) -> Layout:
-        """Return a layout that the case's seed decides."""
-        return random_layout(case.scenario, np.random.default_rng(case.seed))
+    def propose(
+        self,
+        problem: LayoutProblem,
+        budget: int = 0,  # noqa: ARG002
+        seed: int = 0,
+        report: Report | None = None,  # noqa: ARG002
+    ) -> SearchResult:
+        """Return a layout that the seed decides."""
+        return SearchResult(random_layout(problem.scenario, generator(seed)))
 
 
 @dataclass(frozen=True)
-class Rule:
-    """Follows a rule of thumb; against a hidden charge for the middle of where it may be.
+class LeagueEntry:
+    """A proposer with its budget.
 
     Attributes:
-        rule: Gives the layout for a charge.
-        name: In tables.
-    """
-
-    rule: Callable[[Scenario, AnyCharge], Layout]
-    name: str
-
-    def propose(self, case: Case) -> Layout:
-        """Return the rule's layout.
-
-        Raises:
-            BlastEnvError: If there is no line of sight; see `line_of_sight_wall`.
-        """
-        return self.rule(case.scenario, case.charge or expected_charge(case.scenario.charge))
-
-
-@dataclass(frozen=True)
-class VisibilityLayout:
-    """Cuts as many lines of sight as it can; see `sight_lines`.
-
-    Attributes:
-        name: In tables.
-    """
-
-    name: str = MOST_SIGHT_LINES
-
-    def propose(self, case: Case) -> Layout:
-        """Return the layout for the charge, or for all the places where a hidden one may be."""
-        return sight_lines(case.scenario, case.charge)
-
-
-@dataclass(frozen=True)
-class Agent:
-    """A trained agent.
-
-    Attributes:
-        agent: The agent.
-        name: In tables.
-        training: What it cost.
-    """
-
-    agent: LayoutAgent
-    name: str
-    training: Training
-
-    def propose(self, case: Case) -> Layout:
-        """Return the agent's layout; it is told the charge unless that is hidden."""
-        return self.agent.propose(case.scenario, case.charge)
-
-
-@dataclass(frozen=True)
-class Search:
-    """A search that spends blasts on every case.
-
-    Attributes:
-        method: The method.
-        budget: Most blasts a case.
+        proposer: The proposer.
+        budget: Most blasts a case; 0 for what proposes without a blast.
+        title: Name in tables, that of the proposer unless given.
+        kind: What it is.
+        training: What it cost before its first case, if anything.
         first_engine: Engine for these blasts, a cheaper one; the engine that judges then decides
             among the best few layouts, by one more blast for each threat. `None` for the judge's.
         finalists: How many these are.
-        has_learnt: Whether it begins with what an agent or a surrogate has learnt.
+
+    Raises:
+        BlastEnvError: If the budget is below 0.
     """
 
-    method: SearchMethod
-    budget: int
+    proposer: Proposer
+    budget: int = 0
+    title: str = ""
+    kind: ProposerKind = ProposerKind.SEARCH
+    training: Training | None = None
     first_engine: str | None = None
     finalists: int = 8
-    has_learnt: bool = False
 
     def __post_init__(self) -> None:
-        """Check the budget.
+        """Check the budget."""
+        if self.budget < 0:
+            raise BlastEnvError(f"budget is {self.budget} blasts, must be at least 0")
 
-        Raises:
-            BlastEnvError: If it is below 1.
-        """
-        if self.budget < 1:
-            raise BlastEnvError(f"budget is {self.budget} blasts, must be at least 1")
+    @property
+    def method(self) -> str:
+        """Name of the proposer in tables."""
+        return self.title or self.proposer.name
 
     @property
     def name(self) -> str:
-        """Name in tables."""
-        name = search_name(self.method.name, self.budget)
+        """Name in tables, with the budget if there is one."""
+        if not self.budget:
+            return self.method
+        name = search_name(self.method, self.budget)
         if self.first_engine is None:
             return name
         return f"{name} of {self.first_engine}, the best {self.finalists} judged"
 
 
-Instant = NoBarrier | RandomLayout | Rule | VisibilityLayout | Agent
-"""Entries that spend no blast on a case."""
-
-Entry = Instant | Search
-"""All entries."""
+NO_BARRIER = LeagueEntry(NoBarrier())
+"""What all others are compared with."""
 
 
 def search_name(method: str, budget: int) -> str:
@@ -156,22 +124,70 @@ def search_name(method: str, budget: int) -> str:
 
 
 def standard_entries(
-    methods: Sequence[str], budgets: Sequence[int], vehicles: bool = False, items: bool = False
-) -> tuple[Entry, ...]:
-    """Return all entries but agents: no barrier, a random layout, rules, lines of sight, searches.
+    scenarios: Iterable[Scenario], methods: Sequence[str] = (), budgets: Sequence[int] = ()
+) -> tuple[LeagueEntry, ...]:
+    """Return no barrier, a random layout, all rules that suit every scenario, and searches.
 
     Args:
-        methods: Names of search methods.
+        scenarios: Of the cases.
+        methods: Names of proposers, or "module:object" for one's own (`own_proposer`).
         budgets: Blasts a case; each method enters with each.
-        vehicles: Whether every case has a vehicle: the rules against them enter then.
-        items: Whether every case has a catalogue: there are more rules then.
 
     Raises:
         UnknownNameError: If there is no such method; the message names the nearest one.
         BlastEnvError: If a budget is below 1.
     """
-    named = {**(ITEM_RULES if items else RULES), **(VEHICLE_RULES if vehicles else {})}
-    rules = (Rule(rule, name) for name, rule in named.items())
-    found = [find_search_method(name) for name in methods]
-    searches = (Search(method, budget) for method in found for budget in budgets)
-    return (NoBarrier(), RandomLayout(), *rules, VisibilityLayout(), *searches)
+    rules = proposers(ProposerKind.RULE, suiting=scenarios)
+    return (
+        NO_BARRIER,
+        LeagueEntry(RandomLayout()),
+        *(
+            LeagueEntry(find_proposer(name), 0, row.title, ProposerKind.RULE)
+            for name, row in rules.items()
+        ),
+        *searches(methods, budgets),
+    )
+
+
+def searches(methods: Collection[str], budgets: Sequence[int]) -> tuple[LeagueEntry, ...]:
+    """Return an entry for each method and budget; see `standard_entries`."""
+    for budget in budgets:
+        if budget < 1:
+            raise BlastEnvError(f"budget is {budget} blasts, must be at least 1")
+    entries: list[LeagueEntry] = []
+    for name in methods:
+        is_own = ":" in name
+        method = own_proposer(name) if is_own else find_proposer(name)
+        kind = (
+            ProposerKind.LEARNT
+            if not is_own and proposer_row(name).kind is ProposerKind.LEARNT
+            else ProposerKind.SEARCH
+        )
+        entries += (LeagueEntry(method, budget, kind=kind) for budget in budgets)
+    return tuple(entries)
+
+
+def own_proposer(place: str) -> Proposer:
+    """Return a proposer of one's own.
+
+    Args:
+        place: "module:object": a `Proposer`, or a class or function that makes one.
+
+    Raises:
+        BlastEnvError: If there is no such module or object, or it is no proposer.
+    """
+    module, _, name = place.partition(":")
+    try:
+        found: Any = getattr(import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise BlastEnvError(f"method {place!r} cannot be imported: {error}") from error
+    if isinstance(found, type) or (callable(found) and not hasattr(found, "propose")):
+        found = found()
+    if not callable(getattr(found, "propose", None)) or not isinstance(
+        getattr(found, "name", None), str
+    ):
+        raise BlastEnvError(
+            f"method {place!r} is no proposer: it needs a name and a method "
+            "propose(problem, budget, seed, report)"
+        )
+    return found  # type: ignore[no-any-return]

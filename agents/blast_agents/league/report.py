@@ -11,7 +11,7 @@ import pandas as pd
 from blast_agents.league.entries import Training
 from blast_agents.league.figure import league_figure
 from blast_agents.league.standings import Result, Standings, verdicts
-from blast_agents.proposal import Proposal
+from blast_agents.search import Proposal
 from blast_env.arrays import FloatArray
 from blast_env.evaluation import Case
 from blast_env.files import write_atomically

@@ -9,7 +9,7 @@ import numpy as np
 
 from blast_agents.league.entries import Training, search_name
 from blast_agents.league.tracks import Track
-from blast_agents.proposal import Proposal
+from blast_agents.search import Proposal
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.comparison import Comparison, check_something_arrives
 from blast_env.statistics import CVAR_LEVEL, Estimate, conditional_value_at_risk, reductions

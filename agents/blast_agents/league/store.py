@@ -14,9 +14,9 @@ from typing import Annotated, Final, NamedTuple
 from pydantic import Field, TypeAdapter
 
 import blast_agents
-from blast_agents.league.entries import Search
+from blast_agents.league.entries import LeagueEntry
 from blast_agents.league.tracks import practice_of
-from blast_agents.proposal import Proposal
+from blast_agents.search import Proposal
 from blast_env.documents import checked_as, parse_json
 from blast_env.engines import Engine, find_engine
 from blast_env.evaluation import Case, Threat
@@ -83,24 +83,24 @@ class EvaluationKey(NamedTuple):
     layout: Layout
 
 
-def search_key(case: Case, search: Search, engine: str | Engine) -> SearchKey:
+def search_key(case: Case, entry: LeagueEntry, engine: str | Engine) -> SearchKey:
     """Return the key of a search for a case.
 
     Raises:
         CalibrationError: If the scenario has no calibration for the engine.
         UnknownNameError: If there is no such engine.
     """
-    method = repr(search.method)
-    if search.first_engine is not None:
-        method += f" by {engine_text(find_engine(search.first_engine))}, {search.finalists} judged"
+    method = repr(entry.proposer)
+    if entry.first_engine is not None:
+        method += f" by {engine_text(find_engine(entry.first_engine))}, {entry.finalists} judged"
     return SearchKey(
         model=_model(case, engine),
         threats=practice_of(case).threats,
         # Functions among the settings: their names, and not where this process has them.
         method=_ADDRESS.sub("", method),
-        budget=search.budget,
+        budget=entry.budget,
         seed=case.seed,
-        code=_search_code(Path(getfile(type(search.method))).parent),
+        code=_search_code(Path(getfile(type(entry.proposer))).parent),
     )
 
 
@@ -199,7 +199,7 @@ def _search_code(own: Path) -> str:
     if own != folder / "search":
         paths += sorted(own.glob("*.py"))
     digest = sha256()
-    for path in (*paths, folder / "rules.py"):
+    for path in (*paths, folder / "rules.py", folder / "posts.py"):
         if path.name not in _NO_INFLUENCE:
             digest.update(f"{path.name}\n".encode() + path.read_bytes())
     known = versions(packages=_PACKAGES)

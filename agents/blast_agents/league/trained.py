@@ -1,14 +1,14 @@
-"""Agents of run folders as entries of a league."""
+"""Agents of run folders, and surrogates, as entries of a league."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from blast_agents.league.entries import Agent, Search, Training
+from blast_agents.league.entries import LeagueEntry, Training
 from blast_agents.league.tracks import Track
-from blast_agents.search.from_policy import PolicySearch
-from blast_agents.surrogate import RankedAgent, Surrogate, SurrogateSearch
+from blast_agents.search import ProposerKind
+from blast_agents.surrogate import LearntSearch, Surrogate, search_by
 from blast_agents.training import TrainedAgent, load_agent
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
@@ -23,21 +23,25 @@ class TrainedRun:
 
     Attributes:
         run: The folder.
-        entry: The agent.
+        agent: The agent, with the weights of its best evaluation.
+        name: In tables.
+        training: What it cost.
         threat: `"visible"` or `"hidden"`.
         scenario: Name of the scenario, for people.
         site: Content hash of the scenario, or the family of generated sites.
     """
 
     run: Path
-    entry: Agent
+    agent: TrainedAgent
+    name: str
+    training: Training
     threat: Literal["visible", "hidden"]
     scenario: str
     site: str
 
     @classmethod
     def load(cls, run: Path) -> "TrainedRun":
-        """Load the agent with the weights of its best evaluation.
+        """Load the agent of a run folder.
 
         Raises:
             BlastEnvError: If it is no run folder, or damaged.
@@ -45,50 +49,62 @@ class TrainedRun:
         folder = RunFolder(run)
         configuration = folder.configuration()
         settings = configuration.settings
-        name = f"{ALGORITHM_NAMES[settings.algorithm]} ({run.resolve().name})"
+        is_family = settings.scenario in FAMILIES
         return cls(
             run=run,
-            entry=Agent(load_agent(run), name, _training(folder, settings)),
+            agent=load_agent(run),
+            name=f"{ALGORITHM_NAMES[settings.algorithm]} ({run.resolve().name})",
+            training=_training(folder, settings),
             threat=settings.threat,
             scenario=settings.scenario,
-            site=settings.scenario
-            if settings.scenario in FAMILIES
-            else configuration.scenario_hash,
+            site=settings.scenario if is_family else configuration.scenario_hash,
         )
-
-    def search(self, budget: int) -> Search:
-        """Return the agent with a search at test time: what it draws, and changes of the best."""
-        agent = self._drawing
-        method = PolicySearch(agent, agent.digest, name=f"{self.entry.name} with search")
-        return Search(method, budget, has_learnt=True)
-
-    def guided(self, surrogate: Surrogate, budget: int) -> Search:
-        """Return the agent with a search in which a surrogate picks what gets a blast."""
-        agent = self._drawing
-        name = f"{self.entry.name} with search by the surrogate"
-        digest = f"{surrogate.digest} {agent.digest}"
-        method = SurrogateSearch(surrogate, digest, agent, name=name)
-        return Search(method, budget, has_learnt=True)
-
-    def ranked(self, surrogate: Surrogate) -> Agent:
-        """Return the agent with a surrogate, which picks one of the layouts that it draws."""
-        training = Training(
-            self.entry.training.blasts + surrogate.fit.blasts,
-            self.entry.training.seconds + surrogate.fit.seconds,
-        )
-        name = f"{self.entry.name}, ranked by the surrogate"
-        return Agent(RankedAgent(self._drawing, surrogate), name, training)
 
     @property
-    def _drawing(self) -> TrainedAgent:
-        agent = self.entry.agent
-        if not isinstance(agent, TrainedAgent):
-            raise TypeError(f"{agent!r} draws no layouts")
-        return agent
+    def entry(self) -> LeagueEntry:
+        """The agent by itself."""
+        alone = LearntSearch(agent=self.agent, digest=self.agent.digest, name=self.name)
+        return LeagueEntry(alone, kind=ProposerKind.LEARNT, training=self.training)
+
+    def entries(
+        self, budgets: Sequence[int], surrogate: Surrogate | None
+    ) -> tuple[LeagueEntry, ...]:
+        """Return the agent by itself, with searches, and the same once more with a surrogate.
+
+        Args:
+            budgets: Blasts that a search from the agent may spend on a case.
+            surrogate: Picks one of the layouts that the agent draws, and what gets a blast.
+        """
+        digest = self.agent.digest
+        own = LearntSearch(agent=self.agent, digest=digest, name=f"{self.name} with search")
+        found = [
+            self.entry,
+            *(LeagueEntry(own, each, kind=ProposerKind.LEARNT) for each in budgets),
+        ]
+        if surrogate is None:
+            return tuple(found)
+        name = f"{self.name}, ranked by the surrogate"
+        both = Training(
+            self.training.blasts + surrogate.fit.blasts,
+            self.training.seconds + surrogate.fit.seconds,
+        )
+        digest = f"{surrogate.digest} {digest}"
+        ranked = LearntSearch(surrogate, self.agent, digest, name=name)
+        guided = replace(ranked, name=f"{self.name} with search by the surrogate")
+        found.append(LeagueEntry(ranked, kind=ProposerKind.LEARNT, training=both))
+        return (*found, *(LeagueEntry(guided, each, kind=ProposerKind.LEARNT) for each in budgets))
 
     def is_for(self, track: Track) -> bool:
         """Return whether a track asks what the agent was trained for."""
         return self.threat == track.threat and self.site == track.site
+
+
+def surrogate_entries(surrogate: Surrogate, budgets: Sequence[int]) -> tuple[LeagueEntry, ...]:
+    """Return a surrogate's own proposals, and its searches."""
+    search = search_by(surrogate)
+    training = Training(surrogate.fit.blasts, surrogate.fit.seconds)
+    alone = LeagueEntry(search, kind=ProposerKind.LEARNT, training=training)
+    return (alone, *(LeagueEntry(search, each, kind=ProposerKind.LEARNT) for each in budgets))
 
 
 def check_runs(runs: Sequence[TrainedRun], tracks: Sequence[Track]) -> None:

@@ -1,29 +1,40 @@
-"""Classical search for layouts: what a trained agent has to beat at equal cost in blasts."""
+"""Proposers: classical searches and rules, and what they are asked (`registry` lists them all)."""
 
-from blast_agents.search.by_rule import BestRuleSearch, FromRulesSearch, RuleSearch
+from blast_agents.search.by_rule import BestRuleSearch, FromRulesSearch
 from blast_agents.search.evolution import GeneticSearch, Nsga2Search
 from blast_agents.search.methods import (
     AnnealingSearch,
     ExhaustiveSearch,
     GreedySearch,
     RandomSearch,
+    WinnersSearch,
 )
 from blast_agents.search.problem import (
     BlastMeter,
     BudgetError,
     Candidate,
+    LayoutAgent,
     LayoutProblem,
     Progress,
+    Proposal,
+    Proposer,
     Report,
-    SearchMethod,
+    SamplingAgent,
     SearchResult,
+    timed_proposal,
 )
-from blast_agents.search.registry import SEARCH_METHODS, find_search_method
-from blast_agents.search.winners import WinnersSearch
+from blast_agents.search.registry import (
+    Need,
+    ProposerKind,
+    RuleProposer,
+    find_proposer,
+    layouts_by_rule,
+    proposers,
+)
+from blast_agents.search.session import Plan, Search, SearchSession
 from blast_env.geometry import Layout
 
 __all__ = [
-    "SEARCH_METHODS",
     "AnnealingSearch",
     "BestRuleSearch",
     "BlastMeter",
@@ -34,14 +45,25 @@ __all__ = [
     "GeneticSearch",
     "GreedySearch",
     "Layout",
+    "LayoutAgent",
     "LayoutProblem",
+    "Need",
     "Nsga2Search",
+    "Plan",
     "Progress",
+    "Proposal",
+    "Proposer",
+    "ProposerKind",
     "RandomSearch",
     "Report",
-    "RuleSearch",
-    "SearchMethod",
+    "RuleProposer",
+    "SamplingAgent",
+    "Search",
     "SearchResult",
+    "SearchSession",
     "WinnersSearch",
-    "find_search_method",
+    "find_proposer",
+    "layouts_by_rule",
+    "proposers",
+    "timed_proposal",
 ]

@@ -1,16 +1,14 @@
 """Genetic search and NSGA-II on pymoo, which is imported when one of them runs."""
 
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import dataclass
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blast_agents.search.moves import Draw, Moves, random_part, random_walls
-from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
-from blast_agents.search.session import SearchSession
+from blast_agents.search.session import Search, SearchSession
 from blast_env.geometry import Layout
-from blast_env.values import generator
 
 _LEAST_POPULATION: Final = 6
 
@@ -27,7 +25,7 @@ def population_size(layouts: int) -> int:
 
 
 @dataclass(frozen=True)
-class GeneticSearch:
+class GeneticSearch(Search):
     """pymoo's `GA` with sampling, crossover, mutation and repair made for layouts.
 
     The best of the layouts that the first blasts show are the first population; from then on the
@@ -50,10 +48,8 @@ class GeneticSearch:
     more_moves: float = 0.5
     name: str = "genetic"
 
-    def search(
-        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
-    ) -> SearchResult:
-        """Return the best layout that was found.
+    def explore(self, session: SearchSession) -> None:
+        """Draw a population, and let it evolve.
 
         Raises:
             MissingExtraError: If the extra `search` is not installed.
@@ -61,35 +57,23 @@ class GeneticSearch:
         # Here, because the other methods need no extra.
         from blast_agents.search.operators import GA, evolve, operators
 
-        plan = Plan.of(problem, budget)
-        session = SearchSession(problem, budget, plan, report)
+        scenario, plan = session.problem.scenario, session.plan
         size = population_size(plan.exploring_layouts)
-        rng = generator(seed)
 
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
             return session.assess(layouts)[:, np.newaxis]
 
-        def explore() -> None:
-            count = max(size, round(self.starting_share * plan.exploring_layouts))
-            drawn = (self.draw(problem.scenario, rng) for _ in range(count))
-            session.assess([*self.initial, *drawn])
-            algorithm = GA(
-                pop_size=size,
-                n_offsprings=max(2, size // 2),
-                **operators(
-                    Moves(problem.scenario),
-                    session.ranked(plan.threats)[:size],
-                    self.crossed_share,
-                    self.more_moves,
-                ),
-            )
-            evolve(session, algorithm, objectives, seed)
-
-        return session.result(self.name, seed, session.run(explore))
+        count = max(size, round(self.starting_share * plan.exploring_layouts))
+        drawn = (self.draw(scenario, session.rng) for _ in range(count))
+        session.assess([*self.initial, *drawn])
+        first = session.ranked(plan.threats)[:size]
+        made = operators(Moves(scenario), first, self.crossed_share, self.more_moves)
+        algorithm = GA(pop_size=size, n_offsprings=max(2, size // 2), **made)
+        evolve(session, algorithm, objectives)
 
 
 @dataclass(frozen=True)
-class Nsga2Search:
+class Nsga2Search(Search):
     """pymoo's `NSGA2` with the operators of the genetic search, and two things to minimise.
 
     Those are the impulse and the number of modules or, with a catalogue, the cost. The result
@@ -114,10 +98,10 @@ class Nsga2Search:
     count_share: float = 0.4
     name: str = "nsga2"
 
-    def search(
-        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
-    ) -> SearchResult:
-        """Return the front, and the layout with the least impulse.
+    has_front: ClassVar[bool] = True
+
+    def explore(self, session: SearchSession) -> None:
+        """Draw a population, and let it evolve.
 
         Raises:
             MissingExtraError: If the extra `search` is not installed.
@@ -125,28 +109,20 @@ class Nsga2Search:
         # Here, because the other methods need no extra.
         from blast_agents.search.operators import NSGA2, evolve, operators
 
-        plan = Plan.of(problem, budget)
-        session = SearchSession(problem, budget, plan, report)
-        size = 2 * population_size(plan.exploring_layouts)
-        rng = generator(seed)
+        problem = session.problem
+        size = 2 * population_size(session.plan.exploring_layouts)
 
         def objectives(layouts: list[Layout]) -> NDArray[np.float64]:
             prices = [problem.price(each) for each in layouts]
             return np.column_stack([session.assess(layouts), prices])
 
-        def explore() -> None:
-            drawn = [self.draw(problem.scenario, rng) for _ in range(size)]
-            algorithm = NSGA2(
-                pop_size=size,
-                n_offsprings=max(2, size // 2),
-                **operators(
-                    Moves(problem.scenario, count_share=self.count_share),
-                    [*self.initial, *drawn],
-                    self.crossed_share,
-                    self.more_moves,
-                ),
-            )
-            evolve(session, algorithm, objectives, seed)
+        drawn = [self.draw(problem.scenario, session.rng) for _ in range(size)]
+        moves = Moves(problem.scenario, count_share=self.count_share)
+        first = [*self.initial, *drawn]
+        made = operators(moves, first, self.crossed_share, self.more_moves)
+        algorithm = NSGA2(pop_size=size, n_offsprings=max(2, size // 2), **made)
+        evolve(session, algorithm, objectives)
 
-        interrupted = session.run(explore, session.confirm_front)
-        return replace(session.result(self.name, seed, interrupted), front=session.front())
+    def choose(self, session: SearchSession) -> None:
+        """Let the front meet more threats."""
+        session.confirm_front()

@@ -4,22 +4,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, islice
 from math import comb, exp
+from typing import Final
 
 import numpy as np
 
 from blast_agents.rules import random_layout
 from blast_agents.search.moves import Draw, Moves, random_walls
-from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
-from blast_agents.search.session import SearchSession
+from blast_agents.search.problem import LayoutProblem
+from blast_agents.search.session import Plan, Search, SearchSession
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Element, Layout, Piece
 from blast_env.scenario import Placement
-from blast_env.values import generator
 
 
 @dataclass(frozen=True)
-class RandomSearch:
+class RandomSearch(Search):
     """Tries layouts with every module on a random cell, each independent of the others.
 
     Attributes:
@@ -31,24 +31,17 @@ class RandomSearch:
     batch: int = 16
     name: str = "random"
 
-    def search(
-        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
-    ) -> SearchResult:
-        """Return the best of as many random layouts as the budget pays for."""
-        rng = generator(seed)
-        session = SearchSession(problem, budget, Plan.of(problem, budget), report)
-
-        def explore() -> None:
-            if self.initial:
-                session.assess(self.initial)
-            while True:
-                session.assess([random_layout(problem.scenario, rng) for _ in range(self.batch)])
-
-        return session.result(self.name, seed, session.run(explore))
+    def explore(self, session: SearchSession) -> None:
+        """Try one batch after the other."""
+        scenario, rng = session.problem.scenario, session.rng
+        if self.initial:
+            session.assess(self.initial)
+        while True:
+            session.assess([random_layout(scenario, rng) for _ in range(self.batch)])
 
 
 @dataclass(frozen=True)
-class GreedySearch:
+class GreedySearch(Search):
     """Places every module on the best of the cells that it tries for it, and never moves one.
 
     With a catalogue it tries pieces in places, and takes the one that takes off most for its cost.
@@ -68,31 +61,23 @@ class GreedySearch:
     promising_share: float = 0.5
     name: str = "greedy"
 
-    def search(
-        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
-    ) -> SearchResult:
-        """Return the best layout that was met on the way."""
-        rng = generator(seed)
-        plan = Plan.of(problem, budget)
-        session = SearchSession(problem, budget, plan, report)
-
-        def explore() -> None:
-            placement = Placement.empty(problem.scenario)
-            (load,) = session.assess([()]).tolist()
-            gains: dict[Element, float] = {}
-            while not placement.is_full:
-                blasts = session.exploring_left // _still_to_place(placement)
-                tried = self._elements(placement, gains, max(1, blasts // plan.threats), rng)
-                impulses = session.assess([(*placement.layout, each) for each in tried])
-                gains.update(zip(tried, (load - impulses).tolist(), strict=True))
-                best = int(np.argmin(impulses))
-                if placement.catalogue.has_items:
-                    worths = [self._worth(placement, each, gains) for each in tried]
-                    best = int(np.argmax(worths))
-                placement = placement.place(tried[best])
-                load = float(impulses[best])
-
-        return session.result(self.name, seed, session.run(explore))
+    def explore(self, session: SearchSession) -> None:
+        """Place one after the other until nothing more may be placed."""
+        placement = Placement.empty(session.problem.scenario)
+        (load,) = session.assess([()]).tolist()
+        gains: dict[Element, float] = {}
+        while not placement.is_full:
+            blasts = session.exploring_left // _still_to_place(placement)
+            count = max(1, blasts // session.plan.threats)
+            tried = self._elements(placement, gains, count, session.rng)
+            impulses = session.assess([(*placement.layout, each) for each in tried])
+            gains.update(zip(tried, (load - impulses).tolist(), strict=True))
+            best = int(np.argmin(impulses))
+            if placement.catalogue.has_items:
+                worths = [self._worth(placement, each, gains) for each in tried]
+                best = int(np.argmax(worths))
+            placement = placement.place(tried[best])
+            load = float(impulses[best])
 
     @staticmethod
     def _worth(placement: Placement, element: Element, gains: dict[Element, float]) -> float:
@@ -142,7 +127,7 @@ def _legal_costs(placement: Placement) -> Iterator[tuple[FloatArray, BoolArray]]
 
 
 @dataclass(frozen=True)
-class AnnealingSearch:
+class AnnealingSearch(Search):
     """Accepts every better neighbour, and a worse one the less likely the later and the worse.
 
     It begins with the best of the layouts that the first few blasts show. The temperature falls
@@ -164,33 +149,17 @@ class AnnealingSearch:
     cold: float = 0.001
     name: str = "annealing"
 
-    def search(
-        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
-    ) -> SearchResult:
-        """Return the best layout that was met on the way."""
-        rng = generator(seed)
-        plan = Plan.of(problem, budget)
-        session = SearchSession(problem, budget, plan, report)
-
-        def explore() -> None:
-            layouts = int(plan.exploring_layouts * self.starting_share)
-            drawn = [self.draw(problem.scenario, rng) for _ in range(max(1, layouts))]
-            starts = [*self.initial, *drawn]
-            impulses = session.assess(starts)
-            best = int(np.argmin(impulses))
-            self._anneal(session, starts[best], float(impulses[best]), rng)
-
-        return session.result(self.name, seed, session.run(explore))
-
-    def _anneal(
-        self, session: SearchSession, layout: Layout, load: float, rng: np.random.Generator
-    ) -> None:
-        """Go from neighbour to neighbour until the session ends it."""
-        moves = Moves(session.problem.scenario)
-        scale, begun = load, session.exploring_share
+    def explore(self, session: SearchSession) -> None:
+        """Draw some layouts, and go from the best of them from neighbour to neighbour."""
+        scenario, rng = session.problem.scenario, session.rng
+        count = int(session.plan.exploring_layouts * self.starting_share)
+        starts = [*self.initial, *(self.draw(scenario, rng) for _ in range(max(1, count)))]
+        loads = session.assess(starts)
+        best = int(np.argmin(loads))
+        layout, load = starts[best], float(loads[best])
+        moves, cooling = Moves(scenario), Cooling(session, load, self.hot, self.cold)
         while True:
-            share = (session.exploring_share - begun) / max(1.0 - begun, 1e-9)
-            temperature = scale * self.hot * (self.cold / self.hot) ** share
+            temperature = cooling.temperature
             neighbour = moves.neighbour(layout, rng)
             (neighbour_load,) = session.assess([neighbour]).tolist()
             worse = neighbour_load - load
@@ -198,13 +167,103 @@ class AnnealingSearch:
                 layout, load = neighbour, neighbour_load
 
 
+class Cooling:
+    """The temperature, which falls geometrically over the blasts for exploring that are left.
+
+    Args:
+        session: Knows how many are spent.
+        scale: The load that `hot` and `cold` are shares of.
+        hot: Temperature now.
+        cold: Temperature at the end.
+    """
+
+    def __init__(self, session: SearchSession, scale: float, hot: float, cold: float) -> None:
+        self._session, self._scale, self._hot, self._cold = session, scale, hot, cold
+        self._begun = session.exploring_share
+
+    @property
+    def share(self) -> float:
+        """Share of the way from hot to cold."""
+        return (self._session.exploring_share - self._begun) / max(1.0 - self._begun, 1e-9)
+
+    @property
+    def temperature(self) -> float:
+        """The temperature, in the unit of the load."""
+        temperature: float = self._scale * self._hot * (self._cold / self._hot) ** self.share
+        return temperature
+
+
 def _likelihood(worse: float, temperature: float) -> float:
     """Return how likely a worse layout is accepted (Metropolis); never when all is cold."""
     return exp(-worse / temperature) if temperature > 0.0 else 0.0
 
 
+_LEAST_WALKERS: Final = 3
+
+
+_MOST_WALKERS: Final = 16
+
+
 @dataclass(frozen=True)
-class ExhaustiveSearch:
+class WinnersSearch(Search):
+    """Anneals several layouts side by side; from time to time the best take the worst ones' places.
+
+    Each walker accepts every better neighbour, and a worse one the less likely the later and the
+    worse. Single runs of annealing end in different places; of several the good ones are gone on
+    from. The number of walkers grows with the square root of the layouts that the budget pays for.
+
+    Attributes:
+        initial: Layouts to begin with, beside those that are drawn.
+        draw: Draws the layouts to begin with.
+        starting_share: Share of the exploration that goes into them.
+        exchanges: How often walkers are exchanged.
+        exchanged_share: Share of the walkers that go on from the best ones' places then.
+        hot: Temperature at first, as a share of the load that the best walker begins with.
+        cold: Temperature at the end, likewise.
+    """
+
+    initial: tuple[Layout, ...] = ()
+    draw: Draw = random_walls
+    starting_share: float = 0.25
+    exchanges: int = 8
+    exchanged_share: float = 0.34
+    hot: float = 0.02
+    cold: float = 0.001
+    name: str = "winners"
+
+    def explore(self, session: SearchSession) -> None:
+        """Draw some layouts, and let walkers go from the best of them."""
+        scenario, rng, plan = session.problem.scenario, session.rng, session.plan
+        walkers = round(0.4 * plan.exploring_layouts**0.5)
+        walkers = int(np.clip(walkers, _LEAST_WALKERS, _MOST_WALKERS))
+        count = max(walkers, round(self.starting_share * plan.exploring_layouts))
+        count = max(count - len(self.initial), 0)
+        session.assess([*self.initial, *(self.draw(scenario, rng) for _ in range(count))])
+        self._walk(session, session.ranked(plan.threats)[:walkers])
+
+    def _walk(self, session: SearchSession, layouts: list[Layout]) -> None:
+        """Let walkers go from neighbour to neighbour until the session ends it."""
+        moves, rng, exchanged = Moves(session.problem.scenario), session.rng, 0
+        loads = session.assess(layouts)
+        cooling = Cooling(session, float(loads.min()), self.hot, self.cold)
+        while True:
+            share, temperature = cooling.share, cooling.temperature
+            neighbours = [moves.neighbour(layout, rng) for layout in layouts]
+            worse = session.assess(neighbours) - loads
+            accepted = rng.random(len(layouts)) < np.exp(-np.maximum(worse, 0.0) / temperature)
+            for index in np.flatnonzero(accepted).tolist():
+                layouts[index] = neighbours[index]
+                loads[index] += worse[index]
+            if int(share * (self.exchanges + 1)) > exchanged:
+                exchanged += 1
+                order = np.argsort(loads, kind="stable")
+                for rank in range(int(self.exchanged_share * len(layouts))):
+                    winner, loser = int(order[rank]), int(order[-1 - rank])
+                    layouts[loser], loads[loser] = layouts[winner], loads[winner]
+
+
+@dataclass(frozen=True)
+class ExhaustiveSearch(Search):
     """Tries every layout under every threat, the empty one among them; nothing is drawn.
 
     Attributes:
@@ -214,25 +273,12 @@ class ExhaustiveSearch:
     batch: int = 64
     name: str = "exhaustive"
 
-    def search(
-        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
-    ) -> SearchResult:
-        """Return the optimum.
+    def plan(self, problem: LayoutProblem, budget: int) -> Plan:
+        """Let every layout meet every threat.
 
         Raises:
-            BlastEnvError: If the budget does not pay for all layouts; none is tried then.
+            BlastEnvError: If the budget does not pay for all layouts.
         """
-        self._check(problem, budget)
-        session = SearchSession(problem, budget, Plan.thorough(problem, budget), report)
-
-        def explore() -> None:
-            layouts = every_layout(problem)
-            while batch := list(islice(layouts, self.batch)):
-                session.assess(batch)
-
-        return session.result(self.name, seed, session.run(explore))
-
-    def _check(self, problem: LayoutProblem, budget: int) -> None:
         places = len(_placeable(problem))
         counts = range(min(problem.stock, places) + 1)
         layouts = sum(comb(places, count) for count in counts)
@@ -244,6 +290,13 @@ class ExhaustiveSearch:
                 f"{what}, stock {problem.stock}), which take {_count_text(blasts)} blasts; the "
                 f"budget is {budget}: exhaustive search is for small instances"
             )
+        return Plan.thorough(problem, budget)
+
+    def explore(self, session: SearchSession) -> None:
+        """Try one batch after the other."""
+        layouts = every_layout(session.problem)
+        while batch := list(islice(layouts, self.batch)):
+            session.assess(batch)
 
 
 def every_layout(problem: LayoutProblem) -> Iterator[Layout]:

@@ -196,19 +196,18 @@ def operators(
     }
 
 
-def evolve(session: SearchSession, algorithm: Any, objectives: Objectives, seed: int) -> None:
+def evolve(session: SearchSession, algorithm: Any, objectives: Objectives) -> None:
     """Let an algorithm go on until the session ends it or it finds no new layouts.
 
     Args:
-        session: Ends it by `SearchEndedError`.
+        session: Ends it by `SearchEndedError`; its seed decides everything that is drawn.
         algorithm: One of pymoo's genetic algorithms.
         objectives: Asks the session.
-        seed: Decides everything that is drawn.
     """
     scenario = session.problem.scenario
     count = objectives([]).shape[1]
     problem = Problem(n_var=scenario.zone.catalogue.finish, n_obj=count, vtype=bool)
-    algorithm.setup(problem, termination=NoTermination(), seed=seed)
+    algorithm.setup(problem, termination=NoTermination(), seed=session.seed)
     while True:
         population = algorithm.ask()
         if population is None or not len(population):

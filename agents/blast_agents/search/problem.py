@@ -1,14 +1,14 @@
-"""What a search is asked, and what it answers."""
+"""What a proposer is asked, and what it answers: a rule, a search, or something that has learnt."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, Protocol
+from time import perf_counter, process_time
+from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
 
 import numpy as np
-import pandas as pd
+from pydantic import ConfigDict, Field
 
-from blast_agents.rules import expected_charge
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
 from blast_env.evaluation.cases import check_distinct
@@ -17,6 +17,9 @@ from blast_env.geometry import Element, Layout, layout_text, standing
 from blast_env.runner import check_workers
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.statistics import reductions
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
 
 
 class BudgetError(BlastEnvError):
@@ -111,11 +114,6 @@ class LayoutProblem:
         known = set(self.case.charges)
         return known.pop() if len(known) == 1 else None
 
-    @property
-    def charge(self) -> AnyCharge:
-        """The charge if it is known, else the middle of where the scenario lets one be."""
-        return self.told or expected_charge(self.scenario.charge)
-
     def metered(self, budget: int) -> "LayoutProblem":
         """Return the same problem, which pays for so many blasts and no more.
 
@@ -196,33 +194,45 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a search has come.
+    """How far a proposer has come.
 
     Attributes:
         blasts: Blasts spent.
-        budget: Most that it may spend.
-        best: The best layout so far; `None` before the first.
+        budget: Most that it may spend; 0 for one that spends none.
+        best: The best layout so far by blasts; `None` before the first.
+        guessed: Of a proposer that spends none, the share of its work that is done.
     """
 
     blasts: int
     budget: int
-    best: Candidate | None
+    best: Candidate | None = None
+    guessed: float = 0.0
+
+    @property
+    def share(self) -> float:
+        """Share of the work that is done, about."""
+        return self.blasts / self.budget if self.budget else self.guessed
+
+
+Report = Callable[[Progress], None]
+"""Is told after every batch of blasts how far a proposer has come."""
 
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What a search found.
+    """What a proposer proposes, and how it came to that.
 
     Attributes:
-        method: Name of the method.
-        layout: The best layout, its cells sorted; empty if the search ended before it had one.
+        layout: The layout, its cells sorted; empty if a search ended before it had one.
+        method: Name of the proposer.
+        by: What has proposed it where a proposer asks others, in words.
         load: Its load over the threats that it has met, in the unit of the scenario's objective;
-            `None` without a blast.
-            The search chose it by these blasts, so that on others it will be somewhat more.
+            `None` without a blast. A search chose it by these blasts: on others it is somewhat
+            more.
         threats: How many threats it has met.
-        blasts: Blasts spent: distinct pairs of layout and threat that the search asked for,
-            whatever a cache knew of them.
-        budget: Most that it might have spent.
+        blasts: Blasts spent: distinct pairs of layout and threat that were asked for, whatever a
+            cache knew of them.
+        budget: Most that might have been spent.
         seed: What decided everything that was drawn.
         history: The best layout each time that it changed.
         interrupted: Whether it was ended from outside (Ctrl-C) before it was through.
@@ -230,15 +240,16 @@ class SearchResult:
             catalogue, a lower cost), by that number; only of methods that search for it.
     """
 
-    method: str
     layout: Layout
-    load: float | None
-    threats: int
-    blasts: int
-    budget: int
-    seed: int
-    history: tuple[Candidate, ...]
-    interrupted: bool
+    method: str = ""
+    by: str = ""
+    load: float | None = None
+    threats: int = 0
+    blasts: int = 0
+    budget: int = 0
+    seed: int = 0
+    history: tuple[Candidate, ...] = ()
+    interrupted: bool = False
     front: tuple[Candidate, ...] = ()
 
     def best_at(self, blasts: int) -> Candidate | None:
@@ -250,117 +261,101 @@ class SearchResult:
         by_then = [each for each in self.history if each.blasts <= blasts]
         return by_then[-1] if by_then else None
 
-    def history_table(self) -> pd.DataFrame:
+    def history_table(self) -> "pd.DataFrame":
         """Return one row each time that the best layout changed."""
         return _table(self.history)
 
-    def front_table(self) -> pd.DataFrame:
+    def front_table(self) -> "pd.DataFrame":
         """Return one row a layout of the front."""
         return _table(self.front)
 
 
-def _table(candidates: tuple[Candidate, ...]) -> pd.DataFrame:
-    return pd.DataFrame(
-        [
-            (
-                each.blasts,
-                each.load,
-                each.threats,
-                len(each.layout),
-                each.cost,
-                layout_text(each.layout),
-            )
-            for each in candidates
-        ],
-        columns=["blasts", "load", "threats", "modules", "cost", "layout"],
-    )
+def _table(candidates: tuple[Candidate, ...]) -> "pd.DataFrame":
+    # Here, because it takes a third of a second to import.
+    import pandas as pd
+
+    rows = [
+        (
+            *(each.blasts, each.load, each.threats, len(each.layout), each.cost),
+            layout_text(each.layout),
+        )
+        for each in candidates
+    ]
+    columns = ["blasts", "load", "threats", "modules", "cost", "layout"]
+    return pd.DataFrame(rows, columns=columns)
 
 
-LAYOUTS_PER_REALISATION: Final = 500
-"""A known charge is met with one fan and air more for so many layouts that the budget pays for."""
-
-
-CHARGES_PER_ROOT_BLAST: Final = 0.3
-"""Of a hidden charge's places a layout meets so many times the square root of the budget."""
-
-
-CONFIRMED_LAYOUTS: Final = 32
-"""Layouts of which the blasts that are held back can pay for all threats."""
-
-
-MOST_CONFIRMING_SHARE: Final = 0.2
-"""Largest share of the budget that is held back to let the best layouts meet more threats."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """How a search divides its blasts.
-
-    Attributes:
-        threats: How many threats a layout meets while the search explores.
-        exploring_blasts: How many blasts it spends on exploring.
-    """
-
-    threats: int
-    exploring_blasts: int
-
-    @property
-    def exploring_layouts(self) -> int:
-        """How many layouts it can try, at least one."""
-        return max(1, self.exploring_blasts // self.threats)
-
-    @classmethod
-    def of(cls, problem: LayoutProblem, budget: int) -> "Plan":
-        """Return the plan for a budget.
-
-        A layout's impulse differs little from one fan and air to the next, less than layouts do
-        from each other: against a known charge it pays to try many layouts under one threat each,
-        and to find out the lucky ones among the best at the end. It differs much from one place of
-        the charge to the next: what stands well against one may do nothing against the others, so
-        that against a hidden charge layouts meet several places from the start.
-        """
-        most = len(problem.threats)
-        if len({threat.charge for threat in problem.threats}) == 1:
-            wanted = budget // LAYOUTS_PER_REALISATION
-        else:
-            wanted = round(CHARGES_PER_ROOT_BLAST * budget**0.5)
-        threats = max(1, min(wanted, most, budget))
-        if threats == most:
-            return cls.thorough(problem, budget)
-        held_back = min(CONFIRMED_LAYOUTS * most, int(MOST_CONFIRMING_SHARE * budget))
-        return cls(threats, budget - held_back)
-
-    @classmethod
-    def thorough(cls, problem: LayoutProblem, budget: int) -> "Plan":
-        """Return the plan by which every layout meets every threat at once."""
-        return cls(len(problem.threats), budget)
-
-
-Report = Callable[[Progress], None]
-"""Is told after every batch of blasts how far a search has come."""
-
-
-class SearchMethod(Protocol):
-    """Looks for the layout with the least load."""
+class Proposer(Protocol):
+    """Proposes a layout for a case: a rule, a search, or something that has learnt."""
 
     @property
     def name(self) -> str:
         """Name in tables and on the command line."""
 
-    def search(
-        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
-        """Return the best layout that was found.
+        """Return a layout, for instance as `SearchResult(layout)`.
 
-        The same arguments give the same result. Ctrl-C ends the search: the best so far is
-        returned.
+        The same arguments give the same layout. Ctrl-C ends a search: the best so far is returned.
 
         Args:
-            problem: What is minimised.
+            problem: What is minimised. `problem.load` and `problem.loads` run blasts.
             budget: Most blasts that may be spent; see `SearchResult.blasts`.
             seed: Decides everything that is drawn.
             report: Is told how far it has come.
 
         Raises:
-            BlastEnvError: If the method cannot do anything with the budget.
+            BlastEnvError: If it cannot do anything with the budget or the site.
         """
+
+
+class LayoutAgent(Protocol):
+    """Proposes a layout for a site, at once: no blast is simulated."""
+
+    def propose(self, scenario: Scenario, charge: AnyCharge | None = None, /) -> Layout:
+        """Return a layout that keeps every condition of the build zone; always the same one.
+
+        Args:
+            scenario: The scenario; it has a build zone.
+            charge: Where the charge is, if that is known; otherwise the layout is for all the
+                places where the scenario may have one.
+        """
+
+
+class SamplingAgent(LayoutAgent, Protocol):
+    """Proposes a layout, and draws others."""
+
+    def sample(
+        self, scenario: Scenario, charge: AnyCharge | None = None, count: int = 8, seed: int = 0, /
+    ) -> Sequence[Layout]:
+        """Return layouts that it draws; some may be equal."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A layout that was proposed, and what that took: what a league keeps.
+
+    Attributes:
+        layout: Its cells or pieces.
+        seconds: Time until the layout was there.
+        blasts: Blasts spent on it, of the engine that judges.
+        other_blasts: Blasts of another engine spent on it, for a method's own purposes.
+        cpu_s: Processor time that it took, of this process.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    layout: Layout
+    seconds: Annotated[float, Field(ge=0.0)]
+    blasts: Annotated[int, Field(ge=0)] = 0
+    other_blasts: Annotated[int, Field(ge=0)] = 0
+    cpu_s: Annotated[float, Field(ge=0.0)] = 0.0
+
+
+def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
+    """Return a layout that takes no blast, and how long it took."""
+    began_s, began_cpu_s = perf_counter(), process_time()
+    layout = propose()
+    seconds, cpu_s = perf_counter() - began_s, process_time() - began_cpu_s
+    return Proposal(layout, seconds, cpu_s=cpu_s)

@@ -1,21 +1,78 @@
-"""The account of one search: blasts spent, what they showed, and the best layout so far."""
+"""The driver of all searches: the plan for a budget, and the account of what blasts have shown."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Final
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar, Final
 
 import numpy as np
 
-from blast_agents.search.problem import (
-    Candidate,
-    LayoutProblem,
-    Plan,
-    Progress,
-    Report,
-    SearchResult,
-)
+from blast_agents.search.problem import Candidate, LayoutProblem, Progress, Report, SearchResult
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, standing
+from blast_env.values import generator
+
+LAYOUTS_PER_REALISATION: Final = 500
+"""A known charge is met with one fan and air more for so many layouts that the budget pays for."""
+
+
+CHARGES_PER_ROOT_BLAST: Final = 0.3
+"""Of a hidden charge's places a layout meets so many times the square root of the budget."""
+
+
+CONFIRMED_LAYOUTS: Final = 32
+"""Layouts of which the blasts that are held back can pay for all threats."""
+
+
+MOST_CONFIRMING_SHARE: Final = 0.2
+"""Largest share of the budget that is held back to let the best layouts meet more threats."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a search divides its blasts.
+
+    Attributes:
+        threats: How many threats a layout meets while the search explores.
+        exploring_blasts: How many blasts it spends on exploring.
+    """
+
+    threats: int
+    exploring_blasts: int
+
+    @property
+    def exploring_layouts(self) -> int:
+        """How many layouts it can try, at least one."""
+        return max(1, self.exploring_blasts // self.threats)
+
+    @classmethod
+    def of(cls, problem: LayoutProblem, budget: int) -> "Plan":
+        """Return the plan for a budget.
+
+        A layout's impulse differs little from one fan and air to the next, less than layouts do
+        from each other: against a known charge it pays to try many layouts under one threat each,
+        and to find out the lucky ones among the best at the end. It differs much from one place of
+        the charge to the next: what stands well against one may do nothing against the others, so
+        that against a hidden charge layouts meet several places from the start.
+        """
+        most = len(problem.threats)
+        if len({threat.charge for threat in problem.threats}) == 1:
+            wanted = budget // LAYOUTS_PER_REALISATION
+        else:
+            wanted = round(CHARGES_PER_ROOT_BLAST * budget**0.5)
+        threats = max(1, min(wanted, most, budget))
+        if threats == most:
+            return cls.thorough(problem, budget)
+        held_back = min(CONFIRMED_LAYOUTS * most, int(MOST_CONFIRMING_SHARE * budget))
+        return cls(threats, budget - held_back)
+
+    @classmethod
+    def thorough(cls, problem: LayoutProblem, budget: int) -> "Plan":
+        """Return the plan by which every layout meets every threat at once."""
+        return cls(len(problem.threats), budget)
+
 
 _MOST_REPEATS: Final = 300
 """Questions in a row without a new blast after which there is nothing new to be found."""
@@ -37,10 +94,10 @@ class SearchSession:
         budget: Most blasts that may be spent.
         plan: How many threats a layout meets at first, and what is held back for the others.
         report: Is told after every batch how far the search has come.
+        seed: Decides everything that is drawn.
 
     Attributes:
-        problem: As given.
-        plan: As given.
+        rng: Draws it.
         blasts: Blasts spent: distinct pairs of layout and threat that were asked for.
 
     Raises:
@@ -48,12 +105,19 @@ class SearchSession:
     """
 
     def __init__(
-        self, problem: LayoutProblem, budget: int, plan: Plan, report: Report | None = None
+        self,
+        problem: LayoutProblem,
+        budget: int,
+        plan: Plan,
+        report: Report | None = None,
+        seed: int = 0,
     ) -> None:
         if budget < 1:
             raise BlastEnvError(f"budget is {budget} blasts, must be at least 1")
         self.problem = problem
         self.plan = plan
+        self.seed = seed
+        self.rng = generator(seed)
         self.blasts = 0
         self._budget = budget
         self._limit = min(plan.exploring_blasts, budget)
@@ -78,12 +142,12 @@ class SearchSession:
         """Share of the blasts for exploring that is spent."""
         return self.blasts / self._limit
 
-    def run(self, explore: Callable[[], None], choose: Callable[[], None] | None = None) -> bool:
+    def run(self, explore: Callable[[], None], choose: Callable[[], None]) -> bool:
         """Explore until the blasts for it are spent, then let the best meet more threats.
 
         Args:
             explore: Asks `assess` until it is through or `SearchEndedError` comes.
-            choose: Does the same with what was held back; `confirm_best` unless given.
+            choose: Does the same with what was held back.
 
         Returns:
             Whether it was interrupted.
@@ -91,7 +155,7 @@ class SearchSession:
         try:
             self._until_ended(explore)
             self._limit = self._budget
-            self._until_ended(choose or self.confirm_best)
+            self._until_ended(choose)
         except KeyboardInterrupt:
             return True
         return False
@@ -163,19 +227,20 @@ class SearchSession:
         most = max(map(len, self._known.values()), default=0)
         return tuple(self._candidate(key, most) for key in self._front_of(self.ranked(most), most))
 
-    def result(self, method: str, seed: int, interrupted: bool) -> SearchResult:
-        """Return what was found."""
+    def result(self, method: str, interrupted: bool, has_front: bool = False) -> SearchResult:
+        """Return what was found, with the front if there is to be one."""
         best = self.best
         return SearchResult(
-            method=method,
             layout=() if best is None else best.layout,
+            method=method,
             load=None if best is None else best.load,
             threats=0 if best is None else best.threats,
             blasts=self.blasts,
             budget=self._budget,
-            seed=seed,
+            seed=self.seed,
             history=tuple(self._history),
             interrupted=interrupted,
+            front=self.front() if has_front else (),
         )
 
     def _front_of(self, ranked: Sequence[Layout], threats: int) -> list[Layout]:
@@ -252,3 +317,47 @@ class SearchSession:
 
     def _load(self, key: Layout, threats: int) -> float:
         return self.problem.case.counted(self._known[key][:threats], key)
+
+
+@dataclass(frozen=True)
+class Search(ABC):
+    """A search: it says what gets a blast next, and `SearchSession` keeps the account.
+
+    Derive a dataclass that has a name and explores; `blast_agents.search.registry` lists it.
+    """
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Name in tables and on the command line."""
+
+    @abstractmethod
+    def explore(self, session: SearchSession) -> None:
+        """Let `session.assess` layouts until the search is through.
+
+        The session ends it by `SearchEndedError` when the blasts for exploring are spent. What is
+        drawn, `session.rng` draws.
+        """
+
+    def choose(self, session: SearchSession) -> None:
+        """Spend what was held back: the best layouts meet more threats."""
+        session.confirm_best()
+
+    def phases(self, session: SearchSession) -> tuple[Callable[[], None], Callable[[], None]]:
+        """Return how a session is explored, and how the choice is made then."""
+        return partial(self.explore, session), partial(self.choose, session)
+
+    def plan(self, problem: LayoutProblem, budget: int) -> Plan:
+        """Return how the blasts are divided."""
+        return Plan.of(problem, budget)
+
+    has_front: ClassVar[bool] = False
+    """Whether the result has the front of load and price."""
+
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+    ) -> SearchResult:
+        """Return the best layout that was found; see `Proposer`."""
+        session = SearchSession(problem, budget, self.plan(problem, budget), report, seed)
+        interrupted = session.run(*self.phases(session))
+        return session.result(self.name, interrupted, self.has_front)

@@ -2,18 +2,17 @@
 
 from blast_agents.surrogate.engine import SurrogateEngine
 from blast_agents.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
-from blast_agents.surrogate.search import RankedAgent, SurrogateAgent, SurrogateSearch
+from blast_agents.surrogate.search import LearntSearch, search_by
 from blast_agents.surrogate.walls import SurrogateSite, site_of
 
 __all__ = [
     "Guess",
-    "RankedAgent",
+    "LearntSearch",
     "Surrogate",
-    "SurrogateAgent",
     "SurrogateEngine",
-    "SurrogateSearch",
     "SurrogateSite",
     "load_surrogate",
     "packaged_surrogate",
+    "search_by",
     "site_of",
 ]

@@ -1,20 +1,27 @@
-"""Layouts by guesses: a search that asks the surrogate first, an agent that asks nothing else."""
+"""Layouts by what has been learnt: a surrogate, an agent or both, with and without blasts."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import ceil
 from typing import Final
 
 import numpy as np
 
-from blast_agents.search.by_rule import layouts_by_rule
-from blast_agents.search.from_policy import SamplingAgent
 from blast_agents.search.moves import Moves
-from blast_agents.search.problem import LayoutProblem, Plan, Report, SearchResult
-from blast_agents.search.session import SearchSession
-from blast_agents.surrogate.network import Surrogate
+from blast_agents.search.problem import (
+    LayoutProblem,
+    Progress,
+    Report,
+    SamplingAgent,
+    SearchResult,
+)
+from blast_agents.search.registry import layouts_by_rule
+from blast_agents.search.session import Plan, Search, SearchSession
+from blast_agents.surrogate.network import Surrogate, packaged_surrogate
 from blast_agents.surrogate.walls import SurrogateSite, site_of
 from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, Threat
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
 from blast_env.geometry import Layout
@@ -28,6 +35,12 @@ the middle one, and those that are farthest from each other."""
 
 _KEPT: Final = 4
 """How many of the best layouts are changed."""
+
+_BATCH: Final = 8
+"""How many changes are guessed at a time."""
+
+_SITE_SHARE: Final = 0.3
+"""Of the time for guesses alone, what the rules and the ways around on a site take, about."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +91,11 @@ class Guesses:
 
 
 def improved(
-    guesses: Guesses, begin_with: Iterable[Layout], most: int, rng: np.random.Generator
+    guesses: Guesses,
+    begin_with: Iterable[Layout],
+    most: int,
+    rng: np.random.Generator,
+    tell: Callable[[float], None] = lambda _: None,
 ) -> list[Layout]:
     """Return the layouts that a search by guesses alone has met, the best first.
 
@@ -89,11 +106,13 @@ def improved(
         begin_with: Legal layouts.
         most: Most layouts to ask about, beside those.
         rng: Draws the changes.
+        tell: Is told the share that is done.
     """
     guesses.loads([tuple(sorted(each)) for each in begin_with])
     moves, end = Moves(guesses.case.scenario), guesses.count + most
     tries = 0
     while guesses.count < end and tries < 4 * most:
+        tell(1.0 - (end - guesses.count) / most)
         best = guesses.ranked()[:_KEPT]
         changed = [moves.near_best(best, rng) for _ in range(min(_BATCH, end - guesses.count))]
         guesses.loads(changed)
@@ -101,66 +120,187 @@ def improved(
     return guesses.ranked()
 
 
-_BATCH: Final = 8
-
-
 @dataclass(frozen=True)
-class SurrogateAgent:
-    """Proposes what the surrogate likes best of the rules' layouts and changes of them: no blast.
+class LearntSearch(Search):
+    """Proposes by what a surrogate of gas dynamics has learnt, an agent, or both.
+
+    Without a blast (a budget of 0) it proposes
+
+    - what the surrogate likes best of the rules' layouts and changes of them;
+    - what the agent proposes;
+    - with both, what the surrogate likes best of what the agent proposes and draws.
+
+    With blasts a surrogate says what gets one: first what the agent proposes, then the rules'
+    layouts and the best that a search by guesses alone has found, in turn; then changes of the best
+    by blasts, of which it picks one out of many. Against a hidden charge layouts meet a few places
+    alone. The guesses under all places, times the ratio of blast and guess under those few, tell
+    more of a layout than its loads there: they decide what is changed, and what meets the other
+    places in the end.
+
+    An agent without a surrogate gets its blasts for what it proposes and draws and for the rules;
+    then for changes of the best of these, the better ones more often, by one or two moves.
 
     Attributes:
         surrogate: The surrogate.
-        changes: How many changed layouts it looks at, beside the rules'.
+        agent: The agent.
+        digest: Of both, so that results of different ones are told apart.
+        changes: Changed layouts that are guessed where there is no blast.
+        ranked: Layouts that the agent draws for the surrogate where there is no blast.
+        guesses: Layouts that are guessed before the first blast.
+        agent_draws: Layouts that the agent draws for that.
+        drawn: Changes that the surrogate picks one out of, afterwards.
+        guessed_share: Share of the blasts for what was found by guesses alone.
+        drawn_share: Without a surrogate, share of the layouts that the agent draws.
+        name: In tables.
+
+    Raises:
+        BlastEnvError: If there is neither a surrogate nor an agent.
     """
 
-    surrogate: Surrogate = field(repr=False)
+    surrogate: Surrogate | None = field(default=None, repr=False)
+    agent: SamplingAgent | None = field(default=None, repr=False)
+    digest: str = ""
     changes: int = 300
+    ranked: int = 16
+    guesses: int = 600
+    agent_draws: int = 64
+    drawn: int = 16
+    guessed_share: float = 0.4
+    drawn_share: float = 0.3
+    name: str = "surrogate"
 
-    def propose(self, scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
-        """Return a layout that keeps every condition of the build zone; always the same one.
+    def __post_init__(self) -> None:
+        """Check that something has learnt."""
+        if self.surrogate is None and self.agent is None:
+            raise BlastEnvError("there is neither a surrogate nor an agent, must be one or both")
+
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+    ) -> SearchResult:
+        """Return the best layout that was met; with a budget of 0 the best one by guesses.
+
+        Raises:
+            BlastEnvError: If nothing is protected.
+        """
+        if budget:
+            return super().propose(problem, budget, seed, report)
+
+        def tell(share: float) -> None:
+            if report is not None:
+                report(Progress(0, 0, guessed=share))
+
+        layout = self.at_once(problem.scenario, problem.told, tell)
+        return SearchResult(layout, self.name, seed=seed)
+
+    def at_once(
+        self,
+        scenario: Scenario,
+        charge: AnyCharge | None = None,
+        tell: Callable[[float], None] = lambda _: None,
+    ) -> Layout:
+        """Return the layout that is proposed without a blast; always the same one.
 
         Args:
             scenario: The scenario; it has a build zone.
             charge: Where the charge is, if that is known; otherwise the layout is for some of the
                 places where the scenario may have one.
+            tell: Is told the share that is done.
 
         Raises:
-            BlastEnvError: If nothing is protected.
+            BlastEnvError: As for `propose`.
         """
+        if self.surrogate is None:
+            return tuple(sorted(_given(self.agent).propose(scenario, charge)))
         guesses = Guesses.of(self.surrogate, _case_for(scenario, charge))
-        ruled = layouts_by_rule(scenario, charge).values()
-        return improved(guesses, [(), *ruled], self.changes, generator(0))[0]
+        tell(0.5 * _SITE_SHARE)
+        if self.agent is None:
+            begin_with = [(), *layouts_by_rule(scenario, charge).values()]
 
+            def go_on(share: float) -> None:
+                tell(_SITE_SHARE + (1.0 - _SITE_SHARE) * share)
 
-@dataclass(frozen=True)
-class RankedAgent:
-    """Proposes what the surrogate likes best of what another agent proposes and draws: no blast.
-
-    Attributes:
-        agent: The other agent.
-        surrogate: The surrogate.
-        drawn: How many layouts are drawn.
-    """
-
-    agent: SamplingAgent = field(repr=False)
-    surrogate: Surrogate = field(repr=False)
-    drawn: int = 16
-
-    def propose(self, scenario: Scenario, charge: AnyCharge | None = None) -> Layout:
-        """Return a layout that keeps every condition of the build zone; always the same one.
-
-        Args:
-            scenario: As for `SurrogateAgent`.
-            charge: Likewise.
-
-        Raises:
-            BlastEnvError: If nothing is protected.
-        """
-        guesses = Guesses.of(self.surrogate, _case_for(scenario, charge))
+            return improved(guesses, begin_with, self.changes, generator(0), go_on)[0]
         proposed = self.agent.propose(scenario, charge)
-        drawn = self.agent.sample(scenario, charge, self.drawn, 0)
+        drawn = self.agent.sample(scenario, charge, self.ranked, 0)
         guesses.loads([tuple(sorted(each)) for each in (proposed, *drawn)])
         return guesses.ranked()[0]
+
+    def plan(self, problem: LayoutProblem, budget: int) -> Plan:
+        """Divide the blasts; by guesses against a hidden charge for few layouts, met well."""
+        plan = Plan.of(problem, budget)
+        most = len(problem.threats)
+        places = min(max(plan.threats, _LEAST_PLACES), most, budget)
+        if self.surrogate is None or problem.told is not None or places == most:
+            return plan
+        return Plan(places, budget - min(round(_CHOOSING_SHARE * budget), budget - places))
+
+    def phases(self, session: SearchSession) -> tuple[Callable[[], None], Callable[[], None]]:
+        """Return how a session is explored, and how the choice is made then."""
+        if self.surrogate is None:
+            return super().phases(session)
+        estimates = _Estimates.of(self.surrogate, session)
+
+        def choose() -> None:
+            for layout in estimates.ranked():
+                session.assess([layout], len(session.problem.threats))
+
+        return partial(self._explore_by_guesses, session, estimates), choose
+
+    def explore(self, session: SearchSession) -> None:
+        """Let blasts decide between rules and draws of the agent, and changes of the best."""
+        scenario, told, plan = session.problem.scenario, session.problem.told, session.plan
+        agent = _given(self.agent)
+        count = max(1, round(self.drawn_share * plan.exploring_layouts))
+        session.assess([agent.propose(scenario, told)])
+        session.assess([*layouts_by_rule(scenario, told).values()])
+        session.assess(agent.sample(scenario, told, count, session.seed))
+        moves = Moves(scenario)
+        while True:
+            best = session.ranked(plan.threats)[:_KEPT]
+            session.assess([moves.near_best(best, session.rng)])
+
+    def _explore_by_guesses(self, session: SearchSession, estimates: "_Estimates") -> None:
+        """Let blasts decide between what guesses like best, and changes of it."""
+        scenario, told = session.problem.scenario, session.problem.told
+        guesses = estimates.everywhere
+        rules = layouts_by_rule(scenario, told).values()
+        proposed: list[Layout] = []
+        if self.agent is not None:
+            drawn = self.agent.sample(scenario, told, self.agent_draws, session.seed)
+            proposed = [self.agent.propose(scenario, told), *drawn]
+        session.assess(proposed[:1])
+        found = improved(guesses, [(), *rules, *proposed], self.guesses, session.rng)
+        layouts = session.plan.exploring_layouts
+        share = max(1, round(self.guessed_share * layouts))
+        ruled = sorted(rules, key=lambda layout: guesses.loads([layout]).item())
+        ruled = ruled[: ceil(layouts / _LAYOUTS_A_RULE)]
+        for first, second in zip(found[:share], [*ruled, *found[share:]], strict=False):
+            session.assess([first])
+            session.assess([second])
+        moves = Moves(scenario)
+        tried: set[Layout] = set(estimates.ranked())
+        while True:
+            best = estimates.ranked()[:_KEPT]
+            changed = [moves.near_best(best, session.rng) for _ in range(self.drawn)]
+            new = [each for each in dict.fromkeys(changed) if each not in tried] or changed
+            chosen = new[int(guesses.loads(new).argmin())]
+            tried.add(chosen)
+            session.assess([chosen])
+
+
+def packaged_search() -> LearntSearch:
+    """Return the search by the surrogate that comes with the package."""
+    return search_by(packaged_surrogate())
+
+
+def search_by(surrogate: Surrogate) -> LearntSearch:
+    """Return the search by a surrogate."""
+    return LearntSearch(surrogate, digest=surrogate.digest)
+
+
+def _given(agent: SamplingAgent | None) -> SamplingAgent:
+    assert agent is not None  # as checked when it was made
+    return agent
 
 
 def _case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
@@ -171,97 +311,6 @@ def _case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
     return replace(drawn, threats=one_of_each_charge(drawn.threats)[:_HIDDEN_CHARGES])
 
 
-@dataclass(frozen=True)
-class SurrogateSearch:
-    """Spends each blast on what the surrogate likes best of what is left.
-
-    First the rules' layouts and the best that a search by guesses alone has found, in turn; then
-    changes of the best by blasts, of which the surrogate picks one out of many.
-
-    Against a hidden charge layouts meet a few places alone. What the surrogate says of all places,
-    times by how much it was wrong at those, tells more of a layout than its loads there: it decides
-    what is changed, and what meets the other places in the end.
-
-    Attributes:
-        surrogate: The surrogate; the digest says which.
-        digest: Of its file, and of the agent's weights, so that results of different ones are told
-            apart.
-        agent: An agent whose proposal and draws the search by guesses begins with, too; the
-            proposal is the first to get a blast. `None` begins with the rules alone.
-        agent_draws: How many layouts it draws.
-        guesses: Layouts that it is asked about before the first blast.
-        drawn: Changes that it picks one out of, afterwards.
-        guessed_share: Share of the blasts for what was found by guesses alone.
-        name: In tables.
-    """
-
-    surrogate: Surrogate = field(repr=False)
-    digest: str
-    agent: SamplingAgent | None = field(default=None, repr=False)
-    agent_draws: int = 64
-    guesses: int = 600
-    drawn: int = 16
-    guessed_share: float = 0.4
-    name: str = "surrogate"
-
-    def search(
-        self, problem: LayoutProblem, budget: int, seed: int, report: Report | None = None
-    ) -> SearchResult:
-        """Return the best layout that was met.
-
-        Raises:
-            BlastEnvError: If nothing is protected.
-        """
-        rng = generator(seed)
-        plan = _plan(problem, budget)
-        session = SearchSession(problem, budget, plan, report)
-        estimates = _Estimates.of(self.surrogate, problem, session)
-        guesses = estimates.everywhere
-
-        def explore() -> None:
-            rules = layouts_by_rule(problem.scenario, problem.told).values()
-            proposed = self._from_agent(problem, seed)
-            session.assess(proposed[:1])
-            found = improved(guesses, [(), *rules, *proposed], self.guesses, rng)
-            share = max(1, round(self.guessed_share * plan.exploring_layouts))
-            ruled = sorted(rules, key=lambda layout: guesses.loads([layout]).item())
-            ruled = ruled[: ceil(plan.exploring_layouts / _LAYOUTS_A_RULE)]
-            for first, second in zip(found[:share], [*ruled, *found[share:]], strict=False):
-                session.assess([first])
-                session.assess([second])
-            self._go_on(session, estimates, rng)
-
-        def choose() -> None:
-            most = len(problem.threats)
-            for layout in estimates.ranked():
-                session.assess([layout], most)
-
-        return session.result(self.name, seed, session.run(explore, choose))
-
-    def _from_agent(self, problem: LayoutProblem, seed: int) -> list[Layout]:
-        """Return what the agent proposes, then what it draws."""
-        if self.agent is None:
-            return []
-        scenario, told = problem.scenario, problem.told
-        drawn = self.agent.sample(scenario, told, self.agent_draws, seed)
-        return [self.agent.propose(scenario, told), *drawn]
-
-    def _go_on(
-        self, session: SearchSession, estimates: "_Estimates", rng: np.random.Generator
-    ) -> None:
-        """Change the best by blasts, one of many changes at a time, until the blasts are spent."""
-        guesses = estimates.everywhere
-        moves = Moves(guesses.case.scenario)
-        tried: set[Layout] = set(estimates.ranked())
-        while True:
-            best = estimates.ranked()[:_KEPT]
-            changed = [moves.near_best(best, rng) for _ in range(self.drawn)]
-            new = [each for each in dict.fromkeys(changed) if each not in tried] or changed
-            chosen = new[int(guesses.loads(new).argmin())]
-            tried.add(chosen)
-            session.assess([chosen])
-
-
 _LAYOUTS_A_RULE: Final = 8
 """Of so many layouts that get a blast one is a rule's, as long as there are some."""
 
@@ -270,16 +319,6 @@ _LEAST_PLACES: Final = 4
 
 _CHOOSING_SHARE: Final = 0.4
 """Of the blasts, for the places of a hidden charge that the best layouts have not met."""
-
-
-def _plan(problem: LayoutProblem, budget: int) -> Plan:
-    """Return how the blasts are divided; against a hidden charge for few layouts, met well."""
-    plan = Plan.of(problem, budget)
-    most = len(problem.threats)
-    places = min(max(plan.threats, _LEAST_PLACES), most, budget)
-    if problem.told is not None or places == most:
-        return plan
-    return Plan(places, budget - min(round(_CHOOSING_SHARE * budget), budget - places))
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,10 +336,9 @@ class _Estimates:
     met: Guesses
 
     @classmethod
-    def of(
-        cls, surrogate: Surrogate, problem: LayoutProblem, session: SearchSession
-    ) -> "_Estimates":
+    def of(cls, surrogate: Surrogate, session: SearchSession) -> "_Estimates":
         """Begin with none."""
+        problem = session.problem
 
         def under(threats: Sequence[Threat]) -> Guesses:
             case = Case(problem.scenario, tuple(threats), risk=problem.case.risk)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blast_agents.proposal import LayoutAgent
+from blast_agents.search import LayoutAgent
 from blast_agents.training.run_folder import TrainingSettings
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError

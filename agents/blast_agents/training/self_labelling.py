@@ -26,7 +26,7 @@ from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.utils import set_random_seed
 from torch import Tensor
 
-from blast_agents.search.by_rule import layouts_by_rule
+from blast_agents.search import layouts_by_rule
 from blast_agents.search.moves import Moves, legal_part
 from blast_agents.training.agent import Policy, TrainedAgent, as_tensor, policy_for
 from blast_agents.training.cases import Selection, training_cases

@@ -13,7 +13,7 @@ from blast_env.app import placing
 from blast_env.app.cost import cost_words, time_words
 from blast_env.app.design import SLOTS
 from blast_env.app.editor import Editor, Tool
-from blast_env.app.offers import METHODS, PACKAGED, proposers
+from blast_env.app.offers import offered
 from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session
 from blast_env.app.threats import threats_of
@@ -311,13 +311,10 @@ class WorkPanel:
 
     def _offer_proposals(self, scenario: Scenario) -> None:
         """Offer the rules for a site, agents and searches; what was chosen stays if it can."""
-        rules = proposers(scenario)
-        offers = {f"rule {each}": each for each in rules if each == PACKAGED}
-        offers |= {f"run {name}": f"agent of {name}" for name in self._runs}
-        offers |= {f"search {each}": f"search: {each}" for each in METHODS}
-        offers |= {f"rule {each}": f"rule: {each}" for each in rules if each != PACKAGED}
+        offers = {**offered(scenario, self._runs)}
         chosen = self._proposer.value
-        self._proposer.set_options(offers, value=chosen if chosen in offers else next(iter(offers)))
+        value = chosen if chosen in offers else next(iter(offers), None)
+        self._proposer.set_options(offers, value=value)
 
     def follow(self) -> None:
         """Show how far work has come."""
