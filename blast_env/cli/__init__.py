@@ -35,6 +35,11 @@ class _Commands(LazyGroup):
             "blast_env.cli.assess:AssessCommand",
             "Say what charges do to the buildings: panes, panels, level of protection.",
         ),
+        "advise": (
+            "blast_env.cli.advise:AdviseCommand",
+            "Say what a budget buys by keeping the charge away, shields, better components, or "
+            "all.",
+        ),
         "search": (
             "blast_env.cli.search:SearchCommand",
             "Search for the layout with the least load on the protected structures.",

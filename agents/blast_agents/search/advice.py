@@ -1,0 +1,196 @@
+"""What a budget buys by each kind of measure: keep the charge away, shield, harden, or all of them.
+
+A layout needs blasts for what stands on the ground alone. So each barrier that is tried gets the
+measures that suit it best, all choices of them looked at without a blast.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from blast_agents.search.moves import Moves, legal_part
+from blast_agents.search.problem import BlastMeter, BudgetError, LayoutProblem
+from blast_agents.search.registry import layouts_by_rule
+from blast_env.geometry import Layout, Measure, standing
+from blast_env.scenario import Placement, Scenario
+from blast_env.values import generator
+
+_LOW_M: Final = 1.5
+"""Items that stop vehicles and are lower keep them away; others shield."""
+
+_MOST_LOOKED_AT: Final = 10
+"""Of so many measures all choices are looked at; of more only each alone and all together."""
+
+_KEPT: Final = 3
+"""How many of the best barriers are changed."""
+
+_FEWER_SHARE: Final = 0.4
+"""Share of the changes that take a piece away: the cheapest layout that passes is wanted."""
+
+
+class MeasureKind(StrEnum):
+    """Kinds of measures."""
+
+    NOTHING = "nothing"
+    KEEP_AWAY = "keep the charge away"
+    SHIELD = "shield"
+    HARDEN = "harden"
+    TOGETHER = "together"
+
+
+@dataclass(frozen=True)
+class Advice:
+    """The best layout of a kind of measures.
+
+    Attributes:
+        kind: The kind.
+        layout: The layout: the cheapest that passes, else the one with the least shortfall.
+        worth: By the objective with its target: at most 1 if it passes; see
+            `ObjectiveSection.counted`.
+        blasts: Blasts that were asked for.
+    """
+
+    kind: MeasureKind
+    layout: Layout
+    worth: float
+    blasts: int
+
+    @property
+    def passes(self) -> bool:
+        """Whether it reaches the target, by the blasts of the search."""
+        return self.worth <= 1.0
+
+
+def kinds_for(scenario: Scenario) -> tuple[MeasureKind, ...]:
+    """Return the kinds of measures that a scenario has on offer, nothing first."""
+    kinds = [MeasureKind.NOTHING]
+    kinds += [
+        kind for kind in (MeasureKind.KEEP_AWAY, MeasureKind.SHIELD) if _items_of(scenario, kind)
+    ]
+    kinds += [MeasureKind.HARDEN] if scenario.zone.hardening else []
+    return (*kinds, MeasureKind.TOGETHER) if len(kinds) > 2 else tuple(kinds)
+
+
+def only(scenario: Scenario, kind: MeasureKind) -> Scenario:
+    """Return the scenario with nothing but one kind in stock."""
+    zone = scenario.zone
+    names = _items_of(scenario, kind)
+    items = tuple(
+        each if each.name in names else each.model_copy(update={"stock": 0}) for each in zone.items
+    )
+    hardening = zone.hardening if kind in (MeasureKind.HARDEN, MeasureKind.TOGETHER) else ()
+    changed = zone.model_copy(update={"items": items, "hardening": hardening})
+    return scenario.model_copy(update={"build_zone": changed})
+
+
+def _items_of(scenario: Scenario, kind: MeasureKind) -> set[str]:
+    low = {
+        each.name
+        for each in scenario.zone.items
+        if each.stops_vehicles and each.height_m < _LOW_M and scenario.vehicles
+    }
+    every = {each.name for each in scenario.zone.items if each.stock > 0}
+    return {
+        MeasureKind.NOTHING: set[str](),
+        MeasureKind.KEEP_AWAY: every & low,
+        MeasureKind.SHIELD: every - low,
+        MeasureKind.HARDEN: set[str](),
+        MeasureKind.TOGETHER: every,
+    }[kind]
+
+
+def advise(
+    problem: LayoutProblem,
+    kind: MeasureKind,
+    budget: int,
+    seed: int = 0,
+    begin_with: tuple[Layout, ...] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Advice:
+    """Return the best layout of a kind of measures.
+
+    First the rules' layouts and parts of them, then changes of the best: moves of pieces, and
+    fewer of them.
+
+    Args:
+        problem: Of a scenario whose objective has a target.
+        kind: The kind.
+        budget: Most blasts.
+        seed: Decides what is drawn.
+        begin_with: Layouts to begin with: those of kinds that were tried before.
+        progress: Called with the share of the blasts that is spent.
+    """
+    scenario, rng = only(problem.scenario, kind), generator(seed)
+    meter = BlastMeter(budget)
+    metered = replace(problem, meter=meter)
+    best: dict[Layout, Advice] = {}
+    moves = Moves(scenario)
+
+    def drawn() -> Iterator[Layout]:
+        yield ()
+        for layout in begin_with:
+            yield standing(layout)
+        if _items_of(scenario, kind):
+            bare = only(scenario, kind).zone.model_copy(update={"hardening": ()})
+            ruled = layouts_by_rule(scenario.model_copy(update={"build_zone": bare}), problem.told)
+            for layout in ruled.values():
+                yield layout
+                yield layout[: len(layout) // 2]
+            while True:
+                ranked = sorted(best, key=lambda each: best[each].worth)[:_KEPT]
+                chosen = ranked[int(rng.integers(len(ranked)))]
+                yield standing(_changed(moves, chosen, rng))
+
+    tries = 0
+    try:
+        for barrier in drawn():
+            tries += 1
+            key = tuple(sorted(legal_part(scenario, barrier).layout))
+            if tries > 20 * budget:
+                break
+            if key in best:
+                continue
+            layout, worth = _hardened(metered, scenario, key)
+            best[key] = Advice(kind, layout, worth, meter.blasts)
+            if progress is not None:
+                progress(meter.blasts / budget)
+    except BudgetError:
+        pass
+    found = min(best.values(), key=lambda each: each.worth)
+    return replace(found, blasts=meter.blasts)
+
+
+def _changed(moves: Moves, layout: Layout, rng: np.random.Generator) -> Layout:
+    if len(layout) > 1 and rng.random() < _FEWER_SHARE:
+        index = int(rng.integers(len(layout)))
+        return layout[:index] + layout[index + 1 :]
+    return moves.neighbour(layout, rng)
+
+
+def _hardened(problem: LayoutProblem, scenario: Scenario, barrier: Layout) -> tuple[Layout, float]:
+    """Return a barrier with the measures that suit it best, and what that is worth.
+
+    The blasts are those of the barrier alone. If none of the measures pass with it for what is
+    left of the budget, the one with the least shortfall is returned.
+
+    Raises:
+        BudgetError: If the blasts do not pay for it.
+    """
+    names = [each.name for each in scenario.zone.hardening]
+    counts = range(len(names) + 1) if len(names) <= _MOST_LOOKED_AT else (0, 1, len(names))
+    placement = Placement(scenario, barrier)
+    left = placement.budget_left
+    prices = {each.name: each.cost for each in scenario.zone.hardening}
+    found: list[tuple[float, float, Layout]] = []
+    for count in counts:
+        for taken in combinations(names, count):
+            cost = sum(prices[name] for name in taken)
+            if left is None or cost <= left:
+                layout = (*barrier, *map(Measure.named, taken))
+                found.append((problem.load(layout), cost, layout))
+    worth, _, layout = min(found)
+    return layout, worth

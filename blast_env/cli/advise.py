@@ -1,0 +1,192 @@
+"""`blast-env advise`: what does a budget buy by each kind of measure, what does it cost to pass?"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from blast_agents.search import LayoutProblem
+from blast_agents.search.advice import Advice, MeasureKind, advise, kinds_for
+
+from blast_env.cli.command import argument, option
+from blast_env.cli.options import CELL_HELP, SCENARIO_HELP, ChargeOptions
+from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.engines.contract import JUDGE, Engine, find_engine
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import BlastEvaluator, Case, draw_threats
+from blast_env.evaluation.cases import one_of_each_charge
+from blast_env.evaluation.consequences import Consequences, consequences
+from blast_env.geometry import Layout, Measure, layout_counts, standing
+from blast_env.provenance import versions
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.scenario import Placement, Scenario, load_scenario, write_layout
+from blast_env.scenario.versions import SCHEMA_VERSION
+
+_LEVELS: Final = {
+    level.label: level for level in LevelOfProtection if level > LevelOfProtection.BELOW_STANDARDS
+}
+_HEADERS: Final = ("kind", "layout", "cost", "blasts", "level", "passes", "judged", "sharp peaks")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdviseCommand(ChargeOptions):
+    """Say what a budget buys by keeping the charge away, shielding, hardening, and all together.
+
+    Of each kind the cheapest layout that reaches the target is looked for, by gas dynamics; where
+    none does, the one with the least shortfall. What was found is judged again with finer cells,
+    and with peaks as sharp as Kingery and Bulmash's: cells clip peaks, and those of 0.5 m halve
+    them. Hardening needs no blasts of its own.
+    """
+
+    scenario: str = argument(SCENARIO_HELP)
+    budget_cost: float | None = option(None, "What may be spent, else the zone's budget.")
+    target: str | None = option(
+        None, "Level of protection to reach, else the scenario's, else medium."
+    )
+    charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
+    budget: int = option(60, "Most blasts for each kind.", min=1)
+    seed: int = option(0, "Decides what is drawn.", min=0)
+    processes: int = option(1, "Worker processes.", min=1)
+    cell_m: float | None = option(None, CELL_HELP)
+    judge_cell_m: float = option(0.25, "Side of the cells that judge what was found, m.")
+    out: Path | None = option(
+        None, "Layout file of the best layout of all: .json.", writes=(".json",)
+    )
+
+    def __call__(self) -> None:
+        """Search for each kind, judge, and print the verdict."""
+        scenario = self._asked(load_scenario(self.scenario))
+        target = scenario.objective.level
+        assert target is not None
+        drawn = draw_threats(scenario, range(self.charges))
+        fixed = [replace(each, charge=self.fixed(scenario, each.charge)) for each in drawn]
+        threats = one_of_each_charge(fixed)
+        engine, judge = find_engine(JUDGE, self.cell_m), find_engine(JUDGE, self.judge_cell_m)
+        problem = LayoutProblem(
+            BlastEvaluator(scenario, engine), Case(scenario, threats), self.processes
+        )
+        if self.budget < len(threats):
+            raise BlastEnvError(
+                f"budget is {self.budget} blasts, must be at least {len(threats)}: one a charge"
+            )
+        kinds = kinds_for(scenario)
+        print_line(
+            f"{len(kinds)} kinds, at most {self.budget} blasts each, {engine.words}; then "
+            f"{len(kinds) * len(threats)} blasts of the judge, {judge.words}"
+        )
+        found: list[Advice] = []
+        for kind in kinds:
+            with progress_bar(f"{kind}") as progress:
+                before = tuple(each.layout for each in found)
+                first = before if kind is MeasureKind.TOGETHER else ()
+                found.append(advise(problem, kind, self.budget, self.seed, first, progress))
+        judged = self._judged(scenario, problem, found, judge)
+        self._print(scenario, target, found, judged)
+        best = _best(found, judged, target)
+        if self.out is not None:
+            made = {"method": "advise", "seed": self.seed, "versions": versions(engine.version)}
+            print_line(f"wrote {write_layout(self.out, scenario, best.layout, made)}")
+
+    def _asked(self, scenario: Scenario) -> Scenario:
+        """Return the scenario with the target and the budget that were asked for."""
+        target = self.target or scenario.objective.target or "medium"
+        if target not in _LEVELS:
+            raise UnknownNameError("level of protection", target, _LEVELS)
+        kept = scenario.objective.model_dump(
+            include={"charges", "cvar_level", "measure"}, exclude_none=True
+        )
+        document = scenario.model_dump() | {
+            "schema_version": SCHEMA_VERSION,
+            "objective": {**kept, "kind": "response", "target": target},
+        }
+        if self.budget_cost is not None:
+            document["build_zone"] = {**scenario.zone.model_dump(), "budget": self.budget_cost}
+        return Scenario.from_document(document, scenario.name)
+
+    def _judged(
+        self, scenario: Scenario, problem: LayoutProblem, found: list[Advice], judge: Engine
+    ) -> dict[Layout, Consequences]:
+        """Return what the layouts do by the judge; those that differ in measures are other ones."""
+        charges = [threat.charge for threat in problem.threats]
+        judged: dict[Layout, Consequences] = {}
+        layouts = list(dict.fromkeys(each.layout for each in found))
+        with progress_bar("the judge") as progress:
+            for number, layout in enumerate(layouts, start=1):
+                judged[layout] = consequences(scenario, layout, charges, judge)
+                progress(number / len(layouts))
+        return judged
+
+    def _print(
+        self,
+        scenario: Scenario,
+        target: LevelOfProtection,
+        found: list[Advice],
+        judged: dict[Layout, Consequences],
+    ) -> None:
+        print_line(_verdict(scenario, target, found, judged))
+        title = (
+            f"{scenario.name}: what {scenario.zone.budget:g} buys, level {target.label!r} wanted"
+        )
+        table = make_table(title, _HEADERS, text_columns=2)
+        for each in found:
+            seen = judged[each.layout]
+            levels = [seen.level(building) for building in seen.buildings]
+            table.add_row(
+                each.kind,
+                _words(each.layout),
+                f"{Placement(scenario, each.layout).cost:g}",
+                str(each.blasts),
+                min(levels).label,
+                "yes" if each.passes else "no",
+                "passes" if seen.passes(target) else "fails",
+                "fails" if not seen.passes(target) or seen.depends_on_cells(target) else "passes",
+            )
+        result_console().print(table)
+        print_line(
+            f"passes: by the search; level, judged: cells of {self.judge_cell_m:g} m; sharp peaks: "
+            "the same impulses with peaks that cells do not clip."
+        )
+
+
+def _best(
+    found: list[Advice], judged: dict[Layout, Consequences], target: LevelOfProtection
+) -> Advice:
+    """Return the cheapest layout that passes before the judge, else that of least shortfall."""
+    passing = [each for each in found if judged[each.layout].passes(target)]
+    return min(passing or found, key=lambda each: each.worth)
+
+
+def _verdict(
+    scenario: Scenario,
+    target: LevelOfProtection,
+    found: list[Advice],
+    judged: dict[Layout, Consequences],
+) -> str:
+    """Return the answer in a line or two: what it costs to pass, and whether walls help."""
+    best, by_kind = _best(found, judged, target), {each.kind: each for each in found}
+    cost = Placement(scenario, best.layout).cost
+    if not judged[best.layout].passes(target):
+        answer = f"{scenario.name}: nothing that was tried reaches {target.label!r}."
+    elif not best.layout:
+        answer = f"{scenario.name}: the empty site reaches {target.label!r}."
+    else:
+        answer = f"{scenario.name}: {target.label!r} costs {cost:g}: {_words(best.layout)}."
+    shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
+    if shield is None or judged[shield.layout].passes(target):
+        return answer
+    barrier = set(standing(best.layout))
+    gain = 1.0 - (shield.worth - 1.0) / (nothing.worth - 1.0) if nothing.worth > 1.0 else 0.0
+    if best.passes and not barrier:
+        return f"Walls are worth nothing here: better components alone are cheaper. {answer}"
+    if gain < 0.01:
+        return (
+            f"Walls alone are worth nothing here: they change the shortfall by {gain:.1%}. {answer}"
+        )
+    return answer
+
+
+def _words(layout: Layout) -> str:
+    """Return what a layout has: pieces by their items, then measures."""
+    measures = [each.item for each in layout if isinstance(each, Measure)]
+    barrier = standing(layout)
+    parts = [layout_counts(barrier)] if barrier else []
+    return ", ".join(parts + measures) or "nothing"

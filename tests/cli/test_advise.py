@@ -1,0 +1,92 @@
+"""`blast-env advise`: the verdict first, each kind of measure, and blasts for barriers alone."""
+
+from pathlib import Path
+
+import pytest
+from blast_agents.search import LayoutProblem
+from blast_agents.search.advice import MeasureKind, advise, kinds_for, only
+from typer.testing import CliRunner
+
+import blast_env
+from blast_env.cli import app
+from blast_env.evaluation import BlastEvaluator, Case
+from blast_env.geometry import Measure, standing
+from blast_env.scenario import Placement, load_layout
+from tests.evaluation.test_response_objective import THREAT
+from tests.scenario.test_hardening import glazed_yard
+
+
+def run(*words: str | Path) -> str:
+    done = CliRunner().invoke(app, ["advise", *map(str, words)])
+    assert done.exit_code in (0, 2), done.output
+    return done.output
+
+
+def test_each_kind_has_nothing_but_its_own_in_stock() -> None:
+    scenario = glazed_yard(target="medium")
+    assert kinds_for(scenario) == (
+        MeasureKind.NOTHING,
+        MeasureKind.SHIELD,
+        MeasureKind.HARDEN,
+        MeasureKind.TOGETHER,
+    )
+    for kind, has_pieces, has_measures in (
+        (MeasureKind.NOTHING, False, False),
+        (MeasureKind.SHIELD, True, False),
+        (MeasureKind.HARDEN, False, True),
+        (MeasureKind.TOGETHER, True, True),
+    ):
+        placement = Placement.empty(only(scenario, kind))
+        legal = {
+            isinstance(placement.catalogue.element(action), Measure)
+            for action in placement.legal.ravel().nonzero()[0].tolist()
+        }
+        assert (False in legal, True in legal) == (has_pieces, has_measures)
+
+
+def test_hardening_takes_the_best_choice_of_measures_with_one_blast() -> None:
+    scenario = glazed_yard(target="medium")
+    problem = LayoutProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
+    found = advise(problem, MeasureKind.HARDEN, 5)
+    assert found.blasts == 1
+    assert standing(found.layout) == ()
+    glass, panels = Measure.named("glass"), Measure.named("panels")
+    choices = ((), (glass,), (panels,), (glass, panels))
+    assert found.worth == min(problem.load(each) for each in choices)
+    together = advise(problem, MeasureKind.TOGETHER, 12, begin_with=(found.layout,))
+    assert together.worth <= found.worth
+    assert together.blasts <= 12
+
+
+def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) -> None:
+    site, out = tmp_path / "yard.toml", tmp_path / "best.json"
+    blast_env.save_scenario(glazed_yard(charges="mean"), site)
+    options = ("--tnt-kg", "0.1", "--budget", "3", "--judge-cell", "0.5", "--out", out)
+    text = run(site, *options, "--target", "low", "--budget-cost", "15")
+    first, verdict = text.splitlines()[:2]
+    assert first.startswith("4 kinds, at most 3 blasts each, gas, cells of 0.5 m; then 4 blasts")
+    assert "walled_yard" in verdict
+    assert all(
+        kind.value in text for kind in (MeasureKind.NOTHING, MeasureKind.SHIELD, MeasureKind.HARDEN)
+    )
+    assert load_layout(out) is not None
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--target", "good"), "no level of protection 'good'"),
+        (("--budget-cost", "-3"), "build_zone.budget: is -3.0, must be greater than 0"),
+        (("--budget", "0"), "greater than or equal to 1"),
+    ],
+)
+def test_bad_input_gets_the_usual_errors(
+    options: tuple[str, ...], message: str, tmp_path: Path
+) -> None:
+    site = tmp_path / "yard.toml"
+    blast_env.save_scenario(glazed_yard(charges="mean"), site)
+    assert message in run(site, *options)
+
+
+def test_a_target_needs_a_facade() -> None:
+    assert "no protected structure has a facade" in run("visitor_entrance", "--budget", "3")
