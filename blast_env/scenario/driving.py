@@ -32,8 +32,6 @@ from blast_env.scenario.driving_steps import (
     IntArray32,
     Labels,
     all_arcs,
-    passable_places,
-    spread,
     wide_places,
 )
 from blast_env.scenario.sections import Motion, PointM
@@ -83,6 +81,8 @@ class SpeedField:
             is_open: Which places are open to its centre (rows, columns).
             starts: Where it enters (rows, columns), and the direction into the site there.
         """
+        # Here, because they import Numba, which takes half a second.
+        from blast_env.scenario.driving_kernels import passable_places, spread
 
         def label(speed_km_h: float) -> float:
             return _run_up_m(motion, speed_km_h) / STEP_M
