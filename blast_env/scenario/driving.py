@@ -104,14 +104,18 @@ class SpeedField:
                     )
         per_radius = _per_radius(motion)
         arcs = all_arcs().up_to(top / per_radius)
-        passable = np.zeros((len(arcs.of), *is_open.shape), dtype=bool)
-        slowed = np.zeros_like(passable) if motion.slow else np.zeros((1, len(is_open), 0), bool)
-        passable_places(is_open, True, arcs.first, arcs.points, passable)
+        # What is beyond all open places takes time, and nothing else.
+        box = _around(is_open)
+        ground, whole = np.ascontiguousarray(is_open[box]), labels
+        most, labels = np.ascontiguousarray(most[box]), np.ascontiguousarray(labels[:, *box])
+        passable = np.zeros((len(arcs.of), *ground.shape), dtype=bool)
+        slowed = np.zeros_like(passable) if motion.slow else np.zeros((1, len(ground), 0), bool)
+        passable_places(ground, True, arcs.first, arcs.points, passable)
         if motion.slow:
             passable_places(most < top, False, arcs.first, arcs.points, slowed)
         spread(
-            is_open,
-            wide_places(is_open),
+            ground,
+            wide_places(ground),
             most,
             labels,
             DIRECTIONS,
@@ -125,7 +129,8 @@ class SpeedField:
             max((label(area.speed_km_h) for area in motion.slow), default=top),
             min(SPOT * per_radius, top),
         )
-        return cls(motion, half_m, np.float32(STEP_M) * labels, is_open, entered)
+        whole[:, *box] = labels
+        return cls(motion, half_m, np.float32(STEP_M) * whole, is_open, entered)
 
     @property
     def places_km_h(self) -> FloatArray:
@@ -293,6 +298,15 @@ class WayPoint(NamedTuple):
 def places_shape(width_m: float, height_m: float) -> tuple[int, int]:
     """Return how many rows and columns of places a site has."""
     return round(height_m / STEP_M) + 1, round(width_m / STEP_M) + 1
+
+
+def _around(places: BoolArray) -> tuple[slice, slice]:
+    """Return the smallest rectangle of places that holds some of them; all, if there are none."""
+    if not places.any():
+        return slice(None), slice(None)
+    found = (np.flatnonzero(places.any(axis=axis)) for axis in (1, 0))
+    rows, columns = (slice(int(each[0]), int(each[-1]) + 1) for each in found)
+    return rows, columns
 
 
 def _run_up_m(motion: Motion, speed_km_h: float) -> float:

@@ -230,7 +230,7 @@ class VehicleGround:
             steps.append(f"in at ({from_x_m:g}, {from_y_m:g}) m with {speed_km_h:.0f} km/h")
         for piece, speed_km_h, _ in through:
             hit = f"hit at {speed_km_h:.0f} km/h but {piece.rating.words}"
-            steps.append(f"through {piece.name}, {hit}")
+            steps.append(f"through {piece.name.rstrip(',')}, {hit}")
         mass = f"{source.motion.mass_kg:g} kg"
         return f"{text} ({mass}): {', '.join((*steps, f'to ({x_m:g}, {y_m:g}) m'))}"
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from blast_agents.posts import line_of_posts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -328,3 +329,18 @@ def test_a_lane_at_any_angle_is_as_fast_as_straight() -> None:
         x, y = 1.0 + 25.0 * cos(angle), 30.0 + 25.0 * sin(angle)
         exact = KM_H_PER_M_S * sqrt(4.0 * 25.0)
         assert places_km_h[round(y / STEP_M), round(x / STEP_M)] >= exact - 1.5
+
+
+def test_the_rule_of_posts_takes_those_that_hold() -> None:
+    """Light posts are cheaper, but rated for less than the lorry's speed on its way to them."""
+    light = {"name": "light", "length_modules": 1, "height_m": 1.0, "cost": 1.0, "stock": 16}
+    heavy = light | {"name": "heavy", "cost": 3.0, "crash_rating": "V/7200[N2A]/64/90:0.0"}
+    zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4}
+    taken = []
+    for km_h in (32, 64):
+        items = [light | {"crash_rating": f"V/7200[N2A]/{km_h}/90:0.0"}, heavy]
+        motion = LORRY | {"max_speed_km_h": 60.0, "entry_speed_km_h": 50.0}
+        site = gate_site(vehicle_document(motion=motion), build_zone=zone | {"items": items})
+        posts = line_of_posts(site)
+        taken.append({each.item for each in posts if isinstance(each, Piece)})
+    assert taken == [{"heavy"}, {"light"}]
