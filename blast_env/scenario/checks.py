@@ -17,7 +17,6 @@ from blast_env.physics.particles import lattice_capacity
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.response.components import Component, Glazing, Wall
 from blast_env.scenario.facade import facade_problems, hardening_problems
-from blast_env.scenario.heights import air_height_m, depth_inside_m, is_over
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, extent
 from blast_env.scenario.reach import places_on
@@ -39,8 +38,11 @@ from blast_env.scenario.zone import (
     BuildZone,
     EmptyZone,
     Surroundings,
+    air_height_m,
+    depth_inside_m,
     distance_m,
     empty_zone,
+    is_over,
     source_bounds_m,
 )
 from blast_env.scenario.zone_checks import build_zone_problems

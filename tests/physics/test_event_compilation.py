@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import blast_env
-from blast_env.physics.event import loop
+from blast_env.physics.event import engine as event_engine
 
 pytestmark = pytest.mark.slow
 
@@ -48,7 +48,7 @@ def test_the_first_run_compiles_and_says_so_and_only_the_first(tmp_path: Path) -
     without = shutil.ignore_patterns("__pycache__", "*.png")
     shutil.copytree(package, tmp_path / "blast_env", ignore=without)
     shutil.copytree(package.parent / "scenarios", tmp_path / "scenarios")
-    compiled: Any = loop._RUN
+    compiled: Any = event_engine._RUN
     shutil.copytree(
         compiled.stats.cache_path, tmp_path / "blast_env" / "physics" / "event" / "__pycache__"
     )

@@ -8,7 +8,7 @@ import pytest
 
 from blast_env.engines import Blast
 from blast_env.engines.particles import EventEngine
-from blast_env.physics.event import loop
+from blast_env.physics.event import engine as event_engine
 from blast_env.physics.event.engine import EventRun
 from blast_env.physics.scene import Scene
 from blast_env.scenario import Scenario
@@ -53,14 +53,14 @@ def outcome(run: EventRun) -> tuple[float, int, bytes, bytes]:
 def calls_of(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Return a list that grows with every return of the compiled code, by its answer."""
     answers: list[int] = []
-    compiled = loop._RUN
+    compiled = event_engine._RUN
 
     def run(*arguments: object) -> int:
         answers.append(int(compiled(*arguments)))
         return answers[-1]
 
     run.signatures = [()]  # type: ignore[attr-defined]
-    monkeypatch.setattr(loop, "_RUN", run)
+    monkeypatch.setattr(event_engine, "_RUN", run)
     return answers
 
 
@@ -71,7 +71,7 @@ def test_the_compiled_loop_comes_back_often(monkeypatch: pytest.MonkeyPatch) -> 
     run = EventEngine().start(touching_air())
     run.advance(np.inf)
     events = run.steps + run.crossings + run.outdated
-    assert answers.count(loop.PAUSED) >= events // 10_000 > 3
+    assert answers.count(event_engine.PAUSED) >= events // 10_000 > 3
 
 
 def test_an_interrupted_run_goes_on_to_the_same_end() -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from blast_env.physics.event.loop import run_world
+from blast_env.physics.event.engine import run_world
 from blast_env.physics.event.state import RECORD_COLUMNS, RecordArray, World, world_of
 from blast_env.physics.scene import Scene
 

@@ -1,15 +1,323 @@
-"""The event-driven engine: the paper's model with hard discs and without a time step."""
+"""The event-driven engine: the paper's model with hard discs and without a time step.
 
+First the loop that goes from collision to collision, in compiled code; then the run around it.
+"""
+
+import logging
 from collections.abc import Callable
+from hashlib import sha256
+from math import inf, sqrt
+from pathlib import Path
+from threading import Lock
 from typing import Any, Final
 
 import numpy as np
+from numba import njit
+from numba.core import event
+from numpy.typing import NDArray
 
 from blast_env.physics.engine import COLLISION_DTYPE, BallStates, CollisionLog, EndReason
-from blast_env.physics.event import loop
-from blast_env.physics.event.loop import run_world
-from blast_env.physics.event.state import RECORD_COLUMNS, with_walls, world_of
+from blast_env.physics.event.contacts import collide_balls, collide_with_module
+from blast_env.physics.event.prediction import (
+    cell_at,
+    cross,
+    enter_cell,
+    leave_cell,
+    look_ahead,
+    unschedule,
+)
+from blast_env.physics.event.state import (
+    BORDER,
+    CHANGED,
+    FIRST_SURFACE,
+    NEW,
+    RECORD_COLUMNS,
+    RUNNING,
+    Record,
+    RecordArray,
+    World,
+    with_walls,
+    world_of,
+)
 from blast_env.physics.scene import Scene
+
+# Why the loop came back.
+UNTIL: Final = 0
+
+
+RECORD_FULL: Final = 1
+
+
+OUT_OF_REACH: Final = 2
+
+
+EVENT_LIMIT: Final = 3
+
+
+MODULE_DESTROYED: Final = 4
+
+
+PAUSED: Final = 5
+
+
+_COLLISIONS_BETWEEN_CHECKS: Final = 512
+
+
+_EVENTS_PER_CALL: Final = 10_000
+"""After which the loop comes back, so that Ctrl-C is heard: an event takes 1 to 10 us."""
+
+
+_NUMBER: Final[Any] = np.int64
+"""Of a ball, as in loops over them: for two kinds of integers most would be compiled twice."""
+
+
+@njit(error_model="numpy")
+def run_until(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    modules: NDArray[np.int32],
+    loads: RecordArray,
+    targets: NDArray[np.float64],
+    rules: Record,
+    progress: Record,
+    record: NDArray[np.float64],
+    until_s: float,
+) -> int:
+    """Go on until a time, or until something is to be done outside.
+
+    Returns:
+        One of the constants above.
+    """
+    if progress.stage == NEW:
+        _begin(balls, cells, heap, surfaces, rules)
+    elif progress.stage == CHANGED and not _look_again(
+        balls, cells, heap, surfaces, rules, progress
+    ):
+        return PAUSED
+    progress.stage = RUNNING
+    events = 0
+    while True:
+        if events == _EVENTS_PER_CALL:
+            return PAUSED
+        events += 1
+        if progress.collisions >= progress.next_check:
+            progress.next_check = progress.collisions + _COLLISIONS_BETWEEN_CHECKS
+            if not _can_reach(balls, heap, targets, rules.time_limit_s, progress.time_s):
+                return OUT_OF_REACH
+        if progress.collisions >= rules.most_collisions:
+            return EVENT_LIMIT
+        if progress.records == len(record):
+            return RECORD_FULL
+        if heap[0].ball == 0 or heap[1].time_s == inf:
+            return OUT_OF_REACH  # nothing will ever happen again
+        if heap[1].time_s > until_s:
+            return UNTIL
+        ball, time_s = _NUMBER(heap[1].ball), heap[1].time_s
+        if balls[ball].contact_s > time_s:
+            progress.crossings += 1
+            cross(balls, cells, heap, surfaces, rules, ball)
+            continue
+        partner = _NUMBER(balls[ball].partner)
+        if partner >= 0 and balls[partner].collisions != balls[ball].partner_collisions:
+            progress.outdated += 1
+            look_ahead(balls, cells, heap, surfaces, rules, ball)
+            continue
+        progress.collisions += 1
+        progress.time_s = time_s
+        if partner >= 0:
+            one, other = min(ball, partner), max(ball, partner)  # whichever foresaw it
+            collide_balls(balls[one], balls[other], time_s, rules)
+            _go_on(balls, cells, heap, surfaces, rules, ball)
+            _go_on(balls, cells, heap, surfaces, rules, partner)
+        elif partner == BORDER:
+            _remove(balls, cells, heap, ball)
+        else:
+            row = record[progress.records]
+            progress.records += 1
+            row[1] = ball
+            surface = surfaces[FIRST_SURFACE - partner]
+            module = collide_with_module(balls[ball], surface, modules, loads, time_s, rules, row)
+            _go_on(balls, cells, heap, surfaces, rules, ball)
+            if loads[module].impulse > loads[module].capacity:
+                progress.stage = CHANGED
+                return MODULE_DESTROYED
+
+
+@njit(error_model="numpy")
+def _begin(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+) -> None:
+    """Put every ball into its cell, and look ahead for those that move."""
+    for ball in range(len(balls)):
+        enter_cell(balls, cells, ball, cell_at(rules, balls[ball].x, balls[ball].y))
+    for ball in range(len(balls)):
+        if balls[ball].vx != 0.0 or balls[ball].vy != 0.0:
+            look_ahead(balls, cells, heap, surfaces, rules, ball)
+
+
+@njit(error_model="numpy")
+def _look_again(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+    progress: Record,
+) -> bool:
+    """Look ahead again for balls that move; return whether none is left."""
+    looked = 0
+    for ball in range(progress.looked_again, len(balls)):
+        if looked == _EVENTS_PER_CALL:
+            progress.looked_again = ball
+            return False
+        if heap[ball].place > 0:
+            look_ahead(balls, cells, heap, surfaces, rules, ball)
+            looked += 1
+    progress.looked_again = 0
+    return True
+
+
+@njit(error_model="numpy")
+def _go_on(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+    ball: int,
+) -> None:
+    """Look ahead for a ball that has collided, or remove it if it has got too small."""
+    if balls[ball].explosive and balls[ball].radius < rules.minimum_radius:
+        _remove(balls, cells, heap, ball)
+    else:
+        look_ahead(balls, cells, heap, surfaces, rules, ball)
+
+
+@njit(error_model="numpy")
+def _remove(balls: RecordArray, cells: RecordArray, heap: RecordArray, ball: int) -> None:
+    leave_cell(balls, cells, ball)
+    unschedule(heap, balls, ball)
+    balls[ball].alive = 0
+    balls[ball].collisions += 1  # so that nobody waits for it
+
+
+@njit(error_model="numpy")
+def _can_reach(
+    balls: RecordArray,
+    heap: RecordArray,
+    targets: NDArray[np.float64],
+    time_limit_s: float,
+    time_s: float,
+) -> bool:
+    """Whether a moving ball can still act on a structure; see `engine.can_reach`.
+
+    All that move are in the heap: air that nothing has touched yet takes no time here either.
+    """
+    for place in range(1, heap[0].ball + 1):
+        ball = balls[heap[place].ball]
+        if ball.vx == 0.0 and ball.vy == 0.0:
+            continue
+        passed = time_s - ball.since_s
+        x, y = ball.x + ball.vx * passed, ball.y + ball.vy * passed
+        speed = sqrt(ball.vx * ball.vx + ball.vy * ball.vy)
+        reach = 2.0 * speed * (time_limit_s - time_s) + ball.radius
+        for target in range(len(targets)):
+            dx = max(targets[target, 0] - x, x - targets[target, 2], 0.0)
+            dy = max(targets[target, 1] - y, y - targets[target, 3], 0.0)
+            if dx * dx + dy * dy <= reach * reach:
+                return True
+    return False
+
+
+_LOGGER: Final = logging.getLogger("blast_env")
+
+
+_FIRST_CALL: Final = Lock()
+
+
+class _CompilationNotice(event.Listener):
+    """Says that Numba compiles, which it does when it finds nothing on disk."""
+
+    def __init__(self) -> None:
+        self.given = False
+
+    def on_start(self, _event: Any) -> None:
+        if not self.given:
+            self.given = True
+            _LOGGER.warning("compiling the event engine, once per installation: some 10 s ...")
+
+    def on_end(self, _event: Any) -> None:
+        pass
+
+
+def _source_digest() -> int:
+    """Return a number that changes with the source of the compiled code."""
+    digest = sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return int.from_bytes(digest.digest()[:6])
+
+
+def _compiled(source_digest: int) -> Callable[..., int]:
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def run(
+        balls: RecordArray,
+        cells: RecordArray,
+        heap: RecordArray,
+        surfaces: RecordArray,
+        modules: NDArray[np.int32],
+        loads: RecordArray,
+        targets: NDArray[np.float64],
+        rules: Record,
+        progress: Record,
+        record: NDArray[np.float64],
+        until_s: float,
+    ) -> int:
+        # Numba's files are out of date when this file changes, but not when another one does. As
+        # a constant of this function the digest of all of them decides too.
+        progress.source_digest = source_digest
+        return run_until(
+            balls,
+            cells,
+            heap,
+            surfaces,
+            modules,
+            loads,
+            targets,
+            rules,
+            progress,
+            record,
+            until_s,
+        )
+
+    function: Callable[..., int] = run
+    return function
+
+
+_RUN: Final = _compiled(_source_digest())
+
+
+def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
+    """Go on until a time, or until something is to be done outside; see `run_until`.
+
+    The first call in a new installation compiles, and says so through the logger `blast_env`.
+    Other threads run meanwhile, and Ctrl-C is heard within half a second.
+    """
+    answer = PAUSED
+    while answer == PAUSED:
+        if _RUN.signatures:  # type: ignore[attr-defined]
+            answer = int(_RUN(*world, record, until_s))
+        else:
+            with _FIRST_CALL, event.install_listener("numba:compile", _CompilationNotice()):
+                answer = int(_RUN(*world, record, until_s))
+    return answer
+
 
 _RECORD_ROWS: Final = 4096
 
@@ -19,8 +327,8 @@ MOST_RECORDS: Final = 20_000_000
 
 
 _END_REASONS: Final = {
-    loop.OUT_OF_REACH: EndReason.OUT_OF_REACH,
-    loop.EVENT_LIMIT: EndReason.EVENT_LIMIT,
+    OUT_OF_REACH: EndReason.OUT_OF_REACH,
+    EVENT_LIMIT: EndReason.EVENT_LIMIT,
 }
 
 
@@ -62,13 +370,13 @@ class EventRun:
             return
         limit_s = self.scene.parameters.stepping.time_limit_s
         target_s = min(until_s, limit_s)
-        answer = loop.RECORD_FULL
-        while answer in (loop.RECORD_FULL, loop.MODULE_DESTROYED):
+        answer = RECORD_FULL
+        while answer in (RECORD_FULL, MODULE_DESTROYED):
             answer = run_world(self._world, self._record, target_s)
             self._read_record()
             if self._recorded >= MOST_RECORDS:
-                answer = loop.EVENT_LIMIT
-            elif answer == loop.MODULE_DESTROYED:
+                answer = EVENT_LIMIT
+            elif answer == MODULE_DESTROYED:
                 self._world = with_walls(self._world, self.scene, self._parts)
         self.time_s = target_s
         if answer in _END_REASONS:
