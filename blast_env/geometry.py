@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +70,12 @@ class Rectangle(NamedTuple):
     def centre(self) -> tuple[float, float]:
         """The centre point."""
         return (self.left + self.right) / 2, (self.bottom + self.top) / 2
+
+    def distance_to(self, point: tuple[float, float]) -> float:
+        """Return the distance to a point; 0 inside."""
+        across = max(self.left - point[0], point[0] - self.right, 0.0)
+        along = max(self.bottom - point[1], point[1] - self.top, 0.0)
+        return hypot(across, along)
 
     def grown(self, margin: float) -> "Rectangle":
         """Return the rectangle with every side moved outwards by `margin`."""

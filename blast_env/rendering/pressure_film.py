@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import cbrt, hypot
+from math import cbrt
 from pathlib import Path
 from typing import Final
 
@@ -17,7 +17,7 @@ from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import Snapshots
 from blast_env.physics.gas.solver import Recorder
-from blast_env.physics.scene import BlastSite, StructureOutline
+from blast_env.physics.scene import BlastSite
 from blast_env.plan import PAGE
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.film import FilmPlan, for_gif, known_suffix, open_film, plan_until
@@ -189,20 +189,15 @@ def _free_field_peak_kpa(site: BlastSite) -> float:
     """
     solids = [each for each in site.structures if each.cells is None]
     chosen = [each for each in solids if each.protected] or solids
-    nearest_m = min((_distance_m(site, each) for each in chosen), default=_LONGEST_WAY_M)
+    x_y_m = site.charge.position_m
+    distances_m = (each.rectangle_m.distance_to(x_y_m) for each in chosen)
+    nearest_m = min(distances_m, default=_LONGEST_WAY_M)
     mass_kg, on_ground = site.charge.tnt_kg, site.charge.height_m == 0.0
     low, high = (z * cbrt(mass_kg) for z in _CURVES)
     distance_m = min(max(nearest_m, low), high)
     burst: Burst = "hemispherical" if on_ground else "spherical"
     peak_pa = kingery_bulmash("incident_overpressure", distance_m, mass_kg, burst)
     return nice_ceiling(float(peak_pa) / PA_PER_KPA)
-
-
-def _distance_m(site: BlastSite, outline: StructureOutline) -> float:
-    left, bottom, right, top = outline.rectangle_m
-    x_m, y_m = site.charge.position_m
-    across, along = max(left - x_m, x_m - right, 0.0), max(bottom - y_m, y_m - top, 0.0)
-    return hypot(across, along)
 
 
 def _part(progress: Callable[[float], None], first: float, part: float) -> Callable[[float], None]:

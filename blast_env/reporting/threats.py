@@ -195,13 +195,7 @@ def _spread(source: Placed, count: int) -> Iterator[tuple[float, float]]:
 
 def _distance_m(scenario: Scenario, place: tuple[float, float]) -> float:
     """Return the distance of a place from the nearest protected structure."""
-    x_m, y_m = place
-    return min(
-        hypot(
-            max(each.left - x_m, x_m - each.right, 0.0), max(each.bottom - y_m, y_m - each.top, 0.0)
-        )
-        for each in _protected(scenario)
-    )
+    return min(each.distance_to(place) for each in _protected(scenario))
 
 
 def _protected(scenario: Scenario) -> list[Rectangle]:

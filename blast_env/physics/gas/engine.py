@@ -194,7 +194,7 @@ class GasRun:
 
 def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
     """Return the scaled distance of a structure's nearest point in plan, m/kg^(1/3)."""
-    distance_m = _distance_m(site.charge.position_m, structure)
+    distance_m = structure.rectangle_m.distance_to(site.charge.position_m)
     return hypot(distance_m, site.charge.height_m) / cbrt(site.charge.tnt_kg)
 
 
@@ -308,13 +308,6 @@ def _way_m(charge: GasCharge, site: BlastSite, watched: Sequence[int]) -> float:
     ]
     places = corners or [(x, y) for x, y, _ in (gauge.position_m for gauge in site.gauges)]
     return max((hypot(x - x_m, y - y_m) for x, y in places), default=0.0)
-
-
-def _distance_m(point_m: tuple[float, float], outline: StructureOutline) -> float:
-    left, bottom, right, top = outline.rectangle_m
-    across = max(left - point_m[0], point_m[0] - right, 0.0)
-    along = max(bottom - point_m[1], point_m[1] - top, 0.0)
-    return hypot(across, along)
 
 
 def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:
