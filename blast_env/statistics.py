@@ -1,5 +1,6 @@
 """Means, reductions and tails over threats, with their uncertainty."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple, Protocol
 
@@ -40,6 +41,31 @@ def mean_estimate(values: FloatArray) -> Estimate:
     mean = float(values.mean())
     half_width = _half_width(values - mean)
     return Estimate(mean, mean - half_width, mean + half_width)
+
+
+def stratified_estimate(groups: Sequence[tuple[float, Sequence[float]]]) -> Estimate:
+    """Return the sum of weighted means of groups, with Student's t interval within the groups.
+
+    The groups are given, and only what is in them was drawn: the interval says how the sum would
+    change with other values of the same groups.
+
+    Args:
+        groups: Of each group its weight and its values, at least one.
+
+    Returns:
+        Without an interval (NaN) if no group has two values.
+    """
+    arrays = [(weight, np.asarray(values, dtype=np.float64)) for weight, values in groups]
+    value = float(sum(weight * values.mean() for weight, values in arrays))
+    several = [(weight, values) for weight, values in arrays if len(values) > 1]
+    freedom = sum(len(values) - 1 for _, values in several)
+    if not freedom:
+        return Estimate(value, np.nan, np.nan)
+    from scipy.special import stdtrit  # as in `_half_width`
+
+    variance = sum(w**2 * float(values.var(ddof=1)) / len(values) for w, values in several)
+    half_width = float(stdtrit(freedom, 0.975) * np.sqrt(variance))
+    return Estimate(value, value - half_width, value + half_width)
 
 
 def reductions(impulse: FloatArray | float, unprotected: FloatArray | float) -> NDArray[np.float64]:

@@ -56,6 +56,10 @@ class _Commands(LazyGroup):
             "blast_env.cli.league:LeagueCommand",
             "Compare searches, rules and trained agents on the same held-out cases and seeds.",
         ),
+        "judge": (
+            "blast_env.cli.judge:JudgeCommand",
+            "Play submissions to the benchmark again by gas dynamics, and show the standings.",
+        ),
         "propose": (
             "blast_env.cli.propose:ProposeCommand",
             "Propose a layout for any site in a second or a few; no blast is run for it.",

@@ -9,6 +9,7 @@ from blast_env.evaluation.comparison import (
     compare,
 )
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
+from blast_env.evaluation.meter import BlastMeter, BudgetError
 from blast_env.evaluation.report import (
     LayoutEvaluation,
     ThreatOutcome,
@@ -31,6 +32,8 @@ __all__ = [
     "BlastEvaluator",
     "BlastKey",
     "BlastLoads",
+    "BlastMeter",
+    "BudgetError",
     "Case",
     "Comparison",
     "DiskCache",

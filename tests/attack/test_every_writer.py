@@ -39,6 +39,7 @@ _OWN: Final = frozenset(
         *("LayoutFile.of(chosen, layout, provenance).save",),
         *("LayoutFile.of(scenario, layout, provenance).save", "save"),
         *("result.to_excel", "result.to_parquet", "protected.to_excel", "evaluation.to_json"),
+        *("judged.save", "submission.save", "Submission(each, tuple(own)).save"),
         *("report.to_json", "write_table", "self.work.open", "sessions.work.open"),
     }
 )
@@ -58,6 +59,7 @@ _ELSEWHERE: Final = {
     "blast_env/response/plate_table.py: "
     "Path(__file__).with_name('data').joinpath(_NAME).write_text": "makes the package's own table",
     "blast_env/cluster.py: connect": "to a cluster",
+    "blast_env/data/gas_blasts.py: bare.rename": "the columns of a table",
     "studies/other_codes/pyclaw_worker.py": "runs without this package, in a scratch folder",
     "agents/blast_agents/training/train.py: configure": "TensorBoard's; train tells its errors",
     "agents/blast_agents/training/self_labelling.py: configure": "likewise",

@@ -227,6 +227,11 @@ SMALLER: Final[dict[str, str]] = {
     " hotel_forecourt shopping_street --charges 3 --surrogate surrogate.json": (
         "--charges 1 --changes 1"
     ),
+    # docs/researchers/benchmark.md
+    "blast-env judge --method genetic_from_rules --budget 50 --seeds 10 --out entry": (
+        "--problem visitor_entrance-told_2-v1 --budget 2 --seeds 1 --cell 0.5"
+    ),
+    "blast-env judge entry/submission.json --out entry": "--cell 0.5",
     # docs/paper
     "python -m studies.ballistic search": (
         "--candidates 1 --refinements 1 --seeds 1 --finalists 1 --finalist-seeds 1"
@@ -473,11 +478,14 @@ NOT_RUN: Final[dict[str, str]] = {
     """ 'observation:'"'"'grid'"'"''""": "needs RL Zoo",
     "python -m rl_zoo3.enjoy --algo ppo --env BlastBarrier-v0 --gym-packages blast_env -f logs"
     " --stochastic": "needs RL Zoo",
+    "blast-env judge --method my_module:climb --secret 'a text that the judge keeps' --sites 8"
+    " --out entry": "my_module is a placeholder; tests/problems runs such a method",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
 }
 """Commands that are parsed only, and why."""
 
 CODE_OF_THE_BUILD: Final = {
+    "docs/researchers/benchmark.md": "a dozen blasts of gas dynamics",
     "docs/engineers/gas.md": "three blasts of gas dynamics on a large site",
     "docs/howto/cluster.md": "needs a cluster, which runs beside the page's commands",
     "docs/researchers/training.md": "needs the agent that the page's commands train",
@@ -485,6 +493,9 @@ CODE_OF_THE_BUILD: Final = {
 """Pages whose code `make docs` runs and `make test` compiles only, and why."""
 
 CODE_NOT_RUN: Final = {
+    ("docs/researchers/benchmark.md", 2): "needs Optuna, which the project does not have",
+    ("docs/researchers/benchmark.md", 3): "needs Nevergrad, which the project does not have",
+    ("docs/researchers/benchmark.md", 5): "needs BoTorch, which the project does not have",
     ("docs/howto/cluster.md", 2): "needs Slurm and submitit",
     ("docs/researchers/libraries.md", 6): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"

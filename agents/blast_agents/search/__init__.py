@@ -10,8 +10,6 @@ from blast_agents.search.methods import (
     WinnersSearch,
 )
 from blast_agents.search.problem import (
-    BlastMeter,
-    BudgetError,
     Candidate,
     LayoutAgent,
     LayoutProblem,
@@ -37,8 +35,6 @@ from blast_env.geometry import Layout
 __all__ = [
     "AnnealingSearch",
     "BestRuleSearch",
-    "BlastMeter",
-    "BudgetError",
     "Candidate",
     "ExhaustiveSearch",
     "FromRulesSearch",

@@ -13,8 +13,9 @@ from typing import Final
 import numpy as np
 
 from blast_agents.search.moves import Moves, legal_part
-from blast_agents.search.problem import BlastMeter, BudgetError, LayoutProblem
+from blast_agents.search.problem import LayoutProblem
 from blast_agents.search.registry import layouts_by_rule
+from blast_env.evaluation import BlastMeter, BudgetError
 from blast_env.geometry import Layout, Measure, standing
 from blast_env.scenario import Placement, Scenario
 from blast_env.values import generator

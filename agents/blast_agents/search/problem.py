@@ -1,7 +1,7 @@
 """What a proposer is asked, and what it answers: a rule, a search, or something that has learnt."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
@@ -10,51 +10,16 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, Threat
+from blast_env.evaluation import BlastEvaluator, BlastMeter, Case, Threat
 from blast_env.evaluation.cases import check_distinct
 from blast_env.evaluation.comparison import check_something_arrives
-from blast_env.geometry import Element, Layout, layout_text, standing
+from blast_env.geometry import Element, Layout, layout_text
 from blast_env.runner import check_workers
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.statistics import reductions
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
-
-
-class BudgetError(BlastEnvError):
-    """A search asks for more blasts than its budget has."""
-
-
-@dataclass(eq=False)
-class BlastMeter:
-    """Counts distinct pairs of layout and threat, and refuses those beyond a budget.
-
-    Attributes:
-        budget: Most pairs.
-    """
-
-    budget: int
-    _asked: set[tuple[Layout, Threat]] = field(default_factory=set, init=False, repr=False)
-
-    @property
-    def blasts(self) -> int:
-        """Pairs that were asked for so far; one that comes again counts once."""
-        return len(self._asked)
-
-    def add(self, pairs: Iterable[tuple[Sequence[Element], Threat]]) -> None:
-        """Count pairs.
-
-        Raises:
-            BudgetError: If the budget does not pay for all of them; none is counted then.
-        """
-        asked = {(tuple(sorted(standing(layout))), threat) for layout, threat in pairs}
-        asked |= self._asked
-        if len(asked) > self.budget:
-            raise BudgetError(
-                f"the search asks for {len(asked):,} blasts in all, the budget is {self.budget:,}"
-            )
-        self._asked = asked
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,79 @@
+"""The package's own methods on the problems of the benchmark."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from blast_agents.search import LayoutProblem, Proposer, find_proposer, layouts_by_rule
+from blast_env.engines.contract import load_plugin
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator
+from blast_env.geometry import Layout
+from blast_env.problems import BenchmarkProblem, Definition, KnownLayout, Method, ScoreReference
+from blast_env.problems.judging import shares_of
+
+
+@dataclass(frozen=True)
+class ProposerOnBenchmark:
+    """A proposer of the package as a method of the benchmark.
+
+    Attributes:
+        proposer: The proposer.
+    """
+
+    proposer: Proposer
+
+    def __call__(self, problem: BenchmarkProblem, seed: int) -> Layout:
+        """Return the layout that it proposes.
+
+        Raises:
+            BudgetError: If it asks for more blasts than the budget.
+        """
+        asked = LayoutProblem(problem.evaluator, problem.case, meter=problem.meter)
+        result = self.proposer.propose(asked, problem.budget, seed)
+        if result.interrupted:
+            raise KeyboardInterrupt
+        return result.layout
+
+
+def find_method(name: str) -> Method:
+    """Return a method by the name of a proposer, or by `module:object`.
+
+    Raises:
+        UnknownNameError: If there is no such proposer.
+        BlastEnvError: If there is no such module or object, or it cannot be called.
+    """
+    if ":" not in name:
+        return ProposerOnBenchmark(find_proposer(name))
+    try:
+        found = load_plugin(name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise BlastEnvError(f"method is {name!r}: {error}") from error
+    if not callable(found):
+        raise BlastEnvError(f"method is {name!r}, must be something to call")
+    method: Callable[[BenchmarkProblem, int], Layout] = found
+    return method
+
+
+def reference_of(
+    definition: Definition, evaluator: BlastEvaluator, more: Mapping[str, Layout], cell: str
+) -> ScoreReference:
+    """Return what a problem is scored between.
+
+    Args:
+        definition: The problem.
+        evaluator: Runs the blasts of the comparison.
+        more: Further layouts that are known, by what found them.
+        cell: The side of the evaluator's cells; see `cell_key`.
+    """
+    rules = layouts_by_rule(definition.scenario, definition.case.charge)
+    rules = {name: tuple(sorted(layout)) for name, layout in rules.items()}
+    names = [*rules, *more]
+    layouts = [*rules.values(), *more.values()]
+    shares = dict(zip(names, shares_of(definition, layouts, evaluator), strict=True))
+    rule, best = min(rules, key=shares.__getitem__), min(shares, key=shares.__getitem__)
+    known = dict(zip(names, layouts, strict=True))
+    return ScoreReference(
+        definition.digest,
+        {name: shares[name] for name in rules},
+        *(KnownLayout(each, known[each], {cell: shares[each]}) for each in (rule, best)),
+    )

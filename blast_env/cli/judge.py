@@ -1,0 +1,189 @@
+"""`blast-env judge`: submissions to the benchmark, played again by gas dynamics."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import isnan
+from pathlib import Path
+from typing import Final
+
+from blast_env.cli.command import FOLDER, argument, option
+from blast_env.cli.options import CacheOptions, ProcessOptions
+from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.engines import JUDGE, find_engine
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.evaluation import BlastEvaluator
+from blast_env.files import make_folder
+from blast_env.problems import (
+    BUDGETS,
+    DEFINITIONS,
+    JUDGE_CELL_M,
+    SMALL,
+    Asked,
+    BenchmarkProblem,
+    Definition,
+    JudgedSubmission,
+    Run,
+    ScoreReference,
+    Submission,
+    judge,
+    make,
+    play,
+    secret_sites,
+    shipped_standings,
+    stored_references,
+)
+from blast_env.problems.references import cell_key
+from blast_env.statistics import Estimate
+
+_OWN_SITES: Final = 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class JudgeCommand(ProcessOptions, CacheOptions):
+    """Play submissions to the benchmark again by gas dynamics, and show the standings.
+
+    A submission is a file of layouts. Without one, the table of those that come with the package is
+    shown. With --method a method of your own is run first, and its submission is written.
+    """
+
+    submissions: tuple[Path, ...] = argument("Files of submissions.", default=())
+    method: str | None = option(
+        None, "Run this method first: a search's name, or your own as module:object."
+    )
+    problem: tuple[str, ...] = option(
+        (), "Problem for --method; may be given several times; else the small set, `all` for all."
+    )
+    budget: tuple[int, ...] = option(
+        (), "Blasts that --method may spend; may be given several times; else 0 and 50."
+    )
+    seeds: int = option(1, "Runs of --method for each problem and budget above 0.", min=1)
+    secret: str | None = option(
+        None, "Judge --method on generated sites that only this text can draw."
+    )
+    sites: int = option(_OWN_SITES, "How many sites --secret draws.", min=1)
+    search_cell_m: float = option(0.5, "Side of the cells that --method meets, m.")
+    cell_m: float = option(JUDGE_CELL_M, "Side of the judge's cells, m.")
+    out: Path | None = option(
+        None, "Folder for the submission of --method and for what was judged.", writes=FOLDER
+    )
+
+    def __call__(self) -> None:
+        """Judge, and print the table."""
+        if self.out is not None:
+            make_folder(self.out)
+        submitted = [Submission.load(path) for path in self.submissions]
+        judged = [self._judged(each, DEFINITIONS, stored_references()) for each in submitted]
+        if self.method is not None:
+            definitions = self._definitions()
+            submission = self._played(self.method, definitions)
+            references = self._references(definitions)
+            judged.append(self._judged(submission, definitions, references))
+        elif self.secret is not None:
+            raise BlastEnvError("--secret is given without --method: layouts cannot be known yet")
+        _print_standings((*shipped_standings(), *judged))
+
+    def _definitions(self) -> Mapping[str, Definition]:
+        if self.secret is not None:
+            if self.problem:
+                raise BlastEnvError("--problem and --secret exclude each other")
+            return {each.name: each for each in secret_sites(self.secret, self.sites)}
+        names = DEFINITIONS if self.problem == ("all",) else self.problem or SMALL
+        return {name: make(name).definition for name in names}
+
+    def _played(self, method: str, definitions: Mapping[str, Definition]) -> Submission:
+        """Run the method; its submission is written before it is judged."""
+        with import_extra("agents", "--method"):
+            from blast_agents.benchmark import find_method
+        found = find_method(method)
+        made = [
+            partial(_made, definition=each, cell_m=self.search_cell_m, cache=self.cache)
+            for each in definitions.values()
+        ]
+        asked = tuple(Asked(made, self.budget or BUDGETS[:2], range(self.seeds)))
+        journal = None if self.out is None else self.out / "runs.jsonl"
+        with progress_bar(f"{len(asked)} runs of {method}") as progress:
+            done: list[Run] = []
+
+            def show(run: Run) -> None:
+                done.append(run)
+                progress(len(done) / len(asked))
+
+            runs = play(found, asked, journal, show)
+        submission = Submission(method[-60:], runs, f"blast-env judge --method {method}")
+        if self.out is not None:
+            print_line(f"wrote {submission.save(self.out / 'submission.json')}")
+        return submission
+
+    def _references(self, definitions: Mapping[str, Definition]) -> Mapping[str, ScoreReference]:
+        """Return the stored ones, or for secret sites what rules and the package's search find."""
+        if self.secret is None:
+            return stored_references()
+        from blast_agents.benchmark import find_method, reference_of
+
+        found = {}
+        engine = find_engine(JUDGE, self.cell_m)
+        for name, definition in definitions.items():
+            problem = _made(BUDGETS[1], definition, self.search_cell_m, self.cache)
+            best = find_method("surrogate")(problem, 0)
+            evaluator = BlastEvaluator(definition.scenario, engine, cache=self.cache)
+            more = {"surrogate, 50 blasts": best}
+            found[name] = reference_of(definition, evaluator, more, cell_key(self.cell_m))
+        return found
+
+    def _judged(
+        self,
+        submission: Submission,
+        definitions: Mapping[str, Definition],
+        references: Mapping[str, ScoreReference],
+    ) -> JudgedSubmission:
+        with progress_bar(f"judging {submission.method}") as progress:
+            judged = judge(
+                submission,
+                self.cell_m,
+                self.processes,
+                self.cache,
+                definitions=definitions,
+                references=references,
+                progress=progress,
+            )
+        if self.out is not None:
+            print_line(
+                f"wrote {judged.save(self.out / f'judged_{_file_name(judged.method)}.json')}"
+            )
+        return judged
+
+
+def _made(
+    budget: int, definition: Definition, cell_m: float, cache: Path | None
+) -> BenchmarkProblem:
+    return make(definition, budget, cell_m, cache=cache)
+
+
+def _file_name(method: str) -> str:
+    return "".join(letter if letter.isalnum() else "_" for letter in method)
+
+
+def _print_standings(judged: Sequence[JudgedSubmission]) -> None:
+    """Print a row a submission, the best first; those on other problems are other tables."""
+    groups: dict[tuple[frozenset[str], float], list[JudgedSubmission]] = {}
+    for each in judged:
+        groups.setdefault((frozenset(each.problems), each.cell_m), []).append(each)
+    for (problems, cell_m), own in groups.items():
+        title = f"{len(problems)} problems, judged with cells of {cell_m:g} m"
+        headers = ("method", "runs", *(f"{budget:,} blasts" for budget in BUDGETS), "score")
+        table = make_table(title, headers)
+        for each in sorted(own, key=lambda each: -each.area().value):
+            cells = [score_text(each.score(budget)) for budget in BUDGETS]
+            table.add_row(each.method, str(len(each.runs)), *cells, score_text(each.area()))
+        result_console().print(table)
+        print_line(f"problems: {', '.join(sorted(problems))}")
+    if not groups:
+        print_line("no submissions come with the package")
+
+
+def score_text(score: Estimate) -> str:
+    """Return a score with its 95 % interval, where there is one."""
+    if isnan(score.low):
+        return f"{score.value:.2f}"
+    return f"{score.value:.2f} ({score.low:.2f} to {score.high:.2f})"

@@ -1,0 +1,6 @@
+"""The gas blasts that studies, searches and trainings ran, as one documented data set."""
+
+from blast_env.data.gas_blasts import COLUMNS, TABLES, as_tensors, load, sources
+from blast_env.data.published import PublishedBlasts
+
+__all__ = ["COLUMNS", "TABLES", "PublishedBlasts", "as_tensors", "load", "sources"]

@@ -1,0 +1,122 @@
+"""`load("gas_blasts")`: a row for each structure of each blast, beside it the bare load."""
+
+from collections.abc import Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
+from blast_env.tables import Column
+from blast_env.values import path_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLES: Final = (
+    "gas_blasts",
+    "site_blasts",
+    "site_agent_blasts",
+    "street_blasts",
+    "street_agent_blasts",
+)
+"""The files that the set is made of: where the blasts come from."""
+
+COLUMNS: Final = (
+    Column("table", "", "file that the row is from: bundled sites, generated ones, a street"),
+    Column("split", "", "train, validation or test; all rows of a site are in one"),
+    Column("scenario", "", "name of the site"),
+    Column("scenario_hash", "", "content hash of the scenario"),
+    Column("layout", "", "JSON: [row, column] a module, [row, column, item, turned] a piece"),
+    Column("charge_x_m", "m", "where the charge went off, from the left border"),
+    Column("charge_y_m", "m", "from the lower border"),
+    Column("charge_height_m", "m", "height of its centre; 0: it lay on the ground"),
+    Column("tnt_kg", "kg", "its mass"),
+    Column("structure", "", "name of the structure"),
+    Column("protected", "", "whether its load counts"),
+    Column("impulse_pa_s", "Pa s", "mean impulse on the walls that count"),
+    Column("peak_pa", "Pa", "largest overpressure on them"),
+    Column("unprotected_impulse_pa_s", "Pa s", "the same blast without a barrier; else missing"),
+    Column("unprotected_peak_pa", "Pa", "the same for the overpressure"),
+    Column("engine", "", "engine with its version and fields"),
+)
+"""Columns of the set, with units."""
+
+_TESTED: Final = 0.1
+_VALIDATED: Final = 0.2
+_BLAST: Final = ("scenario_hash", "charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
+_LOADS: Final = ("impulse_pa_s", "peak_pa")
+
+
+def load(name: str = "gas_blasts", paths: Sequence[str | Path] = ()) -> "pd.DataFrame":
+    """Return the gas blasts as one table, a row a structure of a blast; see `COLUMNS`.
+
+    Sites are divided by their hashes: 80 % to train on, 10 % each to choose by and to test on. The
+    sites of test are never in train, whatever is added later.
+
+    Args:
+        name: `gas_blasts`: all tables that come with the package.
+        paths: Files of `python -m studies.blast_table` in their place.
+
+    Raises:
+        UnknownNameError: If there is no such set.
+        BlastEnvError: If a file cannot be read, or has other columns.
+    """
+    import pandas as pd
+
+    from blast_env.recording.parquet import read_parquet
+
+    if name != "gas_blasts":
+        raise UnknownNameError("data set", name, ("gas_blasts",))
+    tables = []
+    for path in paths or sources():
+        own, _ = read_parquet(path)
+        missing = {each.name for each in COLUMNS[2:13]} - set(own.columns)
+        if missing:
+            raise BlastEnvError(f"{path}: has no column {', '.join(sorted(missing))}")
+        tables.append(own.assign(table=path_of(path).stem))
+    rows = pd.concat(tables, ignore_index=True)
+    keys = [*_BLAST, "structure"]
+    bare = rows.loc[rows["layout"] == "[]", [*keys, *_LOADS]].drop_duplicates(keys)
+    rows = rows.merge(
+        bare.rename(columns={each: f"unprotected_{each}" for each in _LOADS}), "left", keys
+    )
+    splits = {each: split_of(each) for each in rows["scenario_hash"].unique()}
+    rows["split"] = rows["scenario_hash"].map(splits)
+    return rows[[column.name for column in COLUMNS]]
+
+
+def split_of(scenario_hash: str) -> str:
+    """Return the part of the set that a site belongs to."""
+    share = int(sha256(scenario_hash.encode()).hexdigest()[:8], 16) / 2**32
+    if share < _TESTED:
+        return "test"
+    return "validation" if share < _VALIDATED else "train"
+
+
+def sources() -> tuple[Path, ...]:
+    """Return the files that come with the package: inside it, or in the checkout beside it."""
+    package = Path(__file__).resolve().parent
+    installed = package / "tables"
+    folder = installed if installed.is_dir() else package.parents[1] / "docs" / "data"
+    return tuple(folder / f"{each}.parquet" for each in TABLES)
+
+
+def as_tensors(rows: "pd.DataFrame") -> tuple[Any, Any]:
+    """Return loads over loads without a barrier, and what they depend on in numbers, for torch.
+
+    Layouts are lists of any length, so they stay in the table; these are the charge and the bare
+    load.
+
+    Returns:
+        Inputs (rows, 6): x, y, height of the charge in m, its mass in kg, impulse in Pa s and peak
+        in Pa without a barrier; and outputs (rows, 2): shares of impulse and peak that are left.
+        Rows without a bare load are left out.
+    """
+    with import_extra("agents", "tensors"):
+        import torch
+
+    known = rows.dropna(subset=["unprotected_impulse_pa_s", "unprotected_peak_pa"])
+    inputs = known[[*_BLAST[1:], "unprotected_impulse_pa_s", "unprotected_peak_pa"]]
+    bare = known[["unprotected_impulse_pa_s", "unprotected_peak_pa"]].to_numpy()
+    shares = known[list(_LOADS)].to_numpy() / bare
+    return torch.tensor(inputs.to_numpy()).float(), torch.tensor(shares).float()

@@ -1,0 +1,103 @@
+"""Problems in the form of two other collections: EngiBench's `Problem`, MCBO's tasks.
+
+Neither is a dependency. What is returned is an instance of the collection's own class.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from blast_env.errors import MissingExtraError
+from blast_env.problems.problem import BenchmarkProblem
+
+
+@dataclass(frozen=True)
+class BlastConditions:
+    """EngiBench's conditions: nothing of a problem can be varied.
+
+    Attributes:
+        problem: Its name.
+    """
+
+    problem: str
+
+
+def engibench_problem(problem: BenchmarkProblem, seed: int = 0) -> Any:
+    """Return a problem as one of EngiBench: designs are random keys.
+
+    Its `simulate` gives the share of the load that is left, and spends blasts; `check_constraints`
+    says whether keys are from 0 to 1; `optimize` is not there, `render` gives the layout.
+
+    Args:
+        problem: The problem with its budget.
+        seed: Of `random_design`.
+
+    Raises:
+        MissingExtraError: If EngiBench is not installed.
+    """
+    try:
+        from engibench.core import ObjectiveDirection, Problem
+    except ModuleNotFoundError as error:
+        raise MissingExtraError("engibench is not installed: pip install engibench") from error
+
+    class BlastProblem(Problem[Any]):  # type: ignore[misc]
+        version = problem.definition.version
+        objectives = (("share_of_load", ObjectiveDirection.MINIMIZE),)
+        Conditions = Config = BlastConditions
+        conditions = config = BlastConditions(problem.name)
+        design_space = spaces.Box(0.0, 1.0, (problem.space.keys,), np.float64)
+        dataset_id = "gas_blasts"  # blast_env.data.load
+        container_id = None
+
+        def simulate(self, design: Any, config: Any = None) -> Any:  # noqa: ARG002
+            return np.array([problem.evaluate(problem.space.from_keys(design))])
+
+        def random_design(self) -> tuple[Any, int]:
+            return self.np_random.random(problem.space.keys), -1
+
+        def render(self, design: Any, *, open_window: bool = False) -> Any:  # noqa: ARG002
+            return problem.space.from_keys(design)
+
+    return BlastProblem(seed=seed)
+
+
+def mcbo_task(problem: BenchmarkProblem) -> Any:
+    """Return a problem as a task of MCBO.
+
+    Its search space has for each piece a nominal variable, what is set down, and two whole numbers,
+    where: the random keys in steps.
+
+    Raises:
+        MissingExtraError: If MCBO is not installed.
+    """
+    try:
+        from mcbo.tasks import TaskBase
+    except ModuleNotFoundError as error:
+        raise MissingExtraError("mcbo is not installed: see huawei-noah/HEBO") from error
+    sizes = problem.space.key_sizes
+
+    class BlastTask(TaskBase):  # type: ignore[misc]
+        @property
+        def name(self) -> str:
+            return problem.name
+
+        def evaluate(self, x: Any) -> Any:
+            return np.array([[problem.evaluate(self._layout(row))] for _, row in x.iterrows()])
+
+        def _layout(self, row: Any) -> Any:
+            keys = [(int(each) + 0.5) / sizes[index % 3] for index, each in enumerate(row)]
+            return problem.space.from_keys(keys)
+
+        def get_search_space_params(self) -> list[dict[str, Any]]:
+            params: list[dict[str, Any]] = []
+            for piece in range(problem.space.most_pieces):
+                what = [str(number) for number in range(sizes[0])]
+                params.append({"name": f"what_{piece}", "type": "nominal", "categories": what})
+                for axis, size in zip(("row", "column"), sizes[1:], strict=True):
+                    bounds = {"lb": 0, "ub": size - 1}
+                    params.append({"name": f"{axis}_{piece}", "type": "int", **bounds})
+            return params
+
+    return BlastTask()

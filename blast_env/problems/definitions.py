@@ -1,0 +1,184 @@
+"""Which problems there are, by name and version, and what each of them asks."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from hashlib import sha256
+from types import MappingProxyType
+from typing import Final, Literal
+
+from blast_env.bundled import ITEM_SITES
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.cases import (
+    one_of_each_charge,
+    practice_hidden,
+    practice_visible,
+    visible_case,
+)
+from blast_env.scenario import PointSource, Scenario, VehicleCharge, load_scenario
+from blast_env.scenario.build_scene import draw_threat
+from blast_env.sites import FAMILIES, generate_site
+
+Family = Literal["told", "hidden", "vehicle", "unseen"]
+
+BUDGETS: Final = (0, 50, 200, 1000)
+"""Gas blasts that a method may spend on a problem."""
+
+SEEDS: Final = 10
+"""Runs of a method that draws numbers, seeds 0 to 9."""
+
+_PRACTICE_CHARGES: Final = 4
+"""Places of a hidden charge that `evaluate` meets, unless there are fewer."""
+
+_JUDGED_CHARGES: Final = 4
+"""Places that the judge takes, others than those."""
+
+_DRAWS: Final = 16
+"""Draws that find all places where there are but a few."""
+
+_GENERATED: Final = "site_"
+"""What the names of generated sites begin with; their seed follows."""
+
+_SECRET_BITS: Final = 62
+
+
+@dataclass(frozen=True)
+class Definition:
+    """What a problem asks; it never changes what it says, a new version does.
+
+    Attributes:
+        site: Bundled name, or `site_SEED` for a generated site with heights and a catalogue.
+        family: What is known of the charge.
+        place: Of a told charge: which of the site's charges, from 1.
+        version: From 1.
+    """
+
+    site: str
+    family: Family
+    place: int = 1
+    version: int = 1
+
+    @property
+    def name(self) -> str:
+        """Name, as `control_room-told-v1`; those of further places end in `-told_2-v1`."""
+        place = "" if self.place == 1 else f"_{self.place}"
+        return f"{self.site}-{self.family}{place}-v{self.version}"
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """The site."""
+        if self.site.startswith(_GENERATED):
+            return generate_site(int(self.site.removeprefix(_GENERATED)), FAMILIES[ITEM_SITES])
+        return load_scenario(self.site)
+
+    @cached_property
+    def case(self) -> Case:
+        """What layouts are judged on; its `practice` is what `evaluate` meets.
+
+        A told charge is the same there and here. Of hidden ones a few are drawn, others for the
+        judge, and the same ones where there are but a few.
+        """
+        case = self._told() if self.family == "told" else self._hidden()
+        return replace(case, name=self.name)
+
+    @cached_property
+    def digest(self) -> str:
+        """16 hexadecimal digits of all that the problem says: site, charges, budgets."""
+        practice = self.case.practice
+        assert practice is not None
+        says = {
+            "name": self.name,
+            "scenario": self.scenario.content_hash,
+            "budgets": BUDGETS,
+            "judged": [_charge(each) for each in self.case.threats],
+            "practice": [_charge(each) for each in practice.threats],
+        }
+        return sha256(json.dumps(says, sort_keys=True).encode()).hexdigest()[:16]
+
+    def _told(self) -> Case:
+        scenario, seed = self.scenario, SeedRange.JUDGEMENT.seeds(0, 1)[0]
+        source = scenario.charge[self.place - 1]
+        alone = scenario.model_copy(update={"charge": (source,)})
+        charge = draw_threat(alone, seed)
+        judged = visible_case(scenario, charge, [seed])
+        return replace(judged, practice=practice_visible(scenario, charge, 1, 0))
+
+    def _hidden(self) -> Case:
+        scenario = self.scenario
+        few = all(isinstance(each, PointSource) for each in scenario.charge) or bool(
+            scenario.vehicles
+        )
+        judged, met = (_DRAWS, _DRAWS) if few else (_JUDGED_CHARGES, _PRACTICE_CHARGES)
+        threats = draw_threats(scenario, SeedRange.JUDGEMENT.seeds(0, judged))
+        practice = practice_hidden(scenario, met, 1, 0)
+        practice = replace(practice, threats=one_of_each_charge(practice.threats))
+        return Case(scenario, one_of_each_charge(threats), practice=practice)
+
+
+def _charge(threat: Threat) -> object:
+    charge = threat.charge
+    if isinstance(charge, VehicleCharge):
+        return charge.source.model_dump(mode="json"), charge.rank
+    return charge._asdict()
+
+
+_STREETS: Final = ("control_room", "school_and_clinic", "visitor_entrance")
+_OPEN: Final = ("courtyard", "perimeter_gate", "street_junction")
+_PUBLIC_SITES: Final = range(5000, 5000)
+_PUBLIC_VEHICLES: Final = (5103,)
+
+
+def _definitions() -> tuple[Definition, ...]:
+    return (
+        *(Definition(site, "told", place) for site in _STREETS for place in (1, 2, 3)),
+        *(Definition(site, "told") for site in _OPEN),
+        *(Definition(site, "hidden") for site in (*_STREETS, *_OPEN)),
+        *(Definition(site, "vehicle") for site in ("hotel_forecourt", "shopping_street")),
+        *(Definition(f"{_GENERATED}{seed}", "vehicle") for seed in _PUBLIC_VEHICLES),
+        *(Definition(f"{_GENERATED}{seed}", "unseen") for seed in _PUBLIC_SITES),
+    )
+
+
+DEFINITIONS: Final[Mapping[str, Definition]] = MappingProxyType(
+    {each.name: each for each in _definitions()}
+)
+"""All public problems by name."""
+
+SMALL: Final = ("visitor_entrance-told_2-v1", "control_room-told-v1", "school_and_clinic-told-v1")
+"""A few problems of one blast a layout, for a first look and for methods with many seeds."""
+
+
+def find_definition(name: str) -> Definition:
+    """Return a problem's definition.
+
+    Raises:
+        UnknownNameError: If there is no such problem; the message names the nearest one.
+    """
+    if name not in DEFINITIONS:
+        raise UnknownNameError("problem", name, DEFINITIONS)
+    return DEFINITIONS[name]
+
+
+@cache
+def secret_sites(secret: str, count: int) -> tuple[Definition, ...]:
+    """Return problems on generated sites that only who knows the secret can draw.
+
+    Args:
+        secret: A text that the judge keeps; the same one gives the same sites.
+        count: How many, at least 1.
+
+    Raises:
+        BlastEnvError: If the secret is shorter than 8 characters, or there are to be none.
+    """
+    if len(secret) < 8:
+        raise BlastEnvError(f"secret has {len(secret)} characters, must have at least 8")
+    if count < 1:
+        raise BlastEnvError(f"sites is {count}, must be at least 1")
+    seeds = []
+    for index in range(count):
+        drawn = sha256(f"{secret}/{index}".encode()).digest()
+        # Beyond the seeds that trainings and this package's own problems draw.
+        seeds.append(2**_SECRET_BITS + int.from_bytes(drawn, "big") % 2**_SECRET_BITS)
+    return tuple(Definition(f"{_GENERATED}{seed}", "unseen") for seed in seeds)

@@ -1,0 +1,227 @@
+"""A problem as an optimiser meets it: layouts are vectors or lists, blasts are counted."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from blast_env.engines import JUDGE, Engine, find_engine
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import (
+    BlastCache,
+    BlastEvaluator,
+    BlastMeter,
+    BudgetError,
+    Case,
+    Objective,
+    Threat,
+)
+from blast_env.geometry import Element, Layout
+from blast_env.problems.definitions import BUDGETS, SEEDS, Definition, find_definition
+from blast_env.problems.references import ScoreReference, stored_references
+from blast_env.problems.space import LayoutSpace
+from blast_env.scenario import Scenario, check_layout
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """A layout that has met blasts.
+
+    Attributes:
+        layout: Its cells or pieces, sorted.
+        share: Share of the load without a barrier that is left; less is better.
+        threats: How many threats it has met, counted from the first.
+        blasts: Blasts spent by then.
+    """
+
+    layout: Layout
+    share: float
+    threats: int
+    blasts: int
+
+
+@dataclass(eq=False)
+class BenchmarkProblem:
+    """A problem of the benchmark, with so many gas blasts to spend; `make` makes it.
+
+    Attributes:
+        definition: What it asks.
+        budget: Most blasts of `evaluate`.
+        engine: Runs the blasts.
+        cache: Folder or cache of blasts; what it knows costs no time, but counts all the same.
+        meter: Counts the blasts: distinct pairs of layout and threat.
+        history: Every layout that was evaluated, in order.
+
+    Raises:
+        BlastEnvError: If the budget is negative.
+    """
+
+    definition: Definition
+    budget: int
+    engine: Engine
+    cache: str | Path | BlastCache | None = None
+    meter: BlastMeter = field(init=False)
+    history: list[Evaluated] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        """Begin to count."""
+        if self.budget < 0:
+            raise BlastEnvError(f"budget is {self.budget} blasts, must be at least 0")
+        self.meter = BlastMeter(self.budget)
+
+    @property
+    def name(self) -> str:
+        """Name with family and version."""
+        return self.definition.name
+
+    @property
+    def family(self) -> str:
+        """What is known of the charge: `told`, `hidden`, `vehicle`, `unseen`."""
+        return self.definition.family
+
+    @property
+    def budgets(self) -> tuple[int, ...]:
+        """The budgets that count for the score."""
+        return BUDGETS
+
+    @property
+    def seeds(self) -> range:
+        """The seeds of runs of a method that draws numbers."""
+        return range(SEEDS)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The site."""
+        return self.definition.scenario
+
+    @property
+    def case(self) -> Case:
+        """What `evaluate` meets; who searches may know it, the charges too."""
+        practice = self.definition.case.practice
+        assert practice is not None
+        return practice
+
+    @property
+    def reference(self) -> ScoreReference | None:
+        """The best rule and the best layout known; `None` for a site that only a judge draws."""
+        return stored_references().get(self.name)
+
+    @cached_property
+    def space(self) -> LayoutSpace:
+        """The layouts as vectors."""
+        return LayoutSpace(self.scenario)
+
+    @cached_property
+    def evaluator(self) -> BlastEvaluator:
+        """Runs the blasts, and remembers them."""
+        most = self.budget + len(self.case.threats)
+        return BlastEvaluator(self.scenario, self.engine, cache_size=most, cache=self.cache)
+
+    @property
+    def blasts(self) -> int:
+        """Blasts spent."""
+        return self.meter.blasts
+
+    @property
+    def blasts_left(self) -> int:
+        """Blasts that are left."""
+        return self.budget - self.meter.blasts
+
+    @property
+    def best(self) -> Evaluated | None:
+        """The best layout of those that have met most threats; `None` before the first."""
+        return min(self.history, key=lambda each: (-each.threats, each.share), default=None)
+
+    def check(self, layout: Sequence[Element]) -> tuple[str, ...]:
+        """Return why a layout is not legal, a sentence each; none for a legal one.
+
+        Raises:
+            LayoutError: If it is no list of cells or pieces at all.
+        """
+        return self.space.reasons_against(layout)
+
+    def evaluate(self, layout: Sequence[Element], threats: int | None = None) -> float:
+        """Return the share of the load without a barrier that is left with a layout.
+
+        It takes a blast for each threat, unless the same was asked before. The blasts without a
+        barrier are free.
+
+        Args:
+            layout: (row, column) of each module, or pieces (row, column, item, turned).
+            threats: How many of the problem's threats, the first ones: they lie far from each
+                other, so that a few stand for all. All of them unless given.
+
+        Returns:
+            A number that is to be small; 1 without a barrier.
+
+        Raises:
+            BudgetError: If the budget does not pay for it.
+            LayoutError: If the layout is not legal; no blast is counted then.
+            BlastEnvError: If there are not so many threats.
+        """
+        most = len(self.case.threats)
+        count = most if threats is None else threats
+        if not 1 <= count <= most:
+            raise BlastEnvError(f"threats is {count}, must be 1 to {most}")
+        checked = tuple(sorted(check_layout(self.scenario, layout)))
+        pairs: list[tuple[Layout, Threat]] = [
+            (checked, threat) for threat in self.case.threats[:count]
+        ]
+        try:
+            self.meter.add(pairs)
+        except BudgetError:
+            raise BudgetError(
+                f"{self.name}: {count} blasts asked for, {self.blasts_left} of the budget of "
+                f"{self.budget} are left"
+            ) from None
+        bare: list[tuple[Layout, Threat]] = [((), pair[1]) for pair in pairs]
+        counted = [
+            each.load(self.scenario.objective)
+            for each in self.evaluator.loads_of_many(pairs + bare)
+        ]
+        combined = self.case.combined
+        share = combined(counted[:count]) / combined(counted[count:])
+        self.history.append(Evaluated(checked, share, count, self.blasts))
+        return share
+
+    def judged(self, layout: Sequence[Element], processes: int = 1) -> float:
+        """Return the share of the load that is left under the threats of the judge.
+
+        For reports on what is done: methods do not call it, and its blasts count nowhere.
+
+        Raises:
+            LayoutError: If the layout is not legal.
+        """
+        objective = Objective(self.evaluator, self.definition.case, processes)
+        return objective.assess(layout).load / objective.assess(()).load
+
+
+def make(
+    problem: str | Definition,
+    budget: int = BUDGETS[1],
+    cell_m: float | None = None,
+    engine: str | Engine = JUDGE,
+    cache: str | Path | BlastCache | None = None,
+) -> BenchmarkProblem:
+    """Return a problem of the benchmark.
+
+    Args:
+        problem: Its name, as `control_room-told-v1`, or its definition.
+        budget: Gas blasts that may be spent.
+        cell_m: Side of the cells, m; 0.5 unless given.
+        engine: Another engine than gas dynamics, for tests.
+        cache: Folder in which blasts are kept.
+
+    Raises:
+        UnknownNameError: If there is no such problem; the message names the nearest one.
+        BlastEnvError: If what the problem says is not what its version said when it was made, or
+            an argument is out of bounds.
+    """
+    definition = find_definition(problem) if isinstance(problem, str) else problem
+    known = stored_references().get(definition.name)
+    if known is not None and known.digest != definition.digest:
+        raise BlastEnvError(
+            f"{definition.name}: the site or its charges have changed (digest {definition.digest}, "
+            f"must be {known.digest}): a version never changes what it says"
+        )
+    return BenchmarkProblem(definition, budget, find_engine(engine, cell_m), cache)

@@ -1,0 +1,194 @@
+"""A submission: the layouts that a method found, one a run, in a file that others can judge."""
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Final, Literal
+
+from pydantic import ConfigDict, Field
+
+from blast_env.documents import checked_as, parse_json, read_text
+from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.geometry import Layout
+from blast_env.journal import Journal
+from blast_env.problems.definitions import DEFINITIONS, Definition
+from blast_env.problems.problem import BenchmarkProblem
+from blast_env.scenario import check_layout
+from blast_env.values import path_of
+
+FORMAT: Final = "blast-env submission 1"
+MOST_BYTES: Final = 50_000_000
+"""Most that a file may have: some ten thousand runs."""
+
+Method = Callable[[BenchmarkProblem, int], Layout]
+"""Finds a layout for a problem within its budget; the number is the seed of what it draws."""
+
+Count = Annotated[int, Field(ge=0)]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a method found once.
+
+    Attributes:
+        problem: Name of the problem.
+        budget: Blasts that it might have spent.
+        seed: Of what it drew.
+        blasts: Blasts that it spent.
+        layout: Its answer.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
+    problem: str
+    budget: Count
+    seed: Count
+    blasts: Count
+    layout: Layout
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        """What tells it from other runs of the method."""
+        return self.problem, self.budget, self.seed
+
+
+@dataclass(frozen=True)
+class Submission:
+    """All runs of a method.
+
+    Attributes:
+        method: Name in the table.
+        runs: One a problem, budget and seed.
+        note: Settings, versions, where the code is: one line.
+        format: Of the file.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
+    method: Annotated[str, Field(min_length=1, max_length=60)]
+    runs: Annotated[tuple[Run, ...], Field(min_length=1)]
+    note: Annotated[str, Field(max_length=500)] = ""
+    format: Literal["blast-env submission 1"] = FORMAT
+
+    @classmethod
+    def load(
+        cls, path: str | Path, definitions: Mapping[str, Definition] = DEFINITIONS
+    ) -> "Submission":
+        """Read a file and check it.
+
+        Raises:
+            BlastEnvError: If it cannot be read or is anything else, or as `check`.
+        """
+        try:
+            found = checked_as(cls, parse_json(read_text(path_of(path), MOST_BYTES)))
+            found.check(definitions)
+        except BlastEnvError as error:
+            raise BlastEnvError(f"{path}: {error}") from error
+        return found
+
+    def save(self, path: str | Path) -> Path:
+        """Write the file, a run a line.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        return write_runs(path, self)
+
+    def check(self, definitions: Mapping[str, Definition] = DEFINITIONS) -> None:
+        """Refuse runs of no use.
+
+        Raises:
+            BlastEnvError: If there is no such problem, a run is there twice or spent more than its
+                budget, or a layout is not legal; the message names run and reason.
+        """
+        seen = set()
+        for index, run in enumerate(self.runs):
+            where = f"runs[{index}]"
+            if run.problem not in definitions:
+                raise BlastEnvError(f"{where}: there is no problem {run.problem!r}")
+            if run.key in seen:
+                raise BlastEnvError(
+                    f"{where}: {run.problem}, {run.budget}, {run.seed}: is there twice"
+                )
+            if run.blasts > run.budget:
+                raise BlastEnvError(
+                    f"{where}: {run.blasts} blasts were spent, the budget is {run.budget}"
+                )
+            seen.add(run.key)
+            try:
+                check_layout(definitions[run.problem].scenario, run.layout)
+            except BlastEnvError as error:
+                raise BlastEnvError(f"{where}: {run.problem}: {error}") from error
+
+
+def write_runs(path: str | Path, record: Any) -> Path:
+    """Write a dataclass with `runs` as JSON, a run a line.
+
+    Raises:
+        BlastEnvError: If it cannot be written.
+    """
+    rest = {name: value for name, value in asdict(record).items() if name != "runs"}
+    lines = ",\n".join(f"    {json.dumps(asdict(run))}" for run in record.runs)
+    head = json.dumps(rest, indent=2, allow_nan=False)[:-2]
+    with write_atomically(path) as temporary:
+        temporary.write_text(f'{head},\n  "runs": [\n{lines}\n  ]\n}}\n', "utf-8")
+    return path_of(path)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a method is run on.
+
+    Attributes:
+        problems: What makes each problem, with a budget.
+        budgets: Blasts.
+        seeds: Of the runs; a method with the budget 0 is run once.
+    """
+
+    problems: Sequence[Callable[[int], BenchmarkProblem]]
+    budgets: Sequence[int]
+    seeds: Sequence[int] = field(default=(0,))
+
+    def __iter__(self) -> Any:
+        """Yield what makes a problem, budget and seed; all problems of one seed first."""
+        for seed in self.seeds:
+            for budget in self.budgets:
+                if budget or seed == self.seeds[0]:
+                    yield from ((make, budget, seed) for make in self.problems)
+
+
+def play(
+    method: Method,
+    asked: Iterable[tuple[Callable[[int], BenchmarkProblem], int, int]],
+    journal: Path | None = None,
+    progress: Callable[[Run], None] | None = None,
+) -> tuple[Run, ...]:
+    """Run a method on problems.
+
+    Args:
+        method: The method.
+        asked: What makes each problem, budget and seed; see `Asked`.
+        journal: File in which runs are kept as they come: what is there is not run again.
+        progress: Is told each run.
+
+    Raises:
+        BudgetError: If the method asks for more blasts than its budget.
+        LayoutError: If its answer is not legal.
+    """
+    kept = Journal(journal, Run) if journal is not None else None
+    found = {run.key: run for run in kept.read()} if kept else {}
+    runs = []
+    for make, budget, seed in asked:
+        problem = make(budget)
+        run = found.get((problem.name, budget, seed))
+        if run is None:
+            layout = check_layout(problem.scenario, method(problem, seed))
+            run = Run(problem.name, budget, seed, problem.blasts, tuple(sorted(layout)))
+            if kept:
+                kept.add(run)
+        runs.append(run)
+        if progress is not None:
+            progress(run)
+    return tuple(runs)

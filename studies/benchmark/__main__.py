@@ -1,0 +1,98 @@
+"""`python -m studies.benchmark`: references of the problems, and runs of strong methods."""
+
+from pathlib import Path
+from time import monotonic
+from typing import Annotated
+
+import typer
+from blast_agents.benchmark import find_method, reference_of
+from pydantic import TypeAdapter
+
+from blast_env.cli.output import print_line, user_errors
+from blast_env.engines import JUDGE, find_engine
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator
+from blast_env.files import make_folder, write_atomically
+from blast_env.problems import (
+    DEFINITIONS,
+    SMALL,
+    Asked,
+    Run,
+    ScoreReference,
+    Submission,
+    make,
+    play,
+)
+from blast_env.problems.references import cell_key
+from studies.benchmark.methods import OUTSIDE
+from studies.benchmark.references import known_layouts, published_before
+
+app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
+_STORED = Path("blast_env/problems/data/references.json")
+_REFERENCES = TypeAdapter(dict[str, ScoreReference])
+
+
+@app.command()
+def references(
+    cache: Annotated[Path, typer.Option(help="Folder in which blasts are kept.")],
+    out: Annotated[Path, typer.Option(help="The file.")] = _STORED,
+    most_s: Annotated[float, typer.Option(help="Stop before a problem after so many s.")] = 1e9,
+) -> None:
+    """Play the rules and all layouts that are known, on every problem that has no reference yet."""
+    with user_errors():
+        known = _REFERENCES.validate_json(out.read_bytes()) if out.exists() else {}
+        published, began = published_before(cache, DEFINITIONS), monotonic()
+        engine = find_engine(JUDGE, 0.5)
+        for name, definition in DEFINITIONS.items():
+            if name in known and known[name].digest == definition.digest:
+                continue
+            if monotonic() - began > most_s:
+                break
+            evaluator = BlastEvaluator(definition.scenario, engine, cache=published)
+            more = known_layouts(definition, published)
+            known[name] = reference_of(definition, evaluator, more, cell_key(0.5))
+            best, rule = known[name].best, known[name].rule
+            print_line(
+                f"{name}: {rule.method} {rule.shares['0.5']:.3f}, {best.method} "
+                f"{best.shares['0.5']:.3f}, {evaluator.blasts} blasts"
+            )
+            with write_atomically(out) as temporary:
+                temporary.write_bytes(_REFERENCES.dump_json(dict(sorted(known.items()))) + b"\n")
+
+
+@app.command("play")
+def play_methods(
+    out: Annotated[Path, typer.Option(help="Folder for submissions; goes on with what it has.")],
+    cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Method, again and again.")] = None,
+    problem: Annotated[list[str] | None, typer.Option(help="Problem, again and again.")] = None,
+    budget: Annotated[list[int] | None, typer.Option(help="Blasts.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs of each.")] = 10,
+    first_seed: Annotated[int, typer.Option(min=0)] = 0,
+    cell: Annotated[float, typer.Option(help="Side of the cells, m.")] = 0.5,
+    most_s: Annotated[float, typer.Option(help="Stop before a run after so many s.")] = 1e9,
+) -> None:
+    """Run methods on problems, one seed of all before the next, and write their submissions."""
+    with user_errors():
+        make_folder(out)
+        began = monotonic()
+        names = method or list(OUTSIDE)
+        found = {each: OUTSIDE.get(each) or find_method(each) for each in names}
+        made = [
+            lambda budget, name=name: make(name, budget, cell, cache=cache)
+            for name in problem or SMALL
+        ]
+        runs: dict[str, list[Run]] = {each: [] for each in names}
+        for seed in range(first_seed, first_seed + seeds):
+            for each in names:
+                if monotonic() - began > most_s:
+                    raise BlastEnvError("the time is over; the same command goes on")
+                asked = Asked(made, budget or (50,), (seed,))
+                runs[each] += play(found[each], asked, out / f"{each}.jsonl")
+                print_line(f"seed {seed}, {each}: {monotonic() - began:.0f} s")
+        for each, own in runs.items():
+            Submission(each, tuple(own)).save(out / f"{each}.json")
+
+
+if __name__ == "__main__":
+    app()

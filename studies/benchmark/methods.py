@@ -1,0 +1,147 @@
+"""Methods of other libraries on the benchmark: each asks for a layout, and is told its share.
+
+The libraries are no dependencies: `pip install optuna nevergrad botorch` for those that are run.
+"""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BudgetError
+from blast_env.geometry import Layout
+from blast_env.problems import BenchmarkProblem, Method
+
+_REPEATS: Final = 200
+"""Questions without a new blast after which a method is through."""
+
+_FIT_EVERY: Final = 5
+"""Evaluations after which the model's lengths are fitted anew: a fit takes as long as a blast."""
+
+Value = Callable[[FloatArray], float]
+
+
+def by_keys(search: Callable[[BenchmarkProblem, int, Value], None]) -> Method:
+    """Return the method that lets a library choose random keys until the blasts are spent."""
+
+    def method(problem: BenchmarkProblem, seed: int) -> Layout:
+        repeats = 0
+
+        def value(keys: FloatArray) -> float:
+            nonlocal repeats
+            before = problem.blasts
+            share = problem.evaluate(problem.space.from_keys(keys))
+            repeats = repeats + 1 if problem.blasts == before else 0
+            if repeats > _REPEATS:
+                raise BudgetError("nothing new")
+            return share
+
+        with suppress(BudgetError):
+            search(problem, seed, value)
+        if problem.best is None:
+            raise BlastEnvError(f"{problem.name}: the method asked for nothing")
+        return problem.best.layout
+
+    return method
+
+
+def optuna_tpe(problem: BenchmarkProblem, seed: int, value: Value) -> None:
+    """Optuna's tree-structured Parzen estimator, all keys together."""
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed, multivariate=True))
+    names = [f"key_{index}" for index in range(problem.space.keys)]
+    while True:
+        trial = study.ask()
+        keys = [trial.suggest_float(name, 0.0, 1.0) for name in names]
+        study.tell(trial, value(np.array(keys)))
+
+
+def nevergrad_ngopt(problem: BenchmarkProblem, seed: int, value: Value) -> None:
+    """Nevergrad's NGOpt, which chooses a method by dimension and budget."""
+    import nevergrad as ng
+
+    keys = ng.p.Array(shape=(problem.space.keys,), lower=0.0, upper=1.0)
+    keys.random_state.seed(seed)
+    optimizer = ng.optimizers.NGOpt(parametrization=keys, budget=problem.budget)
+    while True:
+        asked = optimizer.ask()
+        optimizer.tell(asked, value(np.asarray(asked.value)))
+
+
+def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
+    """Bayesian optimisation in a trust region (TuRBO's) with BoTorch: GP, Thompson samples."""
+    import torch
+    from botorch.fit import fit_gpytorch_mll
+    from botorch.models import SingleTaskGP
+    from gpytorch.mlls import ExactMarginalLogLikelihood
+
+    torch.manual_seed(seed)
+    sobol: Any = torch.quasirandom.SobolEngine(problem.space.keys, scramble=True, seed=seed)  # type: ignore[no-untyped-call]
+    first = max(problem.budget // 5, 4)
+    places = sobol.draw(first, dtype=torch.float64)
+    values = torch.tensor([[value(each.numpy())] for each in places], dtype=torch.float64)
+    side, won, lost = 0.8, 0, 0
+    fitted: dict[str, Any] = {}
+    while True:
+        scaled = (values - values.mean()) / values.std().clamp_min(1e-9)
+        model = SingleTaskGP(places, -scaled)
+        if len(places) % _FIT_EVERY == 0 or not fitted:
+            fit_gpytorch_mll(ExactMarginalLogLikelihood(model.likelihood, model))
+            fitted = model.state_dict()
+        model.load_state_dict(fitted)
+        centre = places[values.argmin()]
+        lengths = model.covar_module.lengthscale.detach().reshape(-1)
+        weights = lengths / lengths.log().mean().exp()
+        low = (centre - 0.5 * side * weights).clamp(0.0, 1.0)
+        high = (centre + 0.5 * side * weights).clamp(0.0, 1.0)
+        drawn = low + (high - low) * sobol.draw(400, dtype=torch.float64)
+        moved = torch.rand(drawn.shape, dtype=torch.float64) < min(1.0, 20.0 / drawn.shape[1])
+        drawn = torch.where(moved, drawn, centre)
+        with torch.no_grad():
+            sample = model.posterior(drawn).sample().reshape(-1)
+        chosen = drawn[sample.argmax()]
+        found = value(chosen.numpy())
+        better = found < float(values.min()) - 1e-3 * abs(float(values.min()))
+        won, lost = (won + 1, 0) if better else (0, lost + 1)
+        if won == 3:
+            side, won = min(2.0 * side, 1.6), 0
+        if lost == max(4, problem.space.keys // 4):
+            side, lost = 0.5 * side, 0
+        if side < 0.5**7:
+            side = 0.8
+        places = torch.cat([places, chosen[None]])
+        values = torch.cat([values, torch.tensor([[found]], dtype=torch.float64)])
+
+
+def annealing_on_keys(problem: BenchmarkProblem, seed: int, value: Value) -> None:
+    """Plain Python: simulated annealing on the keys, a few of them drawn anew at a time."""
+    rng = np.random.default_rng(seed)
+    keys = rng.random(problem.space.keys)
+    share = value(keys)
+    while True:
+        tried = np.where(rng.random(len(keys)) < 3.0 / len(keys), rng.random(len(keys)), keys)
+        found = value(tried)
+        heat = 0.05 * max(problem.blasts_left / max(problem.budget, 1), 1e-3)
+        if found < share or rng.random() < np.exp((share - found) / heat):
+            keys, share = tried, found
+
+
+_SEARCHES: Final[Mapping[str, Any]] = MappingProxyType(
+    {
+        "optuna_tpe": optuna_tpe,
+        "nevergrad_ngopt": nevergrad_ngopt,
+        "botorch_turbo": botorch_turbo,
+        "annealing_on_keys": annealing_on_keys,
+    }
+)
+
+OUTSIDE: Final[Mapping[str, Method]] = MappingProxyType(
+    {name: by_keys(search) for name, search in _SEARCHES.items()}
+)
+"""Methods of other libraries, and a plain one, by name."""

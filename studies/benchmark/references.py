@@ -1,0 +1,52 @@
+"""What each problem is scored between: the rules, and the best layout that is known anywhere."""
+
+import json
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from blast_agents.benchmark import find_method
+
+from blast_env.data import PublishedBlasts
+from blast_env.evaluation import DiskCache
+from blast_env.geometry import Layout
+from blast_env.problems import Definition, make
+from blast_env.scenario import Charge, Placement, VehicleCharge, load_layout
+
+DATA = Path("docs/data")
+
+
+def published_layouts(definition: Definition, published: PublishedBlasts) -> Iterator[Layout]:
+    """Yield the layouts that met every charge of a problem whose charges are fixed."""
+    charges = [threat.charge for threat in definition.case.threats]
+    if any(isinstance(charge, VehicleCharge) for charge in charges):
+        return
+    met: dict[str, set[tuple[float, float, float, float]]] = defaultdict(set)
+    for scenario_hash, layout, charge in published.rows:
+        if scenario_hash == definition.scenario.content_hash:
+            met[layout].add(charge)
+    wanted = {(*c.position_m, c.height_m, c.tnt_kg) for c in charges if isinstance(c, Charge)}
+    catalogue = Placement.empty(definition.scenario).catalogue
+    for layout, own in met.items():
+        if wanted <= own and layout != "[]":
+            yield tuple(catalogue.element_from(tuple(e), "layout") for e in json.loads(layout))
+
+
+def known_layouts(definition: Definition, published: PublishedBlasts) -> dict[str, Layout]:
+    """Return layouts that may be the best known, by what found them."""
+    scenario = definition.scenario
+    found: dict[str, Layout] = {}
+    for number, layout in enumerate(published_layouts(definition, published)):
+        found[f"published blasts {number}"] = layout
+    path = DATA / "best_found" / f"{definition.site}.json"
+    if definition.family != "told" and path.exists():
+        found["study of the scenarios"] = load_layout(path, scenario)
+    if scenario.zone.items:
+        found["package"] = find_method("package")(make(definition, 0), 0)
+    return {name: tuple(sorted(layout)) for name, layout in found.items()}
+
+
+def published_before(folder: Path, definitions: Mapping[str, Definition]) -> PublishedBlasts:
+    """Return the published blasts of these problems, before a folder for others."""
+    scenarios = {each.scenario.content_hash: each.scenario for each in definitions.values()}
+    return PublishedBlasts(scenarios, DiskCache(folder))

@@ -1,0 +1,105 @@
+"""Scores between best rule and best known; what was submitted is played again."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Piece
+from blast_env.problems import (
+    JudgedSubmission,
+    KnownLayout,
+    Run,
+    ScoreReference,
+    Submission,
+    judge,
+    shipped_standings,
+    stored_references,
+)
+from blast_env.problems.judging import BUDGET_WEIGHTS, JudgedRun
+from tests.problems.row import RowEngine
+
+NAME = "control_room-told-v1"
+
+
+def wall(row: int) -> tuple[Piece, ...]:
+    return (Piece(row, 0, "low_wall", True),)
+
+
+REFERENCES = {
+    NAME: ScoreReference("", {}, KnownLayout("rule", wall(16)), KnownLayout("best", wall(12)))
+}
+
+
+def judged(*runs: Run) -> JudgedSubmission:
+    return judge(Submission("own", runs), None, engine=RowEngine(), references=REFERENCES)
+
+
+def run(row: int, budget: int = 0, seed: int = 0) -> Run:
+    return Run(NAME, budget, seed, budget, wall(row))
+
+
+def test_the_best_rule_scores_nothing_and_the_best_known_all() -> None:
+    """1 - 0.1 / (1 + distance) of the row: 0.98 for the rule, 0.9 for the best."""
+    scores = [judged(run(row)).score(0).value for row in (16, 20, 12, 13)]
+    assert scores[:3] == pytest.approx([0.0, 0.0, 1.0])
+    assert scores[3] == pytest.approx((0.98 - 0.95) / (0.98 - 0.9))
+
+
+def test_what_takes_few_blasts_counts_for_more_too() -> None:
+    few, many = judged(run(13)), judged(run(13, 1000))
+    assert few.area().value == pytest.approx(few.score(0).value)
+    assert many.score(200).value == 0.0
+    assert many.area().value == pytest.approx(many.score(1000).value * BUDGET_WEIGHTS[1000])
+    assert sum(BUDGET_WEIGHTS.values()) == pytest.approx(1.0)
+    assert few.area().value > many.area().value
+
+
+def test_the_interval_is_over_the_seeds() -> None:
+    """Scores 0 and 1, Student's t with one degree of freedom: 0.5 +- 12.706 * 0.5."""
+    score = judged(run(16, 50, 0), run(12, 50, 1)).score(50)
+    assert score.value == pytest.approx(0.5)
+    assert score.high - score.value == pytest.approx(12.706 * 0.5, rel=1e-4)
+    assert judged(run(12, 50)).score(50).low != judged(run(12, 50)).score(50).low  # NaN
+
+
+def test_a_layout_that_is_better_than_the_best_known_shows() -> None:
+    best = JudgedRun(NAME, 0, 0, 0, wall(12), 0.5, 0.7, 0.6)
+    assert best.score == pytest.approx(2.0)
+    assert replace(best, best=0.7, share=0.7).score == 1.0
+    assert replace(best, best=0.7, share=0.71).score == 0.0
+
+
+@pytest.mark.parametrize(
+    ("runs", "message"),
+    [
+        ((run(99),), "runs\\[0\\]: control_room-told-v1: .*outside"),
+        ((run(1), run(2)), "is there twice"),
+        ((replace(run(1), blasts=1),), "1 blasts were spent, the budget is 0"),
+        ((replace(run(1), problem="none-v1"),), "there is no problem 'none-v1'"),
+    ],
+)
+def test_a_submission_of_no_use_is_refused(
+    runs: tuple[Run, ...], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(BlastEnvError, match=message):
+        judged(*runs)
+    path = Submission("own", runs).save(tmp_path / "own.json")
+    with pytest.raises(BlastEnvError, match=message):
+        Submission.load(path)
+
+
+def test_what_was_judged_is_read_back(tmp_path: Path) -> None:
+    own = judged(run(13), run(14, 50))
+    assert JudgedSubmission.load(own.save(tmp_path / "own.json")) == own
+    (tmp_path / "own.json").write_text('{"method": "own", "runs": []}')
+    with pytest.raises(BlastEnvError, match=r"own\.json: "):
+        JudgedSubmission.load(tmp_path / "own.json")
+
+
+def test_standings_that_come_with_the_package_are_of_its_problems() -> None:
+    known = stored_references()
+    for each in shipped_standings():
+        assert set(each.problems) <= set(known)
+        assert all(0 <= made.blasts <= made.budget for made in each.runs)
