@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
+from math import hypot
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -31,6 +32,7 @@ from blast_env.scenario.sections import (
     AnySource,
     AnyStructure,
     Entry,
+    PointM,
     PointSource,
     Site,
     VehicleSource,
@@ -308,7 +310,7 @@ class Drive:
             return (), ()
         way = self.speeds.way_to(self.worst.places_m[0])
         met: dict[RatedPiece, None] = {}
-        for (x_m, y_m), _ in way:
+        for x_m, y_m in _along(way):
             around = Rectangle(x_m, y_m, x_m, y_m).grown(self.reach.width_m / 2.0)
             met |= dict.fromkeys(each for each in self.broken if around.overlaps(each.rectangle))
         hit = {impact.piece: impact for impact in self.impacts}
@@ -377,6 +379,16 @@ def _too_slow(pieces: Iterable[RatedPiece], speeds: SpeedField) -> tuple[RatedPi
         for each in pieces
         if (speeds.impact_km_h(each.rectangle) or 0.0) > each.rating.speed_km_h
     )
+
+
+def _along(way: Sequence[WayPoint]) -> Iterator[PointM]:
+    """Yield places along a way, half a metre apart or less; its own lie at the ends of arcs."""
+    for one, other in pairwise(way):
+        (x_m, y_m), (to_x_m, to_y_m) = one.place_m, other.place_m
+        steps = max(round(hypot(to_x_m - x_m, to_y_m - y_m) / MODULE_SIDE_M), 1)
+        for step in range(steps + 1):
+            share = step / steps
+            yield x_m + share * (to_x_m - x_m), y_m + share * (to_y_m - y_m)
 
 
 def _reach(

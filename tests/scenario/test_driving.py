@@ -204,7 +204,8 @@ def test_what_gives_way_opens_the_run_up_to_the_next() -> None:
         RatedPiece(Rectangle(x, 2.0, x + 0.5, 4.0), CrashRating(mass_kg=7200.0, speed_km_h=v), n)
         for x, v, n in ((20.0, 48.0, "first"), (50.0, 64.0, "second"), (80.0, 96.0, "third"))
     )
-    drive = road.drive(Obstacles(rated=pieces))
+    obstacles = Obstacles(rated=pieces)
+    drive = road.drive(obstacles)
     assert [each.name for each in drive.broken] == ["first", "second"]
     assert [each.name for each in drive.held] == ["third"]
 
@@ -344,3 +345,20 @@ def test_the_rule_of_posts_takes_those_that_hold() -> None:
         posts = line_of_posts(site)
         taken.append({each.item for each in posts if isinstance(each, Piece)})
     assert taken == [{"heavy"}, {"light"}]
+
+
+def test_the_way_names_all_that_it_breaks_through_in_that_order() -> None:
+    """On a straight road, and where the last of the way is one long arc."""
+    yard = ground(60.0, 40.0, (2.0, 12.0), [], entry_speed_km_h=40.0)
+    hut = gate_site().structures[0].model_copy(update={"corner_m": (56.0, 24.0)})
+    site = VehicleGround(yard.source, yard.site, (hut,))
+    fences = tuple(
+        RatedPiece(
+            Rectangle(x, 0.0, x + 0.5, 40.0), CrashRating(mass_kg=3500.0, speed_km_h=32.0), n
+        )
+        for x, n in ((15.0, "first"), (30.0, "second"), (45.0, "third"))
+    )
+    way, through = site.drive(Obstacles(rated=fences)).weakest_way
+    assert [each.piece.name for each in through] == ["first", "second", "third"]
+    assert "first" in site.explain(Obstacles(rated=fences))
+    assert way[-1].place_m[0] > 46.0
