@@ -126,7 +126,6 @@ def _charge(threat: Threat) -> object:
 
 _STREETS: Final = ("control_room", "school_and_clinic", "visitor_entrance")
 _OPEN: Final = ("courtyard", "perimeter_gate", "street_junction")
-_PUBLIC_SITES: Final = range(5000, 5000)
 _PUBLIC_VEHICLES: Final = (5103,)
 
 
@@ -137,7 +136,6 @@ def _definitions() -> tuple[Definition, ...]:
         *(Definition(site, "hidden") for site in (*_STREETS, *_OPEN)),
         *(Definition(site, "vehicle") for site in ("hotel_forecourt", "shopping_street")),
         *(Definition(f"{_GENERATED}{seed}", "vehicle") for seed in _PUBLIC_VEHICLES),
-        *(Definition(f"{_GENERATED}{seed}", "unseen") for seed in _PUBLIC_SITES),
     )
 
 

@@ -269,6 +269,8 @@ def _judged(
 def shipped_standings() -> tuple[JudgedSubmission, ...]:
     """Return the submissions that come with the package."""
     folder = files("blast_env.problems").joinpath("data/standings")
+    if not folder.is_dir():
+        return ()
     found = (each for each in folder.iterdir() if each.name.endswith(".json"))
     return tuple(
         checked_as(JudgedSubmission, parse_json(each.read_text("utf-8")))

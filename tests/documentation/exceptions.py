@@ -478,6 +478,7 @@ NOT_RUN: Final[dict[str, str]] = {
     """ 'observation:'"'"'grid'"'"''""": "needs RL Zoo",
     "python -m rl_zoo3.enjoy --algo ppo --env BlastBarrier-v0 --gym-packages blast_env -f logs"
     " --stochastic": "needs RL Zoo",
+    "python -m studies.benchmark play": "needs Optuna, Nevergrad and BoTorch",
     "blast-env judge --method my_module:climb --secret 'a text that the judge keeps' --sites 8"
     " --out entry": "my_module is a placeholder; tests/problems runs such a method",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",

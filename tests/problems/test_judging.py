@@ -98,6 +98,10 @@ def test_what_was_judged_is_read_back(tmp_path: Path) -> None:
         JudgedSubmission.load(tmp_path / "own.json")
 
 
+def test_a_package_without_entries_has_no_standings() -> None:
+    assert isinstance(shipped_standings(), tuple)
+
+
 def test_standings_that_come_with_the_package_are_of_its_problems() -> None:
     known = stored_references()
     for each in shipped_standings():
