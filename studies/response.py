@@ -1,14 +1,32 @@
-"""The tables of docs/engineers/response.md: `python -m studies.response`."""
+"""The tables of docs/engineers/response.md: what was checked about the response of buildings.
 
-from collections.abc import Iterator
-from typing import Final
+`python -m studies.response` prints those that need no blast; its commands are the others.
+"""
+
+from collections.abc import Callable, Iterator
+from itertools import product
+from math import pi, sin
+from time import process_time
+from typing import Annotated, Final
 
 import numpy as np
+import typer
+from scipy.integrate import solve_ivp
 
-from blast_env.cli.output import print_line
+from blast_env.arrays import FloatArray
+from blast_env.calibration import kingery_bulmash
+from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.consequences import peak_factor
+from blast_env.evaluation.neighbours import side_on_impulse_pa_s, side_on_peak_pa
+from blast_env.geometry import Layout, Piece
+from blast_env.response.components import Glazing, catalogue
+from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond, sharpened
 from blast_env.response.glass import Pane, glazing_responses
 from blast_env.response.sdof import Resistance, System, responses
+from blast_env.scenario import Scenario
 from blast_env.tables import markdown_table
+from blast_env.units import MS_PER_S
 
 E1300: Final = (
     (4.57, 2.0, 2.0, 1.048),
@@ -65,15 +83,319 @@ def halved_peaks(impulse_pa_s: float = 60.0) -> Iterator[Row]:
         yield f"{thickness_mm:g} mm, 1.2 x 1.5 m", *shares
 
 
-def main() -> None:
-    """Print the tables."""
+def step_and_ramp_factors() -> Iterator[Row]:
+    """Yield a row a load that stays: its dynamic load factor in closed form, and integrated."""
+    system = System(100.0, 1.0, Resistance.elastic_plastic(_STIFFNESS_PA_M, 1e12))
+    for share in (0.0, 0.25, 0.75, 1.5, 3.2):
+        closed = 2.0 if share == 0.0 else 1.0 + abs(sin(pi * share)) / (pi * share)
+        rise_s, end_s = share * system.period_s, (share + 4.0) * system.period_s
+        times = [0.0, end_s] if share == 0.0 else [0.0, rise_s, end_s]
+        load = [_STATIC_PA] * 2 if share == 0.0 else [0.0, _STATIC_PA, _STATIC_PA]
+        found = responses([system], np.array(times), np.array([load]))
+        own = float(found.peak_m[0]) * _STIFFNESS_PA_M / _STATIC_PA
+        yield ("step" if share == 0.0 else f"ramp, {share:g}"), f"{closed:.3f}", f"{own:.3f}"
+
+
+def ductilities() -> Iterator[Row]:
+    """Yield a row a point of Biggs' chart of triangles: ductility by scipy, and here.
+
+    The last two are its asymptotes: an impulse, by energy, and a sudden load that stays, by work.
+    """
+    mass = 100.0
+    for resistance, share in product((0.3, 0.5, 0.8, 1.2), (0.2, 0.6, 2.0)):
+        cap = resistance * _STATIC_PA
+        system = System(mass, 1.0, Resistance.elastic_plastic(_STIFFNESS_PA_M, cap))
+        td, yield_m = share * system.period_s, cap / _STIFFNESS_PA_M
+
+        def motion(
+            t: float, state: FloatArray, td: float = td, yield_m: float = yield_m
+        ) -> list[float]:
+            _, v, elastic = state
+            load = max(_STATIC_PA * (1.0 - t / td), 0.0)
+            yields = (elastic >= yield_m and v > 0.0) or (elastic <= -yield_m and v < 0.0)
+            return [v, (load - _STIFFNESS_PA_M * elastic) / mass, 0.0 if yields else v]
+
+        ends, step = td + 5.0 * system.period_s, system.period_s / 2000.0
+        solved = solve_ivp(motion, (0.0, ends), [0.0] * 3, max_step=step, rtol=1e-8)
+        found = responses([system], np.array([0.0, td]), np.array([[_STATIC_PA, 0.0]]))
+        own = float(found.peak_m[0]) / yield_m
+        point = f"resistance {resistance:g} of the peak, duration {share:g} of the period"
+        yield point, f"{solved.y[0].max() / yield_m:.2f}", f"{own:.2f}"
+    cap, yield_m = 1e4, 1e4 / _STIFFNESS_PA_M
+    system = System(mass, 1.0, Resistance.elastic_plastic(_STIFFNESS_PA_M, cap))
+    impulse, short_s = float(np.sqrt(2.0 * mass * cap * yield_m * 4.5)), system.period_s / 500.0
+    load = np.array([[2.0 * impulse / short_s, 0.0]])
+    own = float(responses([system], np.array([0.0, short_s]), load).peak_m[0]) / yield_m
+    yield "impulse of ductility 5, by energy", "5.00", f"{own:.2f}"
+    load = np.full((1, 2), 0.8 * cap)
+    own = float(responses([system], np.array([0.0, 60.0 * system.period_s]), load).peak_m[0])
+    yield "sudden load of 0.8 of the resistance that stays, by work", "2.50", f"{own / yield_m:.2f}"
+
+
+def side_on_values() -> Iterator[Row]:
+    """Yield a row a scaled distance: side-on values worked back from reflected ones, over KB's."""
+    for scaled in (3.0, 5.0, 7.0, 10.0, 15.0, 20.0):
+        peak, reflected, impulse, reflected_i = (
+            float(kingery_bulmash(quantity, scaled, 1.0, "hemispherical"))
+            for quantity in (
+                *("incident_overpressure", "reflected_overpressure"),
+                *("incident_impulse", "reflected_impulse"),
+            )
+        )
+        of_peak = side_on_peak_pa(np.array([reflected])).item() / peak
+        of_impulse = side_on_impulse_pa_s(np.array([reflected_i])).item() / impulse
+        yield f"{scaled:g}", f"{of_peak:.3f}", f"{of_impulse:.3f}"
+
+
+# With blasts: a wall in the open before a charge on the ground.
+
+OPEN_KG: Final = 30.0
+OPEN_M: Final = 22.0
+PERIODS_S: Final = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
+FRONT_KG: Final = 100.0
+FRONT_M: Final = 30.0
+
+
+def open_wall(stand_off_m: float, width_m: float, height_m: float, tnt_kg: float) -> Scenario:
+    """Return a charge on the ground before the middle of a wall, in the open."""
+    middle_m = 0.5 * width_m + 4.0
+    office = {
+        "kind": "ModularObstacle",
+        "name": "office",
+        "corner_m": [4.0 + stand_off_m, 4.0],
+        "rows": round(2.0 * width_m),
+        "columns": 4,
+        "height_m": height_m,
+        "protected": True,
+        "faces": ["west"],
+        "facade": {"wall": "brick_215", "glazing": "window_annealed_6"},
+    }
+    document = {
+        "schema_version": 2,
+        "name": "open",
+        "site": {
+            "width_m": stand_off_m + 7.0,
+            "height_m": width_m + 8.0,
+            "air_height_m": height_m + 5.0,
+        },
+        "charge": [{"kind": "point", "position_m": [4.0, middle_m], "tnt_kg": tnt_kg}],
+        "structures": [office],
+    }
+    return Scenario.from_document(document, "open")
+
+
+def facade_on(site: Scenario, cell_m: float) -> FacadeResponse:
+    """Return what a blast with such cells does to the facade of a site."""
+    loads = GasBlast(site, engine=GasEngine(cell_m=cell_m)).run().bay_loads
+    assert loads is not None
+    return loads.response
+
+
+def filled_with(bays: list[Bay], name: str) -> list[FilledBay]:
+    """Return bays with a component of the catalogue."""
+    component = catalogue()[name]
+    if isinstance(component, Glazing):
+        return [FilledBay(bay, glazing=component) for bay in bays]
+    return [FilledBay(bay, wall=component) for bay in bays]
+
+
+def curve_histories(
+    bays: list[Bay], stand_off_m: float, tnt_kg: float, middle_m: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return triangles with Kingery and Bulmash's reflected peak and impulse at each bay.
+
+    At the distance of its middle, as if it faced the charge; Friedlander's negative phase is left
+    out, as are the edges of the wall.
+    """
+    distance_m = np.array(
+        [
+            np.sqrt(
+                stand_off_m**2
+                + (0.5 * (bay.left_m + bay.right_m) - middle_m) ** 2
+                + (0.5 * (bay.floor_m + bay.top_m)) ** 2
+            )
+            for bay in bays
+        ]
+    )
+    peak, impulse = (
+        kingery_bulmash(quantity, distance_m, tnt_kg, "hemispherical")
+        for quantity in ("reflected_overpressure", "reflected_impulse")
+    )
+    lasts_s = 2.0 * np.asarray(impulse) / np.asarray(peak)
+    time_s = np.unique(np.concatenate([[0.0], lasts_s, [2.0 * lasts_s.max()]]))
+    falls = np.maximum(1.0 - time_s[np.newaxis, :] / lasts_s[:, np.newaxis], 0.0)
+    return time_s, np.asarray(peak)[:, np.newaxis] * falls
+
+
+def period_rows(found: dict[float, FacadeResponse]) -> Iterator[Row]:
+    """Yield a row a period: deflection of elastic components over that on the finest cells."""
+    cells = sorted(found, reverse=True)
+    for period_s in PERIODS_S:
+        stiffness = (2.0 * pi / period_s) ** 2 * 50.0
+        system = System(50.0, 1.0, Resistance.elastic_plastic(stiffness, 1e12))
+        peaks = {}
+        for cell_m in cells:
+            facade = found[cell_m]
+            systems = [system] * len(facade.bays)
+            peaks[cell_m] = responses(systems, facade.time_s, facade.pressure_pa).peak_m
+        ratios = ((peaks[cell_m] / peaks[cells[-1]]).mean() for cell_m in cells)
+        yield f"{MS_PER_S * period_s:g} ms", *(f"{ratio:.2f}" for ratio in ratios)
+
+
+def component_rows(found: dict[float, FacadeResponse], tnt_kg: float) -> Iterator[Row]:
+    """Yield a row a component: the level that the worst bay allows, by the cells.
+
+    Coarser ones also with histories that are sharpened by `peak_factor`.
+    """
+    cells = sorted(found, reverse=True)
+    for name in catalogue():
+        levels = []
+        for cell_m in cells:
+            facade = found[cell_m]
+            bays = filled_with([each.bay for each in facade.bays], name)
+            histories = facade.time_s, facade.pressure_pa
+            own = respond(bays, *histories).level_of_protection
+            sharper = sharpened(*histories, peak_factor(cell_m, tnt_kg))
+            worse = min(own, respond(bays, *sharper).level_of_protection)
+            levels.append(own.label if worse == own else f"{own.label} ({worse.label})")
+        yield name, *levels
+
+
+def peak_rows(found: dict[float, FacadeResponse], reference_pa: FloatArray) -> Iterator[Row]:
+    """Yield a row a size of cells: peaks and impulses, over the curves and over the finest."""
+    finest = found[min(found)]
+    fine = np.trapezoid(np.maximum(finest.pressure_pa, 0.0), finest.time_s, axis=1)
+    for cell_m, facade in sorted(found.items(), reverse=True):
+        impulse = np.trapezoid(np.maximum(facade.pressure_pa, 0.0), facade.time_s, axis=1)
+        ratio = (facade.pressure_pa.max(axis=1) / reference_pa).mean()
+        allowed = 1.0 / peak_factor(cell_m, OPEN_KG)
+        yield f"{cell_m:g} m", f"{ratio:.2f}", f"{allowed:.2f}", f"{(impulse / fine).mean():.3f}"
+
+
+app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
+
+
+@app.callback(invoke_without_command=True)
+def tables(context: typer.Context) -> None:
+    """Print the tables that need no blast."""
+    if context.invoked_subcommand is not None:
+        return
     loads = ("annealed pane, least thickness", "E1300, kPa", "here, kPa", "ratio")
     print_line(markdown_table(loads, non_factored_loads()))
     factors = ("duration over period", "closed form", "here")
     print_line("\n" + markdown_table(factors, load_factors()))
+    stays = ("load that stays, rise over period", "closed form", "here")
+    print_line("\n" + markdown_table(stays, step_and_ramp_factors()))
+    charts = ("elastic-plastic system", "ductility", "here")
+    print_line("\n" + markdown_table(charts, ductilities()))
     peaks = ("annealed pane, 60 Pa s", "break, 8 kPa", "break, 4 kPa")
     print_line("\n" + markdown_table(peaks, halved_peaks()))
+    side_on = ("m/kg^(1/3)", "side-on peak over the curve", "side-on impulse over the curve")
+    print_line("\n" + markdown_table(side_on, side_on_values()))
+
+
+@app.command()
+def cells(
+    finest: Annotated[float, typer.Option(help="Side of the finest cells, m.")] = 0.125,
+) -> None:
+    """Print what the cells do to the response: 30 kg on the ground, 22 m before a wall."""
+    with user_errors():
+        site = open_wall(OPEN_M, 6.0, 3.5, OPEN_KG)
+        sides_m = [each for each in (0.5, 0.25, 0.125) if each >= finest]
+        found = {}
+        with progress_bar("cells") as progress:
+            for number, cell_m in enumerate(sides_m, start=1):
+                found[cell_m] = facade_on(site, cell_m)
+                progress(number / len(sides_m))
+        bays = [each.bay for each in found[sides_m[0]].bays]
+        _, curves = curve_histories(bays, OPEN_M, OPEN_KG, 7.0)
+        headers = ("cells", "peak over the curve", "allowed for", "impulse over the finest")
+        print_line(markdown_table(headers, peak_rows(found, curves.max(axis=1))))
+        words = [f"{each:g} m" for each in sides_m]
+        print_line("\n" + markdown_table(("period", *words), period_rows(found)))
+        levels = markdown_table(("component", *words), component_rows(found, OPEN_KG))
+        print_line("\nlevel of protection, in brackets if sharper peaks make it worse\n\n" + levels)
+
+
+@app.command()
+def curves(
+    cell: Annotated[float, typer.Option(help="Side of the cells, m.")] = 0.25,
+) -> None:
+    """Print how often gas and Kingery and Bulmash's curves agree on 50 bays in the open."""
+    with user_errors():
+        site = open_wall(FRONT_M, 30.0, 17.5, FRONT_KG)
+        facade = facade_on(site, cell)
+        bays = [each.bay for each in facade.bays]
+        histories = facade.time_s, facade.pressure_pa
+        sharper = sharpened(*histories, peak_factor(cell, FRONT_KG))
+        push = histories[0], np.maximum(histories[1], 0.0)
+        by_curves = curve_histories(bays, FRONT_M, FRONT_KG, 19.0)
+        rows = []
+        for name in catalogue():
+            filled = filled_with(bays, name)
+            gas, sharp, pushed, curve = (
+                _levels(respond(filled, *each)) for each in (histories, sharper, push, by_curves)
+            )
+            worst = np.minimum(np.minimum(gas, sharp), pushed)
+            shares = ((gas == curve), (pushed == curve), (worst <= curve))
+            rows.append((name, *(f"{share.mean():.0%}" for share in shares)))
+        headers = (
+            *("component", "same level", "same, without suction"),
+            "same or worse, by the worst of all",
+        )
+        print_line(f"{len(bays)} bays, cells of {cell:g} m")
+        print_line(markdown_table(headers, rows))
+
+
+def _levels(facade: FacadeResponse) -> FloatArray:
+    found = facade.glass_levels or facade.wall_levels
+    return np.array([float(found[index]) for index in range(len(facade.bays))])
+
+
+@app.command()
+def recording(
+    repeats: Annotated[int, typer.Option(min=1, help="Blasts of each kind.")] = 5,
+) -> None:
+    """Print what recording bays and pieces costs: processor time, and memory."""
+    with user_errors():
+        site, layout = recorded_site()
+        blasts: dict[str, Callable[[GasBlast], object]] = {
+            "nothing but loads": _run_alone,
+            "bays and both sides of the pieces": GasBlast.run,
+        }
+        times: dict[str, list[float]] = {name: [] for name in blasts}
+        for _ in range(repeats + 1):  # the first blast compiles
+            for name, run in blasts.items():
+                blast = GasBlast(site, layout)
+                begin = process_time()
+                run(blast)
+                times[name].append(process_time() - begin)
+        rows = [(name, f"{min(each[1:]):.2f}") for name, each in times.items()]
+        print_line(markdown_table(("recorded", "processor s, least of the blasts"), rows))
+        result = GasBlast(site, layout).run()
+        assert result.bay_loads is not None
+        assert result.piece_loads is not None
+        recorders = result.bay_loads.recorder, result.piece_loads.recorder
+        patches, steps = sum(len(each.faces) for each in recorders), result.steps
+        print_line(f"{patches} histories of {steps} steps: {4e-6 * patches * steps:.2f} MB")
+
+
+def recorded_site() -> tuple[Scenario, Layout]:
+    """Return a forecourt with an office of 90 bays behind twelve walls."""
+    document = open_wall(22.0, 20.0, 10.5, 60.0).model_dump(mode="json")
+    document["structures"][0] |= {"columns": 24, "faces": ["west", "south", "north"]}
+    document["site"]["width_m"] = 42.0
+    item = {"from_catalogue": "t_wall_3_6", "stock": 20}
+    zone = {"corner_m": [9.0, 5.0], "rows": 36, "columns": 8, "items": [item]}
+    site = Scenario.from_document(document | {"build_zone": zone}, "forecourt")
+    return site, tuple(Piece(3 * row, 2, "t_wall_3_6", True) for row in range(12))
+
+
+def _run_alone(blast: GasBlast) -> None:
+    """Run a blast with nothing but its loads and gauges."""
+    run = blast.engine.start_on(blast.site)
+    run.advance(float("inf"))
 
 
 if __name__ == "__main__":
-    main()
+    app()

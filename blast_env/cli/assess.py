@@ -120,11 +120,8 @@ class AssessCommand(ChargeOptions):
             f"{scenario.name}, {name}: {'PASSES' if judged.passes(target) else 'FAILS'} level "
             f"{target.label!r} under {count} charges"
         )
-        if judged.depends_on_cells(target):
-            print_line(
-                "This verdict depends on the cells: with peaks as sharp as Kingery and Bulmash's "
-                "it FAILS. Take smaller ones (--cell)."
-            )
+        for doubt in judged.doubts(target):
+            print_line(f"but it FAILS {doubt}")
 
     def _print(self, scenario: Scenario, found: dict[str, Consequences]) -> None:
         table = make_table(f"{scenario.name}: the worst of all charges", _HEADERS, text_columns=3)

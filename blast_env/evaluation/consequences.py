@@ -33,6 +33,9 @@ from blast_env.tables import Column, table_of
 if TYPE_CHECKING:  # a third of a second to import
     import pandas as pd
 
+_SHARPER: Final = "with peaks as sharp as Kingery and Bulmash's: take smaller cells"
+_NO_SUCTION: Final = "without the suction that follows the blast and pulls walls back"
+
 _CELLS_OF_HALF_A_PEAK: Final = 9.3
 """Cells per m/kg^(1/3) of a charge with which peaks are about half of Kingery and Bulmash's."""
 
@@ -72,6 +75,12 @@ class BuildingResponse:
         found = self.facade
         histories = sharpened(found.time_s, found.pressure_pa, self.peak_factor)
         return respond(found.bays, *histories)
+
+    @cached_property
+    def without_suction(self) -> FacadeResponse:
+        """What would become of its bays if no suction followed the blast and pulled them back."""
+        found = self.facade
+        return respond(found.bays, found.time_s, np.maximum(found.pressure_pa, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,14 +125,23 @@ class Consequences:
         """Return the level of protection that a building reaches under every charge."""
         return min(each.facade.level_of_protection for each in self.of(building))
 
-    def sharpened_level(self, building: str) -> LevelOfProtection:
-        """Return the level that it would reach with peaks that cells do not clip."""
-        return min(each.sharpened.level_of_protection for each in self.of(building))
+    def doubts(self, target: LevelOfProtection) -> tuple[str, ...]:
+        """Return under which other assumptions a verdict that passes would fail, in words.
 
-    def depends_on_cells(self, target: LevelOfProtection) -> bool:
-        """Return whether sharper peaks would turn the verdict on a level."""
-        levels = [self.sharpened_level(building) for building in self.buildings]
-        return self.passes(target) and min(levels, default=target) < target
+        Args:
+            target: The level that the buildings reach.
+        """
+        if not self.passes(target):
+            return ()
+        others = {
+            _SHARPER: [each.sharpened for each in self.responses],
+            _NO_SUCTION: [each.without_suction for each in self.responses],
+        }
+        return tuple(
+            words
+            for words, facades in others.items()
+            if any(facade.level_of_protection < target for facade in facades)
+        )
 
     @property
     def worst_neighbours(self) -> tuple[Neighbour, ...]:
