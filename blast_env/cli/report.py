@@ -1,20 +1,20 @@
 """`blast-env report`: what an engineer hands over."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.progress import BarColumn, Progress, TextColumn
-
+from blast_env.app.cost import CostGuess, cost_of_blast, cost_words
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import SCENARIO_HELP, CacheOptions, ProcessOptions
-from blast_env.cli.output import (
-    message_console,
-    print_line,
-)
+from blast_env.cli.output import message_console, print_line, progress_bar
 from blast_env.engines import JUDGE, find_engine
+from blast_env.errors import UnknownNameError
+from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
-from blast_env.scenario import load_layout, load_scenario
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.scenario import Scenario, check_layout, load_layout, load_scenario
 
 if TYPE_CHECKING:
     from blast_env.reporting import StudyOptions
@@ -24,8 +24,10 @@ if TYPE_CHECKING:
 class ReportCommand(ProcessOptions, CacheOptions):
     """Report on a layout by gas dynamics: HTML that needs nothing else, and PDF.
 
-    Site and threats, bill of quantities, loads with two sizes of cells, facades, film stills, what
-    each item is worth, other masses and places, limits, validity, and everything to repeat it.
+    A verdict first, then what was assumed: site and threats, bill of quantities, loads with two
+    sizes of cells, damage, film stills, what each item is worth, other masses and places, where
+    every number comes from, and everything to repeat it. Stopped (Ctrl-C) after the loads, it
+    writes what is done.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -49,6 +51,9 @@ class ReportCommand(ProcessOptions, CacheOptions):
         flag="--limit",
         metavar="NAME=IMPULSE,PEAK",
     )
+    target: str = option(
+        "low", "Level of protection that buildings with facades must reach: very low to high."
+    )
     units: str = option("si", "si (Pa s, kPa) or psi (psi ms, psi).")
     front: Path | None = option(None, "front.csv of `blast-env search --method nsga2`.")
     places: int = option(5, "Other places of each charge source.")
@@ -65,14 +70,15 @@ class ReportCommand(ProcessOptions, CacheOptions):
 
         check_targets(self.out, self.pdf)
         options = self._study_options()
-        columns = (TextColumn("{task.description}"), BarColumn())
-        with Progress(*columns, console=message_console(), transient=True) as progress:
-            task = progress.add_task("report", total=1.0)
-
-            def tell(what: str, share: float) -> None:
-                progress.update(task, description=what, completed=share)
-
-            study = run_study(scenario, layout, options, tell)
+        check_layout(scenario, layout)
+        parts = _costs(scenario, layout, options)
+        message_console().print(cost_words([cost for _, costs in parts for cost in costs]))
+        with progress_bar(f"report on {scenario.name}") as progress:
+            study = run_study(scenario, layout, options, _told(parts, progress))
+        if study.stopped:
+            message_console().print(
+                f"stopped before: {study.stopped}; what was done by then is written"
+            )
         coarse_m, fine_m = self.cells_m
         print_line(f"{find_engine(JUDGE, coarse_m).describe()} and of {fine_m:g} m")
         for path in write_report(study, self.out, self.pdf):
@@ -88,4 +94,39 @@ class ReportCommand(ProcessOptions, CacheOptions):
         given["charges"] = tuple(Charge((x_m, y_m), tnt_kg) for x_m, y_m, tnt_kg in self.charges)
         given["limits"] = tuple(Limit.parsed(text, units) for text in self.limits)
         given["units"] = units
+        levels = {level.label: level for level in LevelOfProtection}
+        if self.target not in levels:
+            raise UnknownNameError("level of protection", self.target, levels)
+        given["target"] = levels[self.target]
         return StudyOptions(**given)
+
+
+_Parts = tuple[tuple[str, list[CostGuess]], ...]
+
+
+def _costs(scenario: Scenario, layout: Layout, options: "StudyOptions") -> _Parts:
+    """Return what each part of a report costs, about."""
+    from blast_env.reporting.study import blasts_of, threats_of
+
+    threats = threats_of(scenario, options)
+    worst = threats[0].charge
+    return tuple(
+        (label, [cost_of_blast(scenario, worst, cell_m)] * count)
+        for label, count, cell_m in blasts_of(scenario, layout, options, threats)
+    )
+
+
+def _told(parts: _Parts, progress: Callable[[float], None]) -> Callable[[str, float], None]:
+    """Return what turns the share of a part that is done into that of the whole."""
+    costs_s = {label: sum(each.seconds for each in costs) for label, costs in parts}
+    whole_s = sum(costs_s.values())
+
+    def tell(label: str, share: float) -> None:
+        before_s = 0.0
+        for each, cost_s in costs_s.items():
+            if label == each:
+                progress(min((before_s + share * cost_s) / whole_s, 1.0))
+                return
+            before_s += cost_s
+
+    return tell

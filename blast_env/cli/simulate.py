@@ -78,6 +78,12 @@ class SimulateCommand(ChargeOptions, JsonOptions):
         writes=PICTURES,
         panel=_GAS_PANEL,
     )
+    risk_map: Path | None = option(
+        None,
+        "Write a map of where windows and eardrums are at risk.",
+        writes=PICTURES,
+        panel=_GAS_PANEL,
+    )
     quantity: str | None = option(
         None, "impulse or peak: what --heat-map shows.", show_default="impulse", panel=_GAS_PANEL
     )
@@ -371,7 +377,8 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
     @property
     def _recorders(self) -> "Recorders":
         """What records the ground, where a map of it is wanted."""
-        if self.command.impulse_map is None and self.command.peak_map is None:
+        asked = self.command
+        if not any((asked.impulse_map, asked.peak_map, asked.risk_map)):
             return lambda _: ()
         from blast_env.rendering.ground_map import ground_recorders
 
@@ -399,12 +406,13 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
     def write_pictures(self, result: "GasResult", bare: "GasResult | None") -> list[Path]:
         """Write the pictures; the empty site is in each beside the other."""
         asked = self.command
-        if not any((asked.heat_map, asked.history, asked.impulse_map, asked.peak_map)):
+        maps = (asked.impulse_map, asked.peak_map, asked.risk_map)
+        if not any((asked.heat_map, asked.history, *maps)):
             return []
         # Here, because pictures need the extra `render`.
         from blast_env.rendering import gas
         from blast_env.rendering.figures import save_figure
-        from blast_env.rendering.ground_map import ground_map
+        from blast_env.rendering.ground_map import ground_map, threshold_map
 
         kind = gas.kind_of(asked.quantity or "impulse")
         gauge = asked.gauge or next((each.name for each in self.blast.site.gauges), "")
@@ -413,6 +421,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
             (asked.history, lambda: gas.gauge_history(result, gauge, free_field=True, beside=bare)),
             (asked.impulse_map, lambda: ground_map(result, "impulse", bare)),
             (asked.peak_map, lambda: ground_map(result, "peak", bare)),
+            (asked.risk_map, lambda: threshold_map(result, bare)),
         )
         return [save_figure(draw(), path) for path, draw in pictures if path is not None]
 

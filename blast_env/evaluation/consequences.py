@@ -33,6 +33,8 @@ from blast_env.tables import Column, table_of
 if TYPE_CHECKING:  # a third of a second to import
     import pandas as pd
 
+    from blast_env.engines.gas import GasResult
+
 _SHARPER: Final = "with peaks as sharp as Kingery and Bulmash's: take smaller cells"
 _NO_SUCTION: Final = "without the suction that follows the blast and pulls walls back"
 
@@ -111,6 +113,16 @@ class Consequences:
     responses: tuple[BuildingResponse, ...]
     neighbours: tuple[Neighbour, ...] = ()
     barriers: tuple[BarrierResponse, ...] = ()
+
+    @classmethod
+    def together(cls, parts: Iterable["Consequences"]) -> "Consequences":
+        """Return what several charges do, of which each has its own."""
+        every = list(parts)
+        return cls(
+            tuple(each for part in every for each in part.responses),
+            tuple(each for part in every for each in part.neighbours),
+            tuple(each for part in every for each in part.barriers),
+        )
 
     @property
     def buildings(self) -> tuple[str, ...]:
@@ -270,20 +282,37 @@ def consequences(
         )
     if not engine.has_peaks:
         raise BlastEnvError(f"engine {engine.name!r} knows no overpressure: must be 'gas'")
-    responses: list[BuildingResponse] = []
-    neighbours: list[Neighbour] = []
-    barriers: list[BarrierResponse] = []
+    parts: list[Consequences] = []
     every = list(charges)
     for number, charge in enumerate(every, start=1):
         where = charge_against(found, layout, charge)
         result, fallen = _blast(found, tuple(layout), charge, where, engine, without_fallen)
-        factor = peak_factor(result.run.grid.cell_m, where.tnt_kg)
-        responses += by_building(found, result.bay_loads.response, where, factor)
-        neighbours += neighbours_of(found, result, where)
-        barriers.append(BarrierResponse(where, result.pieces, fallen))
+        parts.append(consequences_of(found, result, where, fallen))
         if progress is not None:
             progress(number / len(every))
-    return Consequences(tuple(responses), tuple(neighbours), tuple(barriers))
+    return Consequences.together(parts)
+
+
+def consequences_of(
+    scenario: Scenario, result: "GasResult", charge: Charge, taken_away: Layout = ()
+) -> Consequences:
+    """Return what a blast that was run does to the buildings and the barrier.
+
+    Args:
+        scenario: The scenario.
+        result: The blast.
+        charge: The charge where it went off.
+        taken_away: Pieces that were taken away for it.
+    """
+    responses: list[BuildingResponse] = []
+    if result.bay_loads is not None and result.bay_loads.bays:
+        factor = peak_factor(result.run.grid.cell_m, charge.tnt_kg)
+        responses = by_building(scenario, result.bay_loads.response, charge, factor)
+    return Consequences(
+        tuple(responses),
+        tuple(neighbours_of(scenario, result, charge)),
+        (BarrierResponse(charge, result.pieces, taken_away),),
+    )
 
 
 def _blast(

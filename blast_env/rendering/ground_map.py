@@ -1,17 +1,19 @@
 """Maps of the ground: peak overpressure and impulse of a blast of the gas engine."""
 
 from collections.abc import Sequence
+from math import cbrt, inf, isfinite
 from typing import Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.calibration.references import Burst, kingery_bulmash
 from blast_env.engines.gas import GasResult
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.opening import Opening, opening_of
 from blast_env.physics.gas.probes import GroundMap
-from blast_env.physics.scene import BlastSite
+from blast_env.physics.scene import BlastSite, Charge
 from blast_env.plan import BORDER, INK, Feature, Kinds, blast_features, without, without_counts
 from blast_env.rendering.gas import (
     Quantity,
@@ -31,16 +33,19 @@ from blast_env.rendering.site_plan import (
     write_names,
 )
 from blast_env.rendering.style import number_on_axis, render_extra, short_number, unit_interval
+from blast_env.response.buildings import GroundThreshold, ground_thresholds
+from blast_env.units import PA_PER_KPA
 
 with render_extra():
     from matplotlib import patheffects
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize
     from matplotlib.contour import QuadContourSet
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Circle
+    from matplotlib.patches import Circle, Patch
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 _LEVELS: Final = {"few": (1.0, 2.0, 5.0), "many": (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)}
@@ -48,6 +53,7 @@ _FEW_LEVELS: Final = 7
 _NUMBER_CLEAR: Final = 0.025  # of the site's width
 _MOST_OF_THE_GROUND: Final = 0.93
 _MAP_WIDTHS_IN: Final = (6.0, 7.4)
+_RISKS: Final = ("#fdeec2", "#f9c46b", "#d9682b", "#7a1f2b")  # darker is worse
 _FINER: Final = "spherical stage, finer than the grid"
 _MAP_HEIGHTS_IN: Final = (3.4, 7.0)
 
@@ -160,6 +166,82 @@ def ground_map(
     for axes, each in zip(plans, results, strict=True):
         write_names(axes, _features(each))
     return figure
+
+
+def threshold_map(result: GasResult, beside: GasResult | None = None) -> Figure:
+    """Return a map of where windows and eardrums are at risk, so that people can be sent elsewhere.
+
+    Regions by the peak overpressure on the ground, as the cells have it; dashed, how far each
+    threshold reaches in the open by Kingery and Bulmash's curves, which no cell clips.
+
+    Args:
+        result: A blast that was run with `ground_recorders`.
+        beside: Another result with the same site and charge, drawn to the left.
+
+    Raises:
+        BlastEnvError: If a blast was run without the recorders, or site or charge differ.
+    """
+    results, thresholds = both_results(result, beside), ground_thresholds()
+    width_in, height_in = _map_size_in(result.run.site, len(results))
+    figure = Figure(figsize=(width_in, height_in + 0.9), layout="constrained")
+    plans = figure.subplots(1, len(results), squeeze=False, sharex=True, sharey=True)[0]
+    levels = [each.peak_pa for each in thresholds]
+    for axes, each in zip(plans, results, strict=True):
+        features, site_m = _features(each), each.run.site.site_m
+        draw_plan(axes, [feature for feature in features if feature.kind is Kinds.SITE])
+        x_m, y_m, inside = _on_site(each, ground_values(each, "peak"))
+        shown = axes.contourf(
+            x_m, y_m, inside.T, levels=[*levels, np.inf], colors=_RISKS, extend="neither", zorder=1
+        )
+        shown.set_clip_path(axes.patches[0])
+        reach = 0.03 * max(site_m.right, site_m.top)
+        axes.set_xlim(site_m.left - reach, site_m.right + reach)
+        axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
+        for threshold in thresholds:
+            distance_m = open_distance_m(threshold.peak_pa, each.run.site.charge)
+            if not isfinite(distance_m):
+                continue
+            circle = Circle(each.run.site.charge.position_m, distance_m, fill=False, zorder=2)
+            circle.set(edgecolor="0.15", linewidth=1.2, linestyle=(0, (4.0, 2.0)))
+            axes.add_patch(circle)
+            circle.set_clip_path(axes.patches[0])
+        draw_features(axes, without(features, Kinds.SITE))
+        add_outline(axes, site_m, edgecolor=unit_interval(BORDER), linewidth=1.8)
+        if beside is not None:
+            axes.set_title(layout_words(each.blast), fontsize=11)
+    handles: list[Artist] = [
+        Patch(facecolor=colour, edgecolor="0.4", label=_risk_words(each, result.run.site.charge))
+        for each, colour in zip(thresholds, _RISKS, strict=True)
+    ]
+    handles.append(
+        Line2D([], [], color="0.15", linestyle=(0, (4.0, 2.0)), label="the same in the open, curve")
+    )
+    write_legend(figure, [*handles, *legend_of(without_counts(_features(result)))])
+    title, subtitle = gas_heading(results, "where windows and eardrums are at risk")
+    write_heading(figure, title, f"{subtitle}; cells clip peaks: dashed is the safe side")
+    for axes, each in zip(plans, results, strict=True):
+        write_names(axes, _features(each))
+    return figure
+
+
+def open_distance_m(peak_pa: float, charge: Charge) -> float:
+    """Return how far a side-on peak reaches in the open, by Kingery and Bulmash's curves, m.
+
+    Infinite beyond where they end, at some 40 m/kg^(1/3).
+    """
+    burst: Burst = "hemispherical" if charge.height_m == 0.0 else "spherical"
+    scaled = np.geomspace(0.21, 39.5, 400)
+    peaks = kingery_bulmash("incident_overpressure", scaled, 1.0, burst)
+    if peak_pa < peaks[-1]:
+        return inf
+    found = np.interp(-np.log(peak_pa), -np.log(np.asarray(peaks)), np.log(scaled))
+    return float(np.exp(found) * cbrt(charge.tnt_kg))
+
+
+def _risk_words(threshold: GroundThreshold, charge: Charge) -> str:
+    distance_m = open_distance_m(threshold.peak_pa, charge)
+    reach = f"{distance_m:.0f} m in the open" if isfinite(distance_m) else "farther than the curves"
+    return f"{threshold.words}: from {threshold.peak_pa / PA_PER_KPA:.3g} kPa, {reach}"
 
 
 def _features(result: GasResult) -> tuple[Feature, ...]:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.engines.gas import GasBlast
+from blast_env.evaluation.consequences import Consequences
 from blast_env.geometry import Layout
 from blast_env.physics.gas.settings import ROOF
 from blast_env.physics.scene import Charge
@@ -21,9 +22,12 @@ from blast_env.plan import (
     vehicle_features,
     without,
 )
+from blast_env.rendering.facade import damage_view, facade_picture
 from blast_env.rendering.gas import KINDS, Kind, facades
+from blast_env.rendering.ground_map import threshold_map
 from blast_env.rendering.pressure_film import record_planes, scale_end_kpa
 from blast_env.rendering.pressure_frames import PressurePainter, default_section
+from blast_env.rendering.pressure_impulse import pressure_impulse_diagram
 from blast_env.rendering.site_plan import (
     draw_plan,
     legend_of,
@@ -178,6 +182,39 @@ def _history(
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize=9, frameon=False)
     return f"{target.name}: overpressure over time, mean over its {wall} wall", png(figure)
+
+
+def damage_pictures(
+    scenario: Scenario, layout: Layout, bare: Consequences, walled: Consequences, threat: str
+) -> tuple[Picture, ...]:
+    """Return the damage of buildings with facades under one threat, without the layout and with it.
+
+    The site in three dimensions, each building unfolded, and its pressure-impulse diagram.
+    """
+    if not walled.responses:
+        return ()
+    words = ("no barrier", "layout")
+    views = [
+        (words[0], (), bare.responses),
+        (words[1], layout, walled.responses),
+    ]
+    pictures = [("damage of the facades", png(damage_view(scenario, views, threat)))]
+    for first, second in zip(bare.responses, walled.responses, strict=True):
+        name = second.building
+        rows = list(zip(words, (first, second), strict=True))
+        pictures.append((f"{name}: facades unfolded", png(facade_picture(rows, name))))
+        points = [(each, response.facade) for each, response in rows]
+        diagram = pressure_impulse_diagram(points, name)
+        pictures.append((f"{name}: pressure-impulse diagram", png(diagram)))
+    return tuple(pictures)
+
+
+def risk_picture(bare: MeasuredBlast, walled: MeasuredBlast) -> Picture:
+    """Return where windows and eardrums are at risk, without the layout where the charge stays."""
+    charges = (bare.result.run.site.charge, walled.result.run.site.charge)
+    beside = bare.result if charges[0] == charges[1] else None
+    figure = threshold_map(walled.result, beside)
+    return "where windows and eardrums are at risk: for the choice of assembly points", png(figure)
 
 
 def film_stills(

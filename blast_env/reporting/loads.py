@@ -288,5 +288,7 @@ def measure(
 ) -> MeasuredBlast:
     """Run a blast and return the loads on buildings."""
     histories = WallHistories(targets)
-    result = blast.run(progress, lambda _: (histories,))
+    from blast_env.physics.gas.probes import GroundMap  # Numba takes half a second to import
+
+    result = blast.run(progress, lambda grid: (histories, GroundMap(grid)))
     return MeasuredBlast(result, histories, tuple(targets))

@@ -1,6 +1,7 @@
 """The report as HTML that needs nothing else, and as PDF."""
 
 from base64 import b64encode
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -25,11 +26,13 @@ from blast_env.reporting.figures import (
     site_plan,
     worth_map,
 )
-from blast_env.reporting.outcomes import Limit, LoadPair
+from blast_env.reporting.outcomes import LoadPair
 from blast_env.reporting.study import Study
 from blast_env.reporting.threats import other_places
+from blast_env.reporting.verdict import ReportVerdict, verdict_of
+from blast_env.response.buildings import BuildingDamage
 from blast_env.scenario import write_layout
-from blast_env.units import MS_PER_S
+from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with import_extra("report", "reports"):
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -122,16 +125,6 @@ def report_html(study: Study, commands: list[str]) -> str:
     return environment.get_template(_TEMPLATE).render(_context(study, commands))
 
 
-@dataclass(frozen=True)
-class _Verdict:
-    """Whether a building keeps its limit under a threat."""
-
-    limit: Limit
-    pair: LoadPair
-    kept: bool
-    kept_bare: bool
-
-
 def _context(study: Study, commands: list[str]) -> dict[str, Any]:
     """Return what the template shows."""
     scenario, options = study.scenario, study.options
@@ -141,6 +134,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
     places = [
         each.against(scenario, study.layout) for each in other_places(scenario, options.places)
     ]
+    verdict, summary = verdict_of(study), _summary(study)
     return {
         "study": study,
         "scenario": scenario,
@@ -154,12 +148,15 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
             each.name: each.place_text(scenario, study.layout) for each in study.threats
         },
         "stand_off": stand_off_text(scenario, study.layout),
-        "summary": _summary(study),
-        "verdicts": _verdicts(study),
+        "summary": summary,
+        "verdict": verdict,
+        "sources": _sources(study, verdict, summary),
+        "standing": _standing(verdict),
+        "spread": _spread(study),
         "grid_error": study.grid_error,
         "worth_map": worth_map(scenario, study.items) if study.items else None,
-        "mass_figure": mass_figure(study.masses, options.units),
-        "place_figure": place_figure(scenario, places, study.places),
+        "mass_figure": mass_figure(study.masses, options.units) if study.masses else None,
+        "place_figure": place_figure(scenario, places, study.places) if study.places else None,
         "front_figure": _front(study) if study.front else None,
         "checked": CHECKED_SCALED_DISTANCE,
         "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
@@ -207,15 +204,79 @@ def _summary(study: Study) -> list[SummaryLine]:
     return lines
 
 
-def _verdicts(study: Study) -> list[_Verdict]:
-    """Return for every limit and threat whether it is kept, with the finer cells."""
-    fine = study.options.cells_m[1]
-    return [
-        _Verdict(limit, pair, limit.is_kept(pair.walled), limit.is_kept(pair.bare))
-        for limit in study.options.limits
-        for pair in study.pairs
-        if pair.target.name == limit.target and pair.cell_m == fine
-    ]
+def _standing(verdict: ReportVerdict) -> str:
+    """Return what the pieces of the barrier do, in words."""
+    if verdict.barrier is None:
+        return ""
+    counts = verdict.barrier.pieces["outcome"].value_counts()
+    return ", ".join(f"{number} {word}" for word, number in counts.items())
+
+
+def _spread(study: Study) -> tuple[float, float] | None:
+    """Return the least and the largest reduction over other masses and places."""
+    outcomes = [each for own in study.masses.values() for each in own]
+    shares = [each.reduction for each in (*outcomes, *study.places)]
+    found = [share for share in shares if isfinite(share)]
+    return (min(found), max(found)) if found else None
+
+
+Source = tuple[str, str, str]
+"""A number of the summary: what it is, its value, and where it comes from."""
+
+
+def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine]) -> list[Source]:
+    """Return every number of the summary with where it comes from."""
+    units, fine = study.options.units, study.options.cells_m[1]
+    digests = dict(study.digests)
+
+    def blasts(words: str) -> str:
+        found = (
+            f"{each.name}: {digests[f'{each.name} {words}, cells of {fine:g} m'][:_HASH_DIGITS]}"
+            for each in study.threats
+        )
+        return "blast " + ", ".join(found)
+
+    sides = (("without", "without a barrier"), ("with the layout", "with the layout"))
+    found: list[Source] = []
+    for each in verdict.buildings:
+        for number, (words, of_blast) in enumerate(sides):
+            where = f"worst of the threats; {blasts(of_blast)}; response of its bays"
+            values = (
+                ("level of protection", each.levels[number].label),
+                ("panes that break", f"{each.broken[number]:.1f} of {each.panes}"),
+                ("panels that fail", f"{each.failed[number]} of {each.panels}"),
+            )
+            found += [(f"{each.name}, {words}: {what}", value, where) for what, value in values]
+    for line in summary:
+        for words, of_blast, load in (
+            (*sides[0], line.worst.bare),
+            (*sides[1], line.worst.walled),
+        ):
+            label = f"{line.worst.threat.name} {of_blast}, cells of {fine:g} m"
+            where = f"loads, {line.worst.threat.name}; blast {digests[label][:_HASH_DIGITS]}"
+            impulse = f"{_number(units.impulse_of(load.impulse_pa_s))} {units.impulse}"
+            peak = f"{_number(units.pressure_of(load.peak_pa))} {units.pressure}"
+            found.append((f"{line.name}, {words}: impulse", impulse, where))
+            found.append((f"{line.name}, {words}: peak", peak, where))
+        span = f"{_percent(line.least)} to {_percent(line.most)}"
+        found.append((f"{line.name}: reduction", span, "1 - impulse with / without, all threats"))
+    found.append(("cost of the layout", f"{study.cost:,.10g}", "bill of quantities"))
+    found.append(
+        (
+            "difference between the cells",
+            _percent(study.grid_error),
+            "largest difference of a reduction between the two sizes of cells",
+        )
+    )
+    if verdict.barrier is not None:
+        where = f"rigid bodies under the pressures on their sides; {blasts(sides[1][1])}"
+        found.append(("pieces of the barrier", _standing(verdict), where))
+    for neighbour in study.walled.worst_neighbours:
+        share = _percent(neighbour.probability[BuildingDamage.MAJOR])
+        where = f"Green Book's probit; {_number(neighbour.peak_pa / PA_PER_KPA)} kPa side-on, "
+        where += f"{_number(neighbour.impulse_pa_s)} Pa s; {blasts(sides[1][1])}"
+        found.append((f"{neighbour.building}, a house there: major damage", share, where))
+    return found
 
 
 def _front(study: Study) -> bytes:

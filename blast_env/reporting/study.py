@@ -14,9 +14,16 @@ from blast_env.documents import parse_csv, read_text
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError, shortened
 from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation.consequences import Consequences, consequences_of
 from blast_env.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.geometry import Element, Layout, Measure, Piece, layout_text
-from blast_env.reporting.figures import Picture, blast_pictures, film_stills
+from blast_env.reporting.figures import (
+    Picture,
+    blast_pictures,
+    damage_pictures,
+    film_stills,
+    risk_picture,
+)
 from blast_env.reporting.loads import (
     UNITS,
     MeasuredBlast,
@@ -40,12 +47,17 @@ from blast_env.reporting.threats import (
     other_masses,
     other_places,
 )
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import AnyCharge, Placement, Scenario, check_layout
 from blast_env.statistics import reductions
 
 MOST_THREATS: Final = 6
 MOST_FRONT: Final = 30
 _MASSES: Final = (0.5, 2.0)
+_BARE, _WALLED = "without a barrier", "with the layout"
+_FILM, _MASSES_PART, _ITEMS, _PLACES, _FRONT = (
+    *("film", "other masses", "without each item", "other places", "front"),
+)
 
 
 @dataclass(frozen=True)
@@ -58,6 +70,7 @@ class StudyOptions:
         cells_m: Sides of cells, two of them, the coarser one first: loads with both say what the
             grid does.
         limits: What buildings may take.
+        target: Level of protection that buildings with facades must reach.
         units: Units of loads.
         front: CSV file of a search with the layouts of a front.
         places: How many places of each source the sensitivity looks at.
@@ -74,6 +87,7 @@ class StudyOptions:
     most_threats: int = 2
     cells_m: tuple[float, float] = (0.5, 0.25)
     limits: tuple[Limit, ...] = ()
+    target: LevelOfProtection = LevelOfProtection.LOW
     units: UnitSystem = field(default_factory=lambda: UNITS["si"])
     front: Path | None = None
     places: int = 5
@@ -119,6 +133,9 @@ class Study:
         bill: What the layout is made of; `blast_env.export.bill.BILL_COLUMNS`.
         cost: Its cost.
         pairs: Loads by threat, building and cell size.
+        bare: What becomes of buildings without the layout, with the finer cells.
+        walled: What becomes of them, and of the barrier, with it.
+        walled_coarse: The same with the coarser cells.
         pictures: Facades and histories, by threat.
         stills: Moments of the film of the first threat.
         items: What each module or piece is worth, the most valuable one first.
@@ -128,6 +145,7 @@ class Study:
         notes: What loads are to be distrusted for, by threat and cell size.
         left_out: What could not be looked at.
         digests: Digest of every blast with pictures.
+        stopped: Before which part it was stopped; empty for a whole report.
     """
 
     scenario: Scenario
@@ -138,6 +156,9 @@ class Study:
     bill: pd.DataFrame
     cost: float
     pairs: tuple[LoadPair, ...]
+    bare: Consequences
+    walled: Consequences
+    walled_coarse: Consequences
     pictures: dict[str, tuple[Picture, ...]]
     stills: tuple[Picture, ...]
     items: tuple[ItemWorth, ...]
@@ -147,6 +168,7 @@ class Study:
     notes: tuple[str, ...]
     left_out: tuple[str, ...]
     digests: tuple[tuple[str, str], ...]
+    stopped: str = ""
 
     def pair(self, target: ReportedBuilding, threat: NamedCharge, cell_m: float) -> LoadPair:
         """Return the loads on a building under a threat with one size of cells."""
@@ -185,6 +207,8 @@ def run_study(
 ) -> Study:
     """Run all blasts of a report.
 
+    Whoever stops it (`KeyboardInterrupt`) after the threats gets a report on what is done by then.
+
     Args:
         scenario: The scenario.
         layout: The layout.
@@ -201,19 +225,34 @@ def run_study(
         raise BlastEnvError("the layout is empty: there is nothing to report on")
     targets = targets_of(scenario)
     check_limits(options.limits, targets)
-    threats = (
-        asked_threats(scenario, options.charges)
-        if options.charges
-        else chief_threats(scenario, options.most_threats)
-    )
+    threats = threats_of(scenario, options)
     for threat in threats:
         check_layout(scenario.with_possible_charges([threat.charge]), cells)
     front = front_layouts(options.front, scenario)
     bill = bill_of_quantities(LayoutPlan(scenario, cells))
     runs = Runs(scenario, cells, options, targets, threats, progress)
     runs.run_threats()
-    stills = runs.film() if options.stills else ()
-    masses, left_out = runs.other_masses()
+    stills: tuple[Picture, ...] = ()
+    masses: dict[str, tuple[Outcome, ...]] = {}
+    left_out: tuple[str, ...] = ()
+    items: tuple[ItemWorth, ...] = ()
+    places: tuple[Outcome, ...] = ()
+    points: tuple[FrontPoint, ...] = ()
+    part = _FILM
+    try:
+        stills = runs.film() if options.stills else ()
+        part = _MASSES_PART
+        masses, left_out = runs.other_masses()
+        part = _ITEMS
+        items = runs.item_worths() if options.items else ()
+        part = _PLACES
+        places = runs.other_places()
+        part = _FRONT
+        points = runs.front_points(front)
+        part = ""
+    except KeyboardInterrupt:
+        progress(f"stopped before: {part}", 1.0)
+    fine_m, coarse_m = options.cells_m[1], options.cells_m[0]
     return Study(
         scenario=scenario,
         layout=cells,
@@ -223,16 +262,51 @@ def run_study(
         bill=bill,
         cost=Placement.of(scenario, cells).cost,
         pairs=tuple(runs.pairs),
+        bare=runs.consequences(fine_m, walled=False),
+        walled=runs.consequences(fine_m, walled=True),
+        walled_coarse=runs.consequences(coarse_m, walled=True),
         pictures=runs.pictures,
         stills=stills,
-        items=runs.item_worths() if options.items else (),
+        items=items,
         masses=masses,
-        places=runs.other_places(),
-        front=runs.front_points(front),
+        places=places,
+        front=points,
         notes=tuple(dict.fromkeys(runs.notes)),
         left_out=left_out,
         digests=tuple(runs.digests),
+        stopped=part,
     )
+
+
+def blasts_of(
+    scenario: Scenario, layout: Layout, options: StudyOptions, threats: Sequence[NamedCharge]
+) -> tuple[tuple[str, int, float], ...]:
+    """Return the parts of a report in their order: label, blasts, and side of their cells.
+
+    Labels are those that `run_study` tells; of parts with several, what they begin with.
+    """
+    coarse_m = options.cells_m[0]
+    count, items = len(threats), len(layout) if options.items else 0
+    parts: list[tuple[str, int, float]] = [
+        (f"{threat.name} {words}, cells of {cell_m:g} m", 1, cell_m)
+        for threat in threats
+        for cell_m in options.cells_m
+        for words in (_BARE, _WALLED)
+    ]
+    parts.append((_FILM, 2 if options.stills else 0, coarse_m))
+    parts += [(f"{each.name}, {_MASSES_PART}", 2 * len(_MASSES), coarse_m) for each in threats]
+    parts.append((_ITEMS, count * (items + 2) if items else 0, coarse_m))
+    parts.append((_PLACES, 2 * len(other_places(scenario, options.places)), coarse_m))
+    front = len(front_layouts(options.front, scenario))
+    parts.append((_FRONT, count * (front + 1) if front else 0, coarse_m))
+    return tuple(parts)
+
+
+def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[NamedCharge, ...]:
+    """Return the threats of a report: those that were asked for, or the worst places."""
+    if options.charges:
+        return asked_threats(scenario, options.charges)
+    return chief_threats(scenario, options.most_threats)
 
 
 class Runs:
@@ -253,6 +327,7 @@ class Runs:
         self.pictures: dict[str, tuple[Picture, ...]] = {}
         self.notes: list[str] = []
         self.digests: list[tuple[str, str]] = []
+        self._found: dict[tuple[float, bool], list[Consequences]] = {}
         self._evaluator = BlastEvaluator(scenario, options.coarse, cache=options.cache)
 
     def run_threats(self) -> None:
@@ -261,11 +336,29 @@ class Runs:
             for cell_m in self.options.cells_m:
                 both = [self._measured(threat, cell_m, layout) for layout in ((), self.layout)]
                 self.pairs += self._pairs(threat, cell_m, both[0], both[1])
+                for is_walled, measured in enumerate(both):
+                    charge = threat.against(self.scenario, self.layout if is_walled else ())
+                    found = consequences_of(self.scenario, measured.result, charge)
+                    self._found.setdefault((cell_m, bool(is_walled)), []).append(found)
             # Of the finer cells: only these two results are in memory at once.
-            self.pictures[threat.name] = blast_pictures(both[0], both[1], self.options.units)
+            self.pictures[threat.name] = (
+                *self._damage_pictures(threat.name),
+                risk_picture(*both),
+                *blast_pictures(both[0], both[1], self.options.units),
+            )
+
+    def consequences(self, cell_m: float, *, walled: bool) -> Consequences:
+        """Return what all threats did, with such cells, without the layout or with it."""
+        return Consequences.together(self._found[cell_m, walled])
+
+    def _damage_pictures(self, threat: str) -> tuple[Picture, ...]:
+        """Return the damage of the buildings with facades under the last threat."""
+        fine_m = self.options.cells_m[1]
+        bare, walled = (self._found[fine_m, is_walled][-1] for is_walled in (False, True))
+        return damage_pictures(self.scenario, self.layout, bare, walled, threat)
 
     def _measured(self, threat: NamedCharge, cell_m: float, layout: Layout) -> MeasuredBlast:
-        words = "with the layout" if layout else "without a barrier"
+        words = _WALLED if layout else _BARE
         label = f"{threat.name} {words}, cells of {cell_m:g} m"
         blast = GasBlast(self.scenario, layout, 0, GasEngine(cell_m=cell_m), threat.charge)
         measured = measure(blast, self.targets, partial(self.progress, label))
@@ -289,7 +382,7 @@ class Runs:
             for layout in ((), self.layout)
         ]
         moments_s = self._moments_s()
-        return film_stills(blasts[0], blasts[1], moments_s, partial(self.progress, "film"))
+        return film_stills(blasts[0], blasts[1], moments_s, partial(self.progress, _FILM))
 
     def _moments_s(self) -> list[float]:
         """Return the times of the stills: before and after the arrival at what is protected."""
@@ -317,13 +410,13 @@ class Runs:
             left_out += list(notes)
             own = NamedCharge(f"{threat.charge.tnt_kg:g} kg", threat.charge, "as in the threat")
             ordered = sorted((own, *charges), key=lambda each: each.charge.tnt_kg)
-            found[threat.name] = self._outcomes(f"{threat.name}, other masses", ordered)
+            found[threat.name] = self._outcomes(f"{threat.name}, {_MASSES_PART}", ordered)
         return found, tuple(left_out)
 
     def other_places(self) -> tuple[Outcome, ...]:
         """Return the same charges at other places."""
         places = other_places(self.scenario, self.options.places)
-        return self._outcomes("other places", places)
+        return self._outcomes(_PLACES, places)
 
     def _outcomes(self, label: str, charges: Sequence[NamedCharge]) -> tuple[Outcome, ...]:
         layouts: tuple[Layout, ...] = ((), self.layout)
@@ -339,7 +432,7 @@ class Runs:
             self.layout[:index] + self.layout[index + 1 :] for index in range(len(self.layout))
         ]
         charges = [each.charge for each in self.threats]
-        impulses = self._loads("without each item", ((), self.layout, *fewer), charges)
+        impulses = self._loads(_ITEMS, ((), self.layout, *fewer), charges)
         bare, whole, without = impulses[0], impulses[1], impulses[2:]
         worths = ((without - whole) / bare).mean(axis=1)
         items = [
@@ -358,7 +451,7 @@ class Runs:
         if not layouts:
             return ()
         charges = [each.charge for each in self.threats]
-        impulses = self._loads("front", ((), *layouts), charges)
+        impulses = self._loads(_FRONT, ((), *layouts), charges)
         bare = np.broadcast_to(impulses[0], impulses[1:].shape)
         gone = reductions(impulses[1:], bare).mean(axis=1)
         points = [

@@ -68,6 +68,44 @@ def eardrum_rupture_probability(peak_pa: FloatArray) -> FloatArray:
         return _probability(-15.6 + 1.93 * np.log(np.asarray(peak_pa)))
 
 
+def eardrum_peak_pa(probability: float) -> float:
+    """Return the side-on peak overpressure at which so many eardrums rupture."""
+    from scipy.special import ndtri
+
+    return float(np.exp((5.0 + ndtri(probability) + 15.6) / 1.93))
+
+
+@dataclass(frozen=True)
+class GroundThreshold:
+    """A side-on peak overpressure from which something must be expected on the ground.
+
+    Attributes:
+        words: What.
+        peak_pa: From which peak.
+        source: Where that was read.
+    """
+
+    words: str
+    peak_pa: float
+    source: str
+
+
+_CLANCEY = (
+    "V. J. Clancey, Diagnostic features of explosion damage, 1972, as listed by explosion-safety.jp"
+)
+_EISENBERG = "the probit of Eisenberg and others, 1975"
+
+
+def ground_thresholds() -> tuple[GroundThreshold, ...]:
+    """Return the thresholds that assembly points are chosen by, the smallest peak first."""
+    return (
+        GroundThreshold("one window in ten broken", 2070.0, _CLANCEY),
+        GroundThreshold("windows usually shattered", 3400.0, _CLANCEY),
+        GroundThreshold("one eardrum in 100 ruptured", eardrum_peak_pa(0.01), _EISENBERG),
+        GroundThreshold("half of all eardrums ruptured", eardrum_peak_pa(0.5), _EISENBERG),
+    )
+
+
 def _probability(probit: FloatArray) -> FloatArray:
     from scipy.special import ndtr  # a quarter of a second to import
 

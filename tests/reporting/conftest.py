@@ -3,7 +3,7 @@
 import pytest
 
 from blast_env.reporting import Limit, Study, StudyOptions, run_study
-from tests.reporting.sites import LAYOUT, small_hut
+from tests.reporting.sites import LAYOUT, glazed_hut
 
 
 @pytest.fixture(scope="session")
@@ -13,4 +13,4 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     front.write_text("\n".join(rows) + "\n")
     limits = (Limit("hut", impulse_pa_s=300.0),)
     options = StudyOptions(limits=limits, front=front, places=1, stills=2)
-    return run_study(small_hut(), LAYOUT, options)
+    return run_study(glazed_hut(), LAYOUT, options)

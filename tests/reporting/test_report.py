@@ -13,13 +13,16 @@ import blast_env
 from blast_env.cli import app
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.consequences import Consequences
 from blast_env.geometry import Layout, layout_text
 from blast_env.physics.scene import Charge
-from blast_env.reporting import UNITS, Study, StudyOptions, run_study, write_report
+from blast_env.reporting import UNITS, Limit, Study, StudyOptions, run_study, write_report
 from blast_env.reporting.loads import MeasuredBlast, measure, targets_of
 from blast_env.reporting.page import report_html
-from blast_env.reporting.study import Runs
+from blast_env.reporting.study import Runs, blasts_of
 from blast_env.reporting.threats import chief_threats
+from blast_env.reporting.verdict import verdict_of
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Scenario, save_scenario, write_layout
 from tests.catalogue_sites import WALL, yard
 from tests.reporting.sites import LAYOUT, small_hut
@@ -131,11 +134,17 @@ def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: 
     assert "name = &#34;hut&#34;" in page
     for label, digest in study.digests:
         assert f'{label}</td><td class="l"><code>{digest[:16]}' in page
-    titles = re.findall(r"<h2>(?:\d\. )?([^<]+)</h2>", page)
+    titles = re.findall(r"<h2>(\d+)\. ([^<]+)</h2>", page)
     assert titles == [
-        *("Site and threats", "Layout", "Loads", "The blast", "What each item is worth"),
-        *("Other masses and places", "Reduction against cost", "Validity and limits"),
-        "To repeat it",
+        (str(number), title)
+        for number, title in enumerate(
+            (
+                *("What was assumed", "Site and threats", "Layout", "Loads", "The blast"),
+                *("What each item is worth", "Other masses and places", "Reduction against cost"),
+                *("Validity and limits", "Where the numbers come from", "To repeat it"),
+            ),
+            start=1,
+        )
     ]
 
 
@@ -143,7 +152,9 @@ def test_limits_are_passed_or_failed(study: Study, page: str) -> None:
     fine = study.pair(study.targets[0], study.threats[0], 0.25)
     assert fine.walled.wall_impulse_pa_s < 300.0 < fine.bare.wall_impulse_pa_s
     verdicts = re.findall(r'<span class="(\w+)">(\w+)</span>', page)
-    assert verdicts == [("fail", "FAIL"), ("pass", "pass")]
+    whole, *limits = verdicts
+    assert whole[1] in ("PASSES", "FAILS")
+    assert limits == [("fail", "FAIL"), ("pass", "pass")]
     assert "1 of 1</strong> cases with the layout, 0 without" in page
 
 
@@ -229,3 +240,65 @@ def test_command_passes_on_what_it_was_asked(
 
 def test_engines_of_both_sizes_are_gas() -> None:
     assert StudyOptions().coarse == GasEngine(cell_m=0.5)
+
+
+def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: str) -> None:
+    verdict = verdict_of(study)
+    (line,) = verdict.buildings
+    assert line.levels[0] <= line.levels[1]
+    assert (line.panes, line.panels) == (8, 4)
+    assert verdict.passes == (study.walled.passes(study.options.target) and verdict.limits[0].kept)
+    first = page[page.index("<h3>Verdict") : page.index("<h2>")]
+    assert f">{verdict.word}<" in first
+    assert f"<td>{line.broken[1]:.1f} of 8</td>" in first
+    assert "costs 4" in first
+    assert all(f"all windows: {title}" in page for title, _, _ in verdict.glazing)
+
+
+def test_a_stricter_target_fails_and_limits_count_as_well(study: Study) -> None:
+    strict = replace(study, options=replace(study.options, target=LevelOfProtection.HIGH))
+    assert verdict_of(strict).passes is False
+    harsh = replace(study.options, limits=(Limit("hut", impulse_pa_s=1.0),))
+    assert verdict_of(replace(study, options=harsh)).passes is False
+
+
+def test_without_facades_and_limits_there_is_no_verdict_but_loads(study: Study) -> None:
+    empty = Consequences(())
+    options = replace(study.options, limits=())
+    bare = replace(study, bare=empty, walled=empty, walled_coarse=empty, options=options)
+    assert verdict_of(bare).word == "NO VERDICT"
+    page = report_html(bare, ["blast-env"])
+    assert "no building has a facade" in page
+    assert "Loads of the protected buildings" in page
+
+
+def test_every_number_of_the_verdict_names_its_blast(study: Study, page: str) -> None:
+    table = page[page.index("Where the numbers come from") : page.index("To repeat it")]
+    digests = dict(study.digests)
+    for words in ("without a barrier", "with the layout"):
+        assert digests[f"T1 {words}, cells of 0.25 m"][:16] in table
+    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    assert f"{fine.walled.impulse_pa_s:.0f} Pa\N{MIDDLE DOT}s" in table.replace(" Pa s", " Pa·s")
+    assert "bill of quantities" in table
+
+
+def test_a_report_that_is_stopped_has_what_was_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(_: Runs) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Runs, "other_masses", stop)
+    stopped = run_study(small_hut(), LAYOUT, StudyOptions(stills=0, cells_m=(0.5, 0.25)))
+    assert stopped.stopped == "other masses"
+    assert stopped.pairs
+    assert "This report was stopped before: other masses" in report_html(stopped, ["blast-env"])
+
+
+def test_the_blasts_that_are_counted_before_are_those_that_are_run(study: Study) -> None:
+    """Each part that is told of is one that was counted."""
+    told: list[str] = []
+    options = replace(study.options, front=None, items=False, stills=0)
+    run_study(small_hut(), LAYOUT, options, lambda label, _: told.append(label))
+    parts = blasts_of(small_hut(), LAYOUT, options, study.threats)
+    counted = {label for label, blasts, _ in parts if blasts}
+    assert set(told) == counted - {"other places"}  # the one place is the threat's, and known
+    assert sum(blasts for _, blasts, _ in parts) == 4 + 4 + 2

@@ -1,0 +1,154 @@
+"""The verdict of a report: passes or fails, by the response of facades, or by the limits given."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from blast_env.evaluation.consequences import BarrierResponse, Consequences, other_glazing
+from blast_env.reporting.outcomes import Limit, LoadPair
+from blast_env.reporting.study import Study
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.walls import DamageLevel
+
+
+@dataclass(frozen=True)
+class KeptLimit:
+    """Whether a building keeps its limit under a threat.
+
+    Attributes:
+        limit: The limit.
+        pair: The loads, with the finer cells.
+        kept: Whether it is kept with the layout.
+        kept_bare: Whether it is kept without.
+    """
+
+    limit: Limit
+    pair: LoadPair
+    kept: bool
+    kept_bare: bool
+
+
+@dataclass(frozen=True)
+class BuildingLine:
+    """A building with a facade, without the layout and with it: the worst of all threats.
+
+    Attributes:
+        name: The building.
+        levels: Level of protection.
+        broken: Panes that are expected to break.
+        panes: Panes that it has.
+        conditions: Performance condition of the worst pane, GSA.
+        failed: Wall panels with hazardous damage or worse.
+        panels: Wall panels that it has.
+        damages: Damage of the worst panel.
+    """
+
+    name: str
+    levels: tuple[LevelOfProtection, ...]
+    broken: tuple[float, ...]
+    panes: int
+    conditions: tuple[str, ...]
+    failed: tuple[int, ...]
+    panels: int
+    damages: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ReportVerdict:
+    """Does the layout do?
+
+    Attributes:
+        passes: Whether all that was asked for is kept; `None` where nothing was.
+        passes_bare: The same without the layout.
+        words: What was asked for.
+        doubts: Under which other assumptions a verdict that passes would fail.
+        buildings: The buildings with a facade.
+        limits: The limits that were given.
+        barrier: The barrier under the threat that tilts a piece most.
+        glazing: With which other glass the buildings would pass behind the layout, and without.
+    """
+
+    passes: bool | None
+    passes_bare: bool | None
+    words: str
+    doubts: tuple[str, ...]
+    buildings: tuple[BuildingLine, ...]
+    limits: tuple[KeptLimit, ...]
+    barrier: BarrierResponse | None
+    glazing: tuple[tuple[str, bool, bool], ...]
+
+    @property
+    def word(self) -> str:
+        """In a word."""
+        return {True: "PASSES", False: "FAILS", None: "NO VERDICT"}[self.passes]
+
+
+def verdict_of(study: Study) -> ReportVerdict:
+    """Return the verdict of a report.
+
+    By the level of protection that was asked for, where buildings have facades, and by the limits
+    that were given; both must be kept, on the finer cells and under every threat.
+    """
+    limits = tuple(_limits(study))
+    target = study.options.target
+    kept, kept_bare = ([each.kept for each in limits], [each.kept_bare for each in limits])
+    asked = [f"{len(limits)} limits of loads"] if limits else []
+    doubts: tuple[str, ...] = ()
+    glazing: tuple[tuple[str, bool, bool], ...] = ()
+    if study.walled.buildings:
+        asked.insert(0, f"level of protection {target.label!r}")
+        kept.append(study.walled.passes(target))
+        kept_bare.append(study.bare.passes(target))
+        doubts = study.walled.doubts(target)
+        glazing = tuple(_glazing(study))
+    return ReportVerdict(
+        passes=all(kept) if asked else None,
+        passes_bare=all(kept_bare) if asked else None,
+        words=" and ".join(asked),
+        doubts=doubts,
+        buildings=tuple(_line(study, name) for name in study.walled.buildings),
+        limits=limits,
+        barrier=study.walled.worst_barrier,
+        glazing=glazing,
+    )
+
+
+def _limits(study: Study) -> Iterator[KeptLimit]:
+    fine = study.options.cells_m[1]
+    for limit in study.options.limits:
+        for pair in study.pairs:
+            if pair.target.name == limit.target and pair.cell_m == fine:
+                yield KeptLimit(limit, pair, limit.is_kept(pair.walled), limit.is_kept(pair.bare))
+
+
+def _line(study: Study, name: str) -> BuildingLine:
+    both: Sequence[Consequences] = (study.bare, study.walled)
+    facades = [[response.facade for response in each.of(name)] for each in both]
+    first = facades[0][0]
+    return BuildingLine(
+        name=name,
+        levels=tuple(each.level(name) for each in both),
+        broken=tuple(max(each.broken_panes for each in own) for own in facades),
+        panes=first.panes,
+        conditions=tuple(max(each.worst_condition for each in own).label for own in facades),
+        failed=tuple(
+            max(sum(level >= DamageLevel.HAZARDOUS for level in each.walls.levels) for each in own)
+            for own in facades
+        ),
+        panels=len(first.walled),
+        damages=tuple(max(each.worst_damage for each in own).name.lower() for own in facades),
+    )
+
+
+def _glazing(study: Study) -> Iterator[tuple[str, bool, bool]]:
+    """Yield other glass: its title, and whether buildings pass with it behind the layout, and not.
+
+    Where a building has panes at all.
+    """
+    if not any(each.facade.panes for each in study.walled.responses):
+        return
+    for glazing in other_glazing(study.scenario).values():
+        walled, bare = (
+            each.with_glazing(glazing).passes(study.options.target)
+            for each in (study.walled, study.bare)
+        )
+        yield glazing.title, walled, bare
