@@ -137,6 +137,10 @@ class Consequences:
         """Return the level of protection that a building reaches under every charge."""
         return min(each.facade.level_of_protection for each in self.of(building))
 
+    def depends_on_cells(self, target: LevelOfProtection) -> bool:
+        """Return whether sharper peaks would turn a verdict that passes."""
+        return _SHARPER in self.doubts(target)
+
     def doubts(self, target: LevelOfProtection) -> tuple[str, ...]:
         """Return under which other assumptions a verdict that passes would fail, in words.
 

@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Circle, Rectangle
 
+from blast_env.calibration import kingery_bulmash
+from blast_env.engines.gas import GasBlast
 from blast_env.evaluation.consequences import BuildingResponse
 from blast_env.physics.scene import Charge
 from blast_env.rendering.facade import LEVEL_COLOURS, damage_view, facade_picture
+from blast_env.rendering.ground_map import ground_recorders, open_distance_m, threshold_map
 from blast_env.rendering.pressure_impulse import level_bounds, pressure_impulse_diagram
-from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.buildings import LevelOfProtection, ground_thresholds
 from blast_env.response.components import Glazing, find_component
 from blast_env.response.facade import FacadeResponse, respond
 from blast_env.scenario import Scenario
@@ -89,3 +92,23 @@ def test_worse_levels_begin_at_larger_impulses_and_thicker_glass_holds_more() ->
     ordered = np.array(list(thick.values()))
     assert (np.diff(ordered, axis=0) >= 0.0).all()
     assert (thick[LevelOfProtection.HIGH] >= thin[LevelOfProtection.HIGH]).all()
+
+
+def test_thresholds_reach_as_far_in_the_open_as_the_curves_say() -> None:
+    for threshold in ground_thresholds()[1:]:
+        distance_m = open_distance_m(threshold.peak_pa, CHARGE)
+        peak_pa = kingery_bulmash("incident_overpressure", distance_m, CHARGE.tnt_kg)
+        assert peak_pa == pytest.approx(threshold.peak_pa, rel=0.01)
+    assert np.isinf(open_distance_m(500.0, CHARGE))
+
+
+def test_a_map_of_risks_has_a_region_and_a_circle_a_threshold(site: Scenario) -> None:
+    blasts = (GasBlast(site, layout, charge=CHARGE) for layout in ((), WALL))
+    bare, walled = (blast.run(recorders=ground_recorders) for blast in blasts)
+    figure = threshold_map(walled, beside=bare)
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert any(each.startswith("windows usually shattered: from 3.4 kPa, ") for each in words)
+    for axes in figure.axes:
+        circles = [each for each in axes.patches if isinstance(each, Circle)]
+        radii = [each.get_radius() for each in circles if each.get_linestyle() != "-"]
+        assert radii[-3:] == sorted(radii[-3:], reverse=True)

@@ -7,7 +7,9 @@ from blast_env.response.buildings import (
     BuildingDamage,
     LevelOfProtection,
     building_damage_probability,
+    eardrum_peak_pa,
     eardrum_rupture_probability,
+    ground_thresholds,
     level_of_protection,
 )
 from blast_env.response.walls import DamageLevel
@@ -50,3 +52,12 @@ def test_levels_of_protection() -> None:
     assert level_of_protection(DamageLevel.SUPERFICIAL) is LevelOfProtection.HIGH
     assert level_of_protection(DamageLevel.HAZARDOUS) is LevelOfProtection.VERY_LOW
     assert level_of_protection(DamageLevel.BLOWOUT).label == "below standards"
+
+
+def test_thresholds_on_the_ground_say_their_source_and_go_up() -> None:
+    peaks = [each.peak_pa for each in ground_thresholds()]
+    assert peaks == sorted(peaks)
+    assert all("19" in each.source for each in ground_thresholds())
+    for share in (0.01, 0.5, 0.99):
+        found = eardrum_rupture_probability(np.array([eardrum_peak_pa(share)]))
+        assert found.item() == pytest.approx(share)
