@@ -1,7 +1,7 @@
 """The report as HTML that needs nothing else, and as PDF."""
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -13,6 +13,7 @@ from warnings import catch_warnings, filterwarnings
 import numpy as np
 import tomli_w
 
+from blast_env.engines.bays import bay_rows
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.geometry import layout_counts, layout_text
@@ -43,6 +44,7 @@ _NONE: Final = "\N{EN DASH}"
 _MINUS: Final = "\N{MINUS SIGN}"
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "matplotlib")
 _HASH_DIGITS: Final = 16
+_MOST_BAYS: Final = 40
 
 
 def write_report(
@@ -153,6 +155,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "sources": _sources(study, verdict, summary),
         "standing": _standing(verdict),
         "spread": _spread(study),
+        "bay_tables": _bay_tables(study),
         "grid_error": study.grid_error,
         "worth_map": worth_map(scenario, study.items) if study.items else None,
         "mass_figure": mass_figure(study.masses, options.units) if study.masses else None,
@@ -218,6 +221,51 @@ def _spread(study: Study) -> tuple[float, float] | None:
     shares = [each.reduction for each in (*outcomes, *study.places)]
     found = [share for share in shares if isfinite(share)]
     return (min(found), max(found)) if found else None
+
+
+@dataclass(frozen=True)
+class BayTable:
+    """The bays of a building under a threat, those that panes leave most first.
+
+    Attributes:
+        title: Building and charge.
+        rows: Bay; then, without the layout and with it: share of panes that break, condition of
+            these, damage of the wall panel.
+        left_out: How many more bays there are.
+    """
+
+    title: str
+    rows: tuple[tuple[str, ...], ...]
+    left_out: int
+
+
+def _bay_tables(study: Study) -> list[BayTable]:
+    tables = []
+    for bare, walled in zip(study.bare.responses, study.walled.responses, strict=True):
+        both = list(zip(bay_rows(bare.facade), bay_rows(walled.facade), strict=True))
+        # "5" is worse than "3b", and that than "3a": text will do.
+        both.sort(key=lambda rows: (str(rows[1]["condition"]), _share(rows[1])), reverse=True)
+        rows = tuple(
+            (str(first["bay"]), *(text for each in (first, second) for text in _bay_texts(each)))
+            for first, second in both[:_MOST_BAYS]
+        )
+        x_m, y_m = walled.charge.position_m
+        title = f"{walled.building}, {walled.charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m"
+        tables.append(BayTable(title, rows, len(both) - len(rows)))
+    return tables
+
+
+def _share(row: Mapping[str, object]) -> float:
+    share = float(str(row["break_probability"]))
+    return -1.0 if isnan(share) else share
+
+
+def _bay_texts(row: Mapping[str, object]) -> tuple[str, str, str]:
+    return (
+        _percent(float(str(row["break_probability"]))),
+        str(row["condition"]) or _NONE,
+        str(row["damage"]) or _NONE,
+    )
 
 
 Source = tuple[str, str, str]

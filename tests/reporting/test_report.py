@@ -253,6 +253,8 @@ def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: s
     assert f"<td>{line.broken[1]:.1f} of 8</td>" in first
     assert "costs 4" in first
     assert all(f"all windows: {title}" in page for title, _, _ in verdict.glazing)
+    bays = page[page.index("Bay by bay") :]
+    assert all(f"hut/{wall}/1/1" in bays for wall in ("west", "east", "south", "north"))
 
 
 def test_a_stricter_target_fails_and_limits_count_as_well(study: Study) -> None:
