@@ -103,6 +103,8 @@ def _turn(
     x, y = end
     low, high = max(0, -y), rows - max(0, y)
     left, right = max(0, -x), columns - max(0, x)
+    if left >= right:  # an end below 0 would count from the other side
+        return False
     along, most, never = np.float32(length), np.float32(limit), NEVER
     raised = np.float32(0.0)
     for row in range(low, high):
