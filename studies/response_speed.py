@@ -1,0 +1,44 @@
+"""What the response of facades adds to a blast: `python -m studies.response_speed`."""
+
+import time
+from typing import Any, Final
+
+from blast_env.cli.output import print_line
+from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.physics.scene import Charge
+from blast_env.scenario import Scenario, load_scenario
+
+_REPEATS: Final = 5
+_FACADE: Final = {"bay_m": 1.5, "glazing": "window_annealed_6", "wall": "concrete_200"}
+
+
+def site(**objective: Any) -> Scenario:
+    """Return the control room with a facade where its response counts, else without."""
+    document = load_scenario("control_room").model_dump(mode="json")
+    document["name"] = "glazed_room"
+    if objective:
+        document["objective"] = objective
+        document["structures"][0]["facade"] = _FACADE
+    return Scenario.from_document(document, "glazed_room")
+
+
+def main() -> None:
+    """Print by how much the processor time of a blast is longer."""
+    sites = {"with": site(kind="response"), "without": site()}
+    seconds: dict[str, list[float]] = {name: [] for name in sites}
+    for _ in range(_REPEATS + 1):  # the first one compiles
+        for name, each in sites.items():
+            evaluator = BlastEvaluator(each, "gas")
+            begin = time.process_time()
+            evaluator.loads((), Threat(Charge((2.0, 8.5), 5.0), 0))
+            seconds[name].append(time.process_time() - begin)
+    least = {name: min(each[1:]) for name, each in seconds.items()}
+    more = least["with"] / least["without"] - 1.0
+    bays = len(sites["with"].bays)
+    print_line(
+        f"processor time of a blast, with the response of {bays} bays: {100.0 * more:+.1f} %"
+    )
+
+
+if __name__ == "__main__":
+    main()
