@@ -27,6 +27,7 @@ from selenium.webdriver.common.keys import Keys
 
 from blast_env.app.plan import PixelView
 from blast_env.scenario import Scenario, load_scenario, save_scenario
+from tests.office_park import office_park
 
 WIDTH, HEIGHT = 1280, 800
 REPOSITORY = Path(__file__).parents[3]
@@ -463,6 +464,43 @@ def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
     assert "In short" in report.read_text(encoding="utf-8")
     reached("the report")
     (PICTURES / "map_to_report.txt").write_text("\n".join(stages) + "\n")
+    assert not page.faults()
+
+
+def test_the_verdict_on_a_site_of_100_m(page: Page, tmp_path: Path) -> None:
+    """Windows, a layout and what gas says of them, by the page alone; the times are written down."""
+    began_s = monotonic()
+    stages: list[str] = []
+
+    def reached(stage: str) -> None:
+        stages.append(f"{monotonic() - began_s:.0f} s: {stage}")
+
+    document = office_park().model_dump(mode="json", exclude_none=True)
+    document["charge"] = document["charge"][:1]
+    save_scenario(Scenario.from_document(document, "office_park"), tmp_path / "office_park.toml")
+    page.open()
+    page.all("input[type=file]")[0].send_keys(str(tmp_path / "office_park.toml"))
+    page.until(lambda: "/design/" in page.driver.current_url)
+    page.until(lambda: page.all(".be-plan svg text"))
+    reached("the site of the file")
+    for part in ("office_west", "office_east"):
+        page.choose("selected", part)
+        page.choose("windows", "window, 6 mm annealed")
+    reached("its windows")
+    page.choose("by", "rule: wall near the building")
+    page.button("Propose").click()
+    page.button("take it").click()
+    page.sees("30 of 30 modules")
+    reached("a layout by rule")
+    page.sees("2 blasts of gas: about")
+    page.button("Blast").click()
+    page.sees("left", 300.0)
+    page.shoot("large_running")
+    page.until(lambda: page.text().count("level of protection") and "of 16" in page.text(), 900.0)
+    page.until(lambda: "done" in page.text(), 900.0)
+    page.shoot("large_verdict")
+    reached("the verdict of gas dynamics, without and with the layout")
+    (PICTURES / "site_of_100_m.txt").write_text("\n".join(stages) + "\n")
     assert not page.faults()
 
 
