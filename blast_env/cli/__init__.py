@@ -37,8 +37,8 @@ class _Commands(LazyGroup):
         ),
         "advise": (
             "blast_env.cli.advise:AdviseCommand",
-            "Say what a budget buys by keeping the charge away, shields, better components, or "
-            "all.",
+            "Say what a budget buys by keeping the charge away, shielding, hardening, and all "
+            "together.",
         ),
         "search": (
             "blast_env.cli.search:SearchCommand",
