@@ -430,7 +430,7 @@ def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
     """Yield the structures; of a building in several parts the largest one has the label."""
     buildings: dict[str, list[AnyStructure]] = {}
     for structure in structures:
-        buildings.setdefault(structure.building or structure.name, []).append(structure)
+        buildings.setdefault(structure.building_name, []).append(structure)
     for name, parts in buildings.items():
         largest = max(parts, key=lambda each: each.rows * each.columns)
         heights = [each.height_m for each in parts if each.height_m is not None]

@@ -8,7 +8,8 @@ import openpyxl
 import pytest
 
 import blast_env
-from blast_env.engines.gas import FACE_COLUMNS, GasBlast, GasEngine, GasResult
+from blast_env.engines.gas import NOT_COMPLETE, GasBlast, GasEngine, GasResult
+from blast_env.engines.gas_tables import FACE_COLUMNS
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import Threat
@@ -96,8 +97,8 @@ def test_a_run_is_a_function_of_its_arguments(bare: GasResult) -> None:
     again = blast_env.simulate(HUT, seed=5, engine="gas")
     assert again.digest == bare.digest
     assert replace(GasEngine(), threads=2).start_on(bare.run.site).grid.shape == bare.run.grid.shape
-    finer = GasBlast(HUT, engine=GasEngine(cell_m=0.25, time_limit_s=0.03)).run()
-    coarse = GasBlast(HUT, engine=GasEngine(time_limit_s=0.03)).run()
+    finer = GasBlast(HUT, engine=GasEngine(cell_m=0.25, until=0.03)).run()
+    coarse = GasBlast(HUT, engine=GasEngine(until=0.03)).run()
     assert finer.impulse("hut").pa_s == pytest.approx(coarse.impulse("hut").pa_s, rel=0.1)
 
 
@@ -108,14 +109,67 @@ def test_threads_change_no_bit(bare: GasResult) -> None:
 
 def test_a_run_ends_when_little_more_can_come(bare: GasResult) -> None:
     assert bare.end_reason is EndReason.LOADS_COMPLETE
-    longer = GasBlast(HUT, engine=GasEngine(time_limit_s=2.0 * bare.time_s))
-    run = longer.engine.start_on(longer.site)
-    run._is_complete = lambda: False  # type: ignore[method-assign]
-    run.advance(np.inf)
-    assert run.end_reason is EndReason.TIME_LIMIT
-    late = GasResult(longer, run)
+    assert bare.structures["complete"].all()
+    late = blast_env.simulate(HUT, engine="gas", until=2.0 * bare.time_s)
+    assert late.end_reason is EndReason.TIME_ASKED
+    assert late.time_s >= 2.0 * bare.time_s
     assert late.impulse("hut").pa_s == pytest.approx(bare.impulse("hut").pa_s, rel=0.02)
-    assert any("cut off" in note for note in late.impulse("hut").notes)
+    assert not any(NOT_COMPLETE in note for note in late.impulse("hut").notes)
+    cut = blast_env.simulate(HUT, engine="gas", until=0.03)
+    assert any(NOT_COMPLETE in note for note in cut.impulse("hut").notes)
+    assert cut.structures["to_come_pa_s"].isna().all()  # no wave but the first can have come
+
+
+SHED = {
+    "kind": "ModularObstacle",
+    "name": "shed",
+    "corner_m": [4.5, 6.0],
+    "rows": 2,
+    "columns": 2,
+    "height_m": 2.0,
+}
+
+
+@pytest.fixture(scope="module")
+def yard() -> blast_env.Scenario:
+    """A shed that nobody protects; of the hut only the wall before the charge counts."""
+    document = HUT.model_dump(mode="json", exclude_none=True)
+    document["structures"][0]["faces"] = ["west"]
+    document["structures"].append(SHED)
+    return blast_env.Scenario.from_document(document, "yard")
+
+
+@pytest.mark.parametrize("until", ["structures", "walls", "gauges"])
+def test_what_a_table_shows_is_complete_or_says_so(yard: blast_env.Scenario, until: str) -> None:
+    """Of each wall, lee walls among them, and each gauge: against a blast of twice the time."""
+    result = blast_env.simulate(yard, engine="gas", until=until)
+    late = blast_env.simulate(yard, engine="gas", until=2.0 * result.time_s)
+    assert result.end_reason is EndReason.LOADS_COMPLETE
+    waited_for = {"structures": result.structures.head(1), "gauges": result.gauges}
+    assert waited_for.get(until, result.walls)["complete"].all()
+    for shown, later in ((result.walls, late.walls), (result.gauges, late.gauges)):
+        came = 1.0 - shown["positive_impulse_pa_s"] / later["positive_impulse_pa_s"]
+        assert came[shown["complete"]].median() <= 0.01
+        assert (came[shown["complete"]] <= 0.05).all()  # a slow end of 50 Pa goes on for long
+        rest = later["positive_impulse_pa_s"] - shown["positive_impulse_pa_s"]
+        told = shown["to_come_pa_s"].fillna(np.inf)
+        assert (rest <= told + 0.05 * shown["positive_impulse_pa_s"]).all()
+
+
+def test_to_wait_for_all_walls_takes_longer_and_changes_no_load_before(
+    yard: blast_env.Scenario,
+) -> None:
+    short, long = (blast_env.simulate(yard, engine="gas", until=u) for u in ("structures", "walls"))
+    assert short.time_s < long.time_s
+    same = blast_env.simulate(yard, engine="gas", until=str(short.time_s))
+    assert same.steps == short.steps
+    assert same.structures.equals(short.structures)
+
+
+@pytest.mark.parametrize("until", ["wall", "-1", 0.0, float("nan"), True, None])
+def test_what_a_run_can_wait_for_is_named(until: object) -> None:
+    with pytest.raises(BlastEnvError, match=r"until is .*'structures', 'walls', 'gauges' or sec"):
+        GasEngine(until=until)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -177,7 +231,7 @@ def test_particles_say_that_they_know_no_heights() -> None:
 
 def test_files_have_the_tables(bare: GasResult, tmp_path: Path) -> None:
     workbook = openpyxl.load_workbook(bare.to_excel(tmp_path / "gas.xlsx"))
-    assert workbook.sheetnames == ["Run", "Structures", "Modules", "Gauges", "Columns"]
+    assert workbook.sheetnames == ["Run", "Structures", "Walls", "Modules", "Gauges", "Columns"]
     assert workbook["Structures"].max_row == 2
     assert workbook["Modules"].max_row == len(bare.modules) + 1
     table, record = read_parquet(bare.to_parquet(tmp_path / "gas.parquet"))

@@ -161,7 +161,8 @@ def _report_cases(
 def _engine(settings: TrainingSettings, options: EvaluateOptions) -> Engine:
     """Return the engine that judges: with the run's cells, if it judged by that one, too."""
     own = settings.judge
-    return find_engine(own if own.name == options.engine else options.engine, options.cell_m)
+    engine = own if own.name == options.engine else options.engine
+    return find_engine(engine, options.cell_m, options.until)
 
 
 def _fixed(case: Case, options: EvaluateOptions) -> Case:

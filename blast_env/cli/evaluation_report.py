@@ -11,6 +11,7 @@ from blast_env.cli.options import (
     CELL_HELP,
     CVAR_HELP,
     ENGINE_HELP,
+    UNTIL_HELP,
     CacheOptions,
     ChargeOptions,
     ClusterOptions,
@@ -62,6 +63,7 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
     )
     engine: str = option(JUDGE, ENGINE_HELP)
     cell_m: float | None = option(None, CELL_HELP)
+    until: str | None = option(None, UNTIL_HELP, show_default="structures")
     cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
     export: Path | None = option(
         None,

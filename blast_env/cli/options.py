@@ -17,6 +17,10 @@ ENGINE_HELP: Final = (
     f"{' and '.join(CALIBRATED_ENGINES)} are the paper's particles."
 )
 CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.5."
+UNTIL_HELP: Final = (
+    "What a blast of gas dynamics waits for. structures: those protected; walls: all; "
+    "gauges; or a number of seconds."
+)
 CVAR_HELP: Final = "0.8: the mean of the worst 20 %, beside or instead of that of all."
 
 

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from blast_env.cli.command import argument, option, options_of
-from blast_env.cli.options import CELL_HELP, ENGINE_HELP, SCENARIO_HELP, ChargeOptions, JsonOptions
+from blast_env.cli.options import (
+    CELL_HELP,
+    ENGINE_HELP,
+    SCENARIO_HELP,
+    UNTIL_HELP,
+    ChargeOptions,
+    JsonOptions,
+)
 from blast_env.cli.output import (
     make_table,
     print_json,
@@ -69,6 +76,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
     )
     side_by_side: bool = option(False, "Show in all pictures the site without the barrier as well.")
     cell_m: float | None = option(None, CELL_HELP, panel=_GAS_PANEL)
+    until: str | None = option(None, UNTIL_HELP, panel=_GAS_PANEL, show_default="structures")
     impulse_map: Path | None = option(
         None, "Write a map of the impulse over the ground.", writes=PICTURES, panel=_GAS_PANEL
     )
@@ -120,7 +128,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
         scenario = scenario.with_simulation(self.preset)
         # A layout is for the site of the file; preset and stand-off are this command's.
         layout: Layout = () if self.layout is None else tuple(load_layout(self.layout, site))
-        engine = find_engine(self.engine, self.cell_m)
+        engine = find_engine(self.engine, self.cell_m, self.until)
         self._check(engine, layout)
         charge = self.fixed(scenario, draw_threat(scenario, self.seed))
         shown = self._shown(scenario, layout, engine, charge)
@@ -336,8 +344,8 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
     """A blast of gas dynamics."""
 
     headers = (
-        *("structure", "protected", "impulse (Pa s)", "first phase (Pa s)", "peak (kPa)"),
-        *("arrival (ms)", "most loaded wall", "roof (Pa s)"),
+        *("structure", "protected", "impulse (Pa s)", "to come (Pa s)", "first phase (Pa s)"),
+        *("peak (kPa)", "arrival (ms)", "most loaded wall", "roof (Pa s)"),
     )
 
     def check(self) -> None:
@@ -434,6 +442,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
                 each["structure"],
                 "yes" if each["protected"] else "no",
                 _pa_s_text(scaled[each["structure"]]),
+                _to_come_text(each),
                 f"{each['first_impulse_pa_s']:,.0f}",
                 f"{each['peak_pa'] / PA_PER_KPA:,.1f}",
                 _number(MS_PER_S * each["arrival_s"], ".1f"),
@@ -479,13 +488,22 @@ def _print_gauges(gauges: "pd.DataFrame") -> None:
     if not len(gauges):
         return
     table = make_table(
-        "gauges", ("gauge", "x (m)", "y (m)", "z (m)", "peak (kPa)", "impulse (Pa s)"), 1
+        "gauges",
+        ("gauge", "x (m)", "y (m)", "z (m)", "peak (kPa)", "impulse (Pa s)", "to come (Pa s)"),
+        1,
     )
     for row in gauges.to_dict("records"):
         places = (f"{row[axis]:.2f}" for axis in ("x_m", "y_m", "z_m"))
         peak, impulse = row["peak_pa"] / PA_PER_KPA, row["positive_impulse_pa_s"]
-        table.add_row(row["name"], *places, f"{peak:,.1f}", f"{impulse:,.0f}")
+        table.add_row(row["name"], *places, f"{peak:,.1f}", f"{impulse:,.0f}", _to_come_text(row))
     result_console().print(table)
+
+
+def _to_come_text(row: Mapping[Any, Any]) -> str:
+    """Return about how much of an impulse is still to come; `?` if not all waves have come."""
+    if row["complete"]:
+        return "complete"
+    return "?" if isnan(row["to_come_pa_s"]) else f"{row['to_come_pa_s']:,.1f}"
 
 
 def _number(value: float, form: str) -> str:

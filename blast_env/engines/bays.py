@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
+from blast_env.engines.gas_tables import TAIL_COLUMNS
 from blast_env.errors import UnknownNameError
-from blast_env.physics.gas.settings import FACE_NAMES
+from blast_env.physics.gas.settings import FACE_NAMES, is_complete, still_to_come
 from blast_env.response.damage import Alternatives, BayDamage, bay_damages
 from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond
 from blast_env.response.glass import GlazingCondition
@@ -44,6 +45,9 @@ BAY_COLUMNS: Final = (
     Column("damage", "", "damage of the wall panel in the terms of PDC-TR 06-08"),
 )
 """A row a bay; what a bay does not have is empty."""
+
+LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, *TAIL_COLUMNS)
+"""A row a bay of a blast, with what is still to come."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +110,33 @@ class BayLoads:
         history = self.recorder.history_pa[names.index(name)]
         return pd.DataFrame({"time_s": self.recorder.time_s, "overpressure_pa": history})
 
-    def table(self) -> "pd.DataFrame":
-        """Return one row a bay; see `BAY_COLUMNS`."""
-        return table_of(bay_rows(self.response) if self.bays else [], BAY_COLUMNS)
+    def table(self, run: "GasRun") -> "pd.DataFrame":
+        """Return one row a bay; see `LOADED_BAY_COLUMNS`.
+
+        Args:
+            run: The run that has recorded them.
+        """
+        if not self.bays:
+            return table_of([], LOADED_BAY_COLUMNS)
+        names = [each.name for each in run.site.structures]
+        passed = {name: run.has_passed(index) for index, name in enumerate(names)}
+        (middle_s, first_s), time_s = run.tail.since_s, self.response.time_s
+        rows = bay_rows(self.response)
+        for row, pressure in zip(rows, self.response.pressure_pa, strict=True):
+            positive = np.maximum(pressure, 0.0)
+            impulse_pa_s, last, before = (
+                float(np.trapezoid(np.where(part, positive, 0.0), time_s))
+                for part in (
+                    time_s >= 0.0,
+                    time_s > middle_s,
+                    (time_s > first_s) & (time_s <= middle_s),
+                )
+            )
+            to_come_pa_s = float(still_to_come(last, before))
+            to_come_pa_s = to_come_pa_s if passed[str(row["structure"])] else np.nan
+            row["to_come_pa_s"] = to_come_pa_s
+            row["complete"] = bool(is_complete(impulse_pa_s, to_come_pa_s))
+        return table_of(rows, LOADED_BAY_COLUMNS)
 
 
 def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:

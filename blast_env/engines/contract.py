@@ -393,22 +393,25 @@ JUDGE: Final = "gas"
 """The engine whose word counts about protection."""
 
 
-def find_engine(engine: str | Engine, cell_m: float | None = None) -> Engine:
+def find_engine(
+    engine: str | Engine, cell_m: float | None = None, until: str | float | None = None
+) -> Engine:
     """Return an engine by its name, or the engine itself.
 
     Args:
         engine: The name, or the engine.
         cell_m: Side of the cells of gas dynamics; that of the engine unless given.
+        until: What a blast of gas dynamics waits for; as the engine says unless given.
 
     Raises:
         UnknownNameError: If there is no engine of that name.
-        BlastEnvError: If `cell_m` does not divide the side of a module, or is given for an engine
-            that has no cells; or an extra is missing.
+        BlastEnvError: If `cell_m` does not divide the side of a module, or a setting is given for
+            an engine that does not have it; or an extra is missing.
     """
     found = _made(engine) if isinstance(engine, str) else engine
     if not isinstance(found, Engine):
         raise BlastEnvError(f"engine is {value_text(engine)}, must be a name or an engine")
-    return found.configured(cell_m=cell_m)
+    return found.configured(cell_m=cell_m, until=until)
 
 
 def _made(name: str) -> Engine:

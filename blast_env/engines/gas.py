@@ -11,15 +11,29 @@ from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.calibration.model import ScaledImpulse
-from blast_env.engines.bays import BAY_COLUMNS, BayLoads
+from blast_env.engines.bays import LOADED_BAY_COLUMNS, BayLoads
 from blast_env.engines.contract import BlastLoads, Engine, EngineOption, StructureLoad
+from blast_env.engines.gas_tables import (
+    BUILDING_COLUMNS,
+    FACE_COLUMNS,
+    GAUGE_COLUMNS,
+    MODULE_COLUMNS,
+    STRUCTURE_COLUMNS,
+    WALL_COLUMNS,
+    face_table,
+    gauge_table,
+    load_values,
+    module_table,
+    structure_table,
+    wall_table,
+)
 from blast_env.engines.pieces import PIECE_COLUMNS, PieceLoads
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Element, layout_text
@@ -35,76 +49,18 @@ from blast_env.provenance import versions
 from blast_env.response.damage import BayDamage
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.scenario.build_scene import build_site, draw_threat
-from blast_env.tables import Column, as_types, table_of, texts
-from blast_env.units import MODULE_SIDE_M
+from blast_env.tables import table_of
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
 
     from blast_env.physics.gas.engine import GasRun, Recorders
-    from blast_env.physics.gas.probes import LoadTable
     from blast_env.recording.tables import RunRecord
 
+NOT_COMPLETE: Final = "more than 2 % of the impulse may still come"
+"""Note on a load that is not complete; `GasSettings.until` says what a run waits for."""
+
 _PROGRESS_CALLS: Final = 100
-
-_LOADS: Final = (
-    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases, mean over the area"),
-    Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase, likewise"),
-    Column("negative_impulse_pa_s", "Pa s", "impulse of all negative phases, 0 or below, likewise"),
-    Column("peak_pa", "Pa", "largest overpressure anywhere on it"),
-    Column("arrival_s", "s", "time at which 1 kPa is reached first, from the detonation"),
-)
-
-FACE_COLUMNS: Final = (
-    Column("structure", "", "name of the structure, or `barrier`"),
-    Column("face", "", "west, east, south, north or roof"),
-    Column("module_id", "", "name of the module, made from its centre in metres"),
-    Column("x_m", "m", "centre, from the left border"),
-    Column("y_m", "m", "centre, from the lower border"),
-    Column("z_m", "m", "centre, above the ground"),
-    *_LOADS,
-)
-"""A row a face of a cell."""
-
-MODULE_COLUMNS: Final = (
-    Column("module_id", "", "name of the module, made from its centre in metres"),
-    Column("structure", "", "structure that the module is part of"),
-    Column("row", "", "row in the structure's grid, upwards from 0"),
-    Column("column", "", "column in the structure's grid, to the right from 0"),
-    Column("x_m", "m", "centre, from the left border"),
-    Column("y_m", "m", "centre, from the lower border"),
-    Column("face", "", "west, east, south, north or roof"),
-    Column("area_m2", "m2", "area of that face over the whole height"),
-    *_LOADS,
-    Column("piece", "", "piece of a barrier that it is part of; empty if it is of none"),
-)
-"""A row a face of a module that touches air."""
-
-STRUCTURE_COLUMNS: Final = (
-    Column("structure", "", "name of the structure"),
-    Column("protected", "", "whether its load counts"),
-    Column("weight", "", "its weight among the protected structures"),
-    Column("height_m", "m", "its height"),
-    Column("faces", "", "the walls whose load counts"),
-    Column("area_m2", "m2", "their area"),
-    *_LOADS,
-    Column("most_loaded_face", "", "the wall with the largest impulse"),
-    Column("most_loaded_pa_s", "Pa s", "impulse on that wall"),
-    Column("roof_impulse_pa_s", "Pa s", "impulse on the roof; NaN where it is as high as the air"),
-)
-"""A row a structure; the loads are those on the walls that count."""
-
-GAUGE_COLUMNS: Final = (
-    Column("name", "", "name of the gauge"),
-    Column("x_m", "m", "centre of its cell, from the left border"),
-    Column("y_m", "m", "centre of its cell, from the lower border"),
-    Column("z_m", "m", "centre of its cell, above the ground"),
-    Column("arrival_s", "s", "time at which 1 kPa is reached first, from the detonation"),
-    Column("peak_pa", "Pa", "largest overpressure"),
-    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases"),
-    Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase"),
-    Column("negative_impulse_pa_s", "Pa s", "impulse of all negative phases, 0 or below"),
-)
 
 
 @dataclass(frozen=True)
@@ -116,13 +72,14 @@ class GasEngine(GasSettings, Engine):
     checked_for: ClassVar[str] = "what gas dynamics was checked for"
     options: ClassVar[tuple[EngineOption, ...]] = (
         EngineOption("cell_m", "Side of the cells of gas dynamics, m."),
+        EngineOption("until", "What a blast of gas dynamics waits for."),
     )
     unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingGas"
     screening: ClassVar[str] = "blast_env.rendering.pressure_film:PressureScreening"
     shown: ClassVar[str] = "blast_env.cli.simulate:ShownGas"
 
     name: str = "gas"
-    version: str = f"gas 3 (numba {version('numba')})"
+    version: str = f"gas 4 (numba {version('numba')})"
 
     def start_on(self, site: BlastSite, recorders: "Recorders" = lambda _: ()) -> "GasRun":
         """Return a run at time 0, independent of every other run.
@@ -275,91 +232,33 @@ class GasResult:
     @cached_property
     def faces(self) -> "pd.DataFrame":
         """One row a face of a cell, structures and barrier; see `FACE_COLUMNS`."""
-        import pandas as pd  # it takes a third of a second
-
-        table = self.run.table
-        outlines = self.run.site.structures
-        names = np.array([outline.name for outline in outlines], dtype=object)
-        frame = pd.DataFrame(
-            {
-                "structure": names[table.structure],
-                "face": np.array(FACE_NAMES, dtype=object)[table.face],
-                "module_id": self._module_ids,
-                "x_m": table.centre_m[:, 0],
-                "y_m": table.centre_m[:, 1],
-                "z_m": table.centre_m[:, 2],
-                **_columns(self.run.loads),
-                "row": table.row,
-                "column": table.column,
-            }
-        )
-        return as_types(frame, {"structure": "str", "face": "str", "module_id": "str"})
+        return face_table(self.run)
 
     @cached_property
     def modules(self) -> "pd.DataFrame":
         """One row a face of a module that touches air; see `MODULE_COLUMNS`."""
-        keys = ["structure", "module_id", "row", "column", "face"]
-        groups = self.faces.groupby(keys, sort=False, observed=True)
-        table = _means(groups, self._cell_area_m2).reset_index()
-        corners = {outline.name: outline.corner_m for outline in self.run.site.structures}
-        left, bottom = (table["structure"].map(lambda name, k=k: corners[name][k]) for k in (0, 1))
-        table["x_m"] = left + (table["column"] + 0.5) * MODULE_SIDE_M
-        table["y_m"] = bottom + (table["row"] + 0.5) * MODULE_SIDE_M
-        of_pieces = {
-            (outline.name, *cell): piece
-            for outline in self.run.site.structures
-            for cell, piece in zip(outline.cells or (), outline.pieces or (), strict=False)
-        }
-        modules = zip(table["structure"], table["row"], table["column"], strict=True)
-        pieces = [of_pieces.get(module, "") for module in modules]
-        table["piece"] = texts(pieces)
-        return table[[column.name for column in MODULE_COLUMNS]]
+        return module_table(self.run, self.faces)
+
+    @cached_property
+    def walls(self) -> "pd.DataFrame":
+        """One row a wall or roof of a structure; see `WALL_COLUMNS`."""
+        return wall_table(self.run, self.faces)
 
     @cached_property
     def structures(self) -> "pd.DataFrame":
         """One row a structure; see `STRUCTURE_COLUMNS`."""
-        rows = []
-        for outline in self.run.site.structures:
-            if outline.cells is not None:
-                continue
-            own = self.faces[self.faces["structure"] == outline.name]
-            walls = own[own["face"].isin(outline.faces)]
-            of_walls = walls.groupby("face")["positive_impulse_pa_s"].mean()
-            roof = own[own["face"] == ROOF]["positive_impulse_pa_s"]
-            height_m = outline.height_m or self.run.site.air_height_m
-            rows.append(
-                {
-                    "structure": outline.name,
-                    "protected": outline.protected,
-                    "weight": outline.weight,
-                    "height_m": height_m,
-                    "faces": " ".join(outline.faces),
-                    "area_m2": len(walls) * self._cell_area_m2,
-                    "positive_impulse_pa_s": walls["positive_impulse_pa_s"].mean(),
-                    "first_impulse_pa_s": walls["first_impulse_pa_s"].mean(),
-                    "negative_impulse_pa_s": walls["negative_impulse_pa_s"].mean(),
-                    "peak_pa": walls["peak_pa"].max(),
-                    "arrival_s": walls["arrival_s"].min(),
-                    "most_loaded_face": of_walls.idxmax() if len(of_walls) else "",
-                    "most_loaded_pa_s": of_walls.max() if len(of_walls) else np.nan,
-                    "roof_impulse_pa_s": roof.mean() if len(roof) else np.nan,
-                }
-            )
-        return table_of(rows, STRUCTURE_COLUMNS)
+        return structure_table(self.run, self.faces)
+
+    @cached_property
+    def buildings(self) -> "pd.DataFrame":
+        """One row a building, whose parts are one; see `BUILDING_COLUMNS`."""
+        names = {each.name: each.building_name for each in self.blast.scenario.structures}
+        return structure_table(self.run, self.faces, names)
 
     @cached_property
     def gauges(self) -> "pd.DataFrame":
         """One row a gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
-        import pandas as pd  # it takes a third of a second
-
-        gauges, names = self.run.gauges, [each.name for each in self.run.site.gauges]
-        if gauges is None:
-            return table_of([], GAUGE_COLUMNS)
-        cells = np.array(self._gauge_cells)
-        centres = np.array(self.run.grid.origin_m) + self.run.grid.cell_m * (cells + 0.5)
-        frame = pd.DataFrame({"name": names, **_columns(gauges)})
-        frame[["x_m", "y_m", "z_m"]] = centres
-        return frame[[column.name for column in GAUGE_COLUMNS]]
+        return gauge_table(self.run)
 
     def history(self, gauge: str) -> "pd.DataFrame":
         """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`.
@@ -377,8 +276,10 @@ class GasResult:
 
     @cached_property
     def bays(self) -> "pd.DataFrame":
-        """One row a bay of the facades: its load, and what becomes of it; see `BAY_COLUMNS`."""
-        return table_of([], BAY_COLUMNS) if self.bay_loads is None else self.bay_loads.table()
+        """One row a bay: its load, and what becomes of it; see `LOADED_BAY_COLUMNS`."""
+        if self.bay_loads is None:
+            return table_of([], LOADED_BAY_COLUMNS)
+        return self.bay_loads.table(self.run)
 
     def bay_history(self, name: str) -> "pd.DataFrame":
         """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
@@ -492,7 +393,7 @@ class GasResult:
         state = sha256()
         for table in (self.run.loads, self.run.gauges):
             if table is not None:
-                for values in _columns(table).values():
+                for values in load_values(table).values():
                     state.update(np.ascontiguousarray(values).tobytes())
         state.update(np.array([self.time_s, self.steps]).tobytes())
         return state.hexdigest()
@@ -539,11 +440,14 @@ class GasResult:
 
         tables = [
             SheetTable("Structures", self.structures, STRUCTURE_COLUMNS),
+            SheetTable("Walls", self.walls, WALL_COLUMNS),
             SheetTable("Modules", self.modules, MODULE_COLUMNS),
             SheetTable("Gauges", self.gauges, GAUGE_COLUMNS),
         ]
+        if len(self.buildings) < len(self.structures):
+            tables.insert(0, SheetTable("Buildings", self.buildings, BUILDING_COLUMNS))
         if len(self.bays):
-            tables.append(SheetTable("Bays", self.bays, BAY_COLUMNS))
+            tables.append(SheetTable("Bays", self.bays, LOADED_BAY_COLUMNS))
         if len(self.pieces):
             tables.append(SheetTable("Pieces", self.pieces, PIECE_COLUMNS))
         return write_tables(self.run_record, tables, path)
@@ -566,19 +470,6 @@ class GasResult:
     def _cell_area_m2(self) -> float:
         return self.run.grid.cell_m**2
 
-    @property
-    def _module_ids(self) -> list[str]:
-        table, outlines = self.run.table, self.run.site.structures
-        return [
-            outlines[structure].module_name(row, column)
-            for structure, row, column in zip(table.structure, table.row, table.column, strict=True)
-        ]
-
-    @property
-    def _gauge_cells(self) -> list[tuple[int, int, int]]:
-        gauges = self.run.gauges
-        return [] if gauges is None else [tuple(cell) for cell in gauges.cells]
-
     def _notes(self, index: int) -> tuple[str, ...]:
         from blast_env.physics.gas.engine import scaled_distance  # the run has imported it
 
@@ -589,30 +480,9 @@ class GasResult:
             notes.append(
                 f"scaled distance {scaled:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
             )
-        if self.end_reason is EndReason.TIME_LIMIT:
-            notes.append(f"the blast was cut off: {self.end_reason}")
+        walls = self._walls(index)
+        if not self.run.is_complete(walls, index):
+            notes.append(f"{NOT_COMPLETE}: the run ended because {self.end_reason}")
         if self.run.solver.lifted:
             notes.append(f"{self.run.solver.lifted} cells were raised to the floor of pressure")
         return tuple(notes)
-
-
-def _columns(loads: "LoadTable") -> dict[str, FloatArray]:
-    return {
-        "positive_impulse_pa_s": loads.positive_impulse_pa_s,
-        "first_impulse_pa_s": loads.first_impulse_pa_s,
-        "negative_impulse_pa_s": loads.negative_impulse_pa_s,
-        "peak_pa": loads.peak_pa,
-        "arrival_s": loads.arrival_s,
-    }
-
-
-def _means(groups: Any, area_m2: float) -> "pd.DataFrame":
-    """Return impulses as means, peaks as the largest, arrivals as the first of each group."""
-    table: pd.DataFrame = groups.agg(
-        positive_impulse_pa_s=("positive_impulse_pa_s", "mean"),
-        first_impulse_pa_s=("first_impulse_pa_s", "mean"),
-        negative_impulse_pa_s=("negative_impulse_pa_s", "mean"),
-        peak_pa=("peak_pa", "max"),
-        arrival_s=("arrival_s", "min"),
-    )
-    return table.assign(area_m2=groups.size() * area_m2)

@@ -24,6 +24,7 @@ def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
     charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
     cell_m: float | None = ...,
+    until: str | float | None = ...,
 ) -> "GasResult": ...
 
 
@@ -46,6 +47,7 @@ def simulate(
     charge: AnyCharge | None = None,
     progress: Callable[[float], None] | None = None,
     cell_m: float | None = None,
+    until: str | float | None = None,
 ) -> BlastOutcome:
     """Run a blast to its end.
 
@@ -60,6 +62,8 @@ def simulate(
         charge: The charge, instead of one drawn from the scenario.
         progress: Called from time to time with the share of the time limit that has passed.
         cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
+        until: What a blast of gas dynamics waits for: `"structures"` that are protected, all
+            `"walls"`, or the `"gauges"`; or how many seconds it lasts. Structures unless given.
 
     Returns:
         A `BlastResult` of the particle engines, a `GasResult` of gas dynamics.
@@ -68,13 +72,13 @@ def simulate(
         LayoutError: If the layout does not fit the build zone.
         UnknownNameError: If there is no such engine.
         ScenarioError: If the charge is not clear of a structure or the border.
-        BlastEnvError: If `cell_m` does not divide the side of a module, or is given for an engine
-            that has no cells.
+        BlastEnvError: If `cell_m` does not divide the side of a module, or a setting is given for
+            an engine that does not have it.
         BlastEnvError: If the seed is no integer, negative or too large.
     """
     # Anything else is refused where it is read.
     cells = tuple(layout) if isinstance(layout, Iterable) else layout
-    return find_engine(engine, cell_m).blast(scenario, cells, seed, charge).run(progress)
+    return find_engine(engine, cell_m, until).blast(scenario, cells, seed, charge).run(progress)
 
 
 def simulate_many(

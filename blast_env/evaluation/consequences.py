@@ -353,7 +353,7 @@ def by_building(
         charge: The charge where it went off.
         peak_factor: What its peaks would be multiplied by if cells did not clip them.
     """
-    names = {each.name: each.building or each.name for each in scenario.structures}
+    names = {each.name: each.building_name for each in scenario.structures}
     owners = [names[each.bay.structure] for each in facade.bays]
     found = []
     for building in dict.fromkeys(owners):

@@ -112,7 +112,7 @@ def targets_of(scenario: Scenario) -> tuple[ReportedBuilding, ...]:
     """Return the buildings of a scenario, protected ones first."""
     together: dict[str, list[AnyStructure]] = {}
     for structure in scenario.structures:
-        together.setdefault(structure.building or structure.name, []).append(structure)
+        together.setdefault(structure.building_name, []).append(structure)
     targets = [ReportedBuilding(name, tuple(parts)) for name, parts in together.items()]
     return tuple(sorted(targets, key=lambda each: not each.protected))
 

@@ -468,6 +468,11 @@ class StructureSection(Section):
     facade: FacadeSection | None = None
 
     @property
+    def building_name(self) -> str:
+        """The building that it is a part of, or its own name where it is one by itself."""
+        return self.building or self.name
+
+    @property
     def counted_peak_weight(self) -> float:
         """How much its peak counts: `peak_weight`, or `weight` where that is not given."""
         return self.weight if self.peak_weight is None else self.peak_weight

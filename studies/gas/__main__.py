@@ -23,7 +23,7 @@ from blast_env.runner import run_all
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.scenario.build_scene import draw_charge
 from blast_env.tables import markdown_table
-from blast_env.units import MS_PER_S
+from blast_env.units import MS_PER_S, PA_PER_KPA
 from studies.gas.cells import CellLoads, cell_loads, difference
 from studies.gas.corners import EXPERIMENT, REGIONS, ExperimentalBand, corner_waves
 from studies.gas.judgement import Judgement
@@ -38,14 +38,20 @@ from studies.gas.loads import (
     with_heights,
     yard,
 )
+from studies.gas.oblique import oblique_loads
 from studies.gas.reference import free_field, wide_wall
 from studies.gas.sources import source_ratios, trade_off_figure
+from studies.gas.waiting import waiting
 
 CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
 """With which cells a charge is held against Kingery and Bulmash, by its mass in kg."""
 PEAK_CHARGE_KG: Final = 100.0
 PEAK_DISTANCE_M: Final = 12.5
 YARD: Final = "yard"
+_WITH_HEIGHTS: Final = (
+    *("visitor_entrance", "control_room", "school_and_clinic", "hotel_forecourt"),
+    "shopping_street",
+)
 
 Cell = Annotated[float, typer.Option(help="Side of a cell, m.")]
 Processes = Annotated[int, typer.Option(min=1)]
@@ -284,6 +290,71 @@ def _ending_row(found: Ending) -> tuple[str, ...]:
         f"{found.later_pa_s:.1f}",
         f"{100.0 * found.cut_off:.2f} %",
     )
+
+
+@app.command()
+def until(
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="Scenarios, those with heights unless given.")
+    ] = None,
+    cell: Cell = 0.5,
+) -> None:
+    """Print how long a run is that waits for structures, walls or gauges, and what came later.
+
+    Without a barrier. Of the walls and gauges that a table calls complete: what came until twice
+    the time.
+    """
+    rows = []
+    with user_errors():
+        for name in scenario or _WITH_HEIGHTS:
+            blast = GasBlast(load_scenario(name), engine=GasEngine(cell_m=cell))
+            for waited_for in ("structures", "walls", "gauges"):
+                if waited_for == "gauges" and not blast.site.gauges:
+                    continue
+                found = waiting(blast, waited_for)
+                rows.append(
+                    (
+                        name,
+                        waited_for,
+                        f"{MS_PER_S * found.time_s:.0f}",
+                        f"{found.cpu_s:.1f}",
+                        f"{found.told.sum()} of {len(found.told)}",
+                        str(found.missed),
+                        f"{100.0 * found.worst:.1f} %",
+                    )
+                )
+    headers = ("scenario", "until", "end (ms)", "CPU time (s)", "complete", "more than 2 % came")
+    print_line(markdown_table((*headers, "of these at most"), rows))
+
+
+@app.command()
+def oblique(
+    angles: Annotated[str, typer.Option(help="Degrees, separated by commas.")] = "0,20,30,45",
+    until: Annotated[str, typer.Option(help="What a blast waits for.")] = "structures",
+    cell: Cell = 0.5,
+) -> None:
+    """Print the loads on a facade of 12 m that is turned against the grid, and looks at the charge.
+
+    By faces of cells, and by bays of 3 m along the facade's own normal.
+    """
+    rows = []
+    with user_errors():
+        for angle_deg in _numbers(angles):
+            found = oblique_loads(angle_deg, cell, until)
+            peaks = (
+                *(found.mean_peak_pa, found.largest_peak_pa),
+                *(found.projected_peak_pa, found.largest_projected_pa),
+            )
+            impulses = (found.impulse_pa_s, found.projected_pa_s)
+            rows.append(
+                (
+                    f"{angle_deg:g}",
+                    *(f"{impulse:.0f}" for impulse in impulses),
+                    *(f"{peak / PA_PER_KPA:.0f}" for peak in peaks),
+                )
+            )
+    headers = ("degrees", "impulse (Pa s)", "along the normal", "peak of faces (kPa)", "largest")
+    print_line(markdown_table((*headers, "peak of bays (kPa)", "largest of bays"), rows))
 
 
 @app.command()

@@ -52,7 +52,7 @@ from tests.agents.test_self_labelling import wide_yard
 CHARGE_M = np.array([0.0, 0.0, 0.3])
 POINT_M = np.array([[20.0, 0.0, 1.5]])
 NOTHING = np.empty((0, 5))
-FAST = GasEngine(border_m=0.0, time_limit_s=0.02)
+FAST = GasEngine(border_m=0.0, until=0.02)
 YARD = wide_yard()
 PEAKS = Scenario.from_document(YARD.model_dump() | {"objective": {"quantity": "peak"}}, "peaks")
 CHECK = Check(

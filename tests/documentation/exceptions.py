@@ -201,6 +201,8 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.gas ending --until 0.25 --random-layouts 1": (
         "--until 0.02 --random-layouts 0"
     ),
+    "python -m studies.gas until": "--scenario visitor_entrance --cell 0.5",
+    "python -m studies.gas oblique": "--angles 20 --until 0.02",
     "python -m studies.gas borders --places 2/0,2/12,2/24,8/48": ("--places 2/0,2/12 --until 0.05"),
     "python -m studies.gas air-height": "--heights 9,12 --until 0.05",
     "python -m studies.gas cells --random-layouts 18 --finest 0.125": (

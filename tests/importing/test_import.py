@@ -339,7 +339,7 @@ def test_rectangles_of_a_building_touch_and_have_its_name(ell: Scenario) -> None
 
 def test_two_rectangles_take_the_load_of_one_building(ell: Scenario) -> None:
     """No load on walls between them, and together the mean over the walls of the house."""
-    result = GasBlast(ell, engine=GasEngine(time_limit_s=0.03)).run()
+    result = GasBlast(ell, engine=GasEngine(until=0.03)).run()
     faces = result.faces[result.faces["structure"].str.startswith("House")]
     walls = faces[faces["face"] != "roof"]
     inner = walls[(walls["y_m"] == 5.0) & (walls["x_m"] < 7.5)]
@@ -368,7 +368,7 @@ def test_rectangle_that_others_hide_does_not_count(tmp_path: Path) -> None:
     house = [each for each in scenario.structures if each.building == "House"]
     assert [each.protected for each in house] == [True, False, True]
     assert sum(each.weight for each in house if each.protected) == pytest.approx(1.0)
-    result = GasBlast(scenario, engine=GasEngine(time_limit_s=0.002)).run()
+    result = GasBlast(scenario, engine=GasEngine(until=0.002)).run()
     middle = result.structures.set_index("structure").loc["House_b"]
     assert middle["area_m2"] == 0.0
 

@@ -172,7 +172,7 @@ def test_a_map_names_what_stands_and_numbers_contours(walled: GasResult) -> None
 
 
 def test_a_map_needs_its_recorder(blast: GasBlast, walled: GasResult) -> None:
-    run = replace(blast, engine=GasEngine(margin_m=1.0, time_limit_s=1e-3)).run()
+    run = replace(blast, engine=GasEngine(margin_m=1.0, until=1e-3)).run()
     with pytest.raises(BlastEnvError, match="recorders=ground_recorders"):
         ground_map(run)
     assert any(isinstance(each, GroundMap) for each in walled.run.solver.recorders)
@@ -236,7 +236,7 @@ def test_walls_with_and_without_a_barrier_have_one_scale(
 def test_a_wall_that_does_not_count_says_so(bare: GasResult) -> None:
     section = {**hut().model_dump()["structures"][0], "faces": ["west"]}
     scenario = hut(structures=[section])
-    short = GasEngine(margin_m=1.0, time_limit_s=1e-3)
+    short = GasEngine(margin_m=1.0, until=1e-3)
     figure = facades(GasBlast(scenario, engine=short).run())
     marked = ["does not count" in axes.get_title() for axes in figure.axes[:4]]
     assert marked == [False, True, True, True]
@@ -351,7 +351,7 @@ def test_the_section_points_to_what_is_protected(blast: GasBlast) -> None:
 @pytest.fixture
 def short(blast: GasBlast) -> tuple[GasBlast, GasBlast]:
     """Blasts that end soon after the grid has taken over."""
-    engine = GasEngine(margin_m=1.0, time_limit_s=8e-3)
+    engine = GasEngine(margin_m=1.0, until=8e-3)
     return replace(blast, engine=engine), replace(blast, engine=engine, layout=WALL)
 
 

@@ -72,7 +72,7 @@ def test_a_wall_at_the_visitor_entrance_screens_the_front() -> None:
     """On the first wave alone, for the sake of time."""
     scenario = load_scenario("visitor_entrance")
     wall = tuple(Piece(row, 5, "t_wall_3_6", True) for row in (7, 14))
-    engine = GasEngine(time_limit_s=0.03)
+    engine = GasEngine(until=0.03)
     bare, screened = (
         GasBlast(scenario, layout, 0, engine, None).run().impulse("reception").pa_s
         for layout in ((), wall)

@@ -47,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def study(folder: Path) -> ItemStudy:
     """Return a study whose blasts end after 15 ms, before all has arrived."""
-    return ItemStudy(two_places(), SMALL, GasEngine(time_limit_s=0.015), processes=1, cache=folder)
+    return ItemStudy(two_places(), SMALL, GasEngine(until=0.015), processes=1, cache=folder)
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,13 @@ from blast_env.physics.gas.faces import Faces, exposed_faces
 from blast_env.physics.gas.grid import GasGrid, layers_to
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import FaceLoads, Gauges
-from blast_env.physics.gas.settings import CHECKED_CELLS, FACE_NAMES, GasSettings
+from blast_env.physics.gas.settings import (
+    CHECKED_CELLS,
+    FACE_NAMES,
+    GasSettings,
+    is_complete,
+    still_to_come,
+)
 from blast_env.physics.gas.solver import GasSolver, Recorder, Settling, state_bytes
 from blast_env.physics.gas.source import (
     GasCharge,
@@ -30,6 +36,7 @@ from blast_env.physics.gas.source import (
     least_clearance_m,
     set_charge,
 )
+from blast_env.physics.gas.tail import Tail
 from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
 
@@ -40,7 +47,6 @@ _MOST_BYTES: Final = 8 * 2**30
 # are the same for all layouts, so that their loads can be compared.
 _SWING_S: Final = 0.11  # after sound has come all over, in which the other waves follow
 _WINDOW_S: Final = 0.03
-_GROWTH: Final = 0.02  # of an impulse in a window, below which it is complete then
 _TIME_LIMIT_S: Final = 0.3  # for more windows
 _HOTTEST: Final = 4.0  # that settled products are at most, in units of still air's temperature
 _SMALL_LOAD: Final = 0.05  # of the largest impulse: what counts at least
@@ -89,6 +95,7 @@ class GasRun:
         table: The faces on which loads are recorded.
         loads: The loads on them.
         gauges: The gauges, `None` without any.
+        tail: What came last on faces and gauges.
         end_reason: Why the run has ended; None while it has not.
         notes: Why the result is to be distrusted, a sentence each.
     """
@@ -105,7 +112,7 @@ class GasRun:
         self.table = _face_table(self.grid, owner)
         self.loads = FaceLoads(len(self.table.faces))
         self.gauges = _gauges(self.grid, site)
-        scale = cbrt(self.charge.mass_kg / 100.0)
+        scale = self._scale = cbrt(self.charge.mass_kg / 100.0)
         own = [self.loads] if self.gauges is None else [self.loads, self.gauges]
         self.solver = GasSolver(
             self.grid,
@@ -120,13 +127,14 @@ class GasRun:
         if self.gauges is not None:
             _add_opening(self.gauges, self.grid, self.charge, self.handover_radius_m)
         self.end_reason: EndReason | None = None
-        self._window_s = _WINDOW_S * scale
-        watched = _watched(site)
-        self._groups = [_faces_of(self.table, site, index) for index in watched]
-        self._impulses: FloatArray | None = None
-        waves_s = _way_m(self.charge, site, watched) / _SOUND_M_S + _SWING_S * scale
-        self._check_s = waves_s - self._window_s
-        self.limit_s = settings.time_limit_s or waves_s + _TIME_LIMIT_S * scale
+        watched = _watched(site, settings.until)
+        self._groups = _groups(self.table, site, settings.until, watched)
+        gauges = [each.position_m for each in site.gauges]
+        places = [] if settings.until != "gauges" and watched else gauges
+        self._waves_s = self._passed_s([*_corners_m(site, watched), *places])
+        self.tail = Tail(own, _WINDOW_S * scale, self._waves_s)
+        asked = settings.until_s
+        self.limit_s = self._waves_s + _TIME_LIMIT_S * scale if asked is None else asked
 
     @property
     def time_s(self) -> float:
@@ -155,21 +163,60 @@ class GasRun:
         """
         while self.end_reason is None and self.solver.time_s < until_s:
             self.solver.step()
+            looked = self.tail.look(self.solver.time_s)
+            asked = self.settings.until_s is not None
             if self.solver.time_s >= self.limit_s:
-                self.end_reason = EndReason.TIME_LIMIT
-            elif self.solver.time_s >= self._check_s and self._is_complete():
+                self.end_reason = EndReason.TIME_ASKED if asked else EndReason.TIME_LIMIT
+            elif asked or not looked or self.solver.time_s < self._waves_s:
+                continue
+            elif self._is_complete():
                 self.end_reason = EndReason.LOADS_COMPLETE
 
+    def has_passed(self, index: int) -> bool:
+        """Return whether all waves of the charge have come to a structure, by its index."""
+        return self.solver.time_s >= self._passed_s(_corners_m(self.site, [index]))
+
+    def is_complete(self, faces: NDArray[np.int64], index: int) -> bool:
+        """Return whether the mean impulse on some faces of a structure is complete."""
+        return not len(faces) or (self.has_passed(index) and self._are_complete([faces]))
+
+    @property
+    def gauges_to_come_pa_s(self) -> FloatArray:
+        """About what is still to come at each gauge (n,); NaN if not all waves have come to it."""
+        if self.gauges is None:
+            return np.empty(0)
+        passed_s = [self._passed_s([each.position_m]) for each in self.site.gauges]
+        to_come = still_to_come(*self.tail.came_pa_s(1))
+        return np.where(self.solver.time_s >= np.array(passed_s), to_come, np.nan)
+
+    def _passed_s(self, places_m: Sequence[tuple[float, ...]]) -> float:
+        """Return when all waves of the charge have come to some places, if nothing is between."""
+        x_m, y_m, _ = self.charge.position_m
+        way_m = max((hypot(each[0] - x_m, each[1] - y_m) for each in places_m), default=0.0)
+        return way_m / _SOUND_M_S + _SWING_S * self._scale
+
+    def _are_complete(self, groups: Sequence[NDArray[np.int64]], least: float = 0.0) -> bool:
+        """Return whether mean impulses on groups of faces are complete.
+
+        Args:
+            groups: The faces of each.
+            least: What counts at least, over the largest of them.
+        """
+        series = [self.loads.positive_impulse_pa_s, *self.tail.came_pa_s(0)]
+        now, last, before = (
+            np.array([values[members].mean() for members in groups]) for values in series
+        )
+        now = np.maximum(now, least * now.max(initial=0.0))
+        return bool(is_complete(now, still_to_come(last, before)).all())
+
     def _is_complete(self) -> bool:
-        """Whether the impulses have hardly grown in a window, after all waves of the charge."""
-        impulse = self.loads.positive_impulse_pa_s
-        impulses = np.array([impulse[members].mean() for members in self._groups])
-        before, self._impulses = self._impulses, impulses
-        self._check_s += self._window_s
-        if before is None:
-            return False
-        least = _SMALL_LOAD * impulses.max(initial=0.0)
-        return bool((impulses - before <= _GROWTH * np.maximum(impulses, least)).all())
+        """Whether little is still to come of what the run waits for."""
+        least = _SMALL_LOAD if self.settings.until == "structures" else 0.0
+        complete = self._are_complete(self._groups, least)
+        if self.gauges is not None and self.settings.until == "gauges":
+            of_gauges = still_to_come(*self.tail.came_pa_s(1))
+            complete &= bool(is_complete(self.gauges.positive_impulse_pa_s, of_gauges).all())
+        return complete
 
     def _notes(self) -> tuple[str, ...]:
         """Return why the source was not checked for such a blast."""
@@ -280,10 +327,25 @@ def _face_table(grid: GasGrid, owner: NDArray[np.int64]) -> FaceTable:
     return FaceTable(faces, structure, row, column, face, faces.centres_m(grid))
 
 
-def _watched(site: BlastSite) -> list[int]:
+def _watched(site: BlastSite, until: str | float) -> list[int]:
     """Return the structures that a run waits for: those protected, or else all but the barrier."""
     structures = [k for k, outline in enumerate(site.structures) if outline.cells is None]
-    return [k for k in structures if site.structures[k].protected] or structures
+    protected = [k for k in structures if site.structures[k].protected]
+    return structures if until == "walls" else protected or structures
+
+
+def _groups(
+    table: FaceTable, site: BlastSite, until: str | float, watched: Sequence[int]
+) -> list[NDArray[np.int64]]:
+    """Return the faces whose mean impulses a run waits for: of structures, or of each wall."""
+    if until != "walls":
+        return [_faces_of(table, site, index) for index in watched]
+    walls = (
+        np.flatnonzero((table.structure == index) & (table.face == face))
+        for index in watched
+        for face in range(len(FACE_NAMES))
+    )
+    return [members for members in walls if len(members)]
 
 
 def _faces_of(table: FaceTable, site: BlastSite, index: int) -> NDArray[np.int64]:
@@ -294,20 +356,14 @@ def _faces_of(table: FaceTable, site: BlastSite, index: int) -> NDArray[np.int64
     return np.flatnonzero(chosen if chosen.any() else own)
 
 
-def _way_m(charge: GasCharge, site: BlastSite, watched: Sequence[int]) -> float:
-    """Return the way in plan from the charge to the far end of what a run waits for, m.
-
-    To the farthest gauge where there is no structure.
-    """
-    x_m, y_m, _ = charge.position_m
-    corners = [
+def _corners_m(site: BlastSite, structures: Sequence[int]) -> list[tuple[float, float]]:
+    """Return the corners of some structures in plan."""
+    return [
         (x, y)
-        for left, bottom, right, top in (site.structures[k].rectangle_m for k in watched)
+        for left, bottom, right, top in (site.structures[k].rectangle_m for k in structures)
         for x in (left, right)
         for y in (bottom, top)
     ]
-    places = corners or [(x, y) for x, y, _ in (gauge.position_m for gauge in site.gauges)]
-    return max((hypot(x - x_m, y - y_m) for x, y in places), default=0.0)
 
 
 def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:

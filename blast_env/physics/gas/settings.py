@@ -1,10 +1,13 @@
 """What a run of gas dynamics can be told, and what its results are made of; without Numba."""
 
 from dataclasses import dataclass
-from math import inf, isclose
+from math import inf, isclose, nan
 from typing import Final
 
-from blast_env.errors import BlastEnvError
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.physics.scene import WALLS
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import finite_number
@@ -18,6 +21,12 @@ CHECKED_SCALED_DISTANCE: Final = (1.7, 8.6)
 CHECKED_CELLS: Final = 9.2
 """Least cells per cube root of the charge's mass in kg with which it was checked, times 1 m."""
 
+COMPLETE: Final = 0.02
+"""Share of an impulse that may still come where it counts as complete."""
+
+_MOST_REST: Final = 4.0
+"""The sum of the series over what came last, at most: for a ratio of 0.8."""
+_WAITED_FOR: Final = ("structures", "walls", "gauges")
 _FARTHEST_M: Final = 10_000.0
 _LEAST_CELL_M: Final = 0.001
 
@@ -34,7 +43,9 @@ class GasSettings:
         settled_s: When the products of 100 kg are no more than hot gas, see `Settling`; grows with
             the cube root of the mass. Infinite where they never are.
         threads: Threads that share a blast; they change nothing but the time.
-        time_limit_s: When a run ends at the latest; by default long after the last wave.
+        until: What a run waits for: the means over the walls that count of each protected structure
+            ("structures"), those of every wall and roof on the site ("walls"), or the protected
+            structures and every gauge ("gauges"); or how long it lasts in seconds, also as text.
 
     Raises:
         BlastEnvError: If one of them is out of bounds.
@@ -45,7 +56,7 @@ class GasSettings:
     border_m: float = 24.0
     settled_s: float = 0.06
     threads: int = 1
-    time_limit_s: float | None = None
+    until: str | float = "structures"
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -61,6 +72,39 @@ class GasSettings:
                 raise BlastEnvError(f"{name} is {length_m:g}, must be 0 to {_FARTHEST_M:g}")
         if self.settled_s != inf and not finite_number("settled_s", self.settled_s) > 0.0:
             raise BlastEnvError(f"settled_s is {self.settled_s:g}, must be above 0")
-        limit_s = self.time_limit_s
-        if limit_s is not None and not finite_number("time_limit_s", limit_s) > 0.0:
-            raise BlastEnvError(f"time_limit_s is {limit_s:g}, must be above 0")
+        if self.until not in _WAITED_FOR:
+            object.__setattr__(self, "until", _seconds(self.until))
+
+    @property
+    def until_s(self) -> float | None:
+        """How long a run lasts; `None` where it waits for loads."""
+        return None if isinstance(self.until, str) else self.until
+
+
+def still_to_come(last_pa_s: FloatArray | float, before_pa_s: FloatArray | float) -> FloatArray:
+    """Return about what is still to come after what came last and before that, Pa s (n,)."""
+    last = np.asarray(last_pa_s)
+    less = np.maximum(before_pa_s - last, last / _MOST_REST)
+    series = np.divide(last, less, out=np.ones(np.shape(less)), where=less > 0.0)
+    return np.asarray(last * np.maximum(series, 1.0))
+
+
+def is_complete(impulse_pa_s: FloatArray | float, to_come_pa_s: FloatArray | float) -> BoolArray:
+    """Return whether impulses are complete; not where NaN is still to come."""
+    return np.asarray(np.asarray(to_come_pa_s) <= COMPLETE * np.asarray(impulse_pa_s))
+
+
+def _seconds(until: object) -> float:
+    """Return how long a run lasts.
+
+    Raises:
+        BlastEnvError: If it says neither that nor what a run waits for.
+    """
+    try:
+        seconds = float(until) if isinstance(until, str) else finite_number("until", until)
+    except (ValueError, BlastEnvError):
+        seconds = nan
+    if not 0.0 < seconds < inf:
+        known = ", ".join(repr(each) for each in _WAITED_FOR)
+        raise BlastEnvError(f"until is {value_text(until)}, must be {known} or seconds above 0")
+    return seconds

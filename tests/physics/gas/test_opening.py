@@ -53,7 +53,7 @@ def test_gauges_nearer_than_the_first_obstacle_miss_nothing() -> None:
         gauges=(Gauge("near", (5.25, 5.25, 0.25)),),
         air_height_m=6.0,
     )
-    run = GasEngine(margin_m=0.0, border_m=0.0, time_limit_s=0.03).start_on(site)
+    run = GasEngine(margin_m=0.0, border_m=0.0, until=0.03).start_on(site)
     run.advance(0.03)
     gauges = run.gauges
     assert gauges is not None

@@ -1,0 +1,284 @@
+"""Tables of a blast of gas dynamics: loads by face, module, wall, structure, building and gauge.
+
+Each says of its loads whether they are complete, see `blast_env.physics.gas.tail`.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.physics.gas.settings import FACE_NAMES, ROOF, is_complete, still_to_come
+from blast_env.physics.scene import WALLS, StructureOutline
+from blast_env.tables import Column, as_types, table_of, texts
+from blast_env.units import MODULE_SIDE_M
+
+if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
+    import pandas as pd
+
+    from blast_env.physics.gas.engine import GasRun
+    from blast_env.physics.gas.probes import LoadTable
+
+TAIL_COLUMNS: Final = (
+    Column("to_come_pa_s", "Pa s", "about the impulse that still comes; NaN if not all waves came"),
+    Column("complete", "", "whether at most 2 % of the impulse still comes"),
+)
+"""Whether a load is complete; see `blast_env.physics.gas.tail`."""
+
+_LOADS: Final = (
+    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases, mean over the area"),
+    Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase, likewise"),
+    Column("negative_impulse_pa_s", "Pa s", "impulse of all negative phases, 0 or below, likewise"),
+    Column("peak_pa", "Pa", "largest overpressure anywhere on it"),
+    Column("arrival_s", "s", "time at which 1 kPa is reached first, from the detonation"),
+    *TAIL_COLUMNS,
+)
+
+FACE_COLUMNS: Final = (
+    Column("structure", "", "name of the structure, or `barrier`"),
+    Column("face", "", "west, east, south, north or roof"),
+    Column("module_id", "", "name of the module, made from its centre in metres"),
+    Column("x_m", "m", "centre, from the left border"),
+    Column("y_m", "m", "centre, from the lower border"),
+    Column("z_m", "m", "centre, above the ground"),
+    *_LOADS,
+)
+"""A row a face of a cell."""
+
+MODULE_COLUMNS: Final = (
+    Column("module_id", "", "name of the module, made from its centre in metres"),
+    Column("structure", "", "structure that the module is part of"),
+    Column("row", "", "row in the structure's grid, upwards from 0"),
+    Column("column", "", "column in the structure's grid, to the right from 0"),
+    Column("x_m", "m", "centre, from the left border"),
+    Column("y_m", "m", "centre, from the lower border"),
+    Column("face", "", "west, east, south, north or roof"),
+    Column("area_m2", "m2", "area of that face over the whole height"),
+    *_LOADS,
+    Column("piece", "", "piece of a barrier that it is part of; empty if it is of none"),
+)
+"""A row a face of a module that touches air."""
+
+WALL_COLUMNS: Final = (
+    Column("structure", "", "name of the structure"),
+    Column("face", "", "west, east, south, north or roof"),
+    Column("counts", "", "whether its load counts, if the structure is protected"),
+    Column("area_m2", "m2", "its area that touches air"),
+    *_LOADS,
+)
+"""A row a wall or roof of a structure; not of the barrier."""
+
+_OF_COUNTING_WALLS: Final = (
+    Column("height_m", "m", "its height"),
+    Column("faces", "", "the walls whose load counts"),
+    Column("area_m2", "m2", "their area"),
+    *_LOADS,
+    Column("most_loaded_face", "", "the wall with the largest impulse"),
+    Column("most_loaded_pa_s", "Pa s", "impulse on that wall"),
+    Column("roof_impulse_pa_s", "Pa s", "impulse on the roof; NaN where it is as high as the air"),
+)
+
+STRUCTURE_COLUMNS: Final = (
+    Column("structure", "", "name of the structure"),
+    Column("protected", "", "whether its load counts"),
+    Column("weight", "", "its weight among the protected structures"),
+    *_OF_COUNTING_WALLS,
+)
+"""A row a structure; the loads are those on the walls that count."""
+
+BUILDING_COLUMNS: Final = (
+    Column("building", "", "name of the building, or of the structure that is one by itself"),
+    Column("parts", "", "names of its structures"),
+    Column("protected", "", "whether the load of one of them counts"),
+    *_OF_COUNTING_WALLS,
+)
+"""A row a building; its loads are means over the walls that count of all its parts."""
+
+GAUGE_COLUMNS: Final = (
+    Column("name", "", "name of the gauge"),
+    Column("x_m", "m", "centre of its cell, from the left border"),
+    Column("y_m", "m", "centre of its cell, from the lower border"),
+    Column("z_m", "m", "centre of its cell, above the ground"),
+    Column("arrival_s", "s", "time at which 1 kPa is reached first, from the detonation"),
+    Column("peak_pa", "Pa", "largest overpressure"),
+    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases"),
+    Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase"),
+    Column("negative_impulse_pa_s", "Pa s", "impulse of all negative phases, 0 or below"),
+    *TAIL_COLUMNS,
+)
+"""A row a gauge."""
+
+
+def load_values(loads: "LoadTable") -> dict[str, FloatArray]:
+    """Return the loads on the points of a table, by column."""
+    return {
+        "positive_impulse_pa_s": loads.positive_impulse_pa_s,
+        "first_impulse_pa_s": loads.first_impulse_pa_s,
+        "negative_impulse_pa_s": loads.negative_impulse_pa_s,
+        "peak_pa": loads.peak_pa,
+        "arrival_s": loads.arrival_s,
+    }
+
+
+def face_table(run: "GasRun") -> "pd.DataFrame":
+    """Return one row a face of a cell, structures and barrier; see `FACE_COLUMNS`."""
+    import pandas as pd  # it takes a third of a second
+
+    table = run.table
+    names = np.array([outline.name for outline in run.site.structures], dtype=object)
+    loads = load_values(run.loads)
+    passed = np.array([run.has_passed(index) for index in range(len(names))])[table.structure]
+    last, before = run.tail.came_pa_s(0)
+    frame = pd.DataFrame(
+        {
+            "structure": names[table.structure],
+            "face": np.array(FACE_NAMES, dtype=object)[table.face],
+            "module_id": _module_ids(run),
+            "x_m": table.centre_m[:, 0],
+            "y_m": table.centre_m[:, 1],
+            "z_m": table.centre_m[:, 2],
+            **loads,
+            "row": table.row,
+            "column": table.column,
+            "last_pa_s": np.where(passed, last, np.nan),
+            "before_pa_s": before,
+        }
+    )
+    _add_tail(frame)
+    return as_types(frame, {"structure": "str", "face": "str", "module_id": "str"})
+
+
+def _add_tail(table: "pd.DataFrame") -> None:
+    """Add what is still to come, by what came last and before that."""
+    last, before = table["last_pa_s"].to_numpy(), table["before_pa_s"].to_numpy()
+    table["to_come_pa_s"] = still_to_come(last, before)
+    impulse = table["positive_impulse_pa_s"].to_numpy()
+    table["complete"] = is_complete(impulse, table["to_come_pa_s"].to_numpy())
+
+
+def _module_ids(run: "GasRun") -> list[str]:
+    table, outlines = run.table, run.site.structures
+    return [
+        outlines[structure].module_name(row, column)
+        for structure, row, column in zip(table.structure, table.row, table.column, strict=True)
+    ]
+
+
+def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataFrame":
+    """Return impulses as means, peaks as the largest, arrivals as the first of each group."""
+    groups: Any = faces.groupby(keys, sort=False, observed=True)
+    table: pd.DataFrame = groups.agg(
+        positive_impulse_pa_s=("positive_impulse_pa_s", "mean"),
+        first_impulse_pa_s=("first_impulse_pa_s", "mean"),
+        negative_impulse_pa_s=("negative_impulse_pa_s", "mean"),
+        peak_pa=("peak_pa", "max"),
+        arrival_s=("arrival_s", "min"),
+        last_pa_s=("last_pa_s", "mean"),  # a structure's are all there, or none
+        before_pa_s=("before_pa_s", "mean"),
+    )
+    _add_tail(table)
+    return table.assign(area_m2=groups.size() * run.grid.cell_m**2).reset_index()
+
+
+def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
+    """Return one row a face of a module that touches air; see `MODULE_COLUMNS`.
+
+    Args:
+        run: The run.
+        faces: Its `face_table`.
+    """
+    table = _grouped(run, faces, ["structure", "module_id", "row", "column", "face"])
+    outlines = run.site.structures
+    corners = {outline.name: outline.corner_m for outline in outlines}
+    left, bottom = (table["structure"].map(lambda name, k=k: corners[name][k]) for k in (0, 1))
+    table["x_m"] = left + (table["column"] + 0.5) * MODULE_SIDE_M
+    table["y_m"] = bottom + (table["row"] + 0.5) * MODULE_SIDE_M
+    of_pieces = {
+        (outline.name, *cell): piece
+        for outline in outlines
+        for cell, piece in zip(outline.cells or (), outline.pieces or (), strict=False)
+    }
+    modules = zip(table["structure"], table["row"], table["column"], strict=True)
+    table["piece"] = texts([of_pieces.get(module, "") for module in modules])
+    return table[[column.name for column in MODULE_COLUMNS]]
+
+
+def wall_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
+    """Return one row a wall or roof of a structure; arguments as for `module_table`."""
+    counting = {each.name: each.faces for each in run.site.structures if each.cells is None}
+    own = faces[faces["structure"].isin(list(counting))]
+    table = _grouped(run, own, ["structure", "face"])
+    walls = zip(table["structure"], table["face"], strict=True)
+    table["counts"] = [face in counting[structure] for structure, face in walls]
+    return table[[column.name for column in WALL_COLUMNS]]
+
+
+def structure_table(
+    run: "GasRun", faces: "pd.DataFrame", buildings: Mapping[str, str] | None = None
+) -> "pd.DataFrame":
+    """Return one row a structure, or one a building; see `STRUCTURE_COLUMNS`, `BUILDING_COLUMNS`.
+
+    Args:
+        run: The run.
+        faces: Its `face_table`.
+        buildings: The building that each structure is a part of, by name.
+    """
+    together: dict[str, list[StructureOutline]] = {}
+    for outline in run.site.structures:
+        if outline.cells is None:
+            owner = outline.name if buildings is None else buildings[outline.name]
+            together.setdefault(owner, []).append(outline)
+    rows = [_structure_row(run, faces, name, parts) for name, parts in together.items()]
+    return table_of(rows, STRUCTURE_COLUMNS if buildings is None else BUILDING_COLUMNS)
+
+
+def _structure_row(
+    run: "GasRun", faces: "pd.DataFrame", name: str, parts: Sequence[StructureOutline]
+) -> dict[str, object]:
+    """Return the loads on the walls that count of some structures together."""
+    structure, face = faces["structure"], faces["face"]
+    counting = [(structure == each.name) & face.isin(each.faces) for each in parts]
+    walls = faces[np.logical_or.reduce(counting)]
+    roof = faces[structure.isin([each.name for each in parts]) & (face == ROOF)]
+    of_walls = walls.groupby("face")["positive_impulse_pa_s"].mean()
+    impulse_pa_s = walls["positive_impulse_pa_s"].mean()
+    to_come_pa_s = float(
+        still_to_come(walls["last_pa_s"].mean(skipna=False), walls["before_pa_s"].mean())
+    )
+    return {
+        "structure": name,
+        "building": name,
+        "parts": " ".join(each.name for each in parts),
+        "protected": any(each.protected for each in parts),
+        "weight": parts[0].weight,
+        "height_m": max(each.height_m or run.site.air_height_m for each in parts),
+        "faces": " ".join(wall for wall in WALLS if any(wall in each.faces for each in parts)),
+        "area_m2": len(walls) * run.grid.cell_m**2,
+        "positive_impulse_pa_s": impulse_pa_s,
+        "first_impulse_pa_s": walls["first_impulse_pa_s"].mean(),
+        "negative_impulse_pa_s": walls["negative_impulse_pa_s"].mean(),
+        "peak_pa": walls["peak_pa"].max(),
+        "arrival_s": walls["arrival_s"].min(),
+        "to_come_pa_s": to_come_pa_s,
+        "complete": bool(is_complete(impulse_pa_s, to_come_pa_s)),
+        "most_loaded_face": of_walls.idxmax() if len(of_walls) else "",
+        "most_loaded_pa_s": of_walls.max() if len(of_walls) else np.nan,
+        "roof_impulse_pa_s": roof["positive_impulse_pa_s"].mean() if len(roof) else np.nan,
+    }
+
+
+def gauge_table(run: "GasRun") -> "pd.DataFrame":
+    """Return one row a gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
+    import pandas as pd  # it takes a third of a second
+
+    gauges = run.gauges
+    if gauges is None:
+        return table_of([], GAUGE_COLUMNS)
+    loads, to_come_pa_s = load_values(gauges), run.gauges_to_come_pa_s
+    centres = np.array(run.grid.origin_m) + run.grid.cell_m * (gauges.cells + 0.5)
+    frame = pd.DataFrame({"name": [each.name for each in run.site.gauges], **loads})
+    frame[["x_m", "y_m", "z_m"]] = centres
+    frame["to_come_pa_s"] = to_come_pa_s
+    frame["complete"] = is_complete(loads["positive_impulse_pa_s"], to_come_pa_s)
+    return frame[[column.name for column in GAUGE_COLUMNS]]
