@@ -275,11 +275,9 @@ def peak_rows(found: dict[float, FacadeResponse], reference_pa: FloatArray) -> I
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 
 
-@app.callback(invoke_without_command=True)
-def tables(context: typer.Context) -> None:
+@app.command()
+def tables() -> None:
     """Print the tables that need no blast."""
-    if context.invoked_subcommand is not None:
-        return
     loads = ("annealed pane, least thickness", "E1300, kPa", "here, kPa", "ratio")
     print_line(markdown_table(loads, non_factored_loads()))
     factors = ("duration over period", "closed form", "here")

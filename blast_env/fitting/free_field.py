@@ -1,15 +1,10 @@
-"""The free-field study: blasts at many distances with many seeds, resumable.
+"""The free-field study: blasts at many distances with many seeds, resumable."""
 
-Below it the journal that it resumes from: results of long work, one JSON object a line.
-"""
-
-import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import IO, TYPE_CHECKING, Annotated, ClassVar, Final, Generic, Literal, TypeVar
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
 import pandas as pd
@@ -36,18 +31,14 @@ from blast_env.calibration.model import (
     SimulatedQuantity,
 )
 from blast_env.calibration.references import kingery_bulmash, paper_ufc_column
-from blast_env.documents import DocumentError, parse_json_lines, read_text
 from blast_env.engines import find_engine, simulate
 from blast_env.errors import BlastEnvError
-from blast_env.files import sync
+from blast_env.journal import Journal
 from blast_env.physics.parameters import parameters_digest
 from blast_env.provenance import package_version
 from blast_env.runner import as_completed
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
 
 RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")
 
@@ -387,68 +378,3 @@ def calibrate(
         for name, law in laws.items()
     }
     return CalibrationReport(study, runs, summary, reference, laws, metrics, simulated)
-
-
-MOST_BYTES: Final = 100_000_000
-"""Most that a file may have: some hundred thousand results."""
-
-Result = TypeVar("Result", bound="DataclassInstance")
-
-
-@dataclass(frozen=True)
-class Journal(Generic[Result]):
-    """A file of results.
-
-    Attributes:
-        path: The file; it need not be there.
-        kind: A dataclass that pydantic can check: what a line is.
-    """
-
-    path: Path
-    kind: type[Result]
-
-    def read(self) -> list[Result]:
-        """Return the results; none if there is no such file.
-
-        A last line that was cut short is left out: what it was about is done again.
-
-        Raises:
-            BlastEnvError: If a line is anything else; the message has file, line, key and bound.
-        """
-        if not self.path.exists():
-            return []
-        try:
-            return list(parse_json_lines(read_text(self.path, MOST_BYTES), self.kind))
-        except DocumentError as error:
-            raise BlastEnvError(f"{self.path}: {error}") from error
-
-    def add(self, result: Result) -> None:
-        """Add a result, after cutting off a last line that was left unfinished.
-
-        Raises:
-            BlastEnvError: If the file cannot be written.
-        """
-        line = json.dumps(asdict(result), allow_nan=False) + "\n"
-        is_new = not self.path.exists()
-        try:
-            with self.path.open("ab+") as file:
-                _cut_unfinished_line(file)
-                file.write(line.encode())
-                file.flush()
-                os.fsync(file.fileno())
-            if is_new:
-                sync(self.path.parent)
-        except OSError as error:
-            reason = error.strerror or error
-            raise BlastEnvError(f"{self.path}: cannot be written: {reason}") from error
-
-
-def _cut_unfinished_line(file: IO[bytes]) -> None:
-    size = file.seek(0, os.SEEK_END)
-    if size == 0:
-        return
-    file.seek(size - 1)
-    if file.read(1) == b"\n":
-        return
-    file.seek(0)
-    file.truncate(file.read().rfind(b"\n") + 1)

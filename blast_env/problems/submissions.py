@@ -11,8 +11,8 @@ from pydantic import ConfigDict, Field
 from blast_env.documents import checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.fitting.free_field import Journal
 from blast_env.geometry import Layout
+from blast_env.journal import Journal
 from blast_env.problems.definitions import DEFINITIONS, Definition
 from blast_env.problems.problem import BenchmarkProblem
 from blast_env.scenario import check_layout

@@ -32,8 +32,9 @@ from blast_env.engines import simulate
 from blast_env.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation import Threat
 from blast_env.evaluation.store import BlastKey, DiskCache
-from blast_env.fitting.free_field import FreeFieldRun, Journal
+from blast_env.fitting.free_field import FreeFieldRun
 from blast_env.importing import ImportOptions, import_site
+from blast_env.journal import Journal
 from blast_env.physics.scene import Charge
 from blast_env.recording.parquet import read_parquet
 from blast_env.reporting.study import front_layouts

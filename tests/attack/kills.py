@@ -28,7 +28,8 @@ from blast_env.app.session import Sessions
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.files import FolderStore, is_temporary
-from blast_env.fitting.free_field import FreeFieldRun, FreeFieldStudy, Journal
+from blast_env.fitting.free_field import FreeFieldRun, FreeFieldStudy
+from blast_env.journal import Journal
 from blast_env.scenario import load_scenario, save_scenario, write_layout
 from tests.agents.league_cases import road_scenario
 from tests.agents.training_runs import (

@@ -47,7 +47,7 @@ _OWN: Final = frozenset(
 
 _ELSEWHERE: Final = {
     "blast_env/files.py": "the one place",
-    "blast_env/fitting/free_field.py: self.path.open": "adds a line, or cuts off a torn one",
+    "blast_env/journal.py: self.path.open": "adds a line, or cuts off a torn one",
     "blast_env/rendering/film.py: TemporaryFile": "what ffmpeg says; made in the block of a film",
     "blast_env/rendering/film.py: Popen": "ffmpeg writes to the temporary file of its caller",
     "blast_env/rendering/film.py: first.save": "to the temporary file of its caller",

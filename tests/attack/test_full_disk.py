@@ -9,7 +9,8 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.files import FolderStore, is_temporary, write_atomically
-from blast_env.fitting.free_field import FreeFieldRun, Journal
+from blast_env.fitting.free_field import FreeFieldRun
+from blast_env.journal import Journal
 from tests.attack.disks import file_size_limit
 from tests.attack.writers import WRITERS
 

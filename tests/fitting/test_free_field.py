@@ -15,10 +15,10 @@ from blast_env.fitting import free_field as study_module
 from blast_env.fitting.free_field import (
     FreeFieldRun,
     FreeFieldStudy,
-    Journal,
     impulse_by_seed,
     summarise,
 )
+from blast_env.journal import Journal
 
 SMALL = load_scenario("free_field").with_simulation(
     overrides={"explosive": {"ball_count": 120}, "stepping": {"time_limit_s": 0.1}}

@@ -33,6 +33,7 @@ OPTIONAL = {
     *("drivable", "places", "apart_m"),
     *("peak_weight", "objective", "quantity", "charges", "cvar_level"),
     *("reference_impulse_pa_s", "reference_peak_pa"),
+    *("motion", "entry_speed_km_h", "grip", "slow", "crash_rating", "penetration_m", "test"),
 }
 CASES = [(document, path) for document in all_documents() for path in key_paths(document)]
 KEYS = [(document, path) for document, path in CASES if isinstance(path[-1], str)]

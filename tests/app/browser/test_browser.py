@@ -468,7 +468,7 @@ def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
 
 
 def test_the_verdict_on_a_site_of_100_m(page: Page, tmp_path: Path) -> None:
-    """Windows, a layout and what gas says of them, by the page alone; the times are written down."""
+    """Windows, a layout and what gas says of them, by the page alone; the times are kept."""
     began_s = monotonic()
     stages: list[str] = []
 
