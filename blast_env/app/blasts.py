@@ -4,7 +4,8 @@ The scale of everything on a site is that of the blast without a barrier under t
 does not change when a layout is added, and what was drawn before stays comparable.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -247,6 +248,7 @@ def _gas(
     notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]
     return {
         "loads": _gas_loads(result),
+        "buildings": tuple(_buildings(result)),
         "notes": tuple(dict.fromkeys(notes)),
         "pictures": pictures,
         "waves": tuple(_waves(result)),
@@ -324,15 +326,7 @@ def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture
 
 def _gas_loads(result: GasResult) -> tuple[Load, ...]:
     rows = result.structures.to_dict("records")
-    loads = [
-        Load(
-            structure=str(row["structure"]),
-            protected=bool(row["protected"]),
-            impulse_pa_s=float(row["positive_impulse_pa_s"]),
-            peak_kpa=float(row["peak_pa"]) / PA_PER_KPA,
-        )
-        for row in rows
-    ]
+    loads = [_load(str(row["structure"]), row) for row in rows]
     weights = [float(row["weight"]) for row in rows]
     counted = [
         (each, weight) for each, weight in zip(loads, weights, strict=True) if each.protected
@@ -344,6 +338,24 @@ def _gas_loads(result: GasResult) -> tuple[Load, ...]:
         peak_kpa=max(each.peak_kpa for each, _ in counted),
     )
     return (together, *loads)
+
+
+def _load(name: str, row: Mapping[Hashable, Any]) -> Load:
+    """Return the load of a row of structures or of buildings."""
+    return Load(
+        structure=name,
+        protected=bool(row["protected"]),
+        impulse_pa_s=float(row["positive_impulse_pa_s"]),
+        peak_kpa=float(row["peak_pa"]) / PA_PER_KPA,
+    )
+
+
+def _buildings(result: GasResult) -> Iterator[Load]:
+    """Yield the loads of buildings of several parts."""
+    sizes = Counter(each.building_name for each in result.blast.scenario.structures)
+    for row in result.buildings.to_dict("records"):
+        if sizes[row["building"]] > 1:
+            yield _load(str(row["building"]), row)
 
 
 def _waves(result: GasResult) -> Iterator[Wave]:

@@ -139,6 +139,7 @@ class BlastRecord(Kept):
         engine: The engine.
         layout: The layout.
         loads: All structures; the first one is of all protected ones together.
+        buildings: Buildings of several structures, where their mean is known.
         notes: What there is to say about it.
         pictures: Pictures beside the film.
         waves: Histories of the gauges.
@@ -152,6 +153,7 @@ class BlastRecord(Kept):
     engine: EngineRecord
     layout: tuple[tuple[Any, ...], ...]
     loads: tuple[Load, ...]
+    buildings: tuple[Load, ...] = ()
     notes: tuple[str, ...] = ()
     pictures: tuple[Picture, ...] = ()
     waves: tuple[Wave, ...] = ()
@@ -345,12 +347,14 @@ def comparison(
     judge = LoadJudge(scenario)
     rows = []
     for name, cost, record in records:
-        unprotected = {load.structure: load for load in _loads_of(bare.get(record.threat))}
-        for load in record.loads:
-            counted, share = judge.counted(record, load), nan
-            without = unprotected.get(load.structure)
-            if without is not None and record.layout:
-                share = reductions(counted, judge.counted(bare[record.threat], without)).item()
+        unprotected = bare.get(record.threat)
+        without = {each.structure: each for each in _loads_of(unprotected)}
+        for load, parts in _shown(record, scenario):
+            counted, share = sum(judge.counted(record, each) for each in parts), nan
+            if unprotected is not None and without and record.layout:
+                bare_parts = [without[each.structure] for each in parts]
+                bare_load = sum(judge.counted(unprotected, each) for each in bare_parts)
+                share = reductions(counted, bare_load).item()
             rows.append(
                 Row(
                     layout=name,
@@ -365,6 +369,18 @@ def comparison(
                 )
             )
     return rows + list(_all_threats(records, judge))
+
+
+def _shown(record: BlastRecord, scenario: Scenario) -> Iterator[tuple[Load, tuple[Load, ...]]]:
+    """Yield the loads that have a row, with those of their parts: a building is one of them."""
+    known = {each.structure: each for each in record.buildings}
+    names = {each.name: each.building_name for each in scenario.structures}
+    together: dict[str, list[Load]] = {}
+    for load in record.loads:
+        building = names.get(load.structure, load.structure)
+        together.setdefault(building if building in known else load.structure, []).append(load)
+    for name, parts in together.items():
+        yield known.get(name, parts[0]), tuple(parts)
 
 
 def _all_threats(

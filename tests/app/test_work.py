@@ -36,7 +36,7 @@ from blast_env.physics.scene import Charge
 from blast_env.reporting import StudyOptions
 from blast_env.scenario import Scenario, load_scenario
 from tests.app.here import Here
-from tests.gas_sites import WALL, glazed_hut, hut
+from tests.gas_sites import WALL, glazed_hut, hut, site_document
 from tests.scenarios import BALLISTIC_COURTYARD
 from tests.vehicle_sites import gate_site, vehicle_document
 
@@ -153,6 +153,27 @@ def test_the_table_counts_what_the_site_s_objective_says() -> None:
     assert counted[("A", "all 2: worst")] == 7.0
     assert rows[("A", "all 2: worst")].reduction == "30.0 %"
     assert rows[("A", "near")].reduction == "50.0 %"
+
+
+def test_a_building_of_several_parts_is_one_row(tmp_path: Path) -> None:
+    document = site_document()
+    (whole,) = document["structures"]
+    halves = [
+        whole | {"name": name, "rows": 2, "corner_m": [6.0, y_m], "building": "house"}
+        for name, y_m in (("south_half", 3.0), ("north_half", 4.0))
+    ]
+    site = Scenario.from_document(document | {"structures": halves}, "halves")
+    session = session_on(tmp_path, site)
+    session.engine = EngineRecord(name="gas", cell_m=0.5)
+    session.put("wall", session.design.with_layout(WALL))
+    session.blast([0])
+    rows = session.comparison()
+    assert [row.structure for row in rows] == ["all protected", "house"] * 2
+    result = GasBlast(site, WALL).run()
+    ((impulse_pa_s, peak_pa),) = result.buildings[["positive_impulse_pa_s", "peak_pa"]].to_numpy()
+    assert float(rows[3].impulse.replace(",", "")) == pytest.approx(impulse_pa_s, rel=5e-3)
+    assert float(rows[3].peak) == pytest.approx(peak_pa / 1e3, rel=5e-3)
+    assert rows[3].reduction == rows[2].reduction  # of both parts together
 
 
 def test_particles_show_a_film_and_say_that_peaks_need_gas(tmp_path: Path) -> None:
