@@ -71,8 +71,8 @@ def test_side_on_values_come_back_from_reflected_ones(scaled: float) -> None:
 
 
 def test_pieces_that_fall_in_time_are_taken_away(found: Consequences) -> None:
-    """A wall of 300 kg is on its way when the blast is over; lighter ones do not count."""
-    (barrier,) = judge(site(mass_kg=300.0), WALL, without_fallen=True).barriers
+    """A wall of 500 kg is on its way when the blast is over; lighter ones do not count."""
+    (barrier,) = judge(site(mass_kg=500.0), WALL, without_fallen=True).barriers
     assert barrier.taken_away == ()
     assert list(barrier.pieces["outcome"][:1]) == ["overturns"]
     gone = judge(site(mass_kg=60.0), WALL, without_fallen=True)
