@@ -13,6 +13,7 @@ from blast_env import load_scenario, simulate
 from blast_env.physics.gas.faces import ground_faces
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import FaceLoads, Gauges, GroundMap
+from blast_env.physics.gas.refined import RefinedSolver, Refinement
 from blast_env.physics.gas.solver import GasSolver, Settling
 from blast_env.physics.gas.source import GasCharge, set_charge
 from blast_env.scenario import Scenario
@@ -43,6 +44,16 @@ def gas_engine(precision: Literal["single", "double"]) -> None:
     solver.largest_overpressure_pa()
 
 
+def refined_gas_engine() -> None:
+    grid = GasGrid(0.5, np.zeros((8, 8, 8), dtype=bool))
+    charge = GasCharge(1.0, (2.0, 2.0, 0.0))
+    settling = Settling(0.0, 2.0)
+    solver = RefinedSolver(grid, Refinement((0.1,)), burning=charge.burning, settling=settling)
+    set_charge(solver, charge)
+    solver.step()
+    solver.overpressure_in(2, 0)
+
+
 def surrogate() -> None:
     piece = np.array([[4.0, -1.0, 5.0, 1.0, 2.0]])
     Ways.between(np.zeros(3), np.array([[9.0, 0.0, 1.0]]), 100.0, piece).shares(piece)
@@ -58,6 +69,7 @@ def main() -> None:
     event_engine()
     gas_engine("single")
     gas_engine("double")
+    refined_gas_engine()
     surrogate()
     driving()
 

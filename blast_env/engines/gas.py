@@ -28,6 +28,7 @@ from blast_env.physics.gas.settings import (
     CHECKED_SCALED_DISTANCE,
     FACE_NAMES,
     ROOF,
+    UNIFORM,
     GasSettings,
 )
 from blast_env.physics.scene import BlastSite
@@ -116,6 +117,7 @@ class GasEngine(GasSettings, Engine):
     checked_for: ClassVar[str] = "what gas dynamics was checked for"
     options: ClassVar[tuple[EngineOption, ...]] = (
         EngineOption("cell_m", "Side of the cells of gas dynamics, m."),
+        EngineOption("cells", "Cells of gas dynamics: uniform, coarse or fine."),
     )
     unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingGas"
     screening: ClassVar[str] = "blast_env.rendering.pressure_film:PressureScreening"
@@ -158,11 +160,17 @@ class GasEngine(GasSettings, Engine):
     @property
     def words(self) -> str:
         """Its name, and the side of its cells."""
-        return f"{self.name}, cells of {self.cell_m:g} m"
+        return f"{self.name}, {self._cell_words}"
 
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
         """Return in a line which engine spoke, and with which cells."""
-        return f"{super().describe(scenarios)}, cells of {self.cell_m:g} m"
+        return f"{super().describe(scenarios)}, {self._cell_words}"
+
+    @property
+    def _cell_words(self) -> str:
+        if self.cells == UNIFORM:
+            return f"cells of {self.cell_m:g} m"
+        return f"{self.cells} cells from {self.smallest_m:g} m"
 
 
 @dataclass(frozen=True, eq=False)
@@ -510,7 +518,8 @@ class GasResult:
             "charge height (m)": charge.height_m,
             "charge TNT equivalent (kg)": charge.tnt_kg,
             "engine": self.engine_name,
-            "cell (m)": blast.engine.cell_m,
+            "cell (m)": blast.engine.smallest_m,
+            "cells of one size": "yes" if blast.engine.cells == UNIFORM else blast.engine.cells,
             "margin (m)": blast.engine.margin_m,
             "border (m)": blast.engine.border_m,
             "engine version": known["engine"],

@@ -17,6 +17,7 @@ from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
+from blast_env.physics.gas.settings import CELLS
 from blast_env.physics.scene import Charge
 from blast_env.rendering.figures import save_figure
 from blast_env.runner import run_all
@@ -39,6 +40,7 @@ from studies.gas.loads import (
     yard,
 )
 from studies.gas.reference import free_field, wide_wall
+from studies.gas.refined import cell_choice
 from studies.gas.sources import source_ratios, trade_off_figure
 
 CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
@@ -58,6 +60,35 @@ def _numbers(text: str) -> list[float]:
         return [float(part) for part in text.split(",") if part]
     except ValueError as error:
         raise typer.BadParameter(f"{text!r}: {error}") from error
+
+
+@app.command()
+def refined(
+    scenario: str = "visitor_entrance",
+    choices: Annotated[str, typer.Option(help="Sides in m, and `coarse` or `fine`.")] = (
+        "0.5,0.25,coarse,fine"
+    ),
+) -> None:
+    """Print what cells of several sizes change and cost, against uniform ones."""
+    with user_errors():
+        site = load_scenario(scenario)
+        charge = draw_charge(site, 0)
+        layouts = {"no barrier": (), "wall near the building": wall_near_building(site, charge)}
+        rows = []
+        for choice in choices.split(","):
+            is_side = choice not in CELLS
+            engine = GasEngine(cell_m=float(choice)) if is_side else GasEngine(cells=choice)
+            for name, layout in layouts.items():
+                found = cell_choice(site, layout, engine)
+                numbers = (
+                    f"{found.impulse_pa_s:.1f}",
+                    f"{found.peak_pa / 1000.0:.0f}",
+                    f"{found.cell_updates / 1e6:.0f}",
+                    f"{found.cpu_s:.1f}",
+                )
+                rows.append((found.cells, name, *numbers))
+        headers = ("cells", "layout", "impulse (Pa s)", "peak (kPa)", "million updates", "CPU s")
+        print_line(markdown_table(headers, rows))
 
 
 @app.command()

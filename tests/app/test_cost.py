@@ -11,6 +11,7 @@ from blast_env.app.session import Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
 from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.physics.gas.solver import GasSolver
 from blast_env.scenario import load_scenario
 from tests.app.here import Here
 from tests.gas_sites import WALL, hut
@@ -24,7 +25,9 @@ def test_steps_are_about_those_of_a_blast() -> None:
     told = cost_of_blast(scenario, charge, 0.5)
     run = GasBlast(scenario, (), 0, GasEngine(), charge).run()
     assert told.steps == pytest.approx(run.steps, rel=0.33)
-    assert told.cells == pytest.approx(run.run.solver.state[0].size, rel=0.01)
+    solver = run.run.solver
+    assert isinstance(solver, GasSolver)
+    assert told.cells == pytest.approx(solver.state[0].size, rel=0.01)
 
 
 def test_half_the_cells_cost_sixteen_times_as_much_inside() -> None:

@@ -6,9 +6,10 @@ until its front reaches the first structure or the build zone, then the solver t
 loads on the structures are complete.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cbrt, ceil, hypot
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,7 @@ from blast_env.physics.gas.faces import Faces, exposed_faces
 from blast_env.physics.gas.grid import GasGrid, layers_to
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import FaceLoads, Gauges
+from blast_env.physics.gas.refined import RefinedSolver, Refinement
 from blast_env.physics.gas.settings import CHECKED_CELLS, FACE_NAMES, GasSettings
 from blast_env.physics.gas.solver import GasSolver, Recorder, Settling, state_bytes
 from blast_env.physics.gas.source import (
@@ -44,6 +46,13 @@ _GROWTH: Final = 0.02  # of an impulse in a window, below which it is complete t
 _TIME_LIMIT_S: Final = 0.3  # for more windows
 _HOTTEST: Final = 4.0  # that settled products are at most, in units of still air's temperature
 _SMALL_LOAD: Final = 0.05  # of the largest impulse: what counts at least
+
+_REFINEMENTS: Final[Mapping[str, Refinement]] = MappingProxyType(
+    {
+        "coarse": Refinement(steep=(0.1, 0.1, 0.1), loud=0.2),
+        "fine": Refinement(steep=(0.03, 0.03, 0.03), loud=0.05),
+    }
+)
 
 Recorders = Callable[[GasGrid], Sequence[Recorder]]
 
@@ -107,14 +116,14 @@ class GasRun:
         self.gauges = _gauges(self.grid, site)
         scale = cbrt(self.charge.mass_kg / 100.0)
         own = [self.loads] if self.gauges is None else [self.loads, self.gauges]
-        self.solver = GasSolver(
+        self.solver = _solver(
+            settings,
+            site,
             self.grid,
-            faces=self.table.faces,
-            recorders=(*own, *recorders(self.grid)),
-            with_fuel=True,
-            burning=self.charge.burning,
-            settling=Settling(settings.settled_s * scale, _HOTTEST),
-            threads=settings.threads,
+            self.charge,
+            self.table.faces,
+            (*own, *recorders(self.grid)),
+            Settling(settings.settled_s * scale, _HOTTEST),
         )
         set_charge(self.solver, self.charge, self.handover_radius_m)
         if self.gauges is not None:
@@ -183,13 +192,50 @@ class GasRun:
                 f"the charge is {clear:.2g} m from a solid, below the {least:.2g} m "
                 "that its source needs"
             )
-        cells = cbrt(self.charge.mass_kg) / self.settings.cell_m
+        cells = cbrt(self.charge.mass_kg) / self.settings.smallest_m
         if cells < CHECKED_CELLS:
             notes.append(
                 f"{cells:.2g} cells per m/kg^(1/3) of the charge, checked from {CHECKED_CELLS:g}: "
                 "take smaller cells"
             )
         return tuple(notes)
+
+
+def _solver(
+    settings: GasSettings,
+    site: BlastSite,
+    grid: GasGrid,
+    charge: GasCharge,
+    faces: Faces,
+    recorders: Sequence[Recorder],
+    settling: Settling,
+) -> GasSolver | RefinedSolver:
+    """Return the solver for uniform cells, or for those that follow the blast."""
+    refinement = _REFINEMENTS.get(settings.cells)
+    if refinement is None:
+        return GasSolver(
+            grid,
+            faces=faces,
+            recorders=recorders,
+            with_fuel=True,
+            burning=charge.burning,
+            settling=settling,
+            threads=settings.threads,
+        )
+    matters = np.zeros(grid.shape, dtype=bool)
+    for outline in site.structures:
+        if outline.cells is not None:
+            matters |= _cells_of(outline, grid, site)
+    return RefinedSolver(
+        grid,
+        refinement,
+        matters=matters,
+        faces=faces,
+        recorders=recorders,
+        burning=charge.burning,
+        settling=settling,
+        threads=settings.threads,
+    )
 
 
 def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
@@ -204,7 +250,7 @@ def _grid(settings: GasSettings, site: BlastSite) -> tuple[GasGrid, NDArray[np.i
     Returns:
         The grid; index of the structure (-1: none), row and column of the module (3, nx, ny).
     """
-    cell_m = settings.cell_m
+    cell_m = settings.smallest_m
     margin = ceil(settings.margin_m / cell_m)
     low = np.array([site.site_m.left, site.site_m.bottom])
     high = np.array([site.site_m.right, site.site_m.top])

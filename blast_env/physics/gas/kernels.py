@@ -526,6 +526,16 @@ def _record_walls(
 
 
 @njit(error_model="numpy", fastmath=FUSED)
+def _keep_flow(
+    work: Reals, flow: Reals, end: int, row: int, i: int, flux: int, n: int, ratio: Any
+) -> None:
+    """Add the fluxes through n faces of the rim, times the step over the cell side, to `flow`."""
+    for k in range(flow.shape[1]):
+        for j in range(n):
+            flow[end, k, row, i + j] += ratio * get(work, flux + k * PITCH + j)
+
+
+@njit(error_model="numpy", fastmath=FUSED)
 def _forget_signals(work: Reals) -> None:
     for i in range(PITCH):
         put(work, _SIGNAL + i, work.dtype.type(0.0))
@@ -556,6 +566,9 @@ def advance_planes(
     walls: NDArray[np.int32],
     first: NDArray[np.int32],
     notes: NDArray[np.float64],
+    rim: NDArray[np.int64],
+    flow_x: Reals,
+    flow_y: Reals,
 ) -> None:
     """Move the gas along x and y in the planes from z_from to z_to, those of others left alone.
 
@@ -574,6 +587,11 @@ def advance_planes(
         walls: Cell beyond the face along x, and number of the face, row by row (k, 2).
         first: First entry of a row among `walls`, for faces along x and then along y.
         notes: Fastest signal so far, cells lifted to the floor so far; changed.
+        rim: First and last + 1 cells along z, y and x of a part whose flows are kept (6,); below 0
+            for none.
+        flow_x: What went through its low and high ends along x, per area and in units of the cell
+            side, added to (2, components, z, y).
+        flow_y: The same along y (2, components, z, x).
     """
     y0, y1, x0, x1 = box[2], box[3], box[4], box[5]
     tiles = (x1 - x0 + TILE - 1) // TILE
@@ -616,6 +634,10 @@ def advance_planes(
                         _fuel_row(work, n - 4, _ABOVE_LOW + 2, _BELOW + 2, _ACROSS + 2)
                     line = lines + z * rows + y - 1
                     _record_walls(work, pressure, walls, first, line, _ACROSS + _V + 2, xa, n - 4)
+                    if rim[0] <= z < rim[1] and (y - 1 == rim[2] or y - 1 == rim[3]):
+                        xc, end = max(xa, rim[4]), 0 if y - 1 == rim[2] else 1
+                        at, many = _ACROSS + 2 + xc - xa, min(xb, rim[5]) - xc
+                        _keep_flow(work, flow_y, end, z - rim[0], xc - rim[4], at, many, ratio)
                 if y > y0 + 1:
                     _update_plane_row(state, work, z, y - 2, xa, n - 4, ratio, along, across[y - 2])
                 if y0 < y < y1 + 1:
@@ -635,6 +657,13 @@ def advance_planes(
                         _fuel_row(work, n - 3, _EAST + 1, _WEST + 2, _ALONG + 2)
                     line = z * rows + y - 1
                     _record_walls(work, pressure, walls, first, line, _ALONG + _U + 2, xa, n - 3)
+                    if rim[0] <= z < rim[1] and rim[2] <= y - 1 < rim[3]:
+                        for end in range(2):
+                            if xa <= rim[4 + end] < xb or rim[4 + end] == xb == x1:
+                                at = _ALONG + 2 + rim[4 + end] - xa
+                                _keep_flow(
+                                    work, flow_x, end, z - rim[0], y - 1 - rim[2], at, 1, ratio
+                                )
                     for k in range(count):
                         for i in range(_whole(n - 4)):
                             at = k * PITCH + 2 + i
@@ -715,10 +744,13 @@ def advance_columns(
     walls: NDArray[np.int32],
     first: NDArray[np.int32],
     notes: NDArray[np.float64],
+    rim: NDArray[np.int64],
+    flow_z: Reals,
 ) -> None:
     """Move the gas along z in the rows from y_from to y_to; see `advance_planes`.
 
-    `upright` is the cell side over the height of each cell along z (nz + 8,).
+    `upright` is the cell side over the height of each cell along z (nz + 8,), `flow_z` what went
+    through the rim's lower and upper ends (2, components, y, x).
     """
     z0, z1, x0, x1 = box[0], box[1], box[4], box[5]
     tiles = (x1 - x0 + TILE - 1) // TILE
@@ -730,6 +762,7 @@ def advance_columns(
         for tile in range(tiles):
             x = x0 + (x1 - x0) * tile // tiles
             n = x0 + (x1 - x0) * (tile + 1) // tiles - x
+            xc = max(x, rim[4])
             _forget_signals(work)
             for z in range(z0 - 2, z1 + 2):
                 _shift_rows(work, count, n)
@@ -748,6 +781,10 @@ def advance_columns(
                         _fuel_row(work, n, _ABOVE_LOW, _BELOW, _ACROSS)
                     line = 2 * lines + (z - 1) * rows + y
                     _record_walls(work, pressure, walls, first, line, _ACROSS + _W, x, n)
+                    if rim[2] <= y < rim[3] and (z - 1 == rim[0] or z - 1 == rim[1]):
+                        end, many = 0 if z - 1 == rim[0] else 1, min(x + n, rim[5]) - xc
+                        at = _ACROSS + xc - x
+                        _keep_flow(work, flow_z, end, y - rim[2], xc - rim[4], at, many, ratio)
                 if z > z0 + 1:
                     _update_column_row(state, work, z - 2, y, x, n, ratio * upright[z - 2])
             notes[0] = max(notes[0], _fastest(work, n))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.solver import GasSolver
+from blast_env.physics.gas.solver import Gas, GasSolver
 from blast_env.physics.gas.state import Reals
 
 ARRIVAL_PA: Final = 1000.0
@@ -156,7 +156,7 @@ class FaceLoads(LoadTable):
     def __init__(self, count: int, arrival_pa: float = ARRIVAL_PA) -> None:
         super().__init__(count, arrival_pa, is_mean=True)
 
-    def record(self, solver: GasSolver, step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step."""
         self.add(solver.wall_overpressure_pa(), solver.time_s, step_s)
 
@@ -185,7 +185,7 @@ class PatchHistories:
         self._steps: list[float] = []
         self._history: list[NDArray[np.float32]] = []
 
-    def record(self, solver: GasSolver, step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step: the mean over its time, in its middle."""
         over = solver.wall_pressure[self._members] - 1.0
         sums = np.bincount(self._patch, weights=over, minlength=len(self.faces))
@@ -243,7 +243,7 @@ class Gauges(LoadTable):
                 self._history.append(overpressure)
                 self.add(overpressure, float(time), float(step_s))
 
-    def record(self, solver: GasSolver, step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step."""
         overpressure = solver.overpressure_at(self.cells)
         self._times.append(solver.time_s)
@@ -307,9 +307,12 @@ class GroundMap:
         self._impulse = np.zeros(shape, dtype=np.float32)
         self._unit_pa = 1.0
 
-    def record(self, solver: GasSolver, step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step."""
         self._unit_pa = solver.pressure_pa
+        if not isinstance(solver, GasSolver):
+            self._add_plane(solver.overpressure_in(2, self._layer) / solver.pressure_pa, step_s)
+            return
         _add_to_map(
             solver.state,
             self._layer + self._lead,
@@ -319,6 +322,13 @@ class GroundMap:
             step_s,
             solver.state.dtype.type(0.4),
         )
+
+    def _add_plane(self, over: NDArray[np.float64], step_s: float) -> None:
+        """Add a step, from the overpressures of the layer in units of still air's (nx, ny)."""
+        plane = over.T.astype(np.float32)
+        peak, impulse = self._peak[self._inner], self._impulse[self._inner]
+        np.maximum(peak, plane, out=peak)
+        impulse += np.float32(step_s) * np.maximum(plane, np.float32(0.0))
 
     @property
     def peak_pa(self) -> NDArray[np.float64]:
@@ -368,7 +378,7 @@ class Snapshots:
         self._times = sorted(times_s)
         self._solid = np.take(grid.solid, layer, axis=axis)
 
-    def record(self, solver: GasSolver, step_s: float) -> None:  # noqa: ARG002
+    def record(self, solver: Gas, step_s: float) -> None:  # noqa: ARG002
         """Take a picture if it is time; one picture of a step stands for all times in it."""
         due = 0
         while due < len(self._times) and self._times[due] <= solver.time_s:

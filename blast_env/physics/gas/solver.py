@@ -34,6 +34,11 @@ _CELLS_PER_CALL: Final = 1_000_000
 _DTYPES: Final = {"single": np.float32, "double": np.float64}
 
 
+def ramp(steps: int) -> float:
+    """Return the share of the full step to be taken after so many."""
+    return min(1.0, _FIRST_SHARE + (1.0 - _FIRST_SHARE) * steps / _FIRST_STEPS)
+
+
 def state_bytes(
     grid: GasGrid,
     precision: Literal["single", "double"] = "single",
@@ -90,10 +95,44 @@ class Settling(NamedTuple):
     hottest: float
 
 
+class Gas(Protocol):
+    """A gas on its way, whatever its cells are; see `GasSolver` for what everything is."""
+
+    grid: GasGrid
+    faces: Faces
+    time_s: float
+    steps: int
+    pressure_pa: float
+    wall_pressure: Reals
+
+    @property
+    def cell_updates(self) -> int:
+        """Cells moved on so far."""
+
+    @property
+    def lifted(self) -> int:
+        """Cells that had to be lifted to the floor so far."""
+
+    def step(self) -> None:
+        """Make a time step."""
+
+    def advance(self, until_s: float) -> None:
+        """Go on until the simulated time is at least `until_s`."""
+
+    def wall_overpressure_pa(self) -> NDArray[np.float64]:
+        """Return the mean overpressures on the faces during the last step (n,)."""
+
+    def overpressure_at(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the overpressures in some cells, x, y and z (n, 3)."""
+
+    def overpressure_in(self, axis: int, layer: int) -> NDArray[np.float64]:
+        """Return the overpressures in a layer of cells, along the two other axes."""
+
+
 class Recorder(Protocol):
     """Something that looks at the gas after every step."""
 
-    def record(self, solver: "GasSolver", step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Look at the gas after a step of `step_s`."""
 
 
@@ -183,6 +222,8 @@ class GasSolver:
         edges = (self._code.shape[1], kernels.EDGE_SIZE)
         self._edges = [np.zeros(edges, dtype=dtype) for _ in range(threads)]
         self._notes = np.zeros((threads, 2))
+        self._no_rim = np.full(6, -1)
+        self._no_flow = np.zeros((2, components, 1, 1), dtype=dtype)
         self._whole = np.array(
             [bound for n in self._code.shape for bound in (MARGIN, n - MARGIN)], dtype=np.int64
         )
@@ -203,11 +244,20 @@ class GasSolver:
         velocity_m_s: Sequence[ArrayLike] = (0.0, 0.0, 0.0),
         pressure_pa: ArrayLike,
         fuel_kg_m3: ArrayLike = 0.0,
+        start: tuple[int, int, int] | None = None,
     ) -> None:
-        """Set the gas in the air cells, from arrays over x, y and z or values for all of them."""
-        density = np.broadcast_to(np.asarray(density_kg_m3, dtype=np.float64), self.grid.shape)
-        pressure = np.broadcast_to(np.asarray(pressure_pa, dtype=np.float64), self.grid.shape)
-        air = ~self.grid.solid
+        """Set the gas in the air cells, from arrays over x, y and z or values for all of them.
+
+        Arrays may be of a part of the grid, of which `start` is the first cell; the rest is still.
+        """
+        if start is not None:
+            self.state[:] = self._still[:, None, None, None]
+        shape = self.grid.shape if start is None else np.shape(density_kg_m3)
+        part = tuple(slice(a, a + n) for a, n in zip(start or (0, 0, 0), shape, strict=True))
+        density = np.broadcast_to(np.asarray(density_kg_m3, dtype=np.float64), shape)
+        pressure = np.broadcast_to(np.asarray(pressure_pa, dtype=np.float64), shape)
+        solid = self.grid.solid[part]
+        air = ~solid
         for name, values in (("density_kg_m3", density), ("pressure_pa", pressure)):
             least = values[air].min(initial=np.inf)
             if not least > 0.0:
@@ -215,14 +265,14 @@ class GasSolver:
         density = density / self.density_kg_m3
         pressure = pressure / self.pressure_pa
         energy = pressure / (GAMMA - 1.0)
-        self._put(state.DENSITY, density)
+        self._put(state.DENSITY, density, part, solid)
         for k, component in enumerate(velocity_m_s):
             velocity = np.asarray(component, dtype=np.float64) / self.velocity_m_s
-            self._put(state.X_MOMENTUM + k, density * velocity)
+            self._put(state.X_MOMENTUM + k, density * velocity, part, solid)
             energy = energy + 0.5 * density * velocity * velocity
-        self._put(ENERGY, energy)
+        self._put(ENERGY, energy, part, solid)
         if len(self.state) > state.FUEL:
-            self._put(state.FUEL, np.asarray(fuel_kg_m3) / self.density_kg_m3)
+            self._put(state.FUEL, np.asarray(fuel_kg_m3) / self.density_kg_m3, part, solid)
         self._signal = 0.0
         if self._skip:
             self.box = self._whole.copy()
@@ -244,8 +294,7 @@ class GasSolver:
         """Make one time step, of at most `most_s`."""
         if self._signal == 0.0:
             self._signal = float(state.fastest_signal(self.state))
-        share = min(1.0, _FIRST_SHARE + (1.0 - _FIRST_SHARE) * self.steps / _FIRST_STEPS)
-        reduced = 2.0 * share * self._courant * self.grid.cell_m / self._signal
+        reduced = 2.0 * ramp(self.steps) * self._courant * self.grid.cell_m / self._signal
         step_s = min(reduced / self.velocity_m_s, most_s)
         ratio = self.state.dtype.type(step_s * self.velocity_m_s / self.grid.cell_m)
         half = self.state.dtype.type(0.5) * ratio
@@ -338,6 +387,9 @@ class GasSolver:
                 self._walls,
                 self._first_wall,
                 self._notes[k],
+                self._no_rim,
+                self._no_flow,
+                self._no_flow,
             )
 
         self._share_out(move, int(self.box[0]), int(self.box[1]))
@@ -360,6 +412,8 @@ class GasSolver:
                 self._walls,
                 self._first_wall,
                 self._notes[k],
+                self._no_rim,
+                self._no_flow,
             )
 
         self._share_out(move, int(self.box[2]), int(self.box[3]))
@@ -428,11 +482,16 @@ class GasSolver:
         inner = values[ENERGY] - real(0.5) * motion / values[state.DENSITY]
         return (real(GAMMA - 1.0) * inner - real(1.0)).astype(np.float64)
 
-    def _put(self, component: int, values: NDArray[np.float64]) -> None:
-        """Set a component in the air cells; solid cells keep still air."""
-        inner = self.state[(component, *self.grid.inner)]
-        values = np.broadcast_to(values, self.grid.shape)
-        inner[:] = np.where(self.grid.solid, float(self._still[component]), values).T
+    def _put(
+        self,
+        component: int,
+        values: NDArray[np.float64],
+        part: tuple[slice, ...],
+        solid: NDArray[np.bool_],
+    ) -> None:
+        """Set a component in the air cells of a part; solid cells keep still air."""
+        inner = self.state[(component, *self.grid.inner)].T[part]
+        inner[:] = np.where(solid, float(self._still[component]), values)
 
     def _get(self, component: int) -> NDArray[np.float64]:
         inner = self.state[(component, *self.grid.inner)]
