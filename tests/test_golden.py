@@ -131,12 +131,16 @@ def test_a_blast_is_what_it_was(scene: str, engine: str) -> None:
 
 
 CONTENT_HASHES: Final = {
+    "clinic_front": "c4e690e5046b6ddc0ef5c40323266df5d1c0ef0e8f902365a7518a400340071a",
     "control_room": "f0b4d497dccfd3fb5c7fa88a4d7442000a78207db5b421985695c92a320c52d6",
     "courtyard": "76c48339ea3f457b906e152fbc0abd85ec13b276c4ecda0be3a9c6dcc0131cb7",
     "free_field": "2356d490bee5e2af05f7c80a219c16f8ceb886210f1e0a53aa86954cd4b1ac54",
+    "guard_post": "96238796816c920456002127a66a81fb946324b80291d4f8a26f0cf0930ca59b",
     "hotel_forecourt": "9b5360183b00680dc721c96579e47652bc6abe59af04289e67d32bae9f932c69",
+    "ministry_kerb": "5353c2f6831f6f080fb92cd1b923b58355aaede1c5782061415b819b414f0918",
     "perimeter_gate": "06955a399c03dbe9aad722de7981e16cb7405f389b4c56d1034d496c08e1a94d",
     "school_and_clinic": "e7108ad01f9785be89d65ae66993d201b389c62a96647a8958b896f78e93ac6a",
+    "school_wing": "fe3a2184ef5f8b3b9aca4a47c8913253ddfb023c42504b41b01da0197a54269c",
     "shopping_street": "fc400c0490aff067a563d800e38ec8f09d76fd246359914dfb8171af907a1004",
     "street_junction": "57291072154f0caa826fe1cb6e4e0682b528042494dd445e303e23d0f1557ff2",
     "visitor_entrance": "5bffa26f5e878df20c765c6d284d7b247fd49a4b5c286013580a98c04dbc0297",
