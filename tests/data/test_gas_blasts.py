@@ -1,0 +1,57 @@
+"""The gas blasts as a data set: what its card promises of every row."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from blast_env.data import COLUMNS, TABLES, as_tensors, load, sources
+from blast_env.errors import BlastEnvError, UnknownNameError
+
+
+@pytest.fixture(scope="module")
+def rows() -> pd.DataFrame:
+    return load("gas_blasts")
+
+
+def test_columns_are_those_of_the_card_and_every_table_is_there(rows: pd.DataFrame) -> None:
+    assert list(rows.columns) == [each.name for each in COLUMNS]
+    assert set(rows["table"]) == set(TABLES)
+    assert len(rows) > 10_000
+
+
+def test_a_site_is_in_one_part_only_and_no_part_is_empty(rows: pd.DataFrame) -> None:
+    parts = rows.groupby("scenario_hash")["split"].nunique()
+    assert (parts == 1).all()
+    assert set(rows["split"]) == {"train", "validation", "test"}
+
+
+def test_without_a_barrier_a_load_is_that_without_a_barrier(rows: pd.DataFrame) -> None:
+    bare = rows[rows["layout"] == "[]"]
+    assert (bare["unprotected_peak_pa"] > 0.0).all()
+    np.testing.assert_allclose(bare["impulse_pa_s"], bare["unprotected_impulse_pa_s"], rtol=0.01)
+
+
+def test_loads_are_positive_and_layouts_can_be_read(rows: pd.DataFrame) -> None:
+    assert (rows[["impulse_pa_s", "peak_pa", "tnt_kg"]] > 0.0).to_numpy().all()
+    assert all(isinstance(json.loads(each), list) for each in rows["layout"].unique()[:500])
+
+
+def test_tensors_leave_out_what_has_no_bare_load(rows: pd.DataFrame) -> None:
+    inputs, shares = as_tensors(rows)
+    known = int(rows["unprotected_impulse_pa_s"].notna().sum())
+    assert inputs.shape == (known, 6)
+    assert shares.shape == (known, 2)
+    assert bool((shares > 0.0).all())
+
+
+def test_other_names_and_other_files_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="gas_blasts"):
+        load("gas_blast")
+    other = tmp_path / "other.parquet"
+    pq.write_table(pq.read_table(sources()[0]).drop_columns(["tnt_kg"]), other)
+    with pytest.raises(BlastEnvError, match="tnt_kg"):
+        load(paths=[other])
