@@ -59,12 +59,12 @@ def test_a_block_of_concrete_unless_the_file_says_otherwise(result: GasResult) -
 
 
 def test_a_light_wall_falls_and_a_foot_or_an_anchor_holds_it() -> None:
-    fallen = yard_with(mass_kg=300.0)
-    light = fallen.pieces.iloc[0]
-    footed = yard_with(mass_kg=300.0, base_width_m=4.0).pieces.iloc[0]
-    anchored = yard_with(mass_kg=300.0, anchorage_n=3e6).pieces.iloc[0]
+    light = yard_with(mass_kg=500.0).pieces.iloc[0]
+    footed = yard_with(mass_kg=500.0, base_width_m=4.0).pieces.iloc[0]
+    anchored = yard_with(mass_kg=500.0, anchorage_n=3e6).pieces.iloc[0]
     assert light["outcome"] == "overturns"
-    assert light["falls_in_blast"] == (light["overturn_s"] <= fallen.time_s)
+    # It is still on its way when the blast is over.
+    assert not light["falls_in_blast"]
     assert light["overturn_s"] < 2.0
     assert footed["outcome"] in ("slides", "rocks")
     assert footed["tilt"] < 0.5
