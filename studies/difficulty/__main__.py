@@ -1,11 +1,11 @@
-"""Whether it matters where the barrier stands, for docs/studies/scenario_tables.md.
+"""Whether it matters where the barrier stands, for docs/studies/scenarios.md.
 
 For every bundled scenario with a build zone: no barrier, random layouts, layouts by hand and the
 best that was searched, on the same threats. Where single modules are placed, with an engine of
 particles, on held-out seeds; once with one layout for all threats, once with a layout for each
 charge. Where the items of a catalogue are placed, with gas dynamics, one layout for all places of
-the charge. Prints the tables and a verdict, writes both between the markers of the page, and draws
-a picture of each scenario with the best layout.
+the charge. Prints the tables and a verdict, writes both into a file that the page includes, and
+draws a picture of each scenario with the best layout.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,6 @@ import typer
 from blast_env import load_scenario
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import evaluate_against
 from blast_env.files import make_folder, write_atomically
 from blast_env.rendering.figures import save_figure
@@ -35,7 +34,7 @@ from studies.difficulty.verdict import (
     joint_criteria,
 )
 
-PAGE: Final = Path("docs/studies/scenario_tables.md")
+TABLES: Final = Path("docs/studies/tables")
 PICTURES: Final = Path("docs/pictures")
 
 _HEADERS: Final = (
@@ -54,7 +53,7 @@ _ITEM_HEADERS: Final = (
     "reduction",
     "at the worst place",
 )
-_JOINT: Final = "all with items"
+_JOINT: Final = "all_with_items"
 _PERCENT: Final = 100.0
 
 
@@ -78,25 +77,24 @@ def main(
     ] = Path("out/scenario_difficulty"),
     processes: Annotated[int, typer.Option(min=1, help="Worker processes.")] = 2,
     cluster: ClusterAddress = None,
-    page: Annotated[Path, typer.Option(help="The page with the markers.")] = PAGE,
+    tables: Annotated[Path, typer.Option(help="Folder for the tables.")] = TABLES,
     pictures: Annotated[Path, typer.Option(help="Folder for the pictures.")] = PICTURES,
 ) -> None:
-    """Run the study and bring page and pictures up to date."""
+    """Run the study and bring tables and pictures up to date."""
     effort = Effort(layouts=layouts, seeds=seeds, charges=charges, realisations=realisations)
     items = ItemEffort(layouts=random, budget=budget, place_budget=place_budget)
     with user_errors(), running_on(cluster):
         scenarios = [load_scenario(name) for name in names or studied_scenarios()]
-        for scenario in scenarios:  # before the blasts, so that no result is lost
-            with_section(read_page(page), scenario.name, "")
-        make_folder(pictures)
+        for folder in (tables, pictures):  # before the blasts, so that no result is lost
+            make_folder(folder)
         results = []
         for scenario in scenarios:
             if scenario.zone.items:
-                results.append(study_items(scenario, items, blasts, processes, page, pictures))
+                results.append(study_items(scenario, items, blasts, processes, tables, pictures))
             else:
-                study_scenario(scenario, effort, engine, processes, page, pictures)
+                study_scenario(scenario, effort, engine, processes, tables, pictures)
         if {each.scenario.name for each in results} == set(with_items()):
-            write_joint(results, page)
+            write_joint(results, tables)
 
 
 def with_items() -> tuple[str, ...]:
@@ -110,9 +108,9 @@ def studied_scenarios() -> tuple[str, ...]:
 
 
 def study_scenario(
-    scenario: Scenario, effort: Effort, engine: str, processes: int, page: Path, pictures: Path
+    scenario: Scenario, effort: Effort, engine: str, processes: int, tables: Path, pictures: Path
 ) -> None:
-    """Study one scenario: print, write its section of the page, draw its picture."""
+    """Study one scenario: print, write its tables, draw its picture."""
     start = perf_counter()
     print_line(f"{scenario.name}: at most {effort.blasts:,} blasts")
     with progress_bar(scenario.name) as progress:
@@ -127,9 +125,9 @@ def study_scenario(
         print_result(f"{scenario.name}, {title}", result)
     print_verdict(criteria)
     parts = [origin(study), *(markdown(*task) for task in tasks), markdown_verdict(criteria)]
-    write_section(page, scenario.name, "\n\n".join(parts))
+    written = write_tables(tables, scenario.name, "\n\n".join(parts))
     print_line(
-        f"{study.evaluator.blasts:,} blasts, {perf_counter() - start:.0f} s; wrote {page} and "
+        f"{study.evaluator.blasts:,} blasts, {perf_counter() - start:.0f} s; wrote {written} and "
         f"{picture_path(pictures, scenario.name)}\n"
     )
 
@@ -139,10 +137,10 @@ def study_items(
     effort: ItemEffort,
     blasts: Path,
     processes: int,
-    page: Path,
+    tables: Path,
     pictures: Path,
 ) -> ItemResult:
-    """Study one scenario with a catalogue: print, write its section, draw its picture."""
+    """Study one scenario with a catalogue: print, write its tables, draw its picture."""
     start_s = process_time()
     print_line(f"{scenario.name}: at most {effort.blasts(scenario):,} blasts")
     with progress_bar(scenario.name) as progress:
@@ -159,15 +157,15 @@ def study_items(
         elsewhere_text(result),
         markdown_verdict(criteria),
     ]
-    write_section(page, scenario.name, "\n\n".join(parts))
+    written = write_tables(tables, scenario.name, "\n\n".join(parts))
     print_line(
         f"{study.evaluator.blasts:,} blasts, {process_time() - start_s:.0f} s of this process; "
-        f"wrote {page} and {picture}\n"
+        f"wrote {written} and {picture}\n"
     )
     return result
 
 
-def write_joint(results: Sequence[ItemResult], page: Path) -> None:
+def write_joint(results: Sequence[ItemResult], tables: Path) -> None:
     """Print and write what the scenarios with a catalogue have together."""
     rows = joint_rows(results)
     headers = ("rule, points behind the best found", *(each.scenario.name for each in results))
@@ -175,7 +173,7 @@ def write_joint(results: Sequence[ItemResult], page: Path) -> None:
     criteria = joint_criteria(results)
     print_verdict(criteria)
     table = markdown_table(headers, rows)
-    write_section(page, _JOINT, f"{table}\n\n{markdown_verdict(criteria)}")
+    write_tables(tables, _JOINT, f"{table}\n\n{markdown_verdict(criteria)}")
 
 
 def item_rows(result: ItemResult) -> list[tuple[str, ...]]:
@@ -331,37 +329,17 @@ def markdown_verdict(criteria: Sequence[Criterion]) -> str:
     return "\n".join([verdict(criteria), *([""] if missed else []), *missed])
 
 
-def read_page(path: Path) -> str:
-    """Return the text of the page.
-
-    Raises:
-        BlastEnvError: If there is none.
-    """
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise BlastEnvError(f"{path}: cannot be read: {error.strerror or error}") from error
+def tables_path(folder: Path, name: str) -> Path:
+    """Return where the tables of a scenario are."""
+    return folder / f"scenario_{name}.txt"
 
 
-def write_section(path: Path, name: str, text: str) -> None:
-    """Write other text between the markers of the page."""
-    changed = with_section(read_page(path), name, text)
+def write_tables(folder: Path, name: str, text: str) -> Path:
+    """Write the tables of a scenario for the page, and return where."""
+    path = tables_path(folder, name)
     with write_atomically(path) as temporary:
-        temporary.write_text(changed, encoding="utf-8")
-
-
-def with_section(page: str, name: str, text: str) -> str:
-    """Return a page with other text between the markers of a scenario.
-
-    Raises:
-        BlastEnvError: If the page does not have them.
-    """
-    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
-    before, found, rest = page.partition(begin)
-    _, found_end, after = rest.partition(end)
-    if not (found and found_end):
-        raise BlastEnvError(f"{name}: the page has no lines {begin.strip()!r} and {end!r}")
-    return f"{before}{begin}{text}\n{end}{after}"
+        temporary.write_text(f"{text}\n", encoding="utf-8")
+    return path
 
 
 if __name__ == "__main__":

@@ -404,8 +404,6 @@ SMALLER: Final[dict[str, str]] = {
     " --run out/runs/maskable_courtyard_hidden --set evaluation_cases=32": _TRAIN,
     "blast-env train --scenario sites --threat hidden --run out/runs/maskable_sites"
     " --set evaluation_cases=48 --set evaluation_interval=10": _TRAIN,
-    "blast-env train --scenario courtyard --steps 40960 --set ent_coef=0.005"
-    " --run out/runs/entropy": _TRAIN,
     "blast-env league --track known --scenario courtyard --cases 24 --seeds 16 --budgets 200"
     " --methods genetic --run out/runs/maskable_courtyard --run out/runs/ppo_courtyard"
     " --out out/league": _LEAGUE,

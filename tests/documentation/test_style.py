@@ -7,14 +7,6 @@ import pytest
 from tests.documentation.pages import TEXTS
 from tests.documentation.style import MOST_CHARACTERS, MOST_WORDS, faults, sentences
 
-NOT_YET: Final = frozenset(
-    {
-        "docs/researchers/league.md",
-        "docs/researchers/search.md",
-    }
-)
-"""Pages that do not pass yet. Take a page off when it passes; add none."""
-
 PAGE: Final = """# A title
 
 A first sentence. A second one, with `code. That` ends, and [a link](page.md#part)!
@@ -65,8 +57,4 @@ def test_a_page_in_plain_english_has_no_fault() -> None:
 
 @pytest.mark.parametrize("page", sorted(TEXTS))
 def test_a_page_is_in_plain_english(page: str) -> None:
-    found = faults(TEXTS[page])
-    if page in NOT_YET:
-        assert found, f"{page} passes: take it off the list"
-    else:
-        assert found == []
+    assert faults(TEXTS[page]) == []

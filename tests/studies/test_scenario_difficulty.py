@@ -1,4 +1,4 @@
-"""The study behind docs/studies/scenario_tables.md: figures, criteria, an up-to-date page."""
+"""The study behind docs/studies/scenarios.md: figures, criteria, tables that are up to date."""
 
 import re
 from dataclasses import replace
@@ -12,15 +12,14 @@ from typer.testing import CliRunner
 
 from blast_env import load_scenario
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange, evaluate_against
 from studies.difficulty import __main__ as scenario_difficulty
 from studies.difficulty.__main__ import (
-    PAGE,
     PICTURES,
+    TABLES,
     picture_path,
     studied_scenarios,
-    with_section,
+    tables_path,
 )
 from studies.difficulty.figure import difficulty_figure
 from studies.difficulty.study import STAND_OFFS, DifficultyStudy, Effort, TaskResult, WayOutcome
@@ -185,25 +184,14 @@ def test_the_picture_shows_both_plans(study: DifficultyStudy, hidden: TaskResult
     assert titles[1].startswith("a wall, 16 modules: ")
 
 
-def test_only_the_section_of_the_scenario_changes() -> None:
-    page = "a\n<!-- begin x -->\nold\n<!-- end x -->\nb\n<!-- begin y -->\n<!-- end y -->\n"
-    changed = with_section(page, "x", "new")
-    assert changed == page.replace("old", "new")
-    assert with_section(with_section(changed, "y", "z"), "x", "old") == with_section(page, "y", "z")
-    with pytest.raises(BlastEnvError, match="z: the page has no lines"):
-        with_section(page, "z", "new")
-
-
-def section_of(name: str) -> str:
-    section = (REPOSITORY / PAGE).read_text("utf-8").partition(f"<!-- begin {name} -->")[2]
-    return section.partition(f"<!-- end {name} -->")[0]
+def tables_of(name: str) -> str:
+    return tables_path(REPOSITORY / TABLES, name).read_text("utf-8")
 
 
 @pytest.mark.parametrize("name", studied_scenarios())
-def test_the_page_was_made_with_the_scenario_as_it_is(name: str) -> None:
+def test_the_tables_were_made_with_the_scenario_as_it_is(name: str) -> None:
     """Otherwise run `python -m studies.difficulty`."""
-    section = section_of(name)
-    assert f"scenario hash `{load_scenario(name).content_hash[:12]}`" in section
+    assert f"scenario hash `{load_scenario(name).content_hash[:12]}`" in tables_of(name)
     assert picture_path(REPOSITORY / PICTURES, name).is_file()
 
 
@@ -213,7 +201,7 @@ def test_the_overview_says_what_the_tables_say(name: str) -> None:
     overview = (REPOSITORY / "docs" / "studies" / "scenarios.md").read_text("utf-8")
     (row,) = re.findall(rf"^\| \[{name}\].*$", overview, re.MULTILINE)
     random, rule, best = re.findall(r"[\d.]+(?= %)", row)
-    hidden = section_of(name).partition("**Charge visible")[0].partition("A layout for one")[0]
+    hidden = tables_of(name).partition("**Charge visible")[0].partition("A layout for one")[0]
     found = dict(re.findall(r"^\| (\w[^|]+) \|.*?\| (-?[\d.]+) %", hidden, re.MULTILINE))
     rules = {line: value for line, value in found.items() if re.match("high|long|ring|wall", line)}
     rules |= {line: value for line, value in found.items() if "posts" in line}
@@ -232,12 +220,12 @@ def run_command(*arguments: str) -> tuple[int, str]:
 
 def test_the_command_prints_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scenario_difficulty, "load_scenario", ballistic)
-    page, pictures = tmp_path / "page.md", tmp_path / "pictures"
-    page.write_text("# Title\n<!-- begin courtyard -->\n<!-- end courtyard -->\n")
+    tables, pictures = tmp_path / "tables", tmp_path / "pictures"
     small = ("--layouts=2", "--seeds=2", "--charges=2", "--realisations=1", "--processes=1")
-    exit_code, output = run_command("courtyard", *small, f"--page={page}", f"--pictures={pictures}")
+    folders = (f"--tables={tables}", f"--pictures={pictures}")
+    exit_code, output = run_command("courtyard", *small, *folders)
     assert exit_code == 0, output
-    text = page.read_text()
+    text = (tables / "scenario_courtyard.txt").read_text()
     for words in ("Charge hidden", "Charge visible", "wall near the building", "best of 2 random"):
         assert words in text
     assert text.count("| no barrier | 0 |") == 2
@@ -245,10 +233,9 @@ def test_the_command_prints_and_writes(tmp_path: Path, monkeypatch: pytest.Monke
     assert (pictures / "scenario_courtyard.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_page_without_markers_is_refused_before_any_blast(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    page.write_text("# Title\n")
-    for path in (page, tmp_path / "missing.md"):
-        exit_code, output = run_command("courtyard", "--page", str(path))
-        assert exit_code == 2
-        assert "error" in output
+def test_a_folder_that_cannot_be_is_refused_before_any_blast(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    exit_code, output = run_command("courtyard", "--tables", str(file))
+    assert exit_code == 2
+    assert "error" in output
