@@ -24,25 +24,23 @@ from blast_env.app.records import (
     Kept,
     Load,
     Picture,
-    Verdict,
     Wave,
     blast_key,
     read_film,
     read_record,
     write_kept,
 )
+from blast_env.app.verdicts import keep_histories
 from blast_env.app.work import BlastTask, ThreatOf, scenario_of
 from blast_env.calibration.model import CalibrationError
 from blast_env.documents import read_text
 from blast_env.engines import Blast, find_engine
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
-from blast_env.evaluation.consequences import BuildingResponse, by_building
 from blast_env.files import make_folder, write_atomically
-from blast_env.geometry import Layout
+from blast_env.geometry import Layout, standing
 from blast_env.provenance import versions
 from blast_env.rendering.canvas import Frame
-from blast_env.rendering.facade import facade_picture
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.film import paint_at, plan_film, scale_end
 from blast_env.rendering.frames import FramePainter
@@ -119,7 +117,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
         BlastEnvError: If they cannot be run.
     """
     scenario = scenario_of(task.scenario)
-    layout = placing.layout_from(scenario, task.layout)
+    layout = standing(placing.layout_from(scenario, task.layout))
     work: list[tuple[ThreatOf, Layout]] = []
     for threat in task.threats:
         # Gas has its scale from the blast without a barrier; particles are looked at first.
@@ -135,7 +133,7 @@ def _run_one(
     task: BlastTask, scenario: Scenario, threat: ThreatOf, layout: Layout, tell: Tell
 ) -> None:
     charge = charge_against(scenario, layout, threat.charge)
-    key = blast_key(scenario.content_hash, layout, charge, task.engine)
+    key = blast_key(scenario, layout, charge, task.engine)
     folder = Path(task.blasts) / key
     if read_record(folder) is not None:
         return
@@ -233,7 +231,7 @@ def _gas(
     shot = record_planes(blast, height_m, section, told, ground_recorders)
     result = shot.result
     bare_charge = charge_against(scenario, (), charge)
-    bare_key = blast_key(scenario.content_hash, (), bare_charge, task.engine)
+    bare_key = blast_key(scenario, (), bare_charge, task.engine)
     scale = _scale(shot, Path(task.blasts) / bare_key / _SCALE)
     if not layout:
         write_kept(scale, folder / _SCALE)
@@ -241,10 +239,8 @@ def _gas(
     times_s = np.linspace(0.0, scale.until_s, FRAMES).tolist()
     frames = (painter.paint(time_s, "") for time_s in times_s)
     _write_film(frames, times_s, folder, share_of(tell, 60, 100, 25) or tell)
-    where = charge_against(scenario, layout, charge)
-    bays = result.bay_loads
-    buildings = by_building(scenario, bays.response, where) if bays and bays.bays else []
-    pictures = (*_damage(buildings, folder), *_pictures(result, scale, folder))
+    keep_histories(result, folder)
+    pictures = tuple(_pictures(result, scale, folder))
     notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]
     return {
         "loads": _gas_loads(result),
@@ -252,29 +248,7 @@ def _gas(
         "notes": tuple(dict.fromkeys(notes)),
         "pictures": pictures,
         "waves": tuple(_waves(result)),
-        "verdicts": tuple(_verdict(each) for each in buildings),
     }
-
-
-def _verdict(building: BuildingResponse) -> Verdict:
-    facade = building.facade
-    return Verdict(
-        building=building.building,
-        level=facade.level_of_protection,
-        panes=facade.panes,
-        broken=facade.broken_panes,
-        condition=facade.worst_condition.label,
-        damage=facade.worst_damage.name.lower(),
-    )
-
-
-def _damage(buildings: Sequence[BuildingResponse], folder: Path) -> Iterator[Picture]:
-    for number, each in enumerate(buildings):
-        words = f"{each.charge.tnt_kg:g} kg at ({each.charge.position_m[0]:g}, "
-        words += f"{each.charge.position_m[1]:g}) m"
-        name = f"damage_{number}.png"
-        save_figure(facade_picture([(words, each)], each.building), folder / name)
-        yield Picture(file=name, label=f"damage of {each.building}")
 
 
 def _scale(shot: PressureShot, kept: Path) -> Scale:

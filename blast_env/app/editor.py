@@ -253,7 +253,7 @@ class Editor:
             self.selected = None
             return
         own = self.selected
-        fixed = (ThingKind.GAUGE, ThingKind.ITEM)
+        fixed = (ThingKind.GAUGE, *edits.NOWHERE)
         if own is not None and edits.has(scenario, own) and own.kind not in fixed:
             box = edits.rectangle_of(scenario, own)
             near = max(abs(x_m - box.right), abs(y_m - box.top)) <= _HANDLE_M

@@ -39,6 +39,7 @@ class ThingKind(StrEnum):
     COST_AREA = "cost area"
     GAUGE = "gauge"
     ITEM = "item"
+    MEASURE = "measure"
 
 
 class SiteThing(NamedTuple):
@@ -57,10 +58,15 @@ _PATHS: Final[Mapping[ThingKind, tuple[str, ...]]] = {
     ThingKind.COST_AREA: ("build_zone", "cost_areas"),
     ThingKind.GAUGE: ("gauges",),
     ThingKind.ITEM: ("build_zone", "items"),
+    ThingKind.MEASURE: ("build_zone", "hardening"),
 }
 """Where each kind is in a scenario file."""
 
 _SINGLE: Final = (ThingKind.SITE, ThingKind.ZONE)
+NOWHERE: Final = (ThingKind.SITE, ThingKind.ITEM, ThingKind.MEASURE)
+"""Kinds without a place of their own on the plan."""
+
+_BETTER_GLASS: Final = "window_laminated_6"
 
 
 def snapped(value_m: float) -> float:
@@ -106,6 +112,8 @@ def things(scenario: Scenario) -> Iterator[tuple[SiteThing, str]]:
             yield SiteThing(ThingKind.COST_AREA, index), f"cost area: {cost_area.reason}"
         for index, item in enumerate(zone.items):
             yield SiteThing(ThingKind.ITEM, index), f"item of the catalogue: {item.name}"
+        for index, measure in enumerate(zone.hardening):
+            yield SiteThing(ThingKind.MEASURE, index), f"hardening measure: {measure.name}"
     for index, gauge in enumerate(scenario.gauges):
         yield SiteThing(ThingKind.GAUGE, index), f"gauge {gauge.name}"
 
@@ -118,7 +126,7 @@ def has(scenario: Scenario, thing: SiteThing) -> bool:
 def rectangle_of(scenario: Scenario, thing: SiteThing) -> Rectangle:
     """Return the smallest rectangle around a thing; of a point, one without extent.
 
-    An item of the catalogue is nowhere, or everywhere in the build zone: that is its rectangle.
+    Items and measures are nowhere, or everywhere in the build zone: that is their rectangle.
 
     Raises:
         BlastEnvError: If there is no such thing.
@@ -195,7 +203,7 @@ def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
     Raises:
         ScenarioError: If it cannot be there.
     """
-    if thing.kind in (ThingKind.SITE, ThingKind.ITEM):
+    if thing.kind in NOWHERE:
         return scenario
     corner = rectangle_of(scenario, thing)
     shift = _HALF if thing.kind is ThingKind.GAUGE else 0.0  # gauges are in the middle of cells
@@ -327,6 +335,7 @@ def added(
             ),
         },
         ThingKind.ITEM: lambda: _item(scenario),
+        ThingKind.MEASURE: lambda: _measure(scenario),
         ThingKind.GAUGE: lambda: _gauge(scenario, start_m),
         ThingKind.ZONE: lambda: _zone(scenario, area),
     }[kind]()
@@ -341,7 +350,7 @@ def added(
         else:
             table[key] = [*table.get(key, []), section]
 
-    if kind in (ThingKind.KEEP_OUT, ThingKind.COST_AREA, ThingKind.ITEM):
+    if kind in (ThingKind.KEEP_OUT, ThingKind.COST_AREA, ThingKind.ITEM, ThingKind.MEASURE):
         _ = scenario.zone  # refuses a site without one
     after = changed(scenario, edit)
     last = max(each.number for each, _ in things(after) if each.kind is kind)
@@ -427,6 +436,12 @@ def _item(scenario: Scenario) -> Document:
         "cost": 4.0 * scenario.zone.module_cost,
         "stock": max(scenario.zone.stock // 4, 1),
     }
+
+
+def _measure(scenario: Scenario) -> Document:
+    names = {each.name for each in scenario.zone.hardening}
+    number = next(n for n in range(1, 200) if f"glass{n}" not in names)
+    return {"name": f"glass{number}", "glazing": _BETTER_GLASS, "cost": 1000.0}
 
 
 def _zone(scenario: Scenario, area: Rectangle) -> Document:

@@ -8,8 +8,12 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from blast_env.errors import LayoutError
-from blast_env.geometry import Cell, Element, Layout, Piece, Rectangle
+from blast_env.geometry import Cell, Element, Layout, Measure, Piece, Rectangle
+from blast_env.physics.scene import WALLS
+from blast_env.response.components import catalogue
 from blast_env.scenario import Placement, Scenario
+from blast_env.scenario.catalogue import Hardening
+from blast_env.scenario.facade import Components
 from blast_env.units import MODULE_SIDE_M
 
 PlainLayout = tuple[tuple[Any, ...], ...]
@@ -30,6 +34,22 @@ class Placeable(NamedTuple):
     label: str
     can_turn: bool
     left: int
+
+
+class Measurable(NamedTuple):
+    """A measure that hardens facades, which a layout takes or not.
+
+    Attributes:
+        name: Its name.
+        label: What people call it, with its cost.
+        words: What it puts where.
+        is_taken: Whether the layout takes it.
+    """
+
+    name: str
+    label: str
+    words: str
+    is_taken: bool
 
 
 def plain(layout: Iterable[Element]) -> PlainLayout:
@@ -70,6 +90,33 @@ def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
         )
         for item, left in zip(zone.items, placement.stocks_left, strict=False)
     )
+
+
+def measures(scenario: Scenario, layout: Layout) -> tuple[Measurable, ...]:
+    """Return the measures that may harden facades; none without a build zone that has some."""
+    zone = scenario.build_zone
+    known = {**catalogue(), **scenario.components}
+    return tuple(
+        Measurable(
+            each.name,
+            f"{each.name}, cost {each.cost:g}",
+            _words_of(each, known),
+            Measure.named(each.name) in layout,
+        )
+        for each in (() if zone is None else zone.hardening)
+    )
+
+
+def _words_of(measure: Hardening, known: Components) -> str:
+    """Return what a measure puts where: `window, 12 mm laminated on office, west, storey 1`."""
+    names = [each for each in (measure.glazing, measure.wall) if each]
+    what = " and ".join(known[name].title or name for name in names)
+    where = [*(measure.structures or ("all structures",))]
+    where += [] if len(measure.walls) == len(WALLS) else measure.walls
+    if measure.storeys is not None:
+        where.append(f"storeys {', '.join(map(str, measure.storeys))}")
+    words = f"{what} on {', '.join(where)}"
+    return f"{measure.description}: {words}" if measure.description else words
 
 
 def element(scenario: Scenario, item: str, cell: Cell, turned: bool = False) -> Element:

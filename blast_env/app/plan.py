@@ -339,11 +339,7 @@ def _star(x: float, y: float, colour: str) -> str:
 
 
 def _selection(view: PixelView, scenario: Scenario, selected: SiteThing | None) -> Iterator[str]:
-    if (
-        selected is None
-        or not edits.has(scenario, selected)
-        or selected.kind in (ThingKind.SITE, ThingKind.ITEM)
-    ):
+    if selected is None or not edits.has(scenario, selected) or selected.kind in edits.NOWHERE:
         return
     box = edits.rectangle_of(scenario, selected)
     grown = 0.6 if selected.kind in (ThingKind.CHARGE, ThingKind.GAUGE) else 0.0

@@ -15,9 +15,8 @@ from blast_env.documents import read_text
 from blast_env.engines.contract import CALIBRATED_ENGINES
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.geometry import Layout
+from blast_env.geometry import Layout, standing
 from blast_env.physics.scene import Charge
-from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.statistics import reductions
 from blast_env.units import PA_PER_KPA
@@ -119,7 +118,7 @@ class Verdict(Kept):
         panes: Panes that it has.
         broken: Panes that are expected to break.
         condition: Performance condition of its worst pane, GSA.
-        damage: Damage of its worst wall panel.
+        damage: Damage of its worst wall panel; empty where it has none.
     """
 
     building: str
@@ -143,7 +142,6 @@ class BlastRecord(Kept):
         notes: What there is to say about it.
         pictures: Pictures beside the film.
         waves: Histories of the gauges.
-        verdicts: What becomes of the buildings with facades.
         seconds: How long it took.
         repeat: All that is needed to run it again.
     """
@@ -157,7 +155,6 @@ class BlastRecord(Kept):
     notes: tuple[str, ...] = ()
     pictures: tuple[Picture, ...] = ()
     waves: tuple[Wave, ...] = ()
-    verdicts: tuple[Verdict, ...] = ()
     seconds: float
     repeat: dict[str, Any]
 
@@ -200,11 +197,26 @@ def read_film(folder: Path) -> Film | None:
         return None
 
 
-def blast_key(scenario_hash: str, layout: Layout, charge: Charge, engine: EngineRecord) -> str:
-    """Return by what a blast is found again: all that its result depends on."""
+def frames_in(folder: Path) -> int:
+    """Return how many frames of the film of a blast are there."""
+    film = read_film(folder)
+    return 0 if film is None else film.count
+
+
+def blast_key(scenario: Scenario, layout: Layout, charge: Charge, engine: EngineRecord) -> str:
+    """Return by what a blast is found again: all that its loads and histories depend on.
+
+    Measures that harden facades are left out, and so is what stands in bays: no load depends on it.
+    """
+    divided = [
+        (each.name, each.facade.storey_m, each.facade.bay_m)
+        for each in scenario.structures
+        if each.facade is not None
+    ]
     depends = (
-        scenario_hash,
-        sorted(map(tuple, layout)),
+        scenario.content_hash,
+        divided,
+        sorted(map(tuple, standing(layout))),
         tuple(charge),
         engine.name,
         engine.cell_m or 0.5,
@@ -258,37 +270,6 @@ class VerdictRow(Kept):
     panes: str
     condition: str
     damage: str
-
-
-def verdict_rows(records: Sequence[tuple[str, BlastRecord]]) -> list[VerdictRow]:
-    """Return what becomes of the buildings, the worst of all threats first where there are more.
-
-    Args:
-        records: Name of the layout, and the blast.
-    """
-    found: dict[tuple[str, str], list[tuple[str, Verdict]]] = {}
-    for name, record in records:
-        for verdict in record.verdicts:
-            found.setdefault((name, verdict.building), []).append((record.threat, verdict))
-    rows = []
-    for (name, _), own in found.items():
-        if len(own) > 1:
-            worst = max((each for _, each in own), key=lambda each: (-each.level, each.broken))
-            rows.append(_verdict_row(name, f"worst of {len(own)}", worst))
-        rows += [_verdict_row(name, threat, each) for threat, each in own]
-    return rows
-
-
-def _verdict_row(layout: str, threat: str, verdict: Verdict) -> VerdictRow:
-    return VerdictRow(
-        layout=layout,
-        threat=threat,
-        building=verdict.building,
-        level=LevelOfProtection(verdict.level).label,
-        panes=f"{verdict.broken:.1f} of {verdict.panes}" if verdict.panes else _DASH,
-        condition=verdict.condition if verdict.panes else _DASH,
-        damage=verdict.damage,
-    )
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import Final
 
 from blast_env.app.folder import WorkFolder
@@ -79,6 +80,18 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
         if not (folder / name).is_file():
             raise HTTPException(404, f"there is no {name}")
         return FileResponse(folder / name, headers=_KEPT_BY_BROWSER)
+
+    drawing = Lock()
+
+    @app.get("/damage/{design_id}/{key}/{name}")
+    def damage(design_id: str, key: str, name: str) -> FileResponse:
+        try:
+            check_key(name.replace(".", "", 1))
+            with drawing:  # requests come in threads
+                path = sessions.of(design_id).damage_file(key, name)
+        except BlastEnvError as error:
+            raise HTTPException(404, str(error)) from error
+        return FileResponse(path, headers=_KEPT_BY_BROWSER)
 
     app.add_static_file(local_file=_PAGE_FILES / "player.js", url_path="/player.js")
     app.add_exception_handler(503, _say)

@@ -19,12 +19,13 @@ from blast_env.app.records import (
     BlastRecord,
     EngineRecord,
     Row,
+    Verdict,
     VerdictRow,
     blast_key,
     comparison,
-    verdict_rows,
 )
 from blast_env.app.threats import NamedThreat, threats_of, usual_threats
+from blast_env.app.verdicts import FacadeVerdict, facades_digest, picture_name, verdict_rows
 from blast_env.app.work import (
     BlastTask,
     FilmTask,
@@ -36,7 +37,7 @@ from blast_env.app.work import (
     ThreatOf,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Layout
+from blast_env.geometry import Layout, Measure
 from blast_env.scenario import AnyCharge, Scenario
 from blast_env.scenario.build_scene import charge_against
 
@@ -82,6 +83,7 @@ class Session:
     threats: tuple[str, ...] = ()
     view: str = "Plan"
     _listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
+    _verdicts: dict[tuple[str, str], tuple[Verdict, ...]] = field(default_factory=dict, init=False)
 
     @classmethod
     def opened(cls, folder: DesignFolder, work: WorkFolder, workers: Workers) -> "Session":
@@ -134,6 +136,18 @@ class Session:
         design, notes = self.design.with_scenario(scenario)
         self.put(label, design)
         return notes
+
+    def harden(self, measure: str, *, taken: bool) -> None:
+        """Take a measure that hardens facades into the layout that is edited, or out of it.
+
+        Raises:
+            LayoutError: If there is no such measure, or the budget does not pay for it.
+            BlastEnvError: As for `put`.
+        """
+        own = Measure.named(measure)
+        layout = tuple(each for each in self.design.layout if each != own)
+        label = f"{'take' if taken else 'leave'} {measure}"
+        self.put(label, self.design.with_layout((*layout, own) if taken else layout))
 
     def show(self, slot: int) -> None:
         """Take another layout before oneself."""
@@ -332,7 +346,7 @@ class Session:
     def key(self, layout: Layout, threat: NamedThreat) -> str:
         """Return the key of a blast."""
         charge = charge_against(self.scenario, layout, threat.charge)
-        return blast_key(self.scenario.content_hash, layout, charge, self.engine)
+        return blast_key(self.scenario, layout, charge, self.engine)
 
     def comparison(self) -> list[Row]:
         """Return the table of all blasts that were run for the design as it is now."""
@@ -350,12 +364,52 @@ class Session:
 
     def verdicts(self) -> list[VerdictRow]:
         """Return what becomes of the buildings in all blasts of the design as it is now."""
-        found = (
-            (each.name, self.folder.record_of(each.key))
+        found = [
+            (each.name, record, self.verdicts_on(each, threat))
             for threat in self.chosen_threats()
             for each in self.shown(threat)
-        )
-        return verdict_rows([(name, record) for name, record in found if record is not None])
+            if (record := self.folder.record_of(each.key)) is not None
+        ]
+        return [*verdict_rows(found)]
+
+    def verdicts_on(self, shown: Shown, threat: NamedThreat) -> tuple[Verdict, ...]:
+        """Return what a blast does to the buildings, with what stands in their facades now."""
+        if not any(each.facade for each in self.scenario.structures):
+            return ()
+        known = shown.key, facades_digest(self.scenario, shown.layout)
+        if known not in self._verdicts:
+            read = self._facades(shown, threat)
+            if read is None:
+                return ()
+            self._verdicts[known] = read.verdicts()
+        return self._verdicts[known]
+
+    def damage_picture(self, shown: Shown, number: int) -> str:
+        """Return the name of the picture of a building's damage; see `damage_file`."""
+        return picture_name(number, facades_digest(self.scenario, shown.layout))
+
+    def damage_file(self, key: str, name: str) -> Path:
+        """Return the picture of a building's damage; it is drawn the first time.
+
+        Raises:
+            BlastEnvError: If the design shows no such picture (any more).
+        """
+        path = self.folder.blast_of(key) / name
+        if path.is_file():
+            return path
+        for threat in self.chosen_threats():
+            for each in self.shown(threat):
+                read = self._facades(each, threat) if each.key == key else None
+                for number in range(0 if read is None else len(self.scenario.structures)):
+                    if read is not None and self.damage_picture(each, number) == name:
+                        read.draw(number, path)
+                        return path
+        raise BlastEnvError(f"there is no {name}")
+
+    def _facades(self, shown: Shown, threat: NamedThreat) -> FacadeVerdict | None:
+        charge = charge_against(self.scenario, shown.layout, threat.charge)
+        folder = self.folder.blast_of(shown.key)
+        return FacadeVerdict.read(self.scenario, shown.layout, charge, folder)
 
     def waves(self, threat: NamedThreat) -> Sequence[tuple[str, BlastRecord]]:
         """Return the blasts with gauges under a threat, by the names of the layouts."""

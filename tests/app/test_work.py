@@ -21,10 +21,10 @@ from blast_env.app.records import (
     blast_key,
     comparison,
     read_film,
-    verdict_rows,
 )
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of
+from blast_env.app.verdicts import verdict_rows
 from blast_env.app.work import Status, ThreatOf, read_status, write_status
 from blast_env.engines import find_engine
 from blast_env.engines.gas import GasBlast
@@ -211,7 +211,6 @@ def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Sessi
     assert films[0] is not None
     assert films[0] == films[1]  # the same moments
     assert {each.label for each in record.pictures} == {
-        "damage of hut",
         "peak over the ground",
         "impulse over the ground",
         "peak on the walls of hut",
@@ -241,12 +240,13 @@ def test_the_table_of_buildings_says_what_the_library_says(gas: Session) -> None
 
 def test_of_several_threats_the_worst_comes_first(gas: Session) -> None:
     (threat,) = gas.chosen_threats()
-    record = gas.folder.record_of(gas.shown(threat)[1].key)
+    own = gas.shown(threat)[1]
+    record = gas.folder.record_of(own.key)
     assert record is not None
-    (verdict,) = record.verdicts
+    (verdict,) = gas.verdicts_on(own, threat)
     milder = verdict.model_copy(update={"level": 4, "broken": 0.0})
-    other = record.model_copy(update={"threat": "other", "verdicts": (milder,)})
-    rows = verdict_rows([("A", other), ("A", record)])
+    other = record.model_copy(update={"threat": "other"})
+    rows = [*verdict_rows([("A", other, [milder]), ("A", record, [verdict])])]
     assert [row.threat for row in rows] == ["worst of 2", "other", threat.name]
     assert rows[0].level == rows[2].level != rows[1].level == "high"
 
@@ -263,17 +263,18 @@ def test_what_is_there_is_not_run_again(gas: Session) -> None:
 def test_keys_know_what_a_result_depends_on() -> None:
     charge = Charge((2.0, 4.0), 5.0)
     assert [each.charge for each in threats_of(hut())] == [charge]
-    scenario_hash, engine = hut().content_hash, EngineRecord(name="gas")
-    key = blast_key(scenario_hash, WALL, charge, engine)
-    assert key == blast_key(scenario_hash, WALL[::-1], charge, engine)
-    assert key == blast_key(scenario_hash, WALL, charge, EngineRecord(name="gas", cell_m=0.5))
+    site, engine = hut(), EngineRecord(name="gas")
+    key = blast_key(site, WALL, charge, engine)
+    assert key == blast_key(site, WALL[::-1], charge, engine)
+    assert key == blast_key(site, WALL, charge, EngineRecord(name="gas", cell_m=0.5))
     others = {
-        blast_key(scenario_hash, WALL[:-1], charge, engine),
-        blast_key(scenario_hash, WALL, charge._replace(tnt_kg=6.0), engine),
-        blast_key(scenario_hash, WALL, charge, EngineRecord(name="gas", cell_m=0.25)),
-        blast_key("0", WALL, charge, engine),
+        blast_key(site, WALL[:-1], charge, engine),
+        blast_key(site, WALL, charge._replace(tnt_kg=6.0), engine),
+        blast_key(site, WALL, charge, EngineRecord(name="gas", cell_m=0.25)),
+        blast_key(glazed_hut(), WALL, charge, engine),  # with bays
+        blast_key(hut(objective={"quantity": "peak"}), WALL, charge, engine),
     }
-    assert len(others | {key}) == 5
+    assert len(others | {key}) == 6
 
 
 @pytest.mark.parametrize("proposer", offers.rules(load_scenario("courtyard")))

@@ -44,7 +44,7 @@ class DesignPage:
                     with ui.tab_panel("3-D").classes("p-0"):
                         self._solid = SolidView(self.editor)
                     with ui.tab_panel("Results").classes("p-0"):
-                        self._results = ResultsView(session, self._url)
+                        self._results = ResultsView(session)
             self._tabs.on_value_change(lambda event: self._keep_view(event.value))
             self._work = WorkPanel(self.editor, self.refresh, self.show_results, runs)
         ui.context.client.on_delete(session.listen(self.refresh))
@@ -100,9 +100,6 @@ class DesignPage:
             "b": lambda: self._work.blast(),
             "r": lambda: self._work.turn(),
         }
-
-    def _url(self, key: str) -> str:
-        return f"/blasts/{self.session.folder.design_id}/{key}"
 
 
 _KEYS = (

@@ -62,6 +62,13 @@ _FIELDS: Final[Mapping[ThingKind, tuple[FormField, ...]]] = {
         *_CORNER,
         *_SIZE,
     ),
+    ThingKind.MEASURE: (
+        FormField("name", "name", "text"),
+        FormField("glass", "glazing", "glazing", optional=True),
+        FormField("wall panels", "wall", "wall", optional=True),
+        FormField("on the walls", "walls", "walls"),
+        FormField("cost", "cost"),
+    ),
     ThingKind.ITEM: (
         FormField("name", "name", "text"),
         FormField("length (modules)", "length_modules", "integer"),
@@ -128,6 +135,7 @@ def section_of(scenario: Scenario, thing: SiteThing) -> Document:
         ThingKind.COST_AREA: document.get("build_zone", {}).get("cost_areas", []),
         ThingKind.GAUGE: document.get("gauges", []),
         ThingKind.ITEM: document.get("build_zone", {}).get("items", []),
+        ThingKind.MEASURE: document.get("build_zone", {}).get("hardening", []),
     }
     section: Document = tables[thing.kind][thing.number]
     return section

@@ -1,17 +1,19 @@
 """Results beside each other: films, maps, walls, gauges, and the table."""
 
-from collections.abc import Callable
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 from nicegui import ui
 
-from blast_env.app.records import BlastRecord, LoadJudge, Row, VerdictRow, read_film
-from blast_env.app.session import Session
+from blast_env.app.records import BlastRecord, LoadJudge, Row, VerdictRow, frames_in
+from blast_env.app.session import BARE, Session, Shown
 from blast_env.app.threats import NamedThreat
 from blast_env.scenario import ObjectiveSection
 
 _FILM: Final = "film"
 _GAUGES: Final = "gauges"
+_DAMAGE: Final = "damage of "
 _COLUMNS: Final = (
     ("layout", "layout", "left"),
     ("threat", "threat", "left"),
@@ -42,17 +44,34 @@ _LINES: Final = (
 )
 
 
+@dataclass(frozen=True)
+class _Found:
+    """A blast of which something is there.
+
+    Attributes:
+        shown: The layout.
+        record: What is kept of it; `None` while it runs.
+        frames: How many frames of its film are there.
+        film: Address of its film.
+        pictures: Addresses of its pictures, by their labels.
+    """
+
+    shown: Shown
+    record: BlastRecord | None
+    frames: int
+    film: str
+    pictures: Mapping[str, str]
+
+
 class ResultsView:
     """Shows the blasts of the layouts as they are now.
 
     Args:
         session: The design.
-        url: Where the files of a blast are, by its key.
     """
 
-    def __init__(self, session: Session, url: Callable[[str], str]) -> None:
+    def __init__(self, session: Session) -> None:
         self._session = session
-        self._url = url
         self._what = _FILM
         self._threat = ""
         self._with_bare = True
@@ -119,19 +138,21 @@ class ResultsView:
         if self._threat not in threats:
             self._threat = next(iter(threats))
         self._threats.set_options([*threats], value=self._threat)
-        found = self._found(threats[self._threat])
-        # Not the records themselves: a number that does not exist is not even equal to itself.
-        there = tuple((name, key, record is None, frames) for name, key, record, frames in found)
+        threat = threats[self._threat]
+        there = [
+            (each, frames_in(session.folder.blast_of(each.key))) for each in session.shown(threat)
+        ]
         options = (self._what, self._threat, self._with_bare, self._large)
-        state = (options, session.engine, there, tuple(threats), session.folder.blasts_there())
+        blasts = session.folder.blasts_there()
+        state = (options, session.engine, there, tuple(threats), blasts, session.scenario)
         if state == self._state:
             return
         self._state = state
-        records = [record for _, _, record, _ in found if record is not None]
-        self._offer(records)
-        shown = [each for each in found if self._with_bare or each[0] != "no barrier"]
-        self._show_cards(shown)
-        self._show_chart(threats[self._threat])
+        found = [*self._found(there, threat)]
+        records = [each.record for each in found if each.record is not None]
+        self._offer(found)
+        self._show_cards([each for each in found if self._with_bare or each.shown.name != BARE])
+        self._show_chart(threat)
         verdicts = session.verdicts()
         self._verdicts.rows = [_row(each, k) for k, each in enumerate(verdicts)]
         self._verdicts.visible = bool(verdicts)
@@ -144,57 +165,65 @@ class ResultsView:
         self._empty.visible = not found
         self._show_notes(records)
 
-    def _found(self, threat: NamedThreat) -> list[tuple[str, str, BlastRecord | None, int]]:
-        """Return name, key, record and number of frames of every blast of which anything is."""
-        found = []
-        for each in self._session.shown(threat):
-            folder = self._session.folder.blast_of(each.key)
-            record, film = self._session.folder.record_of(each.key), read_film(folder)
-            if record is not None or film is not None:
-                found.append((each.name, each.key, record, 0 if film is None else film.count))
-        return found
+    def _found(self, there: Sequence[tuple[Shown, int]], threat: NamedThreat) -> Iterator[_Found]:
+        """Yield every blast of which anything is there, with the addresses of its pictures."""
+        session = self._session
+        for each, frames in there:
+            record = session.folder.record_of(each.key)
+            if record is None and not frames:
+                continue
+            where = f"{session.folder.design_id}/{each.key}"
+            damage = {
+                f"{_DAMAGE}{verdict.building}": f"/damage/{where}/"
+                + session.damage_picture(each, number)
+                for number, verdict in enumerate(session.verdicts_on(each, threat))
+            }
+            pictures = () if record is None else record.pictures
+            others = {own.label: f"/blasts/{where}/{own.file}" for own in pictures}
+            yield _Found(each, record, frames, f"/blasts/{where}/", damage | others)
 
-    def _offer(self, records: list[BlastRecord]) -> None:
+    def _offer(self, found: Sequence[_Found]) -> None:
         """Offer what pictures there are."""
-        labels = dict.fromkeys(each.label for record in records for each in record.pictures)
-        gauges = [_GAUGES] if any(record.waves for record in records) else []
+        labels = dict.fromkeys(label for each in found for label in each.pictures)
+        gauges = [_GAUGES] if any(each.record and each.record.waves for each in found) else []
         options = [_FILM, *labels, *gauges]
         if self._what not in options:
             self._what = _FILM
         self._pictures.set_options(options, value=self._what)
 
-    def _show_cards(self, found: list[tuple[str, str, BlastRecord | None, int]]) -> None:
+    def _show_cards(self, found: Sequence[_Found]) -> None:
         self._cards.clear()
         self._bar.visible = self._what == _FILM and bool(found)
         self._cards.visible = self._what != _GAUGES
-        wide = self._what.startswith("damage of ") or " on the walls of " in self._what
+        wide = self._what.startswith(_DAMAGE) or " on the walls of " in self._what
         columns = 1 if wide or self._large or len(found) == 1 else 2
         self._cards.style(f"grid-template-columns: repeat({columns}, minmax(0, 1fr))")
         with self._cards:
-            for name, key, record, frames in found:
-                self._card(name, key, record, frames)
+            for each in found:
+                self._card(each)
 
-    def _card(self, name: str, key: str, record: BlastRecord | None, frames: int) -> None:
-        url = self._url(key)
+    def _card(self, found: _Found) -> None:
+        name = found.shown.name
         with ui.element("figure").classes("be-card m-0"):
             with ui.row().classes("w-full items-center no-wrap"):
-                title = name if name == "no barrier" else f"layout {name}"
+                title = name if name == BARE else f"layout {name}"
                 ui.label(title).style("font-weight: 600")
                 ui.space()
-                ui.label(self._summary(record)).classes("be-quiet")
+                ui.label(self._summary(found.record)).classes("be-quiet")
             if self._what == _FILM:
-                if frames:
+                if found.frames:
                     image = ui.element("img")
-                    image.props(f'data-film="{url}/" data-count={frames} alt="film, {title}"')
+                    image.props(
+                        f'data-film="{found.film}" data-count={found.frames} alt="film, {title}"'
+                    )
                 else:
                     ui.label("the film begins in a moment").classes("be-quiet")
                 return
-            pictures = () if record is None else record.pictures
-            file = next((each.file for each in pictures if each.label == self._what), None)
-            if file is None:
+            address = found.pictures.get(self._what)
+            if address is None:
                 ui.label("not drawn yet").classes("be-quiet")
             else:
-                ui.element("img").props(f'src="{url}/{file}" alt="{self._what}, {title}"')
+                ui.element("img").props(f'src="{address}" alt="{self._what}, {title}"')
 
     def _summary(self, record: BlastRecord | None) -> str:
         if record is None or not record.loads:

@@ -1,6 +1,7 @@
 """The panel on the left: what stands on the site, and what can be changed about it."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 from nicegui import ui
@@ -15,6 +16,10 @@ from blast_env.scenario import Scenario
 
 _SIDES: Final = {"left_right": "left and right", "bottom_top": "bottom and top"}
 _SITE: Final = SiteThing(ThingKind.SITE)
+_ADDED: Final = {
+    ThingKind.ITEM: "add an item to the catalogue of what can be placed",
+    ThingKind.MEASURE: "add better glass or walls that a layout can take, at a price",
+}
 
 
 class SitePanel:
@@ -44,9 +49,9 @@ class SitePanel:
             with ui.row().classes("gap-1"):
                 self._delete = ui.button("delete", icon="delete", on_click=self._remove)
                 self._delete.props("dense outline no-caps size=sm")
-                item = ui.button("item", icon="add", on_click=self._add_item)
-                item.props("dense outline no-caps size=sm")
-                item.tooltip("add an item to the catalogue of what can be placed")
+                for kind, words in _ADDED.items():
+                    add = ui.button(kind.value, icon="add", on_click=partial(self._add, kind))
+                    add.props("dense outline no-caps size=sm").tooltip(words)
             ui.label("arrow keys move what is selected by 0.5 m").classes("be-quiet")
             self._facts = ui.label().classes("be-quiet")
 
@@ -103,7 +108,7 @@ class SitePanel:
             element.on("keydown.enter", lambda: self._put(field, element.value))
             element.on("change", lambda: self._put(field, element.value))
         if field.optional:
-            empty = "none" if field.inside == "facade" else "by rule"
+            empty = "none" if field.form in ("glazing", "wall") else "by rule"
             element.props(f'placeholder="{empty}" clearable stack-label')
         element.props("dense outlined").classes("w-full")
         return element
@@ -144,14 +149,14 @@ class SitePanel:
         self._editor.selected = SiteThing(ThingKind(kind), int(number))
         self._after()
 
-    def _add_item(self) -> None:
+    def _add(self, kind: ThingKind) -> None:
         editor = self._editor
 
         def add(site: Scenario) -> Scenario:
-            after, editor.selected = edits.added(site, ThingKind.ITEM, (0.0, 0.0), (0.0, 0.0))
+            after, editor.selected = edits.added(site, kind, (0.0, 0.0), (0.0, 0.0))
             return after
 
-        editor.attempt("add an item", add)
+        editor.attempt(f"add {kind}", add)
         self._after()
 
     def _remove(self) -> None:

@@ -19,6 +19,7 @@ from blast_env.app.session import Session
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout
 from blast_env.scenario import Scenario
 
 _ENGINES: Final = {
@@ -138,6 +139,8 @@ class WorkPanel:
         )
         self._palette.props("dense outlined options-dense").classes("w-full be-whole")
         self._turned = ui.switch("turned (key R)", on_change=lambda e: self.turn(e.value))
+        self._measures = ui.column().classes("w-full gap-0")
+        self._measures_shown: object = None
 
     def _build_blast(self) -> None:
         ui.separator()
@@ -218,6 +221,11 @@ class WorkPanel:
         self._editor.turned = not self._editor.turned if turned is None else turned
         self._after()
 
+    def _harden(self, measure: str, taken: bool) -> None:
+        if not self._try(lambda: self._session.harden(measure, taken=taken)):
+            self._measures_shown = None  # its switch does not say how it is
+            self._after()
+
     def _use(self, name: str) -> None:
         if self._filling:
             return
@@ -291,6 +299,7 @@ class WorkPanel:
         chosen = next((each for each in offers if each.name == self._editor.item), None)
         self._turned.value = self._editor.turned
         self._turned.visible = chosen is not None and chosen.can_turn
+        self._offer_measures(design.scenario, design.layout)
         self._offer_proposals(design.scenario)
         known = [each.name for each in threats_of(design.scenario)]
         self._threats.set_options(known, value=list(session.threats))
@@ -308,6 +317,22 @@ class WorkPanel:
         self._search_cost.visible = bool(costs)
         if costs:
             self._search_cost.text = cost_words(costs)
+
+    def _offer_measures(self, scenario: Scenario, layout: Layout) -> None:
+        """Offer what may harden facades; a switch each, since it is taken or not."""
+        offers = placing.measures(scenario, layout)
+        if offers == self._measures_shown:
+            return
+        self._measures_shown = offers
+        self._measures.clear()
+        with self._measures:
+            if offers:
+                ui.label("harden: no new blast is needed").classes("be-quiet")
+            for each in offers:
+                act = partial(self._harden, each.name)
+                switch = ui.switch(each.label, value=each.is_taken)
+                switch.on_value_change(lambda event, act=act: act(event.value))
+                switch.props("dense").classes("text-sm").tooltip(each.words)
 
     def _offer_proposals(self, scenario: Scenario) -> None:
         """Offer the rules for a site, agents and searches; what was chosen stays if it can."""

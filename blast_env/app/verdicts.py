@@ -1,0 +1,166 @@
+"""What becomes of buildings with facades, from the histories that are kept of a blast.
+
+Other windows and measures that harden them need no new blast: the loads stay.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Final
+from zipfile import BadZipFile
+
+import numpy as np
+
+from blast_env.app.records import BlastRecord, Verdict, VerdictRow
+from blast_env.arrays import FloatArray
+from blast_env.evaluation.consequences import BuildingResponse, by_building
+from blast_env.files import write_atomically
+from blast_env.geometry import Layout
+from blast_env.physics.scene import Charge
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.facade import FilledBay, respond
+from blast_env.scenario import Scenario
+
+_BAYS: Final = "bays.npz"
+_DASH: Final = "\N{EN DASH}"
+_NAME: Final = "damage_{}_{}.png"
+_HASH_DIGITS: Final = 16
+
+
+def keep_histories(result: Any, folder: Path) -> None:
+    """Keep the histories of the bays of a blast by gas dynamics.
+
+    Raises:
+        BlastEnvError: If they cannot be written.
+    """
+    loads = result.bay_loads
+    if loads is None or not loads.bays:
+        return
+    with write_atomically(folder / _BAYS) as temporary:
+        np.savez(
+            temporary,
+            names=np.array([each.bay.name for each in loads.bays]),
+            time_s=loads.recorder.time_s,
+            pressure_pa=loads.recorder.history_pa,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class FacadeVerdict:
+    """What one blast does to the facades of a site with a layout.
+
+    Attributes:
+        bays: The bays that have a history, with what stands in them behind the layout.
+        time_s: Times of the histories (times,).
+        pressure_pa: Mean overpressure on each bay (bays, times).
+        charge: The charge where it went off.
+        scenario: The site.
+    """
+
+    bays: tuple[FilledBay, ...]
+    time_s: FloatArray
+    pressure_pa: FloatArray
+    charge: Charge
+    scenario: Scenario
+
+    @classmethod
+    def read(
+        cls, scenario: Scenario, layout: Layout, charge: Charge, folder: Path
+    ) -> "FacadeVerdict | None":
+        """Return the verdict of a blast that is kept; `None` without histories of the facades."""
+        try:
+            content = BytesIO((folder / _BAYS).read_bytes())  # closed, too, if it is damaged
+            with np.load(content, allow_pickle=False) as kept:
+                names, time_s, pressure = (kept[key] for key in ("names", "time_s", "pressure_pa"))
+        except (OSError, ValueError, KeyError, BadZipFile):
+            return None
+        known = {each.bay.name: each for each in scenario.bays_with(layout)}
+        rows = [row for row, name in enumerate(names.tolist()) if name in known]
+        if not rows:
+            return None
+        bays = tuple(known[names[row]] for row in rows)
+        return cls(bays, time_s, pressure[rows].astype(np.float64), charge, scenario)
+
+    def buildings(self) -> list[BuildingResponse]:
+        """Return what becomes of the buildings."""
+        found = respond(self.bays, self.time_s, self.pressure_pa)
+        return by_building(self.scenario, found, self.charge)
+
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Return that in numbers."""
+        return tuple(map(_verdict, self.buildings()))
+
+    def draw(self, number: int, path: Path) -> None:
+        """Draw the facade of one building in the colours of its damage.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        # Here, because pictures take half a second to import, and tables need none.
+        from blast_env.rendering.facade import facade_picture
+        from blast_env.rendering.figures import save_figure
+
+        building = self.buildings()[number]
+        (x_m, y_m), tnt_kg = self.charge.position_m, self.charge.tnt_kg
+        words = f"{tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
+        save_figure(facade_picture([(words, building)], building.building), path)
+
+
+def facades_digest(scenario: Scenario, layout: Layout) -> str:
+    """Return by what a verdict on a blast is found again: all that stands in the bays."""
+    return sha256(repr(scenario.bays_with(layout)).encode()).hexdigest()[:_HASH_DIGITS]
+
+
+def picture_name(number: int, digest: str) -> str:
+    """Return the name of the picture of a building's damage.
+
+    Args:
+        number: Of the building.
+        digest: What stands in the bays, see `facades_digest`.
+    """
+    return _NAME.format(number, digest)
+
+
+def _verdict(building: BuildingResponse) -> Verdict:
+    facade = building.facade
+    return Verdict(
+        building=building.building,
+        level=facade.level_of_protection,
+        panes=facade.panes,
+        broken=facade.broken_panes,
+        condition=facade.worst_condition.label,
+        damage=facade.worst_damage.name.lower() if len(facade.walled) else "",
+    )
+
+
+def verdict_rows(
+    records: Sequence[tuple[str, BlastRecord, Sequence[Verdict]]],
+) -> Iterator[VerdictRow]:
+    """Yield what becomes of the buildings, the worst of all threats first where there are more.
+
+    Args:
+        records: Name of the layout, the blast, and the verdicts on it.
+    """
+    found: dict[tuple[str, str], list[tuple[str, Verdict]]] = {}
+    for name, record, verdicts in records:
+        for verdict in verdicts:
+            found.setdefault((name, verdict.building), []).append((record.threat, verdict))
+    for (name, _), own in found.items():
+        if len(own) > 1:
+            worst = max((each for _, each in own), key=lambda each: (-each.level, each.broken))
+            yield _verdict_row(name, f"worst of {len(own)}", worst)
+        yield from (_verdict_row(name, threat, each) for threat, each in own)
+
+
+def _verdict_row(layout: str, threat: str, verdict: Verdict) -> VerdictRow:
+    return VerdictRow(
+        layout=layout,
+        threat=threat,
+        building=verdict.building,
+        level=LevelOfProtection(verdict.level).label,
+        panes=f"{verdict.broken:.1f} of {verdict.panes}" if verdict.panes else _DASH,
+        condition=verdict.condition if verdict.panes else _DASH,
+        damage=verdict.damage or _DASH,
+    )

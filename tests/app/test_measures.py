@@ -1,0 +1,172 @@
+"""Measures that harden facades, on the page: cost and verdict follow without a new blast."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nicegui import ui
+from nicegui.testing import User
+
+from blast_env.app import edits, placing
+from blast_env.app.edits import ThingKind
+from blast_env.app.folder import WorkFolder
+from blast_env.app.records import EngineRecord
+from blast_env.app.session import Session, Sessions
+from blast_env.engines import find_engine
+from blast_env.errors import BlastEnvError, LayoutError
+from blast_env.evaluation.consequences import consequences
+from blast_env.geometry import Layout, Measure, Piece
+from blast_env.scenario import Scenario, ScenarioError
+from tests.app.here import Here
+from tests.app.test_page import opened, play
+from tests.gas_sites import glazed_hut, hut
+
+WALL: Layout = (Piece(0, 0, "wall", True), Piece(3, 0, "wall", True))
+GLASS = Measure.named("glass")
+
+
+def hardened_hut() -> Scenario:
+    """Return the hut with windows in brick walls, and what could be had instead."""
+    document: dict[str, Any] = glazed_hut().model_dump(mode="json", exclude_none=True)
+    wall = {"name": "wall", "length_modules": 3, "height_m": 1.5, "cost": 10.0, "stock": 2}
+    zone = document["build_zone"] | {
+        "items": [wall],
+        "budget": 100.0,
+        "hardening": [
+            {"name": "glass", "glazing": "window_laminated_6", "cost": 50.0},
+            {"name": "panels", "wall": "concrete_150", "cost": 45.0, "walls": ["west"]},
+        ],
+    }
+    del zone["height_m"], zone["stock"]
+    return Scenario.from_document(document | {"build_zone": zone}, "hut")
+
+
+@pytest.fixture(scope="module")
+def blasted(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """The hut behind a wall, blasted by gas."""
+    folder = WorkFolder(tmp_path_factory.mktemp("measures"))
+    session = Sessions(folder, Here()).new(hardened_hut(), "begin")
+    session.engine = EngineRecord(name="gas", cell_m=0.5)
+    session.put("wall", session.design.with_layout(WALL))
+    session.blast([0])
+    return session
+
+
+def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> None:
+    (threat,) = blasted.chosen_threats()
+    bare, before = blasted.verdicts()
+    there = blasted.folder.blasts_there()
+    blasted.harden("glass", taken=True)
+    _, after = blasted.verdicts()
+    found = consequences(blasted.scenario, (*WALL, GLASS), [threat.charge], find_engine("gas"))
+    facade = found.responses[0].facade
+    assert after.panes == f"{facade.broken_panes:.1f} of {facade.panes}" != before.panes
+    assert after.condition == facade.worst_condition.label
+    assert after.damage == before.damage  # its walls are as they were
+    assert blasted.verdicts()[0] == bare
+    assert {row.cost for row in blasted.comparison()} == {"0", "70"}
+    assert blasted.cost([0]) == ()
+    assert blasted.folder.blasts_there() == there
+    blasted.undo()
+    assert blasted.verdicts() == [bare, before]
+
+
+def test_a_measure_alone_is_shown_with_the_blast_without_a_barrier(blasted: Session) -> None:
+    blasted.put("none", blasted.design.with_layout((GLASS,)))
+    (threat,) = blasted.chosen_threats()
+    bare, own = blasted.shown(threat)
+    assert own.key == bare.key
+    rows = blasted.verdicts()
+    assert rows[0].panes != rows[1].panes
+    blasted.undo()
+
+
+def test_other_windows_need_no_blast_and_other_bays_do(blasted: Session) -> None:
+    blasted.put("wall", blasted.design.with_layout(WALL))
+    house = next(each for each, _ in edits.things(blasted.scenario) if each.kind == "structure")
+    facade = {"bay_m": 1.0, "glazing": "window_laminated_6", "wall": "brick_215"}
+    with pytest.raises(ScenarioError, match="must fit"):  # the catalogue's are larger
+        edits.with_values(blasted.scenario, house, {"facade": facade})
+    before = blasted.verdicts()
+    facade |= {"glazing": "small_window", "wall": "concrete_200"}
+    blasted.put_site("walls", edits.with_values(blasted.scenario, house, {"facade": facade}))
+    assert [row.panes for row in blasted.verdicts()] == [row.panes for row in before]
+    assert [row.damage for row in blasted.verdicts()] != [row.damage for row in before]
+    assert blasted.cost([0]) == ()
+    facade["bay_m"] = 2.0
+    blasted.put_site("bays", edits.with_values(blasted.scenario, house, {"facade": facade}))
+    assert blasted.verdicts() == []
+    assert len(blasted.cost([0])) == 2
+    blasted.undo()
+    blasted.undo()
+
+
+def test_the_picture_of_the_damage_is_of_what_stands_there_now(blasted: Session) -> None:
+    blasted.put("wall", blasted.design.with_layout(WALL))
+    (threat,) = blasted.chosen_threats()
+    own = blasted.shown(threat)[1]
+    plain = blasted.damage_picture(own, 0)
+    assert blasted.damage_file(own.key, plain).read_bytes().startswith(b"\x89PNG")
+    blasted.harden("glass", taken=True)
+    harder = blasted.damage_picture(blasted.shown(threat)[1], 0)
+    assert harder != plain
+    assert blasted.damage_file(own.key, harder).stat().st_size > 10_000
+    with pytest.raises(BlastEnvError, match=r"there is no damage_0_0\.png"):
+        blasted.damage_file(own.key, "damage_0_0.png")
+    blasted.undo()
+
+
+def test_a_damaged_file_of_histories_gives_no_verdict(blasted: Session) -> None:
+    blasted.put("wall", blasted.design.with_layout(WALL))
+    (threat,) = blasted.chosen_threats()
+    own = blasted.shown(threat)[1]
+    path = blasted.folder.blast_of(own.key) / "bays.npz"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-100])
+    blasted._verdicts.clear()
+    assert [row.layout for row in blasted.verdicts()] == ["no barrier"]
+    path.write_bytes(whole)
+
+
+def test_the_budget_pays_or_it_is_said(blasted: Session) -> None:
+    blasted.put("wall", blasted.design.with_layout((*WALL, GLASS)))
+    with pytest.raises(LayoutError, match="budget"):
+        blasted.harden("panels", taken=True)
+    assert blasted.design.layout == (*WALL, GLASS)
+    words = {each.name: each for each in placing.measures(blasted.scenario, blasted.design.layout)}
+    assert words["glass"].is_taken
+    assert not words["panels"].is_taken
+    assert words["panels"].words == "reinforced concrete wall, 150 mm on all structures, west"
+
+
+def test_a_measure_is_added_to_a_site_with_items_and_windows() -> None:
+    site, thing = edits.added(hardened_hut(), ThingKind.MEASURE, (0.0, 0.0), (0.0, 0.0))
+    assert thing.number == 2
+    dearer = edits.with_values(site, thing, {"cost": 12.0, "wall": "concrete_200"})
+    assert (dearer.zone.hardening[2].cost, dearer.zone.hardening[2].wall) == (12.0, "concrete_200")
+    assert len(edits.removed(dearer, thing).zone.hardening) == 2
+    with pytest.raises(ScenarioError, match=r"no build_zone\.items"):
+        edits.added(hut(), ThingKind.MEASURE, (0.0, 0.0), (0.0, 0.0))
+
+
+def test_a_switch_on_the_page_takes_a_measure(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hardened_hut())
+
+        def switch(words: str) -> Any:
+            switches = user.find(kind=ui.switch).elements
+            return next(each for each in switches if getattr(each, "text", "") == words)
+
+        switch("glass, cost 50").value = True
+        assert session.design.layout == (GLASS,)
+        await user.should_see("cost 50 of 100")
+        switch("panels, cost 45").value = True
+        assert len(session.design.layout) == 2
+        session.undo()
+        assert not switch("panels, cost 45").value
+        session.put("wall", session.design.with_layout((GLASS, *WALL)))
+        switch("panels, cost 45").value = True  # the budget does not pay for it
+        await user.should_see("budget")
+        assert not switch("panels, cost 45").value
+
+    play(tmp_path, story)
