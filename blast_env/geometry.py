@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blast_env.arrays import BoolArray, IntArray
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 
 Cell = tuple[int, int]
 """(row, column) of a build-zone cell, from 0; rows count upwards, columns to the right."""
@@ -107,17 +107,28 @@ class Rectangle(NamedTuple):
 
     def meets_segment(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
         """Whether the segment from `start` to `end` has a point in the open rectangle."""
-        enter, leave = 0.0, 1.0
-        bounds = ((self.left, self.right), (self.bottom, self.top))
-        for (low, high), begin, finish in zip(bounds, start, end, strict=True):
+        return bool(self.meets_segments(start, np.array(end[0]), np.array(end[1])))
+
+    def meets_segments(self, start: tuple[float, float], x: FloatArray, y: FloatArray) -> BoolArray:
+        """Return which segments from `start` have a point in the open rectangle; of any shape.
+
+        Args:
+            start: Where all of them begin.
+            x: Of their ends.
+            y: Of their ends, likewise.
+        """
+        enter, leave = np.zeros(x.shape), np.ones(x.shape)
+        bounds = ((self.left, self.right, x), (self.bottom, self.top, y))
+        for begin, (low, high, finish) in zip(start, bounds, strict=True):
             step = finish - begin
-            if step == 0.0:
-                if not low < begin < high:
-                    return False
-                continue
-            first, last = sorted(((low - begin) / step, (high - begin) / step))
-            enter, leave = max(enter, first), min(leave, last)
-        return enter < leave or (start == end and enter <= leave)
+            along = step != 0.0
+            first, last = ((side - begin) / np.where(along, step, 1.0) for side in (low, high))
+            enter = np.where(along, np.maximum(enter, np.minimum(first, last)), enter)
+            leave = np.where(along, np.minimum(leave, np.maximum(first, last)), leave)
+            if not low < begin < high:
+                leave = np.where(along, leave, -1.0)
+        met: BoolArray = enter < leave
+        return met
 
 
 def stacked_runs(cells: BoolArray) -> IntArray:

@@ -301,11 +301,8 @@ class _View:
         depth_m = (x_m - charge_m[0]) * along_x + (y_m - charge_m[1]) * along_y
         between = placement.usable & (depth_m > 0.0) & (depth_m < distance_m)
         protected = [each.rectangle_m for each in scenario.structures if each.protected]
-        for row, column in np.argwhere(between):
-            cell_m = (float(x_m[row, column]), float(y_m[row, column]))
-            between[row, column] = not any(
-                rectangle.meets_segment(charge_m, cell_m) for rectangle in protected
-            )
+        for rectangle in protected:
+            between &= ~rectangle.meets_segments(charge_m, x_m, y_m)
         aside_m = (y_m - charge_m[1]) * along_x - (x_m - charge_m[0]) * along_y
         variants = placement.catalogue.variants
         up_m, right_m = _centres_off_m(variants)

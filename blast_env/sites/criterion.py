@@ -261,7 +261,7 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
     placement = Placement.empty(scenario)
     left = np.ones(len(lines.weight), dtype=bool)
     cut = _cut_by_variants(lines, placement.catalogue)
-    gain = lines.weight @ cut
+    gain = _gains(lines.weight, cut)
     nothing = _ROUNDING * float(lines.weight.sum())
     while not placement.is_full:
         worth = np.where(placement.legal, gain.reshape(placement.legal.shape), 0.0)
@@ -272,7 +272,7 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
         placement = placement.place(placement.catalogue.element(action))
         newly = left & cut[:, action]
         left &= ~newly
-        gain = gain - lines.weight[newly] @ cut[newly]
+        gain = gain - _gains(lines.weight[newly], cut[newly])
     return placement.layout
 
 
@@ -280,15 +280,43 @@ _ROUNDING: Final = 1e-9
 """Share of the lines that is nothing: what rounding leaves where weights are no whole numbers."""
 
 
+_NUMBERS_AT_ONCE: Final = 1_000_000
+"""Truth values that are turned into numbers at a time, eight bytes each."""
+
+
+def _gains(weight: FloatArray, cut: BoolArray) -> FloatArray:
+    """Return the weight of the lines that each action would cut (actions,)."""
+    gains = np.zeros(cut.shape[1])
+    few = max(1, _NUMBERS_AT_ONCE // max(1, len(weight)))
+    for first in range(0, len(gains), few):
+        gains[first : first + few] = weight @ cut[:, first : first + few]
+    return gains
+
+
 def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
     """Return which lines each action would cut (lines, actions); those outside count in part."""
-    rows, columns = catalogue.shape
-    cut = np.zeros((len(lines.weight), len(catalogue.variants), rows, columns), dtype=bool)
+    cut = np.zeros((len(lines.weight), len(catalogue.variants), *catalogue.shape), dtype=bool)
+    by_height = {
+        height_m: lines.cut_by(height_m)
+        for height_m in {each.height_m for each in catalogue.variants if not each.is_measure}
+    }
     for number, variant in enumerate(catalogue.variants):
-        own = lines.cut_by(variant.height_m)
-        for up, right in variant.cells_at(0, 0):
-            cut[:, number, : rows - up, : columns - right] |= own[:, up:, right:]
+        if variant.is_measure:
+            continue
+        own = cut[:, number]
+        own[...] = by_height[variant.height_m]
+        for cells, length in ((own.transpose(1, 0, 2), variant.rows), (own.T, variant.columns)):
+            _take_next(cells, length)
     return cut.reshape(len(lines.weight), -1)
+
+
+def _take_next(cells: BoolArray, length: int) -> None:
+    """Let each cell be true if any of so many along the first axis is, from itself on."""
+    taken = 1
+    while taken < length:
+        step = min(taken, length - taken)
+        cells[:-step] |= cells[step:]
+        taken += step
 
 
 def _wall_share(scenario: Scenario, lines: Visibility) -> float:

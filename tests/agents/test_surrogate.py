@@ -15,6 +15,7 @@ from blast_agents.league.trained import TrainedRun
 from blast_agents.rules import random_layout
 from blast_agents.search import LayoutProblem
 from blast_agents.search.registry import layouts_by_rule
+from blast_agents.surrogate import walls
 from blast_agents.surrogate.engine import SurrogateEngine
 from blast_agents.surrogate.fitting import MEMBERS, Samples, elements, errors, fit, folds
 from blast_agents.surrogate.network import (
@@ -31,7 +32,7 @@ from blast_agents.surrogate.search import (
     LearntSearch,
     improved,
 )
-from blast_agents.surrogate.walls import FEATURES, WallPoints, site_of
+from blast_agents.surrogate.walls import FEATURES, MOST_POINTS, WallPoints, site_of
 from blast_agents.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -48,6 +49,7 @@ from blast_env.scenario import AnyCharge, Placement, Scenario, load_scenario
 from studies.blast_table import COLUMNS, SITE_NAME, scenario_of
 from studies.surrogate import choices, reductions_of, varied_layouts, verdict
 from tests.agents.test_self_labelling import wide_yard
+from tests.office_park import office_park
 
 CHARGE_M = np.array([0.0, 0.0, 0.3])
 POINT_M = np.array([[20.0, 0.0, 1.5]])
@@ -222,6 +224,41 @@ def test_a_guess_is_the_same_alone_and_among_others() -> None:
     for number, (layout, charge) in enumerate(zip(layouts, charges, strict=True)):
         alone = surrogate.guess(site_of(YARD), [layout], [charge])
         assert alone.impulse_pa_s[0] == pytest.approx(together.impulse_pa_s[number], rel=1e-12)
+
+
+def test_points_that_a_barrier_does_not_hide_keep_what_was_said_of_them() -> None:
+    """Only the others are asked about again; the load is the same as of all features at once."""
+    site, surrogate, charge = site_of(PEAKS), by_hand(), Charge((1.5, 4.0), 5.0)
+    (approach,) = site.approaches(charge)
+    hidden = []
+    for layout in [(), *(random_layout(YARD, np.random.default_rng(n)) for n in range(3))]:
+        barrier = site.barrier(layout)
+        numbers, features = approach.behind(barrier)
+        whole = approach.features(barrier)
+        assert (whole[numbers] == features).all()
+        unchanged = np.setdiff1d(np.arange(len(whole)), numbers)
+        assert (whole[unchanged] == approach.on_empty[unchanged]).all()
+        hidden.append(len(numbers))
+        guess = surrogate.guess(site, [layout], [charge])
+        logs = np.log(
+            np.exp(approach.log_impulse + np.array([each(whole) for each in surrogate.members]))
+            @ approach.area_m2
+            / approach.area_m2.sum()
+        )
+        assert guess.impulse_pa_s.item() == pytest.approx(np.exp(logs.mean()), rel=1e-12)
+        assert guess.peak_pa is not None
+    assert hidden[0] == 0 < max(hidden)
+
+
+def test_large_walls_have_few_points_that_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario, surrogate, charge = office_park(), packaged_surrogate(), Charge((22.0, 40.0), 500.0)
+    few = site_of(scenario)
+    monkeypatch.setattr(walls, "MOST_POINTS", 10**6)
+    every = site_of(scenario)
+    points = [sum(len(a.area_m2) for a in site.approaches(charge)) for site in (few, every)]
+    assert points[0] < 1.2 * MOST_POINTS < points[1]
+    loads = [surrogate.guess(site, [()], [charge]).loads(site).item() for site in (few, every)]
+    assert loads[0] == pytest.approx(loads[1], rel=0.01)
 
 
 def test_it_is_kept_in_a_file(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario, load_scenario
-from blast_env.sites import Visibility
+from blast_env.scenario import Placement, Scenario, load_scenario
+from blast_env.sites import Visibility, visibility_layout
 from tests.sites.cases import COLUMNS, ROWS, block, yard, yard_document
 
 CELLS = st.tuples(st.integers(0, ROWS - 1), st.integers(0, COLUMNS - 1))
@@ -104,3 +104,19 @@ def test_bundled_scenarios_have_lines_of_sight() -> None:
         lines = Visibility.of(load_scenario(name))
         assert 0.1 < lines.open_share <= 1.0
         assert np.isfinite(lines.weight).all()
+
+
+def test_the_first_piece_cuts_most_for_its_cost_of_all_that_may_stand() -> None:
+    """Piece by piece, by the cells and the height of each."""
+    scenario = load_scenario("visitor_entrance")
+    lines, empty = Visibility.of(scenario), Placement.empty(scenario)
+    worth = {}
+    for action in np.flatnonzero(empty.legal).tolist():
+        piece = empty.catalogue.element(action)
+        height_m = empty.catalogue.variant(piece).height_m
+        cells = empty.catalogue.cells(piece)
+        cut = lines.cut_share(cells, [height_m] * len(cells))
+        worth[piece] = cut / float(empty.costs.flat[action])
+    first = visibility_layout(scenario, lines)[0]
+    assert worth[first] == pytest.approx(max(worth.values()))
+    assert worth[first] > 1.2 * float(np.median(list(worth.values())))

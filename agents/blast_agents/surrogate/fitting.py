@@ -19,6 +19,7 @@ from blast_agents.surrogate.network import (
     Fit,
     Member,
     Surrogate,
+    answers,
     log_loads,
 )
 from blast_agents.surrogate.walls import FEATURES, Approach, site_of
@@ -203,7 +204,8 @@ def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> ErrorsO
     scaled = (samples.features - surrogate.mean) / surrogate.scale
 
     def of(members: Sequence[Member], loads: Loads) -> Errors:
-        logs = log_loads(members, scaled, loads.known, samples.area_m2, starts, loads.power)
+        differs = answers(members, scaled)
+        logs = log_loads(differs, loads.known, samples.area_m2, starts, loads.power)
         return _errors(logs.mean(axis=0), loads.target, samples.case, chosen)
 
     return ErrorsOfBoth(

@@ -37,6 +37,9 @@ IMPULSE_POWER: Final = 1.0
 PEAK_POWER: Final = 16.0
 """The peak on a structure is nearly the largest: a mean of so high a power."""
 
+_AT_ONCE: Final = 512
+"""Points of which a network is asked at a time: as many as stay in a processor's cache."""
+
 
 class Check(BaseModel):
     """How far guesses of one load are off where the surrogate was not fitted.
@@ -167,10 +170,21 @@ class Member(NamedTuple):
     last_bias: FloatArray
 
     def __call__(self, features: FloatArray) -> FloatArray:
-        """Return by how much the logarithm of a load differs from Kingery and Bulmash's."""
-        hidden = _silu(features @ self.first + self.first_bias)
-        hidden = _silu(hidden @ self.second + self.second_bias)
-        return (hidden @ self.last + self.last_bias)[:, 0]
+        """Return by how much the logarithm of a load differs from Kingery and Bulmash's.
+
+        Args:
+            features: Of points, less their mean, over their scale (points, FEATURES).
+
+        Returns:
+            Shape (points,).
+        """
+        differs = np.empty(len(features))
+        for start in range(0, len(features), _AT_ONCE):
+            few = slice(start, start + _AT_ONCE)
+            hidden = _silu(features[few] @ self.first + self.first_bias)
+            hidden = _silu(hidden @ self.second + self.second_bias)
+            differs[few] = (hidden @ self.last + self.last_bias)[:, 0]
+        return differs
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,18 +256,36 @@ class Surrogate:
         self, approaches: Sequence[Approach], barriers: Sequence[FloatArray], peaks: bool
     ) -> tuple[FloatArray, ...]:
         """Return mean and spread of the impulse on one structure, then of its peak if asked."""
-        features = [each.features(b) for each, b in zip(approaches, barriers, strict=True)]
-        counts = [len(each) for each in features]
-        starts: IntArray = np.cumsum([0, *counts[:-1]])
+        starts: IntArray = np.cumsum([0, *(len(each.area_m2) for each in approaches[:-1])])
         area_m2 = np.concatenate([each.area_m2 for each in approaches])
-        scaled = (np.concatenate(features) - self.mean) / self.scale
-        known = np.concatenate([each.log_impulse for each in approaches])
-        impulse = log_loads(self.members, scaled, known, area_m2, starts, IMPULSE_POWER)
+        behind = [each.behind(b) for each, b in zip(approaches, barriers, strict=True)]
+        rows = np.concatenate([start + of for start, (of, _) in zip(starts, behind, strict=True)])
+        scaled = self._scaled(np.concatenate([features for _, features in behind]))
+
+        def of(
+            members: tuple[Member, ...], known: Sequence[FloatArray], power: float
+        ) -> FloatArray:
+            differs = np.hstack([self._on_empty(each, members) for each in approaches])
+            differs[:, rows] = answers(members, scaled)
+            return log_loads(differs, np.concatenate(known), area_m2, starts, power)
+
+        impulse = of(self.members, [each.log_impulse for each in approaches], IMPULSE_POWER)
         if not peaks:
             return _mean_and_spread(impulse)
-        known = np.concatenate([each.log_peak for each in approaches])
-        peak = log_loads(self.peak_members, scaled, known, area_m2, starts, PEAK_POWER)
+        peak = of(self.peak_members, [each.log_peak for each in approaches], PEAK_POWER)
         return (*_mean_and_spread(impulse), *_mean_and_spread(peak))
+
+    def _on_empty(self, approach: Approach, members: tuple[Member, ...]) -> FloatArray:
+        """Return what networks say of the points where no barrier stands (members, points)."""
+        kept = approach.kept.get((self, members is self.members))
+        if kept is None:
+            kept = answers(members, self._scaled(approach.on_empty))
+            approach.kept[self, members is self.members] = kept
+        return kept
+
+    def _scaled(self, features: FloatArray) -> FloatArray:
+        scaled: FloatArray = (features - self.mean) / self.scale
+        return scaled
 
 
 def _mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -261,32 +293,28 @@ def _mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.exp(logs.mean(axis=0)), logs.std(axis=0)
 
 
+def answers(members: Sequence[Member], scaled: FloatArray) -> FloatArray:
+    """Return what each network says of points (members, points); see `Member`."""
+    return np.array([member(scaled) for member in members])
+
+
 def log_loads(
-    members: Sequence[Member],
-    scaled: FloatArray,
-    known: FloatArray,
-    area_m2: FloatArray,
-    starts: IntArray,
-    power: float,
+    differs: FloatArray, known: FloatArray, area_m2: FloatArray, starts: IntArray, power: float
 ) -> FloatArray:
     """Return the logarithm of the load on each structure, by each network (members, structures).
 
     It is the power mean of the loads at its points, each by the area that it stands for.
 
     Args:
-        members: The networks.
-        scaled: Features of all points, less their `mean`, over their `scale` (points, FEATURES).
+        differs: What the networks say of all points: `answers` (members, points).
         known: Logarithm of Kingery and Bulmash's load there (points,).
         area_m2: What each point stands for (points,).
         starts: The first point of each structure (structures,).
         power: Of the mean.
     """
     area_of_all_m2 = np.add.reduceat(area_m2, starts)
-    sums = [
-        np.add.reduceat(area_m2 * np.exp(power * (known + member(scaled))), starts)
-        for member in members
-    ]
-    logs: FloatArray = np.log(np.array(sums) / area_of_all_m2) / power
+    loads = area_m2 * np.exp(power * (known + differs))
+    logs: FloatArray = np.log(np.add.reduceat(loads, starts, axis=1) / area_of_all_m2) / power
     return logs
 
 

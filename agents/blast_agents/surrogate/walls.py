@@ -1,13 +1,13 @@
 """What the surrogate sees of a site: points on the walls that count, and what may stop a blast."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from blast_agents.surrogate.ways import SHARES, Ways
-from blast_env.arrays import FloatArray
+from blast_env.arrays import FloatArray, IntArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, standing
@@ -16,6 +16,11 @@ from blast_env.scenario import AnyStructure, Scenario
 
 _ALONG_M: Final = 1.0
 _UP_M: Final = 1.5
+"""Points on a wall are so far apart, or farther where there would be too many of them."""
+
+MOST_POINTS: Final = 500
+"""On all walls of a site, about. More cost time and say the same, for large walls are far away."""
+
 _BEFORE_M: Final = 0.05
 """Points are this far before their wall, so that it does not stop what comes to them."""
 
@@ -50,16 +55,22 @@ class WallPoints:
     to_roof_m: FloatArray
 
     @classmethod
-    def on(cls, structure: AnyStructure, height_m: float) -> "WallPoints":
-        """Put points on a structure, one a metre along a wall and 1.5 m of its height, or so."""
+    def on(cls, structure: AnyStructure, height_m: float, apart: float = 1.0) -> "WallPoints":
+        """Put points on a structure, one a metre along a wall and 1.5 m of its height, or so.
+
+        Args:
+            structure: The structure.
+            height_m: Its height.
+            apart: How many times as far from each other points are.
+        """
         left, bottom, right, top = structure.rectangle_m
-        levels = max(1, round(height_m / _UP_M))
+        levels = max(1, round(height_m / (_UP_M * apart)))
         z_m = (np.arange(levels) + 0.5) * height_m / levels
         rows = []
         for face in structure.faces:
             x_out, y_out = _OUTWARD[face]
             length_m = top - bottom if x_out else right - left
-            number = max(1, round(length_m / _ALONG_M))
+            number = max(1, round(length_m / (_ALONG_M * apart)))
             area_m2 = length_m * height_m / (number * levels)
             for along_m in (np.arange(number) + 0.5) * length_m / number:
                 if x_out:
@@ -79,20 +90,35 @@ class Approach:
     Attributes:
         ways: From the charge to the points.
         fixed: The first features of each point (points, FEATURES - SHARES).
+        on_empty: All of them where no barrier stands (points, FEATURES).
         log_impulse: Logarithm of Kingery and Bulmash's reflected impulse there, Pa s (points,).
         log_peak: Of their reflected overpressure, Pa, likewise.
         area_m2: What each point stands for (points,).
+        kept: What surrogates say of the points where no barrier stands, by what said it.
     """
 
     ways: Ways
     fixed: FloatArray
+    on_empty: FloatArray
     log_impulse: FloatArray
     log_peak: FloatArray
     area_m2: FloatArray
+    kept: dict[object, FloatArray] = field(default_factory=dict, repr=False)
 
     def features(self, barrier: FloatArray) -> FloatArray:
-        """Return the features of the points behind a barrier (points, FEATURES)."""
-        return np.hstack((self.fixed, self.ways.shares(barrier)))
+        """Return the features of all points behind a barrier (points, FEATURES)."""
+        features = self.on_empty.copy()
+        changed, features[changed] = self.behind(barrier)
+        return features
+
+    def behind(self, barrier: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return which points a barrier hides from the charge in part, and their features.
+
+        Returns:
+            Numbers of the points (behind,), and their features (behind, FEATURES).
+        """
+        numbers, shares = self.ways.behind(barrier)
+        return numbers, np.hstack((self.fixed[numbers], shares))
 
 
 class SurrogateSite:
@@ -117,7 +143,11 @@ class SurrogateSite:
         self._solids = np.array(
             [[*each.rectangle_m, each.height_m or air_m] for each in scenario.structures]
         ).reshape(-1, 5)
-        self._points = [WallPoints.on(each, each.height_m or air_m) for each in self.protected]
+        heights_m = [each.height_m or air_m for each in self.protected]
+        apart = _apart(self.protected, heights_m)
+        self._points = [
+            WallPoints.on(*each, apart) for each in zip(self.protected, heights_m, strict=True)
+        ]
         self._approaches: dict[Charge, tuple[Approach, ...]] = {}
 
     def approaches(self, charge: Charge) -> tuple[Approach, ...]:
@@ -162,8 +192,27 @@ class SurrogateSite:
         met_m = np.maximum(distance_m, _LEAST_Z * scale)
         impulse = kingery_bulmash("reflected_impulse", met_m, charge.tnt_kg)
         peak = kingery_bulmash("reflected_overpressure", met_m, charge.tnt_kg)
-        fixed = np.hstack((geometry, ways.shares()))
-        return Approach(ways, fixed, np.log(impulse), np.log(peak), points.area_m2)
+        shares = ways.shares()
+        fixed = np.hstack((geometry, shares))
+        on_empty = np.hstack((fixed, shares))
+        return Approach(ways, fixed, on_empty, np.log(impulse), np.log(peak), points.area_m2)
+
+
+def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> float:
+    """Return how many times as far apart points are as on a small site, so that they are not many.
+
+    Args:
+        structures: All that are protected.
+        heights_m: Their heights.
+    """
+    area_m2 = 0.0
+    for structure, height_m in zip(structures, heights_m, strict=True):
+        left, bottom, right, top = structure.rectangle_m
+        lengths_m = [
+            top - bottom if _OUTWARD[face][0] else right - left for face in structure.faces
+        ]
+        area_m2 += height_m * sum(lengths_m)
+    return float(max(1.0, (area_m2 / (_ALONG_M * _UP_M * MOST_POINTS)) ** 0.5))
 
 
 def site_of(scenario: Scenario) -> SurrogateSite:

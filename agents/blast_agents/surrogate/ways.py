@@ -97,16 +97,38 @@ class Ways:
         Args:
             barrier: Left, bottom, right, top, height of each piece of it, m (pieces, 5).
         """
-        stopped, is_straight_open = self.stopped, self.is_straight_open
-        if barrier is not None and len(barrier):
-            stopped, is_straight_open = stopped.copy(), is_straight_open.copy()
-            self._stop(barrier, stopped, is_straight_open)
-        return _open_shares(stopped, is_straight_open, self.weights)
+        shares = _open_shares(self.every, self.stopped, self.is_straight_open, self.weights)
+        if barrier is not None:
+            behind, shares[behind] = self.behind(barrier)
+        return shares
 
-    def _stop(self, solids: FloatArray, stopped: IntArray, is_straight_open: BoolArray) -> None:
-        """Mark what solids stop, beside what was stopped before."""
+    def behind(self, barrier: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return to which points a barrier stops ways, and what is open to these.
+
+        Args:
+            barrier: As for `shares`.
+
+        Returns:
+            Numbers of the points (behind,), and their shares (behind, SHARES).
+        """
+        stopped, is_straight_open = self.stopped.copy(), self.is_straight_open.copy()
+        is_behind = self._stop(barrier, stopped, is_straight_open)
+        behind: IntArray = np.flatnonzero(is_behind)
+        return behind, _open_shares(behind, stopped, is_straight_open, self.weights)
+
+    @property
+    def every(self) -> IntArray:
+        """The numbers of all points (points,)."""
+        return np.arange(len(self.points_m))
+
+    def _stop(
+        self, solids: FloatArray, stopped: IntArray, is_straight_open: BoolArray
+    ) -> BoolArray:
+        """Mark what solids stop beside what was stopped; return to which points (points,)."""
+        is_behind = np.zeros(len(stopped), dtype=bool)
         by = (self.by_m, self.by_height_m)
-        _stop(self.start_m, self.points_m, *by, solids, stopped, is_straight_open)
+        _stop(self.start_m, self.points_m, *by, solids, stopped, is_straight_open, is_behind)
+        return is_behind
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -154,18 +176,20 @@ def _flat_m2(one_m: FloatArray, other_m: FloatArray) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _open_shares(stopped: IntArray, is_straight_open: BoolArray, weights: FloatArray) -> FloatArray:
-    """Return `Ways.shares`."""
-    points, stations, asides = stopped.shape
+def _open_shares(
+    chosen: IntArray, stopped: IntArray, is_straight_open: BoolArray, weights: FloatArray
+) -> FloatArray:
+    """Return what is open to some of the points (chosen, SHARES)."""
+    _, stations, asides = stopped.shape
     falls = weights.shape[-1]
-    shares = np.zeros((points, stations * falls + 1))
-    for point in range(points):
+    shares = np.zeros((len(chosen), stations * falls + 1))
+    for number, point in enumerate(chosen):
         for station in range(stations):
             for aside in range(asides):
                 left = weights[point, station, aside, stopped[point, station, aside]]
                 for fall in range(falls):
-                    shares[point, station * falls + fall] += left[fall]
-        shares[point, -1] = is_straight_open[point]
+                    shares[number, station * falls + fall] += left[fall]
+        shares[number, -1] = is_straight_open[point]
     return shares
 
 
@@ -178,8 +202,12 @@ def _stop(
     solids: FloatArray,
     stopped: IntArray,
     is_straight_open: BoolArray,
+    is_behind: BoolArray,
 ) -> None:
-    """Mark the ways as stopped that meet a solid; those that are stopped are not looked at."""
+    """Mark the ways as stopped that meet a solid; those that are stopped are not looked at.
+
+    Marks the points to which a way is newly stopped, too.
+    """
     points, stations, asides = stopped.shape
     met = np.empty((2 * len(solids), 3))
     first = 0
@@ -190,8 +218,9 @@ def _stop(
         end_m = points_m[first]
         straight = met[: _meet(start_m, end_m, solids, met)]
         for point in range(first, last):
-            if _is_stopped(start_m[2], points_m[point, 2], straight):
+            if is_straight_open[point] and _is_stopped(start_m[2], points_m[point, 2], straight):
                 is_straight_open[point] = False
+                is_behind[point] = True
         for station in range(stations):
             for aside in range(asides):
                 corner_m = by_m[first, station, aside]
@@ -209,7 +238,9 @@ def _stop(
                         ):
                             break
                         above += 1
-                    stopped[point, station, aside] = above
+                    if above > stopped[point, station, aside]:
+                        stopped[point, station, aside] = above
+                        is_behind[point] = True
         first = last
 
 
