@@ -356,10 +356,6 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env league --engine gas --track known --scenario courtyard --cases 8 --seeds 1"
     " --methods best_rule --budgets 8 --run out/particle --run out/particle_gas"
     " --run out/gas_alone --out out/fidelity": "--cases 1 --budgets 1",
-    "blast-env train --algo self_labelling --engine gas --scenario studies/demo_site.toml"
-    " --steps 700 --envs 1 --set cases=24 --set cases_per_round=12 --set samples=3"
-    " --set neighbours=5 --set first_updates=300 --set updates=100 --set evaluation_cases=8"
-    " --set evaluation_interval=1 --run out/kerb": _LABEL,
     "blast-env train --algo self_labelling --engine gas --scenario studies/school_street.toml"
     " --envs 1 --steps 1800 --set cases=96 --set cases_per_round=32 --set samples=2"
     " --set neighbours=4 --set borrowed=2 --set first_updates=600 --set updates=200"
