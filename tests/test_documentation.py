@@ -217,6 +217,14 @@ def test_pages_that_code_and_texts_name_exist() -> None:
     assert {(where, page) for where, page in named if not (ROOT / page).exists()} == set()
 
 
+def test_pages_include_tables_that_exist_and_every_table() -> None:
+    included = set()
+    for page, text in TEXTS.items():
+        for path in re.findall(r"^(?:```\{include\}|:file:) (\S+)$", text, re.MULTILINE):
+            included.add((ROOT / page).parent.joinpath(path).resolve())
+    assert included == {*(ROOT / "docs" / "studies" / "tables").iterdir()}
+
+
 def test_the_page_of_the_environments_names_every_id() -> None:
     page = TEXTS["docs/researchers/environment.md"]
     ids = [name for name, spec in gym.registry.items() if "blast_env" in str(spec.entry_point)]
