@@ -33,6 +33,7 @@ from tests.scenario.documents import (
 )
 
 BUNDLED = tuple(sorted(path.stem for path in (REPOSITORY / "scenarios").glob("*.toml")))
+EXAMPLES = REPOSITORY / "docs" / "data"
 
 
 def test_the_promised_scenarios_are_bundled() -> None:
@@ -272,16 +273,16 @@ def test_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_example_of_the_format_description_loads() -> None:
-    text = (REPOSITORY / "docs" / "reference" / "scenario_format.md").read_text(encoding="utf-8")
-    (example,) = re.findall(r"```toml\n(# A complete example.*?)```", text, re.S)
-    scenario = parse_scenario(example, "docs/reference/scenario_format.md")
+    scenario = load_scenario(EXAMPLES / "example.toml")
     assert scenario.build_zone is not None
     assert scenario.simulation.overrides
 
 
 def test_example_of_heights_fits_into_the_whole_example() -> None:
-    text = (REPOSITORY / "docs" / "reference" / "scenario_format.md").read_text(encoding="utf-8")
-    whole, heights = (tomllib.loads(each) for each in re.findall(r"```toml\n(.*?)```", text, re.S))
+    whole, heights = (
+        tomllib.loads((EXAMPLES / name).read_text(encoding="utf-8"))
+        for name in ("example.toml", "example_heights.toml")
+    )
     scenario = Scenario.from_document({**whole, **heights, "schema_version": 2}, "example")
     assert (scenario.schema_version, scenario.air_height_m) == (2, 12.0)
     for key in ("charge", "structures"):  # what the second one repeats is as in the first
