@@ -11,6 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from blast_env.engines import Engine, find_engine
+from blast_env.envs.actions import ACTIONS, Actions, NumberedActions
 from blast_env.envs.arguments import (
     PlainSpec,
     ResetOptions,
@@ -55,9 +56,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
     ## Action space
     `Discrete(variants * rows * columns + 1)`. A variant is an item of the catalogue in one
-    orientation; without a catalogue there is one, a module of 0.5 m. Cells count row by row from
-    the lower left corner of the zone. The last action finishes. `action_masks()` and
-    `info["action_mask"]` say which actions are legal; `explain(element)` says why one is not.
+    orientation, or a module of 0.5 m. Cells count row by row from the lower left corner. The last
+    action finishes. `action_masks()` says which are legal, `explain(element)` why one is not. With
+    `action="item_then_place"` or `"item_then_block"` the variant is chosen, then the cell.
 
     ## Observation space
     `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
@@ -81,8 +82,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
     ## Episode end
     Terminated when the agent finishes, when nothing more can be placed, or after
-    `illegal_action_limit` illegal actions. Never truncated by itself. At the end `info` has the
-    impulses with and without the barrier, `reduction`, `layout`, and what repeats the blasts.
+    `illegal_action_limit` illegal actions. At the end `info` has the impulses with and without the
+    barrier, `reduction`, `layout`, and what repeats the blasts.
 
     ## Arguments
     Those of `__init__`, below.
@@ -118,6 +119,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         scenario: AnyScenario | ScenarioSource = "courtyard",
         reward: str | Reward = "terminal",
         observation: str | Observation = "image",
+        action: str | Actions = "place",
         threat: str | ThreatModel = "visible",
         threats: int | None = None,
         realisations: int | None = None,
@@ -139,6 +141,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             reward: `"terminal"`, `"incremental"`, or a `Reward`.
             observation: `"image"`, `"grid"`, `"grid_with_load"` (four more blasts a charge),
                 `"features"`, or an `Observation`.
+            action: `"place"`, `"item_then_place"`, `"item_then_block"`, or `Actions`.
             threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
             threats: How many charges are drawn when they are hidden; 16 unless given.
             realisations: Blasts for each charge; 2 unless given. It is 1 where charges are hidden,
@@ -178,11 +181,13 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             realisations=find_realisations(realisations, threat, found),
             risk=find_risk(risk, cvar_level),
             observation=strategy("observation", observation, OBSERVATIONS),
+            actions=strategy("action", action, ACTIONS),
             evaluators=Evaluators(found, cache),
         )
         representative = self.task.source.representative
         self.task.evaluators.of(representative)  # so that a wrong engine fails here, not later
-        self.action_space = spaces.Discrete(representative.zone.catalogue.finish + 1)
+        numbered = NumberedActions.of(self.task.actions, representative.zone.catalogue)
+        self.action_space = spaces.Discrete(numbered.finish + 1)
         self.observation_space = self.task.observation.space(representative)
         self.show_blast = show_blast
         if show_blast and render_mode not in ("human", "rgb_array"):
@@ -215,7 +220,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return episode.observe(), episode.information()
 
     def step(self, action: np.int64 | int) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Place a module, or finish; see the class.
+        """Place a module, choose a part of that, or finish; see the class.
 
         Raises:
             gymnasium.error.InvalidAction: If the action is not in the action space.

@@ -1,7 +1,7 @@
 """One episode of placing, and what all episodes of an environment have in common."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import fsum, isnan
 from typing import Any, Final
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.engines import Engine
+from blast_env.envs.actions import Actions, Chosen, NumberedActions
 from blast_env.envs.arguments import (
     ResetOptions,
     strategy,
@@ -65,6 +66,8 @@ class Episode:
         observation: Observes the episode.
         initial: The layout at the start.
         placement: The modules placed so far.
+        actions: What the actions are.
+        chosen: What has been chosen of the next module or piece.
         illegal_actions: How many illegal actions there were.
         begun: Whether there has been an action.
         ended: Whether the charge has gone off.
@@ -75,26 +78,36 @@ class Episode:
     observation: EpisodeObservation
     initial: Layout
     placement: Placement
+    actions: NumberedActions
+    chosen: Chosen = field(init=False)
     illegal_actions: int = 0
     begun: bool = False
     ended: bool = False
 
-    def action_mask(self) -> NDArray[np.bool_]:
-        """Return which actions are legal (actions,); the last one, to finish, always is.
+    def __post_init__(self) -> None:
+        """Begin with nothing chosen."""
+        self.chosen = Chosen(self.placement.legal)
 
-        When the charge has gone off, it is the only one.
+    def action_mask(self) -> NDArray[np.bool_]:
+        """Return which actions are legal (actions,); see `NumberedActions.mask`.
+
+        When the charge has gone off, to finish is the only one.
         """
-        return np.append(self.placement.legal.ravel() & (not self.ended), True)
+        if not self.ended:
+            return self.actions.mask(self.chosen)
+        mask = np.zeros(self.actions.finish + 1, dtype=np.bool_)
+        mask[-1] = True
+        return mask
 
     def observe(self) -> Array:
-        """Return the observation."""
-        return self.observation.observe(self.placement)
+        """Return the observation: what is not possible after what was chosen is shown as taken."""
+        return self.observation.observe(self.placement.limited_to(self.chosen.possible))
 
     def act(self, action: int, reward: Reward, illegal: IllegalActions) -> dict[str, float]:
-        """Place a module or a piece, or finish; return the terms of the reward.
+        """Place a module or a piece, choose a part of it, or finish; return the reward's terms.
 
         Args:
-            action: As in `Catalogue`, which numbers the actions.
+            action: One of `actions`.
             reward: Pays for the action.
             illegal: What an illegal action leads to.
 
@@ -102,7 +115,7 @@ class Episode:
             BlastEnvError: If the reward names a term that is taken.
         """
         before = self.placement
-        self.placement, is_illegal, self.ended = self._after(action, illegal)
+        self.placement, self.chosen, is_illegal, self.ended = self._after(action, illegal)
         self.illegal_actions += is_illegal
         transition = Transition(
             initial=self.initial,
@@ -122,7 +135,7 @@ class Episode:
             action: As for `act`, which is still to be called.
             illegal: Likewise.
         """
-        placement, _, ended = self._after(action, illegal)
+        placement, _, _, ended = self._after(action, illegal)
         case = self.objective.case
         # Measures that harden facades need no blast of their own.
         barrier = tuple(each for each in placement.layout if not isinstance(each, Measure))
@@ -133,16 +146,19 @@ class Episode:
             for threat in case.threats
         )
 
-    def _after(self, action: int, illegal: IllegalActions) -> tuple[Placement, bool, bool]:
-        """Return the placement after an action, whether that is illegal, and whether it ends."""
-        before, legal = self.placement, self.placement.legal
-        finishes = action == legal.size
-        is_illegal = not finishes and not legal.flat[action]
-        placement = before
-        if not finishes and not is_illegal:
-            placement = before.place(before.catalogue.element(action))
+    def _after(self, action: int, illegal: IllegalActions) -> tuple[Placement, Chosen, bool, bool]:
+        """Return placement and choice after an action, whether it is illegal, whether it ends."""
+        placement, chosen = self.placement, self.chosen
+        finishes = action == self.actions.finish and chosen.choices == 0
+        found = None if finishes else self.actions.narrowed(chosen, action)
+        is_illegal = not finishes and found is None
+        if isinstance(found, Chosen):
+            chosen = found
+        elif found is not None:
+            placement = placement.place(found)
+            chosen = Chosen(placement.legal)
         exhausted = self.illegal_actions + is_illegal >= illegal.limit
-        return placement, is_illegal, finishes or exhausted or placement.is_full
+        return placement, chosen, is_illegal, finishes or exhausted or placement.is_full
 
     def assess(self) -> tuple[Assessment, Assessment]:
         """Return what the layout is worth, and what no barrier is."""
@@ -230,6 +246,7 @@ class Task:
         realisations: Blasts for each charge, with different fan and air.
         risk: How the loads of several charges become one; as the scenario says if `None`.
         observation: What is seen.
+        actions: What an action says.
         evaluators: Run the blasts.
     """
 
@@ -238,6 +255,7 @@ class Task:
     realisations: int
     risk: Risk | None
     observation: Observation
+    actions: Actions
     evaluators: Evaluators
 
     def start(self, rng: np.random.Generator, options: ResetOptions) -> Episode:
@@ -270,6 +288,7 @@ class Task:
             observation=self.observation.episode(observable),
             initial=placement.checked,
             placement=placement,
+            actions=NumberedActions.of(self.actions, placement.catalogue),
         )
 
     def _case(

@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from blast_env.envs.actions import ACTIONS
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import Array
 from blast_env.errors import BlastEnvError
@@ -95,6 +96,8 @@ def barrier_env(env: gym.Env[Any, Any]) -> BlastBarrierEnv:
         raise BlastEnvError(f"env is {env}, must be a BlastBarrier environment: nothing is placed")
     if inner.render_mode != "rgb_array":
         raise BlastEnvError(f'render_mode is {inner.render_mode!r}, must be "rgb_array" to play')
+    if inner.task.actions != ACTIONS["place"]:
+        raise BlastEnvError(f'action is {inner.task.actions}, must be "place" to play')
     return inner
 
 

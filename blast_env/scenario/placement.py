@@ -180,6 +180,18 @@ class Placement:
         ground.flags.writeable = False
         return ground
 
+    def limited_to(self, possible: BoolArray) -> "Placement":
+        """Return the placement in which no more may be placed than some of what is `legal`.
+
+        Args:
+            possible: As `legal`, and nothing that is not.
+        """
+        if possible is self.legal:
+            return self
+        limited = Placement(self.scenario, self.layout)
+        vars(limited).update(_empty_zone=self._empty_zone, legal=possible)
+        return limited
+
     def places(self, cells: BoolArray) -> BoolArray:
         """Return from which lower left cell each variant covers nothing but some cells.
 

@@ -5,11 +5,16 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from blast_agents.surrogate import SurrogateEngine
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import obs_as_tensor
 
+from blast_env.scenario import Scenario
+from tests.agents.test_surrogate import by_hand
+from tests.catalogue_sites import ITEMS
 from tests.libraries.ids import BARRIER_IDS, IDS, arguments
+from tests.office_park import office_park
 
 pytestmark = pytest.mark.slow
 _STEPS = 4
@@ -68,3 +73,36 @@ def test_maskable_ppo_gives_illegal_actions_no_probability(name: str) -> None:
     probability = policy.get_distribution(tensor, mask[None]).distribution.probs[0]
     assert not mask[placed]
     assert float(probability.detach()[~mask].sum()) == 0.0
+
+
+def test_maskable_ppo_learns_by_item_and_block_in_a_zone_of_a_hundred_metres() -> None:
+    """19,264 places for four variants are 152 actions; illegal ones get no probability."""
+    document = office_park().model_dump(exclude_none=True)
+    zone = {"corner_m": (36.0, 12.0), "rows": 112, "columns": 43, "items": ITEMS, "budget": 20.0}
+    scenario = Scenario.from_document(document | {"build_zone": zone}, "large")
+    assert scenario.zone.catalogue.finish == 19_264
+    env = gym.make(
+        "BlastBarrier-v0",
+        scenario=scenario,
+        action="item_then_block",
+        observation="features",
+        engine=SurrogateEngine(by_hand()),
+    )
+    assert env.action_space == gym.spaces.Discrete(4 + 84 + 64 + 1)
+    model = MaskablePPO("MlpPolicy", env, policy_kwargs=_POLICY, **{**_SMALL, "n_steps": 32})
+    before = {name: each.clone() for name, each in model.policy.state_dict().items()}
+    model.learn(64)
+    changed = [not (each == before[name]).all() for name, each in model.policy.state_dict().items()]
+    assert any(changed)
+    observation, info = env.reset(seed=0)
+    choices = set()
+    for _ in range(6):
+        mask = info["action_mask"].astype(bool)
+        action, _ = model.predict(observation, action_masks=mask)
+        assert mask[action]
+        choices.add(int(action) // 88 if action >= 4 else -1)
+        observation, _, ended, _, info = env.step(action)
+        assert info["illegal_actions"] == 0
+        if ended:
+            observation, info = env.reset()
+    assert len(choices) == 3  # item, block and cell

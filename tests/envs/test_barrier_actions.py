@@ -1,0 +1,170 @@
+"""Action spaces that choose step by step: the same layouts and rewards as place by place."""
+
+import pickle
+from dataclasses import replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from blast_env.envs.actions import ACTIONS, Chosen, ItemThenPlace, NumberedActions
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.envs.observations import GridObservation
+from blast_env.envs.play import CursorControl
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element, Layout
+from blast_env.scenario import Placement, Scenario
+from tests.catalogue_sites import WALL, yard
+from tests.envs.small import make, play, same, small_scenario
+from tests.scenario.test_hardening import glazed_yard
+
+BY_CHOICE = ["item_then_place", "item_then_block"]
+
+
+def yard_env(**arguments: Any) -> BlastBarrierEnv:
+    return BlastBarrierEnv(scenario=yard(), engine="gas", **arguments)
+
+
+def numbered(name: str, scenario: Scenario) -> NumberedActions:
+    return NumberedActions.of(ACTIONS[name], scenario.zone.catalogue)
+
+
+def actions_for(actions: NumberedActions, placement: Placement, element: Element) -> list[int]:
+    """Return the actions that place an element: at each choice, the one that leads there."""
+    variant = placement.catalogue.variant_number(element)
+    place = (variant, element[0], element[1])
+    chosen, made = Chosen(placement.legal), []
+    while True:
+        made.append(actions.first[chosen.choices] + int(actions.choices[chosen.choices][place]))
+        found = actions.narrowed(chosen, made[-1])
+        if not isinstance(found, Chosen):
+            assert found == element
+            return made
+        chosen = found
+
+
+def test_there_are_as_many_actions_as_items_and_places() -> None:
+    assert [numbered(name, yard()).finish for name in ACTIONS] == [4 * 84, 4 + 84, 4 + 2 + 48]
+    assert yard_env(action="item_then_place").action_space == gym.spaces.Discrete(4 + 84 + 1)
+    large = replace(yard().zone.catalogue, shape=(112, 43))
+    assert [NumberedActions.of(each, large).finish for each in ACTIONS.values()] == [
+        4 * 4816,
+        4 + 4816,
+        4 + 14 * 6 + 64,
+    ]
+    # Without a catalogue there is no item to choose, and 8 x 5 cells are one block.
+    assert [numbered(name, small_scenario()).finish for name in ACTIONS] == [40, 40, 40]
+
+
+@pytest.mark.parametrize("scenario", [yard(), glazed_yard(), small_scenario()])
+@pytest.mark.parametrize("name", list(ACTIONS))
+def test_choices_lead_to_what_is_legal_and_nowhere_else(name: str, scenario: Scenario) -> None:
+    """By the masks, from an empty zone and from one in which something stands."""
+    actions = numbered(name, scenario)
+
+    def elements(chosen: Chosen) -> list[Element]:
+        mask = actions.mask(chosen)
+        assert mask[-1] == (chosen.choices == 0)
+        found: list[Element] = []
+        for action in np.flatnonzero(mask[:-1]).tolist():
+            after = actions.narrowed(chosen, action)
+            assert after is not None
+            found += elements(after) if isinstance(after, Chosen) else [after]
+        return found
+
+    placement = Placement.empty(scenario)
+    for _ in range(2):
+        legal = [
+            scenario.zone.catalogue.element(a) for a in np.flatnonzero(placement.legal).tolist()
+        ]
+        found = elements(Chosen(placement.legal))
+        assert sorted(found) == sorted(legal)
+        placement = placement.place(legal[len(legal) // 2])
+
+
+def paid(env: BlastBarrierEnv, layout: Layout) -> tuple[list[float], dict[str, Any]]:
+    env.reset(seed=0)
+    actions, rewards = NumberedActions.of(env.task.actions, env.placement.catalogue), []
+    for element in layout:
+        for action in actions_for(actions, env.placement, element):
+            _, reward, ended, _, info = env.step(action)
+            assert (ended, info["illegal_actions"]) == (False, 0)
+            rewards.append(reward)
+    _, reward, ended, _, info = env.step(actions.finish)
+    assert (ended, info["layout"]) == (True, layout)
+    return [*rewards, reward], info
+
+
+@pytest.mark.parametrize("reward", ["terminal", "incremental"])
+def test_a_layout_is_paid_alike_however_it_is_chosen(reward: str) -> None:
+    env = yard_env(reward=reward, action="item_then_place")
+    by_choice, info = paid(env, WALL)
+    at_once, expected = paid(yard_env(reward=reward), WALL)
+    assert len(by_choice) > len(at_once)
+    assert sum(by_choice) == pytest.approx(sum(at_once), rel=1e-12)
+    assert info["impulse_pa_s"] == expected["impulse_pa_s"]
+    assert by_choice[2] == 0.0  # the item of the second piece: nothing is placed yet
+
+
+def test_what_does_not_go_with_a_choice_is_illegal_and_changes_nothing() -> None:
+    env = yard_env(action="item_then_place")
+    env.reset(seed=0)
+    before, *_ = env.step(0)
+    finish = 4 + 84
+    mask = env.action_masks()
+    assert not mask[:4].any()  # an item is chosen
+    assert not mask[-1]  # and not yet placed
+    for count, action in enumerate((1, finish), start=1):
+        after, reward, ended, _, info = env.step(action)
+        assert same(before, after)
+        assert (reward, ended, info["illegal_actions"]) == (-0.001, False, count)
+        assert same(env.action_masks(), mask)
+    assert env.placement.layout == ()
+    assert env.blasts_due(finish) == ()
+
+
+def test_observations_show_what_is_still_possible() -> None:
+    env = yard_env(action="item_then_block", observation="grid")
+    observation, _ = env.reset(seed=0)
+    channels = GridObservation().channels_of(yard())
+    legal = [number for number, name in enumerate(channels) if name.endswith(":legal")]
+    assert [bool(plane.any()) for plane in observation[legal]] == [True] * 4
+    chosen, *_ = env.step(2)
+    assert [bool(plane.any()) for plane in chosen[legal]] == [False, False, True, False]
+    assert (chosen[legal[2]] == observation[legal[2]]).all()
+    in_block, *_ = env.step(4)
+    assert 0.0 < in_block[legal[2]].sum() < chosen[legal[2]].sum()
+    assert (in_block[channels.index("free")] == in_block[legal[2]]).all()
+
+
+def test_a_measure_needs_no_place() -> None:
+    scenario = glazed_yard()
+    actions = numbered("item_then_block", scenario)
+    catalogue, placement = scenario.zone.catalogue, Placement.empty(scenario)
+    measure = next(i for i, each in enumerate(catalogue.variants) if each.is_measure)
+    assert actions.narrowed(Chosen(placement.legal), measure) == catalogue.element_at(measure, 0, 0)
+
+
+@pytest.mark.parametrize("name", BY_CHOICE)
+def test_it_is_a_sound_environment(name: str) -> None:
+    env = make(action=name, observation="features")
+    check_env(env, skip_render_check=True)
+    first, second = (play(make(action=name), seed=3, policy_seed=1) for _ in range(2))
+    assert same(first, second)
+    assert first[-1][-1]["layout"]
+    assert pickle.loads(pickle.dumps(env)).action_space == env.action_space
+
+
+def test_a_strategy_of_ones_own_is_taken_and_a_wrong_one_is_told() -> None:
+    of_four = make(action=ItemThenPlace(block_cells=4))
+    assert of_four.action_space == gym.spaces.Discrete(2 * 2 + 16 + 1)
+    with pytest.raises(BlastEnvError, match="item_then_place"):
+        make(action="item_than_place")
+    with pytest.raises(BlastEnvError, match=r"action is 3, must be one of .* choices"):
+        make(action=3)
+    with pytest.raises(BlastEnvError, match="block_cells is 0, must be"):
+        ItemThenPlace(block_cells=0)
+    with pytest.raises(BlastEnvError, match='must be "place" to play'):
+        CursorControl(make(action="item_then_place", render_mode="rgb_array"))
