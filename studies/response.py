@@ -21,9 +21,11 @@ from blast_env.evaluation.consequences import peak_factor
 from blast_env.evaluation.neighbours import side_on_impulse_pa_s, side_on_peak_pa
 from blast_env.geometry import Layout, Piece
 from blast_env.response.components import Glazing, catalogue
+from blast_env.response.damage import level_of
 from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond, sharpened
 from blast_env.response.glass import Pane, glazing_responses
 from blast_env.response.sdof import Resistance, System, responses
+from blast_env.response.walls import panel_responses
 from blast_env.scenario import Scenario
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
@@ -326,20 +328,19 @@ def curves(
         bays = [each.bay for each in facade.bays]
         histories = facade.time_s, facade.pressure_pa
         sharper = sharpened(*histories, peak_factor(cell, FRONT_KG))
-        push = histories[0], np.maximum(histories[1], 0.0)
         by_curves = curve_histories(bays, FRONT_M, FRONT_KG, 19.0)
         rows = []
         for name in catalogue():
             filled = filled_with(bays, name)
-            gas, sharp, pushed, curve = (
-                _levels(respond(filled, *each)) for each in (histories, sharper, push, by_curves)
+            gas, sharp, curve = (
+                _levels(respond(filled, *each)) for each in (histories, sharper, by_curves)
             )
-            worst = np.minimum(np.minimum(gas, sharp), pushed)
-            shares = ((gas == curve), (pushed == curve), (worst <= curve))
+            helped = _levels_helped_by_suction(filled, *histories)
+            shares = ((helped == curve), (gas == curve), (np.minimum(gas, sharp) <= curve))
             rows.append((name, *(f"{share.mean():.0%}" for share in shares)))
         headers = (
-            *("component", "same level", "same, without suction"),
-            "same or worse, by the worst of all",
+            *("component", "same level, if suction helped", "same level"),
+            "same or worse, with sharp peaks",
         )
         print_line(f"{len(bays)} bays, cells of {cell:g} m")
         print_line(markdown_table(headers, rows))
@@ -348,6 +349,20 @@ def curves(
 def _levels(facade: FacadeResponse) -> FloatArray:
     found = facade.glass_levels or facade.wall_levels
     return np.array([float(found[index]) for index in range(len(facade.bays))])
+
+
+def _levels_helped_by_suction(
+    bays: list[FilledBay], time_s: FloatArray, pressure_pa: FloatArray
+) -> FloatArray:
+    """Return levels under the histories as they are, whatever would be without suction."""
+    panes = [each.glazing.pane for each in bays if each.glazing is not None]
+    panels = [each.wall.panel(each.bay.height_m) for each in bays if each.wall is not None]
+    damage = (
+        glazing_responses(panes, time_s, pressure_pa).hazard
+        if panes
+        else panel_responses(panels, time_s, pressure_pa).damage
+    )
+    return np.array([float(level_of(each)) for each in damage.tolist()])
 
 
 @app.command()

@@ -120,7 +120,7 @@ class AssessCommand(ChargeOptions):
             f"{scenario.name}, {name}: {'PASSES' if judged.passes(target) else 'FAILS'} level "
             f"{target.label!r} under {count} charges"
         )
-        for doubt in judged.doubts(target):
+        if doubt := judged.doubt(target):
             print_line(f"but it FAILS {doubt}")
 
     def _print(self, scenario: Scenario, found: dict[str, Consequences]) -> None:

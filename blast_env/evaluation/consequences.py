@@ -36,7 +36,6 @@ if TYPE_CHECKING:  # a third of a second to import
     from blast_env.engines.gas import GasResult
 
 _SHARPER: Final = "with peaks as sharp as Kingery and Bulmash's: take smaller cells"
-_NO_SUCTION: Final = "without the suction that follows the blast and pulls walls back"
 
 _CELLS_OF_HALF_A_PEAK: Final = 9.3
 """Cells per m/kg^(1/3) of a charge with which peaks are about half of Kingery and Bulmash's."""
@@ -77,12 +76,6 @@ class BuildingResponse:
         found = self.facade
         histories = sharpened(found.time_s, found.pressure_pa, self.peak_factor)
         return respond(found.bays, *histories)
-
-    @cached_property
-    def without_suction(self) -> FacadeResponse:
-        """What would become of its bays if no suction followed the blast and pulled them back."""
-        found = self.facade
-        return respond(found.bays, found.time_s, np.maximum(found.pressure_pa, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,25 +132,17 @@ class Consequences:
 
     def depends_on_cells(self, target: LevelOfProtection) -> bool:
         """Return whether sharper peaks would turn a verdict that passes."""
-        return _SHARPER in self.doubts(target)
+        return self.passes(target) and any(
+            each.sharpened.level_of_protection < target for each in self.responses
+        )
 
-    def doubts(self, target: LevelOfProtection) -> tuple[str, ...]:
-        """Return under which other assumptions a verdict that passes would fail, in words.
+    def doubt(self, target: LevelOfProtection) -> str:
+        """Return with what a verdict that passes would fail, in words; empty if with nothing.
 
         Args:
             target: The level that the buildings reach.
         """
-        if not self.passes(target):
-            return ()
-        others = {
-            _SHARPER: [each.sharpened for each in self.responses],
-            _NO_SUCTION: [each.without_suction for each in self.responses],
-        }
-        return tuple(
-            words
-            for words, facades in others.items()
-            if any(facade.level_of_protection < target for facade in facades)
-        )
+        return _SHARPER if self.depends_on_cells(target) else ""
 
     @property
     def worst_neighbours(self) -> tuple[Neighbour, ...]:

@@ -60,7 +60,7 @@ class ReportVerdict:
         passes: Whether all that was asked for is kept; `None` where nothing was.
         passes_bare: The same without the layout.
         words: What was asked for.
-        doubts: Under which other assumptions a verdict that passes would fail.
+        doubt: With what a verdict that passes would fail; empty if with nothing.
         buildings: The buildings with a facade.
         limits: The limits that were given.
         barrier: The barrier under the threat that tilts a piece most.
@@ -70,7 +70,7 @@ class ReportVerdict:
     passes: bool | None
     passes_bare: bool | None
     words: str
-    doubts: tuple[str, ...]
+    doubt: str
     buildings: tuple[BuildingLine, ...]
     limits: tuple[KeptLimit, ...]
     barrier: BarrierResponse | None
@@ -92,19 +92,19 @@ def verdict_of(study: Study) -> ReportVerdict:
     target = study.options.target
     kept, kept_bare = ([each.kept for each in limits], [each.kept_bare for each in limits])
     asked = [f"{len(limits)} limits of loads"] if limits else []
-    doubts: tuple[str, ...] = ()
+    doubt = ""
     glazing: tuple[tuple[str, bool, bool], ...] = ()
     if study.walled.buildings:
         asked.insert(0, f"level of protection {target.label!r}")
         kept.append(study.walled.passes(target))
         kept_bare.append(study.bare.passes(target))
-        doubts = study.walled.doubts(target)
+        doubt = study.walled.doubt(target)
         glazing = tuple(_glazing(study))
     return ReportVerdict(
         passes=all(kept) if asked else None,
         passes_bare=all(kept_bare) if asked else None,
         words=" and ".join(asked),
-        doubts=doubts,
+        doubt=doubt,
         buildings=tuple(_line(study, name) for name in study.walled.buildings),
         limits=limits,
         barrier=study.walled.worst_barrier,

@@ -17,8 +17,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.response.buildings import LevelOfProtection, level_of_protection
 from blast_env.response.components import Glazing, Wall
-from blast_env.response.glass import GlazingCondition, GlazingResponses, glazing_responses
-from blast_env.response.walls import DamageLevel, PanelResponses, panel_responses
+from blast_env.response.glass import GlazingCondition, GlazingResponses, Pane, glazing_responses
+from blast_env.response.walls import DamageLevel, Panel, PanelResponses, panel_responses
 
 STOREY_M = 3.5
 """Height of a storey unless a facade says otherwise."""
@@ -281,6 +281,10 @@ def respond(
 ) -> FacadeResponse:
     """Return what becomes of bays under their histories; no blast is run.
 
+    The suction that follows a blast pulls back what has been pushed in. No verdict rests on that:
+    each component meets its history with and without suction, and the worse of both counts. That is
+    what practice does, which leaves the negative phase out unless it makes rebound worse.
+
     Args:
         bays: The bays.
         time_s: Times of the histories, ascending (times,).
@@ -295,14 +299,37 @@ def respond(
         )
     glazed = [index for index, each in enumerate(bays) if each.glazing is not None]
     walled = [index for index, each in enumerate(bays) if each.wall is not None]
-    panes = [each.glazing.pane for each in bays if each.glazing is not None]
-    panels = [each.wall.panel(each.bay.height_m) for each in bays if each.wall is not None]
+    panes = _panes(bays)
+    panels = _panels(bays)
+    pushed_pa = np.maximum(pressure_pa, 0.0)
     return FacadeResponse(
         bays=tuple(bays),
         time_s=time_s,
         pressure_pa=pressure_pa,
         glazed=np.array(glazed, dtype=np.int64),
-        glazing=glazing_responses(panes, time_s, pressure_pa[glazed]),
+        glazing=glazing_responses(panes, time_s, pressure_pa[glazed]).or_worse(
+            glazing_responses(panes, time_s, pushed_pa[glazed])
+        ),
         walled=np.array(walled, dtype=np.int64),
-        walls=panel_responses(panels, time_s, pressure_pa[walled]),
+        walls=panel_responses(panels, time_s, pressure_pa[walled]).or_worse(
+            panel_responses(panels, time_s, pushed_pa[walled])
+        ),
     )
+
+
+def _panes(bays: Sequence[FilledBay]) -> list[Pane]:
+    """Return a pane of each bay with windows; equal ones share one, whose curve is costly."""
+    made: dict[Glazing, Pane] = {}
+    for each in bays:
+        if each.glazing is not None and each.glazing not in made:
+            made[each.glazing] = each.glazing.pane
+    return [made[each.glazing] for each in bays if each.glazing is not None]
+
+
+def _panels(bays: Sequence[FilledBay]) -> list[Panel]:
+    """Return the panel of each bay with a wall; equal ones share one."""
+    made: dict[tuple[Wall, float], Panel] = {}
+    for each in bays:
+        if each.wall is not None and (each.wall, each.bay.height_m) not in made:
+            made[each.wall, each.bay.height_m] = each.wall.panel(each.bay.height_m)
+    return [made[each.wall, each.bay.height_m] for each in bays if each.wall is not None]

@@ -238,10 +238,20 @@ class PaneCurve:
             )
         return cls(own.deflection_m, load, risk, own.load_mass_factor)
 
-    @property
+    @cached_property
     def resistance(self) -> Resistance:
         """The static pressure over the deflection, as a resistance without yield."""
         return Resistance(np.append(0.0, self.deflection_m), np.append(0.0, self.load_pa))
+
+    @cached_property
+    def log_rate(self) -> FloatArray:
+        """Logarithm of the rate at which a damage that goes to B grows there (points,)."""
+        return np.log(self.risk_60) * (STATIC_FATIGUE / WEIBULL_M)
+
+    @cached_property
+    def log_deflection(self) -> FloatArray:
+        """Logarithm of the deflection (points,)."""
+        return np.log(self.deflection_m)
 
 
 def _single(pane: Pane, thickness_m: float) -> PaneCurve:
@@ -283,6 +293,13 @@ class GlazingResponses:
     condition: FloatArray
     hazard: FloatArray
 
+    def or_worse(self, other: "GlazingResponses") -> "GlazingResponses":
+        """Return for each pane what it did here or there, where its hazard is larger."""
+        worse = other.hazard > self.hazard
+        return GlazingResponses(
+            *(np.where(worse, getattr(other, name), own) for name, own in vars(self).items())
+        )
+
 
 def glazing_responses(
     panes: Sequence[Pane],
@@ -305,13 +322,20 @@ def glazing_responses(
         raise BlastEnvError(
             f"pressure_pa has shape {pressure_pa.shape}, must be ({len(panes)}, {len(time_s)})"
         )
-    rows = np.zeros((len(panes), 9))
+    rows, impulse_pa_s = np.zeros((len(panes), 9)), impulses(time_s, pressure_pa)
     for index, pane in enumerate(panes):
-        rows[index] = _one(pane, time_s, pressure_pa[index], limit_probability)
+        history = pressure_pa[index], impulse_pa_s[index]
+        rows[index] = _one(pane, time_s, *history, limit_probability)
     return GlazingResponses(*rows.T)
 
 
-def _one(pane: Pane, time_s: FloatArray, pressure_pa: FloatArray, limit: float) -> FloatArray:
+def _one(
+    pane: Pane,
+    time_s: FloatArray,
+    pressure_pa: FloatArray,
+    impulse_pa_s: FloatArray,
+    limit: float,
+) -> FloatArray:
     from blast_env.response.kernels import bend
 
     curve = pane.curve
@@ -319,17 +343,16 @@ def _one(pane: Pane, time_s: FloatArray, pressure_pa: FloatArray, limit: float) 
     system = System(pane.mass_kg_m2, curve.load_mass_factor, resistance)
     lasts_s = float(time_s[-1] - time_s[0]) + system.period_s
     step_s = system.period_s / (_STIFFENING * STEPS_PER_PERIOD)
-    rate = np.log(curve.risk_60) * (STATIC_FATIGUE / WEIBULL_M)
     found = np.zeros(5)
     arguments = (
         system.load_mass_factor * pane.mass_kg_m2,
         resistance.deflection_m,
         resistance.pressure_pa,
-        np.log(curve.deflection_m),
-        rate,
+        curve.log_deflection,
+        curve.log_rate,
         time_s,
         pressure_pa,
-        impulses(time_s, pressure_pa),
+        impulse_pa_s,
         step_s,
         int(np.ceil(lasts_s / step_s)),
     )

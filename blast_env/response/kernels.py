@@ -16,14 +16,29 @@ _MOST_TIMES: Final = 50
 
 
 @njit(cache=True)
+def end_of_segment(points: FloatArray, at: float, begin: int) -> int:
+    """Return the end of a polyline's segment at a place; it is looked for from `begin` on."""
+    upper = begin
+    while upper < len(points) - 1 and points[upper] < at:
+        upper += 1
+    while upper > 1 and points[upper - 1] >= at:
+        upper -= 1
+    return upper
+
+
+@njit(cache=True)
+def straight(points: FloatArray, values: FloatArray, at: float, upper: int) -> float:
+    """Return the value at a place on the straight line through a polyline's segment."""
+    slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
+    value: float = values[upper - 1] + slope * (at - points[upper - 1])
+    return value
+
+
+@njit(cache=True)
 def polyline(points: FloatArray, values: FloatArray, at: float) -> float:
     """Return a polyline's value; odd below 0, straight on beyond its end."""
     size = abs(at)
-    upper = 1
-    while upper < len(points) - 1 and points[upper] < size:
-        upper += 1
-    slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
-    value: float = values[upper - 1] + slope * (size - points[upper - 1])
+    value = straight(points, values, size, end_of_segment(points, size, 1))
     return value if at >= 0.0 else -value
 
 
@@ -115,29 +130,23 @@ def bend(
     x, damage, peak, at_s = 0.0, 0.0, 0.0, time_s[0]
     pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, at_s + 0.5 * step_s)
     v = pushed / mass
+    bent, worn = 1, 1  # segments of the two polylines: from step to step they hardly move
     for step in range(1, steps + 1):
         x += step_s * v
         at_s = time_s[0] + step * step_s
         now, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, at_s + 0.5 * step_s)
-        v += (now - pushed - step_s * polyline(points, values, x)) / mass
+        bent = end_of_segment(points, abs(x), bent)
+        resistance = np.sign(x) * straight(points, values, abs(x), bent)
+        v += (now - pushed - step_s * resistance) / mass
         pushed = now
         peak = max(peak, x)
         if x != 0.0:
-            damage += step_s / 60.0 * np.exp(log_log(log_points, log_rate, np.log(abs(x))))
+            log_x = np.log(abs(x))
+            worn = end_of_segment(log_points, log_x, worn)
+            damage += step_s / 60.0 * np.exp(straight(log_points, log_rate, log_x, worn))
         if damage >= until:
             break
     out[0], out[1], out[2], out[3], out[4] = peak, damage, at_s, x, v
-
-
-@njit(cache=True)
-def log_log(points: FloatArray, values: FloatArray, at: float) -> float:
-    """Return a polyline's value, straight on beyond both ends."""
-    upper = 1
-    while upper < len(points) - 1 and points[upper] < at:
-        upper += 1
-    slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
-    value: float = values[upper - 1] + slope * (at - points[upper - 1])
-    return value
 
 
 @njit(cache=True)

@@ -51,6 +51,7 @@ class PlateCurve:
     load_factor: FloatArray
 
 
+@cache
 def plate_curve(aspect_ratio: float) -> PlateCurve:
     """Return the curve of a plate, between those of the table.
 

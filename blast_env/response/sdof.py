@@ -15,6 +15,7 @@ points of its history, and each step gets its impulse exactly, however short the
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -105,12 +106,12 @@ class System:
     load_mass_factor: float
     resistance: Resistance
 
-    @property
+    @cached_property
     def period_s(self) -> float:
         """Natural period at no deflection, s."""
         return 2.0 * np.pi * self._time_scale_s(self.resistance.stiffness_pa_m)
 
-    @property
+    @cached_property
     def shortest_period_s(self) -> float:
         """Natural period where it is stiffest, s."""
         slopes = np.diff(self.resistance.pressure_pa) / np.diff(self.resistance.deflection_m)
@@ -166,7 +167,7 @@ def responses(
         raise BlastEnvError("time_s must ascend, and have at least two times")
     from blast_env.response.kernels import integrate
 
-    rows = np.zeros((len(systems), 6))
+    rows, impulse_pa_s = np.zeros((len(systems), 6)), impulses(time_s, pressure_pa)
     for index, system in enumerate(systems):
         resistance = system.resistance
         step_s = system.shortest_period_s / steps_per_period
@@ -182,7 +183,7 @@ def responses(
             resistance.cracked_pressure_pa,
             time_s,
             pressure_pa[index],
-            impulses(time_s, pressure_pa[index]),
+            impulse_pa_s[index],
             step_s,
             int(np.ceil(lasts_s / step_s)),
             rows[index],
@@ -191,6 +192,8 @@ def responses(
 
 
 def impulses(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
-    """Return the impulse of a history until each of its points, Pa s (times,)."""
-    steps = 0.5 * (pressure_pa[1:] + pressure_pa[:-1]) * np.diff(time_s)
-    return np.append(0.0, np.cumsum(steps))
+    """Return the impulse of histories until each of their points, Pa s (as the pressures)."""
+    steps = 0.5 * (pressure_pa[..., 1:] + pressure_pa[..., :-1]) * np.diff(time_s)
+    impulse_pa_s = np.zeros(pressure_pa.shape)
+    np.cumsum(steps, axis=-1, out=impulse_pa_s[..., 1:])
+    return impulse_pa_s

@@ -372,6 +372,22 @@ class PanelResponses:
         """Levels of damage, one a panel."""
         return damage_level(self.damage)
 
+    def or_worse(self, other: "PanelResponses") -> "PanelResponses":
+        """Return for each panel what it did here or there, where its damage is larger."""
+        worse = other.damage > self.damage
+        motion = Responses(
+            *(
+                np.where(worse, getattr(other.motion, name), own)
+                for name, own in vars(self.motion).items()
+            )
+        )
+        return PanelResponses(
+            motion,
+            np.where(worse, other.ductility, self.ductility),
+            np.where(worse, other.rotation_deg, self.rotation_deg),
+            np.where(worse, other.damage, self.damage),
+        )
+
 
 def panel_responses(
     panels: Sequence[Panel], time_s: FloatArray, pressure_pa: FloatArray
@@ -389,13 +405,11 @@ def panel_responses(
     motion = responses([panel.system for panel in panels], time_s, pressure_pa)
     most = np.maximum(motion.peak_m, -motion.rebound_m)
     ductility = most / np.array([panel.system.resistance.yield_m for panel in panels])
-    rotation = np.array(
-        [panel.rotation_deg(each).item() for panel, each in zip(panels, most, strict=True)]
-    )
-    damage = np.array(
-        [
-            panel.section.limits.measure(ductility[[index]], rotation[[index]]).item()
-            for index, panel in enumerate(panels)
-        ]
-    )
+    rotation, damage = np.zeros(len(panels)), np.zeros(len(panels))
+    of_panels: dict[Panel, list[int]] = {}
+    for index, panel in enumerate(panels):
+        of_panels.setdefault(panel, []).append(index)
+    for panel, own in of_panels.items():
+        rotation[own] = panel.rotation_deg(most[own])
+        damage[own] = panel.section.limits.measure(ductility[own], rotation[own])
     return PanelResponses(motion, ductility, rotation, damage)

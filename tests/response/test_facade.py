@@ -11,6 +11,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall, catalogue, find_component
 from blast_env.response.facade import Bay, FilledBay, divide, respond, sharpened
 from blast_env.response.glass import GlazingCondition
+from blast_env.response.walls import panel_responses
 
 GROUND = Rectangle(10.0, 20.0, 22.0, 27.0)
 
@@ -84,6 +85,27 @@ def test_sharper_histories_keep_their_impulse(factor: float, lasts_s: float) -> 
     times_s, (sharper,) = sharpened(time_s, history[np.newaxis], factor)
     assert np.trapezoid(sharper, times_s) == pytest.approx(np.trapezoid(history, time_s), rel=0.08)
     assert sharper.max() == pytest.approx(factor * history.max(), rel=0.15)
+
+
+def test_no_verdict_rests_on_suction_and_none_leaves_its_rebound_out() -> None:
+    """It holds a block wall that would fall, and throws a light one outwards after a short push."""
+    bays = [FilledBay(bay(), wall=wall(name)) for name in ("block_190", "timber_frame")]
+    bays.append(FilledBay(bay(), glazing("window_tempered_6")))
+    time_s = np.array([0.0, 0.01, 0.02, 0.06, 0.2])
+    helped = {False: 0, True: 0}
+    for peak_pa in np.geomspace(2e3, 4e4, 20).tolist():
+        histories = np.tile([peak_pa, 0.0, -0.2 * peak_pa, 0.0, 0.0], (3, 1))
+        pushed = np.maximum(histories, 0.0)
+        found = respond(bays, time_s, histories)
+        panels = [each.wall.panel(3.5) for each in bays if each.wall is not None]
+        each_way = [
+            panel_responses(panels, time_s, each[:2]).damage for each in (histories, pushed)
+        ]
+        assert found.walls.damage.tolist() == np.maximum(*each_way).tolist()
+        assert respond(bays, time_s, pushed).level_of_protection >= found.level_of_protection
+        for panel in range(2):
+            helped[bool(each_way[0][panel] < each_way[1][panel])] += 1
+    assert min(helped.values()) > 0
 
 
 def test_windows_and_walls_of_a_building_decide_together() -> None:
