@@ -187,6 +187,13 @@ def layout_counts(layout: Collection[Element], kind: str = "", of: int | None = 
     return f"{number} {word}{plural}" + (f" ({named})" if named else "")
 
 
+def layout_words(layout: "Layout") -> str:
+    """Return what a layout has: its pieces by their items, then its measures."""
+    measures = [each.item for each in layout if isinstance(each, Measure)]
+    pieces = [layout_counts(standing(layout))] if standing(layout) else []
+    return ", ".join(pieces + measures) or "nothing"
+
+
 def _element_text(element: Element) -> str:
     row, column, *item = element
     words = [str(each) for each in item[:1]] + ["turned" for each in item[1:] if each]

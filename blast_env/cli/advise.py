@@ -1,6 +1,6 @@
 """`blast-env advise`: what does a budget buy by each kind of measure, what does it cost to pass?"""
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -10,12 +10,13 @@ from blast_agents.search.advice import Advice, MeasureKind, advise, kinds_for
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import CELL_HELP, SCENARIO_HELP, ChargeOptions
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.cli.targets import PICTURES
 from blast_env.engines.contract import JUDGE, Engine, find_engine
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import Consequences, consequences
-from blast_env.geometry import Layout, Measure, layout_counts, standing
+from blast_env.geometry import Layout, layout_words, standing
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Placement, Scenario, load_scenario, write_layout
@@ -51,6 +52,9 @@ class AdviseCommand(ChargeOptions):
     out: Path | None = option(
         None, "Layout file of the best layout of all: .json.", writes=(".json",)
     )
+    picture: Path | None = option(
+        None, "Picture of cost against level of protection: .png, .svg, .pdf.", writes=PICTURES
+    )
 
     def __call__(self) -> None:
         """Search for each kind, judge, and print the verdict."""
@@ -85,6 +89,31 @@ class AdviseCommand(ChargeOptions):
         if self.out is not None:
             made = {"method": "advise", "seed": self.seed, "versions": versions(engine.version)}
             print_line(f"wrote {write_layout(self.out, scenario, best.layout, made)}")
+        if self.picture is not None:
+            self._draw(self.picture, scenario, target, found, judged)
+
+    def _draw(
+        self,
+        path: Path,
+        scenario: Scenario,
+        target: LevelOfProtection,
+        found: list[Advice],
+        judged: dict[Layout, Consequences],
+    ) -> None:
+        # Here, because pictures need the extra `render`.
+        from blast_env.rendering.cost_level import PricedDamage, cost_level_figure
+        from blast_env.rendering.figures import save_figure
+
+        tried = {str(each.kind): [PricedDamage(*astuple(x)) for x in each.tried] for each in found}
+        points = [
+            PricedDamage(Placement(scenario, layout).cost, seen.worst_damage)
+            for layout, seen in judged.items()
+        ]
+        charges = len(next(iter(judged.values())).barriers)
+        title = f"{scenario.name}: what each step up costs, the worst of {charges} charges"
+        words = f"cells of {self.judge_cell_m:g} m"
+        figure = cost_level_figure(tried, points, target, title, words)
+        print_line(f"wrote {save_figure(figure, path)}")
 
     def _asked(self, scenario: Scenario) -> Scenario:
         """Return the scenario with the target and the budget that were asked for."""
@@ -132,7 +161,7 @@ class AdviseCommand(ChargeOptions):
             levels = [seen.level(building) for building in seen.buildings]
             table.add_row(
                 each.kind,
-                _words(each.layout),
+                layout_words(each.layout),
                 f"{Placement(scenario, each.layout).cost:g}",
                 str(each.blasts),
                 min(levels).label,
@@ -169,7 +198,7 @@ def _verdict(
     elif not best.layout:
         answer = f"{scenario.name}: the empty site reaches {target.label!r}."
     else:
-        answer = f"{scenario.name}: {target.label!r} costs {cost:g}: {_words(best.layout)}."
+        answer = f"{scenario.name}: {target.label!r} costs {cost:g}: {layout_words(best.layout)}."
     shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
     if shield is None or judged[shield.layout].passes(target):
         return answer
@@ -182,11 +211,3 @@ def _verdict(
             f"Walls alone are worth nothing here: they change the shortfall by {gain:.1%}. {answer}"
         )
     return answer
-
-
-def _words(layout: Layout) -> str:
-    """Return what a layout has: pieces by their items, then measures."""
-    measures = [each.item for each in layout if isinstance(each, Measure)]
-    barrier = standing(layout)
-    parts = [layout_counts(barrier)] if barrier else []
-    return ", ".join(parts + measures) or "nothing"

@@ -24,6 +24,7 @@ from blast_env.geometry import Element, Layout
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.response.components import Glazing, catalogue
+from blast_env.response.damage import worst
 from blast_env.response.facade import FacadeResponse, FilledBay, respond, sharpened
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.scenario.build_scene import charge_against
@@ -129,6 +130,11 @@ class Consequences:
     def level(self, building: str) -> LevelOfProtection:
         """Return the level of protection that a building reaches under every charge."""
         return min(each.facade.level_of_protection for each in self.of(building))
+
+    @property
+    def worst_damage(self) -> float:
+        """The worst damage of all components under every charge, from 0 to 5."""
+        return worst(each.facade.worst_number for each in self.responses)
 
     def depends_on_cells(self, target: LevelOfProtection) -> bool:
         """Return whether sharper peaks would turn a verdict that passes."""

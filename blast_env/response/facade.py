@@ -218,6 +218,11 @@ class FacadeResponse:
         return max(self.walls.levels, default=DamageLevel.SUPERFICIAL)
 
     @property
+    def worst_number(self) -> float:
+        """The worst of all damage as a number, see `blast_env.response.damage`."""
+        return float(max(self.glazing.hazard.max(initial=0.0), self.walls.damage.max(initial=0.0)))
+
+    @property
     def level_of_protection(self) -> LevelOfProtection:
         """Level of protection of the building: what its worst component allows."""
         return min(level_by_glass(self.worst_condition), level_of_protection(self.worst_damage))

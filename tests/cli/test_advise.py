@@ -4,13 +4,15 @@ from pathlib import Path
 
 import pytest
 from blast_agents.search import LayoutProblem
-from blast_agents.search.advice import MeasureKind, advise, kinds_for, only
+from blast_agents.search.advice import MeasureKind, advise, against_each, kinds_for, only
 from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
 from blast_env.evaluation import BlastEvaluator, Case
 from blast_env.geometry import Measure, standing
+from blast_env.physics.scene import Charge
+from blast_env.rendering.cost_level import PricedDamage, cheapest
 from blast_env.scenario import Placement, load_layout
 from tests.evaluation.test_response_objective import THREAT
 from tests.scenario.test_hardening import glazed_yard
@@ -61,7 +63,9 @@ def test_hardening_takes_the_best_choice_of_measures_with_one_blast() -> None:
 def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) -> None:
     site, out = tmp_path / "yard.toml", tmp_path / "best.json"
     blast_env.save_scenario(glazed_yard(charges="mean"), site)
+    picture = tmp_path / "cost.svg"
     options = ("--tnt-kg", "0.1", "--budget", "3", "--judge-cell", "0.5", "--out", out)
+    options += ("--picture", picture)
     text = run(site, *options, "--target", "low", "--budget-cost", "15")
     first, verdict = text.splitlines()[:2]
     assert first.startswith("4 kinds, at most 3 blasts each, gas, cells of 0.5 m; then 4 blasts")
@@ -70,6 +74,31 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
         kind.value in text for kind in (MeasureKind.NOTHING, MeasureKind.SHIELD, MeasureKind.HARDEN)
     )
     assert load_layout(out) is not None
+    assert picture.stat().st_size > 1000
+
+
+def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:
+    """As many as barriers times choices of measures; what passes is not worse than the target."""
+    scenario = glazed_yard(target="medium")
+    problem = LayoutProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
+    found = advise(problem, MeasureKind.HARDEN, 5)
+    assert [each.cost for each in found.tried] == [0.0, 5.0, 4.0, 9.0]
+    front = cheapest([PricedDamage(each.cost, each.damage) for each in found.tried])
+    assert [each.damage for each in front] == sorted((each.damage for each in front), reverse=True)
+    assert front[0].cost == 0.0
+    assert front[-1].damage == min(each.damage for each in found.tried)
+
+
+def test_a_search_begins_with_rules_against_each_charge_for_a_share_of_the_budget() -> None:
+    """The mean of two charges is where none is: a wall before each of them is another layout."""
+    scenario = only(glazed_yard(target="medium"), MeasureKind.SHIELD)
+    charges = [Charge((2.0, y_m), 5.0) for y_m in (2.0, 10.0)]
+    layouts = list(against_each(scenario, charges))
+    costs = [Placement(scenario, each).cost for each in layouts]
+    assert 0.0 < max(costs) <= scenario.zone.budget
+    middle = scenario.zone.rows / 2
+    assert any(min(x.row for x in each) < middle < max(x.row for x in each) for each in layouts)
+    assert list(against_each(scenario, charges[:1])) == []
 
 
 @pytest.mark.parametrize(

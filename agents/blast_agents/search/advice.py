@@ -4,7 +4,7 @@ A layout needs blasts for what stands on the ground alone. So each barrier that 
 measures that suit it best, all choices of them looked at without a blast.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations
@@ -17,7 +17,8 @@ from blast_agents.search.problem import LayoutProblem
 from blast_agents.search.registry import layouts_by_rule
 from blast_env.evaluation import BlastMeter, BudgetError
 from blast_env.geometry import Layout, Measure, standing
-from blast_env.scenario import Placement, Scenario
+from blast_env.response.damage import worst
+from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.values import generator
 
 _LOW_M: Final = 1.5
@@ -44,6 +45,20 @@ class MeasureKind(StrEnum):
 
 
 @dataclass(frozen=True)
+class Tried:
+    """A layout that was looked at: a barrier that got a blast, with some of the measures.
+
+    Attributes:
+        cost: What it costs.
+        damage: The worst damage of all components under every charge, from 0 to 5; see
+            `blast_env.response.damage`.
+    """
+
+    cost: float
+    damage: float
+
+
+@dataclass(frozen=True)
 class Advice:
     """The best layout of a kind of measures.
 
@@ -53,12 +68,14 @@ class Advice:
         worth: By the objective with its target: at most 1 if it passes; see
             `ObjectiveSection.counted`.
         blasts: Blasts that were asked for.
+        tried: All that was looked at.
     """
 
     kind: MeasureKind
     layout: Layout
     worth: float
     blasts: int
+    tried: tuple[Tried, ...] = ()
 
     @property
     def passes(self) -> bool:
@@ -114,8 +131,8 @@ def advise(
 ) -> Advice:
     """Return the best layout of a kind of measures.
 
-    First the rules' layouts and parts of them, then changes of the best: moves of pieces, and
-    fewer of them.
+    First the rules' layouts, those against each charge alone, and parts of them, then changes of
+    the best: moves of pieces, and fewer of them.
 
     Args:
         problem: Of a scenario whose objective has a target.
@@ -129,6 +146,7 @@ def advise(
     meter = BlastMeter(budget)
     metered = replace(problem, meter=meter)
     best: dict[Layout, Advice] = {}
+    tried: list[Tried] = []
     moves = Moves(scenario)
 
     def drawn() -> Iterator[Layout]:
@@ -136,10 +154,12 @@ def advise(
         for layout in begin_with:
             yield standing(layout)
         if _items_of(scenario, kind):
-            bare = only(scenario, kind).zone.model_copy(update={"hardening": ()})
-            ruled = layouts_by_rule(scenario.model_copy(update={"build_zone": bare}), problem.told)
+            bare = scenario.zone.model_copy(update={"hardening": ()})
+            unhardened = scenario.model_copy(update={"build_zone": bare})
+            ruled = layouts_by_rule(unhardened, problem.told)
+            yield from ruled.values()
+            yield from against_each(unhardened, problem.case.charges)
             for layout in ruled.values():
-                yield layout
                 yield layout[: len(layout) // 2]
             while True:
                 ranked = sorted(best, key=lambda each: best[each].worth)[:_KEPT]
@@ -155,14 +175,29 @@ def advise(
                 break
             if key in best:
                 continue
-            layout, worth = _hardened(metered, scenario, key)
+            layout, worth = _hardened(metered, scenario, key, tried)
             best[key] = Advice(kind, layout, worth, meter.blasts)
             if progress is not None:
                 progress(meter.blasts / budget)
     except BudgetError:
         pass
     found = min(best.values(), key=lambda each: each.worth)
-    return replace(found, blasts=meter.blasts)
+    return replace(found, blasts=meter.blasts, tried=tuple(tried))
+
+
+def against_each(scenario: Scenario, charges: Collection[AnyCharge]) -> Iterator[Layout]:
+    """Yield for each rule its layouts against each of several charges, all together.
+
+    Each charge gets the same share of the budget.
+    """
+    distinct, zone = tuple(dict.fromkeys(charges)), scenario.zone
+    if len(distinct) < 2 or zone.budget is None:
+        return
+    share = zone.model_copy(update={"budget": zone.budget / len(distinct)})
+    poorer = scenario.model_copy(update={"build_zone": share})
+    ruled = [layouts_by_rule(poorer, charge) for charge in distinct]
+    for name in ruled[0]:
+        yield tuple(element for each in ruled for element in each.get(name, ()))
 
 
 def _changed(moves: Moves, layout: Layout, rng: np.random.Generator) -> Layout:
@@ -172,11 +207,14 @@ def _changed(moves: Moves, layout: Layout, rng: np.random.Generator) -> Layout:
     return moves.neighbour(layout, rng)
 
 
-def _hardened(problem: LayoutProblem, scenario: Scenario, barrier: Layout) -> tuple[Layout, float]:
+def _hardened(
+    problem: LayoutProblem, scenario: Scenario, barrier: Layout, tried: list[Tried]
+) -> tuple[Layout, float]:
     """Return a barrier with the measures that suit it best, and what that is worth.
 
-    The blasts are those of the barrier alone. If none of the measures pass with it for what is
-    left of the budget, the one with the least shortfall is returned.
+    All that is looked at is added to `tried`. The blasts are those of the barrier alone. If none of
+    the measures pass with it for what is left of the budget, the one with the least shortfall is
+    returned.
 
     Raises:
         BudgetError: If the blasts do not pay for it.
@@ -193,5 +231,12 @@ def _hardened(problem: LayoutProblem, scenario: Scenario, barrier: Layout) -> tu
             if left is None or cost <= left:
                 layout = (*barrier, *map(Measure.named, taken))
                 found.append((problem.load(layout), cost, layout))
+                tried.append(Tried(placement.cost + cost, _worst_damage(problem, layout)))
     worth, _, layout = min(found)
     return layout, worth
+
+
+def _worst_damage(problem: LayoutProblem, layout: Layout) -> float:
+    """Return the worst damage under every charge; the blasts are those that were run before."""
+    loads = problem.evaluator.loads_of_many((layout, threat) for threat in problem.threats)
+    return worst(each.worst_damage or 0.0 for load in loads for each in load.protected)
