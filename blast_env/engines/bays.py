@@ -85,16 +85,19 @@ class BayLoads:
         histories = self.recorder.history_pa.astype(np.float64)
         return respond(self.bays, self.recorder.time_s, histories)
 
-    def damages(self, alternatives: Sequence[Alternatives]) -> tuple[BayDamage, ...]:
+    def damages(
+        self, alternatives: Sequence[Alternatives], peak_factor: float
+    ) -> tuple[BayDamage, ...]:
         """Return the damage of the bays under each component that they may have.
 
         Args:
             alternatives: What may stand in the bays of the scenario.
+            peak_factor: What peaks are multiplied by to be as sharp as in the open.
         """
         by_name = {each.name: each for each in alternatives}
         own = [by_name[each.bay.name] for each in self.bays]
         histories = self.recorder.history_pa.astype(np.float64)
-        return bay_damages(own, self.recorder.time_s, histories) if own else ()
+        return bay_damages(own, self.recorder.time_s, histories, peak_factor) if own else ()
 
     def history(self, name: str) -> "pd.DataFrame":
         """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.

@@ -47,6 +47,7 @@ from blast_env.physics.gas.settings import (
 from blast_env.physics.scene import BlastSite
 from blast_env.provenance import versions
 from blast_env.response.damage import BayDamage
+from blast_env.response.facade import peak_factor
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.scenario.build_scene import build_site, draw_threat
 from blast_env.tables import table_of
@@ -356,7 +357,8 @@ class GasResult:
         """What becomes of the bays, where that counts."""
         if self.bay_loads is None or not self.blast.scenario.objective.is_response:
             return ()
-        return self.bay_loads.damages(self.blast.scenario.alternatives)
+        factor = peak_factor(self.run.grid.cell_m, self.run.site.charge.tnt_kg)
+        return self.bay_loads.damages(self.blast.scenario.alternatives, factor)
 
     def _walls(self, index: int) -> NDArray[np.int64]:
         """Return the faces of the walls of a structure whose load counts (n,)."""

@@ -10,7 +10,6 @@ loads stay, and the response is worked out again.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import cbrt
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -25,7 +24,13 @@ from blast_env.physics.scene import Charge
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import worst
-from blast_env.response.facade import FacadeResponse, FilledBay, respond, sharpened
+from blast_env.response.facade import (
+    FacadeResponse,
+    FilledBay,
+    peak_factor,
+    respond,
+    sharpened,
+)
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.scenario.facade import with_glass
@@ -37,22 +42,6 @@ if TYPE_CHECKING:  # a third of a second to import
     from blast_env.engines.gas import GasResult
 
 _SHARPER: Final = "with peaks as sharp as Kingery and Bulmash's: take smaller cells"
-
-_CELLS_OF_HALF_A_PEAK: Final = 9.3
-"""Cells per m/kg^(1/3) of a charge with which peaks are about half of Kingery and Bulmash's."""
-
-
-def peak_factor(cell_m: float, tnt_kg: float) -> float:
-    """Return what peaks on cells must be multiplied by to be as sharp as Kingery and Bulmash's.
-
-    A rule that errs on the safe side: 2 with 9.3 cells per m/kg^(1/3), 1.5 with twice as many
-    (`python -m studies.response cells`).
-
-    Args:
-        cell_m: Side of the cells.
-        tnt_kg: Mass of the charge.
-    """
-    return 1.0 + _CELLS_OF_HALF_A_PEAK * cell_m / cbrt(tnt_kg)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,14 +12,13 @@ from blast_env.evaluation.consequences import (
     Consequences,
     bay_table,
     consequences,
-    peak_factor,
     piece_table,
 )
 from blast_env.evaluation.neighbours import side_on_impulse_pa_s, side_on_peak_pa
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
-from blast_env.response.facade import respond
+from blast_env.response.facade import peak_factor, respond
 from blast_env.scenario import Scenario
 from tests.catalogue_sites import ITEMS, WALL, yard_document
 
