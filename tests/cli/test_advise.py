@@ -64,9 +64,9 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     site, out = tmp_path / "yard.toml", tmp_path / "best.json"
     blast_env.save_scenario(glazed_yard(charges="mean"), site)
     picture = tmp_path / "cost.svg"
-    options = ("--tnt-kg", "0.1", "--budget", "3", "--judge-cell", "0.5", "--out", out)
-    options += ("--picture", picture)
-    text = run(site, *options, "--target", "low", "--budget-cost", "15")
+    options = ("--tnt-kg", "0.1", "--budget", "3", "--judge-cell", "0.5")
+    files = ("--out", out, "--picture", picture)
+    text = run(site, *options, *files, "--target", "low", "--budget-cost", "15")
     first, verdict = text.splitlines()[:2]
     assert first.startswith("4 kinds, at most 3 blasts each, gas, cells of 0.5 m; then 4 blasts")
     assert "walled_yard" in verdict
