@@ -230,6 +230,14 @@ class Feature:
     fill: Colour | None = None
 
     @property
+    def look(self) -> Look:
+        """How it looks: as its kind does, with dashes if it begins above the ground."""
+        look = self.kind.look
+        return (
+            replace(look, dashed=True, drawn_dashed=True) if "base_m" in self.properties else look
+        )
+
+    @property
     def title(self) -> str:
         """What legends call it."""
         return self.words or self.kind.words
@@ -438,7 +446,8 @@ def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
         for part in parts:
             kind = Kinds.PROTECTED_STRUCTURE if part.protected else Kinds.STRUCTURE
             outline = area_feature(kind, part.rectangle_m, part.name, **_said_of(part))
-            yield replace(outline, label=label if part is largest else "")
+            words = f"{kind.words} above the ground" if part.base_m > 0.0 else ""
+            yield replace(outline, label=label if part is largest else "", words=words)
 
 
 def _said_of(structure: AnyStructure) -> dict[str, str | float]:
@@ -446,6 +455,8 @@ def _said_of(structure: AnyStructure) -> dict[str, str | float]:
     said: dict[str, str | float] = {"weight": structure.weight}
     if structure.height_m is not None:
         said["height_m"] = structure.height_m
+    if structure.base_m > 0.0:
+        said["base_m"] = structure.base_m
     if structure.building is not None:
         said["building"] = structure.building
     return said

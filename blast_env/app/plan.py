@@ -166,20 +166,21 @@ _BLOCKED: Final = (
 
 def draw_features(view: PixelView, features: Iterable[Feature]) -> Iterator[str]:
     """Yield the features by their geometry and their look; areas of a kind are one figure."""
-    for (kind, colour, corners), group in groupby(
-        features, key=lambda each: (each.kind, each.colour, min(len(each.places_m), 3))
+    for (kind, look, colour, corners), group in groupby(
+        features, key=lambda each: (each.kind, each.look, each.colour, min(len(each.places_m), 3))
     ):
         places = [[view.pixel(*place) for place in each.places_m] for each in group]
         if corners == 3:
-            yield from _areas(kind, colour, places)
+            yield from _areas(kind, look, colour, places)
         elif corners == 2:
-            yield from (_line(kind.look, start, end) for start, end in places)
+            yield from (_line(look, start, end) for start, end in places)
         else:
-            yield from (_sign(kind.look, *place) for (place,) in places)
+            yield from (_sign(look, *place) for (place,) in places)
 
 
-def _areas(kind: FeatureKind, colour: Colour | None, outlines: list[list[PointM]]) -> Iterator[str]:
-    look = kind.look
+def _areas(
+    kind: FeatureKind, look: Look, colour: Colour | None, outlines: list[list[PointM]]
+) -> Iterator[str]:
     path = "".join(f"M{'L'.join(f'{x:g} {y:g}' for x, y in outline)}Z" for outline in outlines)
     fill = "none" if colour is None else _hex(colour)
     if look.hatched:

@@ -55,7 +55,9 @@ def _standing(feature: Feature, air_m: float) -> SolidBox:
     name = str(feature.properties.get("item", feature.name))
     top_m = height_m if isinstance(height_m, float) else air_m
     opacity = 1.0 if known else _SEE_THROUGH
-    return _box(feature.bounds_m, 0.0, top_m, colour or EXPLOSIVE, opacity, name)
+    base_m = feature.properties.get("base_m", 0.0)
+    assert isinstance(base_m, float)
+    return _box(feature.bounds_m, base_m, top_m, colour or EXPLOSIVE, opacity, name)
 
 
 def _place(feature: Feature) -> Iterator[SolidBox]:

@@ -41,10 +41,9 @@ from blast_env.physics.engine import EndReason
 from blast_env.physics.gas.settings import (
     CHECKED_SCALED_DISTANCE,
     FACE_NAMES,
-    ROOF,
     GasSettings,
 )
-from blast_env.physics.scene import BlastSite
+from blast_env.physics.scene import WALLS, BlastSite
 from blast_env.provenance import versions
 from blast_env.response.damage import BayDamage
 from blast_env.response.facade import peak_factor
@@ -382,7 +381,7 @@ class GasResult:
         table, sums = self.run.table, []
         for index, outline in enumerate(self.run.site.structures):
             if outline.cells is None:
-                own = (table.structure == index) & (table.face != FACE_NAMES.index(ROOF))
+                own = (table.structure == index) & (table.face < len(WALLS))
                 momentum = np.zeros((outline.rows, outline.columns))
                 values = self.run.loads.positive_impulse_pa_s[own] * self._cell_area_m2
                 np.add.at(momentum, (table.row[own], table.column[own]), values)

@@ -37,7 +37,7 @@ _LOADS: Final = (
 
 FACE_COLUMNS: Final = (
     Column("structure", "", "name of the structure, or `barrier`"),
-    Column("face", "", "west, east, south, north or roof"),
+    Column("face", "", "west, east, south, north, roof or underside"),
     Column("module_id", "", "name of the module, made from its centre in metres"),
     Column("x_m", "m", "centre, from the left border"),
     Column("y_m", "m", "centre, from the lower border"),
@@ -53,7 +53,7 @@ MODULE_COLUMNS: Final = (
     Column("column", "", "column in the structure's grid, to the right from 0"),
     Column("x_m", "m", "centre, from the left border"),
     Column("y_m", "m", "centre, from the lower border"),
-    Column("face", "", "west, east, south, north or roof"),
+    Column("face", "", "west, east, south, north, roof or underside"),
     Column("area_m2", "m2", "area of that face over the whole height"),
     *_LOADS,
     Column("piece", "", "piece of a barrier that it is part of; empty if it is of none"),
@@ -62,7 +62,7 @@ MODULE_COLUMNS: Final = (
 
 WALL_COLUMNS: Final = (
     Column("structure", "", "name of the structure"),
-    Column("face", "", "west, east, south, north or roof"),
+    Column("face", "", "west, east, south, north, roof or underside"),
     Column("counts", "", "whether its load counts, if the structure is protected"),
     Column("area_m2", "m2", "its area that touches air"),
     *_LOADS,

@@ -384,7 +384,10 @@ def _draw(space: Modelspace, feature: Feature) -> None:
         outline = space.add_lwpolyline(places, close=True, dxfattribs=attributes)
         height_m = feature.properties.get("height_m")
         if isinstance(height_m, float):
-            outline.dxf.thickness = height_m  # what stands is drawn as high as it is
+            base_m = feature.properties.get("base_m", 0.0)
+            assert isinstance(base_m, float)
+            outline.dxf.thickness = height_m - base_m  # what stands is drawn as high as it is
+            outline.dxf.elevation = base_m
         if feature.kind is Kinds.BARRIER:
             outline.set_xdata(APPLICATION, [(_STRING, text) for text in _barrier_texts(feature)])
 

@@ -196,6 +196,8 @@ def _structures(building: FittedBuilding) -> list[dict[str, Any]]:
                 part["weight"] = round(share, 6)
         if building.height_m is not None:
             part["height_m"] = building.height_m
+        if building.base_m:
+            part["base_m"] = building.base_m
         parts.append(part)
     return parts
 

@@ -220,7 +220,11 @@ def _features(
         has_thickness = entity.dxf.is_supported("thickness")
         thickness_m = metres * abs(entity.dxf.get("thickness", 0.0)) if has_thickness else 0.0
         if thickness_m > 0.0:
-            tags["height"] = thickness_m
+            is_level = entity.dxftype() == "LWPOLYLINE"
+            base_m = metres * max(entity.dxf.get("elevation", 0.0), 0.0) if is_level else 0.0
+            tags["height"] = base_m + thickness_m
+            if base_m > 0.0:
+                tags["min_height"] = base_m
         places = _places(path, place, entity, sag, skipped, left)
         if places is not None:
             left -= len(places)

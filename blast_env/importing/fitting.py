@@ -49,6 +49,7 @@ class FittedBuilding:
         rectangles: The modules.
         wall_shares: Which part of the building's walls that look at air each rectangle has.
         height_m: Its height; `None` for as high as the air.
+        base_m: How high it begins above the ground.
         protected: Whether its load counts.
         deviation: How far the modules are from the outline.
         block_m: Side of the blocks it was cut into; a module's side, unless that takes too many
@@ -63,6 +64,7 @@ class FittedBuilding:
     rectangles: tuple[CellRectangle, ...]
     wall_shares: tuple[float, ...]
     height_m: float | None
+    base_m: float
     protected: bool
     deviation: Deviation
     block_m: float
@@ -120,6 +122,7 @@ def fit_buildings(
             rectangles=rectangles,
             wall_shares=shares,
             height_m=height_m,
+            base_m=_base_m(thing, height_m),
             protected=thing.protected,
             deviation=Deviation.between(thing.geometry, outline_of(rectangles)),
             block_m=block * MODULE_SIDE_M,
@@ -304,6 +307,12 @@ def _heights(things: Sequence[Thing], options: ImportOptions) -> list[float | No
         None if height_m is None else max(round(height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
         for height_m in heights
     ]
+
+
+def _base_m(thing: Thing, height_m: float | None) -> float:
+    """Return how high a building begins, in whole modules; a module below its top at most."""
+    base_m = round(thing.base_m / MODULE_SIDE_M) * MODULE_SIDE_M
+    return base_m if height_m is None else max(min(base_m, height_m - MODULE_SIDE_M), 0.0)
 
 
 def _wall_areas(

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
 from math import isfinite
@@ -40,6 +40,7 @@ class Thing:
         name: What the source calls it, or an empty string.
         place: Where in the file it is.
         height_m: Its height, where the source has it.
+        base_m: How high it begins above the ground.
         protected: Whether the source says that its load counts.
         tnt_kg: Mass of a charge there, where the source has it.
         part_of: The building that it is a rectangle of, in what blast-env itself wrote.
@@ -53,6 +54,7 @@ class Thing:
     protected: bool = False
     tnt_kg: float | None = None
     part_of: str = ""
+    base_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,8 @@ _ROADS: Final = frozenset(
 """Values of OpenStreetMap's `highway` on which motor vehicles go."""
 
 _HEIGHT_KEYS: Final = ("height", "height_m", "building:height", "building_height")
+_BASE_KEYS: Final = ("min_height", "building:min_height", "base_m")
+_BASE_LEVEL_KEYS: Final = ("building:min_level", "min_level")
 _LEVEL_KEYS: Final = ("building:levels", "levels", "storeys", "num_floors")
 _NAME_KEYS: Final = ("name", "addr:housename", "text")
 _LENGTH: Final = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*(m|ft|')?")
@@ -146,7 +150,8 @@ def things_of(
             role = Role.NAME  # a text on the layer of what it names
         height_m, note = _height_m(feature, level_height_m, height_key)
         notes += [note] if note else []
-        found.append(_thing(feature, role, height_m))
+        base_m = _base_m(feature, level_height_m)
+        found.append(replace(_thing(feature, role, height_m), base_m=base_m))
     if not any(each.role is Role.BUILDING for each in found) and Role.BUILDING not in selectors:
         found += _untagged_outlines(site_map)
     return tuple(_closed(found)), tuple(dict.fromkeys(notes))
@@ -207,6 +212,17 @@ def _height_m(
     levels = next((lower[name] for name in _LEVEL_KEYS if name in lower), None)
     number = None if levels is None or key is not None else _length_m(levels)
     return (None if number is None else number * level_height_m), None
+
+
+def _base_m(feature: MapFeature, level_height_m: float) -> float:
+    """Return how high something begins: 0 where nothing says it."""
+    lower = {str(name).lower(): value for name, value in feature.tags.items()}
+    for keys, unit_m in ((_BASE_KEYS, 1.0), (_BASE_LEVEL_KEYS, level_height_m)):
+        given = next((lower[name] for name in keys if name in lower), None)
+        number = None if given is None else _length_m(given)
+        if number is not None:
+            return number * unit_m
+    return 0.0
 
 
 def _length_m(value: str | float | bool) -> float | None:

@@ -124,9 +124,9 @@ class Block(NamedTuple):
 class StructureOutline:
     """What a structure is before any blast, in metres; attributes as in `ModularObstacle`.
 
-    Three more are for gas dynamics: `height_m`, `None` for as high as the air; `heights_m`, the
-    heights of single cells, in the order of `cells`, where they are not all `height_m`; and
-    `faces`, the walls whose load counts ("west", "east", "south", "north").
+    Four more are for gas dynamics: `height_m`, `None` for as high as the air; `base_m`, where it
+    begins above the ground; `heights_m`, the heights of single cells, in the order of `cells`,
+    where they are not all `height_m`; and `faces`, the walls whose load counts.
     """
 
     kind: type[ModularObstacle]
@@ -142,6 +142,7 @@ class StructureOutline:
     faces: tuple[WallName, ...] = WALLS
     heights_m: tuple[float | None, ...] | None = None
     pieces: tuple[str, ...] | None = None
+    base_m: float = 0.0
 
     @property
     def rectangle_m(self) -> Rectangle:

@@ -239,9 +239,9 @@ def _draw_sign(feature: Feature, surface: pygame.Surface, place: pygame.Rect) ->
     if len(feature.places_m) > 2:
         _draw_area(surface, place, feature)
     elif len(feature.places_m) == 2:
-        _draw_line(surface, place.midleft, place.midright, feature.kind.look)
+        _draw_line(surface, place.midleft, place.midright, feature.look)
     else:
-        _draw_place(surface, place.center, feature.kind.look, 0.5 * place.width)
+        _draw_place(surface, place.center, feature.look, 0.5 * place.width)
 
 
 def draw_features(surface: pygame.Surface, view: FrameView, features: Iterable[Feature]) -> None:
@@ -252,13 +252,13 @@ def draw_features(surface: pygame.Surface, view: FrameView, features: Iterable[F
             continue
         places = [view.pixel(*place) for place in feature.places_m]
         if len(places) == 2:
-            _draw_line(surface, places[0], places[1], feature.kind.look)
+            _draw_line(surface, places[0], places[1], feature.look)
         else:
-            _draw_place(surface, places[0], feature.kind.look, _SIGN_PX)
+            _draw_place(surface, places[0], feature.look, _SIGN_PX)
 
 
 def _draw_area(surface: pygame.Surface, place: pygame.Rect, feature: Feature) -> None:
-    look = feature.kind.look
+    look = feature.look
     if feature.colour is not None:
         veil = empty_surface(*place.size)
         veil.fill((*feature.colour, round(255 * look.opacity)))
@@ -570,7 +570,7 @@ def names_layer(
     for each in settled:
         if each.leader is not None:
             (x0, y0), (x1, y1) = each.leader
-            colour = each.label.feature.kind.look.line or INK
+            colour = each.label.feature.look.line or INK
             pygame.draw.aaline(layer, colour, (x0, -y0), (x1, -y1))
     for plate, each in zip(plates, settled, strict=True):
         layer.blit(plate, (round(each.place.left), round(-each.place.top)))

@@ -82,9 +82,11 @@ class ObliqueView:
         """Return the corners of a rectangle, counterclockwise from the near one (4, 2)."""
         return self.places(self._corners_m(rectangle_m, height_m))
 
-    def faces(self, rectangle_m: Rectangle, height_m: float) -> tuple[FloatArray, ...]:
+    def faces(
+        self, rectangle_m: Rectangle, height_m: float, base_m: float = 0.0
+    ) -> tuple[FloatArray, ...]:
         """Return the faces that one sees of a box: the right side, the left side, the top."""
-        low, high = (self.on_ground(rectangle_m, each) for each in (0.0, height_m))
+        low, high = (self.on_ground(rectangle_m, each) for each in (base_m, height_m))
         right = np.array([low[0], low[1], high[1], high[0]])
         left = np.array([low[0], low[3], high[3], high[0]])
         return right, left, high
@@ -138,6 +140,7 @@ class Box(NamedTuple):
         colour: Colour of its top.
         edge: Colour of its edges.
         tiles: Parts of its walls.
+        base_m: How high it begins.
     """
 
     rectangle_m: Rectangle
@@ -145,9 +148,12 @@ class Box(NamedTuple):
     colour: Colour
     edge: Colour
     tiles: Sequence[Tile] = ()
+    base_m: float = 0.0
 
 
-def painted_order(view: ObliqueView, rectangles_m: Sequence[Rectangle]) -> list[int]:
+def painted_order(
+    view: ObliqueView, rectangles_m: Sequence[Rectangle], bases_m: Sequence[float] | None = None
+) -> list[int]:
     """Return in which order boxes are painted, so that none covers one that is before it.
 
     A box is behind another if there is a wall between them, along the x or the y axis, with the
@@ -156,7 +162,9 @@ def painted_order(view: ObliqueView, rectangles_m: Sequence[Rectangle]) -> list[
 
     Args:
         view: The view.
-        rectangles_m: The plans of the boxes, which do not overlap.
+        rectangles_m: The plans of the boxes.
+        bases_m: How high they begin; on the ground unless given. Boxes whose plans overlap are
+            above each other, and the lowest comes first.
     """
     left, bottom, right, top = np.array(rectangles_m, dtype=np.float64).reshape(-1, 4).T
     first, second = view.towards(left, bottom), view.towards(right, top)
@@ -164,7 +172,8 @@ def painted_order(view: ObliqueView, rectangles_m: Sequence[Rectangle]) -> list[
     beyond: BoolArray = np.logical_or.reduce(
         near[:, :, np.newaxis] >= far[:, np.newaxis, :] - TOLERANCE_M
     )
-    behind = beyond & ~beyond.T
+    lower = np.subtract.outer(bases_m or np.zeros(len(left)), bases_m or np.zeros(len(left))) < 0.0
+    behind = (beyond & ~beyond.T) | (lower & ~beyond & ~beyond.T)
     waits_for = behind.sum(axis=0)
     order: list[int] = []
     for _ in rectangles_m:
@@ -236,7 +245,9 @@ def _box_of(feature: Feature) -> Box:
         colour = unit_interval(feature.colour or INK)
     else:
         colour = _lighter(unit_interval(feature.kind.look.line or INK))
-    return Box(feature.bounds_m, height_m, colour, unit_interval(INK))
+    base_m = feature.properties.get("base_m", 0.0)
+    assert isinstance(base_m, float)
+    return Box(feature.bounds_m, height_m, colour, unit_interval(INK), base_m=base_m)
 
 
 def scale_length_m(site_m: Rectangle) -> float:
@@ -264,9 +275,10 @@ def _draw_boxes(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
     polygons: list[FloatArray] = []
     colours: list[Colour] = []
     edges: list[Colour] = []
-    for number in painted_order(view, [box.rectangle_m for box in boxes]):
+    bases_m = [box.base_m for box in boxes]
+    for number in painted_order(view, [box.rectangle_m for box in boxes], bases_m):
         box = boxes[number]
-        polygons += view.faces(box.rectangle_m, box.height_m)
+        polygons += view.faces(box.rectangle_m, box.height_m, box.base_m)
         for bright in (_RIGHT_SIDE, _LEFT_SIDE, _TOP):
             red, green, blue = box.colour
             colours.append((bright * red, bright * green, bright * blue))

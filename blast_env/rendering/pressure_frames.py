@@ -400,7 +400,8 @@ class PressurePainter:
         for outline in site.structures:
             top_m = site.air_height_m if outline.height_m is None else outline.height_m
             for rectangle in _parts(outline):
-                self._add_solid(axes, rectangle, outline, is_cut=top_m > height_m)
+                is_cut = outline.base_m < height_m < top_m
+                self._add_solid(axes, rectangle, outline, is_cut=is_cut)
         self._let_move(axes, draw_features(axes, _on_ground(shot)))
         before = len(axes.lines)
         line = axes.axhline if shot.section.axis == "y" else axes.axvline
@@ -429,7 +430,7 @@ class PressurePainter:
             top_m = site.air_height_m if outline.height_m is None else outline.height_m
             for part in _parts(outline):
                 if part[shot.section.normal] < at_m < part[shot.section.normal + 2]:
-                    rectangle = Rectangle(part[along], 0.0, part[along + 2], top_m)
+                    rectangle = Rectangle(part[along], outline.base_m, part[along + 2], top_m)
                     self._add_solid(axes, rectangle, outline, is_cut=True)
         charge = site.charge
         if abs(charge.position_m[shot.section.normal] - at_m) <= shot.result.run.grid.cell_m:

@@ -114,20 +114,20 @@ def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) ->
         What was drawn, the lowest first.
     """
     drawn: list[Artist] = []
-    areas: dict[tuple[FeatureKind, object], list[Path]] = {}
+    areas: dict[tuple[FeatureKind, Look, object], list[Path]] = {}
     for feature in features:
         places = _places(feature, view)
         if len(feature.places_m) > 2:
             outline = Path(np.vstack([places, places[:1]]), closed=True)
-            areas.setdefault((feature.kind, feature.colour), []).append(outline)
+            areas.setdefault((feature.kind, feature.look, feature.colour), []).append(outline)
         elif len(feature.places_m) == 2:
             drawn.append(_line(feature, places))
         else:
             drawn += _sign(feature, places, view)
-    for (kind, fill), paths in areas.items():
+    for (kind, look, fill), paths in areas.items():
         # One patch, so that neighbours have no seam.
         patch = PathPatch(Path.make_compound_path(*paths))
-        patch.set(**_area_style(kind, fill), zorder=kind.level)
+        patch.set(**_area_style(look, fill), zorder=kind.level)
         drawn.append(patch)
     drawn.sort(key=lambda artist: artist.get_zorder())
     for artist in drawn:
@@ -141,9 +141,8 @@ def _places(feature: Feature, view: View) -> FloatArray:
     return view.places(np.array([(*place_m, height_m) for place_m in feature.places_m]))
 
 
-def _area_style(kind: FeatureKind, fill: object) -> dict[str, Any]:
+def _area_style(look: Look, fill: object) -> dict[str, Any]:
     """Return matplotlib's style for an area."""
-    look = kind.look
     line = QUIET_INK if look.line is None else look.line
     style: dict[str, Any] = {
         "facecolor": (*unit_interval(fill), look.opacity) if isinstance(fill, tuple) else "none",
@@ -155,7 +154,7 @@ def _area_style(kind: FeatureKind, fill: object) -> dict[str, Any]:
 
 
 def _line(feature: Feature, places: FloatArray) -> Artist:
-    look, (start, end) = feature.kind.look, places.tolist()
+    look, (start, end) = feature.look, places.tolist()
     colour = unit_interval(look.line or INK)
     if look.arrows:
         arrow = FancyArrowPatch(start, end, arrowstyle="<->", shrinkA=0, shrinkB=0)
@@ -201,10 +200,10 @@ def legend_of(features: Iterable[Feature]) -> list[Artist]:
 
 
 def _legend_entry(feature: Feature) -> Artist:
-    kind, look = feature.kind, feature.kind.look
+    kind, look = feature.kind, feature.look
     entry: Artist
     if len(feature.places_m) > 2:
-        entry = Patch(**_area_style(kind, feature.colour))
+        entry = Patch(**_area_style(look, feature.colour))
     elif len(feature.places_m) == 1:
         entry = Line2D([], [], **_sign_style(kind))
     else:

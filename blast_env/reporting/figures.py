@@ -10,8 +10,7 @@ import numpy as np
 from blast_env.engines.gas import GasBlast
 from blast_env.evaluation.consequences import Consequences
 from blast_env.geometry import Layout
-from blast_env.physics.gas.settings import ROOF
-from blast_env.physics.scene import Charge
+from blast_env.physics.scene import WALLS, Charge
 from blast_env.plan import (
     INK,
     QUIET_INK,
@@ -148,7 +147,8 @@ def _shown_parts(measured: MeasuredBlast, target: ReportedBuilding) -> list[str]
     """Return the structures of a building that have most of its walls."""
     faces = measured.result.faces
     counts = [
-        int(((faces["structure"] == name) & (faces["face"] != ROOF)).sum()) for name in target.names
+        int(((faces["structure"] == name) & faces["face"].isin(WALLS)).sum())
+        for name in target.names
     ]
     least = _LEAST_SHARE * sum(counts)
     shown = [name for name, count in zip(target.names, counts, strict=True) if count >= least]

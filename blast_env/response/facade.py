@@ -85,6 +85,7 @@ def divide(
     walls: Sequence[str],
     storey_m: float = STOREY_M,
     bay_m: float = BAY_M,
+    base_m: float = 0.0,
 ) -> tuple[Bay, ...]:
     """Return the bays of a block, wall by wall, storey by storey.
 
@@ -94,19 +95,21 @@ def divide(
     Args:
         structure: Name of the structure.
         ground_m: Where it stands.
-        height_m: Its height.
+        height_m: Its height above the ground.
         walls: Which walls: west, east, south, north.
         storey_m: Height of a storey.
         bay_m: Width of a bay.
+        base_m: Height at which it begins.
 
     Raises:
         BlastEnvError: If a size is not positive.
     """
-    for name, value in (("height_m", height_m), ("storey_m", storey_m), ("bay_m", bay_m)):
+    rise_m = height_m - base_m
+    for name, value in (("height_m", rise_m), ("storey_m", storey_m), ("bay_m", bay_m)):
         if not value > 0.0:
             raise BlastEnvError(f"facade of {structure!r}: {name} is {value}, must be above 0")
-    storeys = max(1, floor(height_m / storey_m + 0.5))
-    floors = [storey_m * storey for storey in range(storeys)] + [height_m]
+    storeys = max(1, floor(rise_m / storey_m + 0.5))
+    floors = [base_m + storey_m * storey for storey in range(storeys)] + [height_m]
     bays: list[Bay] = []
     for wall in walls:
         low, high = (

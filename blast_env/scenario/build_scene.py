@@ -24,6 +24,7 @@ from blast_env.scenario import (
     check_layout,
     usable_cells,
 )
+from blast_env.scenario.checks import raised_problems
 from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
 from blast_env.scenario.reach import Reach
 from blast_env.scenario.vehicles import NOTHING, Drive, Obstacles, obstacles_of
@@ -168,11 +169,15 @@ def build_scene(
     Raises:
         LayoutError: If the layout does not fit the build zone, or the charge.
         ScenarioError: If the charge is not clear of a structure or the border, or over a roof:
-            without heights it would be inside the structure.
+            without heights it would be inside the structure; or a structure begins above the
+            ground.
         BlastEnvError: If the parameters do not reach to the mass of the charge.
         ValueError: If the seed is negative.
     """
     base = build_site(scenario, layout, seed, charge)
+    raised = tuple(raised_problems(scenario.structures))
+    if raised:
+        raise ScenarioError(scenario.name, raised)
     _check_not_over_a_roof(scenario, base.charge)
     parameters = _parameters_for(scenario, base.charge)
     _, fan_rng, air_rng = random_streams(seed)
@@ -264,6 +269,7 @@ def _outline(section: AnyStructure) -> StructureOutline:
         capacity=section.module_capacity,
         height_m=section.height_m,
         faces=section.faces,
+        base_m=section.base_m,
     )
 
 

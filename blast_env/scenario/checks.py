@@ -42,7 +42,7 @@ from blast_env.scenario.zone import (
     depth_inside_m,
     distance_m,
     empty_zone,
-    is_over,
+    is_over_or_below,
     source_bounds_m,
 )
 from blast_env.scenario.zone_checks import build_zone_problems
@@ -247,9 +247,17 @@ def _structure_problems(parts: Parts) -> Iterator[Problem]:
             parts, f"structures[{index}]", _described(structure), structure.rectangle_m
         )
     for (i, one), (j, other) in combinations(parts.structures.items(), 2):
-        if one.rectangle_m.overlaps(other.rectangle_m):
+        if one.rectangle_m.overlaps(other.rectangle_m) and not _are_above_each_other(one, other):
             message = f"{_described(other)} overlaps structures[{i}], {_described(one)}"
             yield Problem(f"structures[{j}]", message)
+
+
+def _are_above_each_other(one: AnyStructure, other: AnyStructure) -> bool:
+    """Whether one of two structures begins where the other ends, or higher."""
+    return any(
+        low.height_m is not None and high.base_m >= low.height_m - TOLERANCE_M
+        for low, high in ((one, other), (other, one))
+    )
 
 
 def _charge_problems(parts: Parts) -> Iterator[Problem]:
@@ -282,13 +290,15 @@ def _place_problems(parts: Parts, key: str, source: PlaceSource) -> Iterator[Pro
         yield Problem(key, message)
     for j, structure in parts.structures.items():
         distance = distance_m(source, structure.rectangle_m)
-        if distance < radius - TOLERANCE_M and not is_over(source.height_m, structure):
+        if distance < radius - TOLERANCE_M and not is_over_or_below(source.height_m, structure):
             message = (
                 f"its centre comes as near as {distance:g} m to structures[{j}],"
                 f" {_described(structure)}, must keep clear of it{words}"
             )
             if structure.height_m is not None:
                 message += f", or be higher than its {structure.height_m:g} m"
+            if structure.base_m > 0.0:
+                message += f", or be lower than its base_m of {structure.base_m:g} m"
             yield Problem(key, message)
 
 
@@ -436,6 +446,14 @@ def _height_problems(parts: Parts) -> Iterator[Problem]:
     """Check that nothing sticks out of the air."""
     for index, structure in parts.structures.items():
         yield from _above_the_air(parts, f"structures[{index}].height_m", structure.height_m)
+        top_m = parts.air_height_m if structure.height_m is None else structure.height_m
+        if structure.base_m > max(top_m - MODULE_SIDE_M, 0.0) + TOLERANCE_M:
+            what = "the air" if structure.height_m is None else "height_m"
+            message = (
+                f"is {structure.base_m:g}, must be at least {MODULE_SIDE_M:g} below {what}"
+                f" ({top_m:g})"
+            )
+            yield Problem(f"structures[{index}].base_m", message)
     if parts.build_zone is not None:
         yield from _above_the_air(parts, "build_zone.height_m", parts.build_zone.height_m)
         for index, item in enumerate(parts.build_zone.items):
@@ -497,19 +515,34 @@ def _simulation_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def particle_problems(
-    parameters: SimulationParameters, sources: Sequence[AnySource]
+    parameters: SimulationParameters,
+    sources: Sequence[AnySource],
+    structures: Sequence[AnyStructure],
 ) -> Iterator[Problem]:
-    """Yield why particles cannot run a scenario that gas dynamics can: its charges' masses.
+    """Yield why particles cannot run a scenario that gas dynamics can.
 
     Args:
         parameters: Those of the particles; they must reach to the mass of every charge.
         sources: The sources of the charges.
+        structures: The structures; all must stand on the ground.
     """
+    yield from raised_problems(structures)
     for index, source in enumerate(sources):
         try:
             for_charge(parameters, source.tnt_kg)
         except BlastEnvError as error:
             yield Problem(f"charge[{index}].tnt_kg", str(error).removeprefix("tnt_kg "))
+
+
+def raised_problems(structures: Sequence[AnyStructure]) -> Iterator[Problem]:
+    """Yield the structures that begin above the ground, which particles do not know."""
+    for index, structure in enumerate(structures):
+        if structure.base_m > 0.0:
+            message = (
+                f"is {structure.base_m:g}, must be 0 for particles: they know no heights, and"
+                f" nothing would pass below {structure.name!r}; engine 'gas' takes it"
+            )
+            yield Problem(f"structures[{index}].base_m", message)
 
 
 def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:

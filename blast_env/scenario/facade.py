@@ -111,6 +111,7 @@ def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
         structure.faces,
         facade.storey_m,
         facade.bay_m,
+        structure.base_m,
     )
     named = []
     for bay in bays:

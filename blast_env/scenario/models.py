@@ -228,7 +228,7 @@ class Scenario(Section):
     @property
     def particle_problems(self) -> tuple[Problem, ...]:
         """Why particles cannot run the scenario; gas dynamics needs nothing of it."""
-        return tuple(particle_problems(self.parameters, self.charge))
+        return tuple(particle_problems(self.parameters, self.charge, self.structures))
 
     def check_for_particles(self) -> None:
         """Refuse a scenario that particles cannot run.

@@ -433,6 +433,10 @@ class FacadeSection(Section):
                     yield f"parts[{index}].{key}", name
 
 
+PASSAGE_M: Final = 2.0
+"""What begins so high above the ground, or higher, stops no vehicle: a car passes below."""
+
+
 class StructureSection(Section):
     """Base of the structures.
 
@@ -445,7 +449,9 @@ class StructureSection(Section):
             much as `weight` says unless given.
         module_capacity: Impulse, simulation units, that a module bears before it is removed;
             without it modules never fail.
-        height_m: Height; without it, as high as the air.
+        height_m: Height of its top above the ground; without it, as high as the air.
+        base_m: Height of its underside: above 0 it is a canopy, or a storey over a passage. For gas
+            dynamics only.
         faces: The walls whose load counts; a wall is named by the side that it looks to.
         building: The building that the structure is a part of, where several make one; for
             people and tables, no result depends on it.
@@ -459,6 +465,7 @@ class StructureSection(Section):
     peak_weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] | None = None
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
     height_m: Height | None = None
+    base_m: Coordinate = 0.0
     faces: Annotated[
         tuple[WallName, ...],
         Field(min_length=1, max_length=len(WALLS)),
@@ -466,6 +473,11 @@ class StructureSection(Section):
     ] = WALLS
     building: Name | None = None
     facade: FacadeSection | None = None
+
+    @property
+    def lets_through(self) -> bool:
+        """Whether people and vehicles pass below it: it begins at least `PASSAGE_M` up."""
+        return self.base_m >= PASSAGE_M
 
     @property
     def building_name(self) -> str:

@@ -195,10 +195,15 @@ class VehicleGround:
         return (*self.always_closed_m, *(gate.rectangle for gate in self.rated_gates))
 
     @cached_property
+    def standing_m(self) -> tuple[Rectangle, ...]:
+        """The structures that it does not pass below."""
+        return tuple(each.rectangle_m for each in self.structures if not each.lets_through)
+
+    @cached_property
     def always_closed_m(self) -> tuple[Rectangle, ...]:
         """Everything that it must not cover, at any speed."""
         return (
-            *(structure.rectangle_m for structure in self.structures),
+            *self.standing_m,
             *(area.rectangle_m for area in self.source.keep_outs),
             *self.gates,
             *_outside(self.site.rectangle_m, [each.rectangle_m for each in self.source.drivable]),
@@ -327,7 +332,7 @@ class Drive:
     def _beyond_m(self) -> Iterator[FloatArray]:
         radius_m = self.ground.charge_radius_m
         standing = [piece.rectangle for piece in (*self.held, *self.broken)]
-        standing += [each.rectangle_m for each in self.ground.structures]
+        standing += self.ground.standing_m
         for piece in self.held:
             if piece.rating.penetration_m == 0.0:
                 continue
@@ -404,7 +409,7 @@ def _reach(
         tuple(entry.strip_m(site, side, source.width_m) for entry, side in ground.entries),
         (*ground.always_closed_m, *obstacles.stops, *(each.rectangle for each in held)),
         (*obstacles.solid, *(each.rectangle for each in broken)),
-        tuple(each.rectangle_m for each in ground.structures),
+        ground.standing_m,
     ).answer()
 
 

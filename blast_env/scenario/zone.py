@@ -383,7 +383,7 @@ class EmptyZone:
     Attributes:
         catalogue: What can be placed.
         usable: Which cells may be used, shape (rows, columns).
-        passable: Which cells no structure covers, shape (rows, columns).
+        passable: Which cells no structure covers that stops people, shape (rows, columns).
         module_costs: What a module on each cell costs, shape (rows, columns); with a catalogue,
             what the cost of an item is multiplied by there.
         fits: Where the cells under each variant may be used, by its lower left cell, shape
@@ -424,7 +424,8 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
         usable &= ~blocked
     passable = np.ones_like(usable)
     for structure in surroundings.structures:
-        passable &= ~_overlapping(structure.rectangle_m, boxes)
+        if not structure.lets_through:
+            passable &= ~_overlapping(structure.rectangle_m, boxes)
     module_costs = _module_costs(zone, boxes)
     catalogue = zone.catalogue
     costs = np.stack([_costs(variant, module_costs, zone) for variant in catalogue.variants])
@@ -571,19 +572,22 @@ def air_height_m(site: Site, structures: Iterable[AnyStructure], zone: BuildZone
     return default_air_height_m(structures, zone)
 
 
-def is_over(height_m: float, structure: AnyStructure) -> bool:
-    """Whether a height is above the roof of a structure; without a height it has none."""
-    return structure.height_m is not None and height_m > structure.height_m
+def is_over_or_below(height_m: float, structure: AnyStructure) -> bool:
+    """Whether a height is above the roof of a structure, if it has one, or below its underside."""
+    is_over = structure.height_m is not None and height_m > structure.height_m
+    return is_over or height_m < structure.base_m
 
 
 def depth_inside_m(position_m: tuple[float, float, float], structure: AnyStructure) -> float:
-    """Return how far it is from a place to the nearest air beside or above a structure.
+    """Return how far it is from a place to the nearest air beside, above or below a structure.
 
     Negative or 0 outside.
     """
     x_m, y_m, z_m = position_m
     left, bottom, right, top = structure.rectangle_m
     depth_m = min(x_m - left, right - x_m, y_m - bottom, top - y_m)
+    if structure.base_m > 0.0:
+        depth_m = min(depth_m, z_m - structure.base_m)
     return depth_m if structure.height_m is None else min(depth_m, structure.height_m - z_m)
 
 

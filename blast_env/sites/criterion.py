@@ -85,7 +85,7 @@ class Visibility:
                 weight[nearer] = (structure.weight * source_weight)[nearer]
                 target_m[nearer] = structure.height_m or 0.0
                 protected_m = np.minimum(protected_m, entry_m)
-            else:
+            elif not structure.base_m:  # below what begins higher one sees
                 other_m = np.minimum(other_m, entry_m)
         free = (weight > 0.0) & (protected_m < other_m)
         open_share = float(weight[free].sum() / max(weight.sum(), 1e-300))

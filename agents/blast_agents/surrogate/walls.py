@@ -64,14 +64,15 @@ class WallPoints:
             apart: How many times as far from each other points are.
         """
         left, bottom, right, top = structure.rectangle_m
-        levels = max(1, round(height_m / (_UP_M * apart)))
-        z_m = (np.arange(levels) + 0.5) * height_m / levels
+        rise_m = height_m - structure.base_m
+        levels = max(1, round(rise_m / (_UP_M * apart)))
+        z_m = structure.base_m + (np.arange(levels) + 0.5) * rise_m / levels
         rows = []
         for face in structure.faces:
             x_out, y_out = _OUTWARD[face]
             length_m = top - bottom if x_out else right - left
             number = max(1, round(length_m / (_ALONG_M * apart)))
-            area_m2 = length_m * height_m / (number * levels)
+            area_m2 = length_m * rise_m / (number * levels)
             for along_m in (np.arange(number) + 0.5) * length_m / number:
                 if x_out:
                     x_m, y_m = (left if x_out < 0 else right) + _BEFORE_M * x_out, bottom + along_m
@@ -124,6 +125,8 @@ class Approach:
 class SurrogateSite:
     """A scenario as the surrogate sees it.
 
+    What begins above the ground stops nothing, as if it were not there: the surrogate never met it.
+
     Args:
         scenario: The scenario.
 
@@ -141,7 +144,11 @@ class SurrogateSite:
         self.alternatives = scenario.alternatives if scenario.objective.is_response else ()
         air_m = scenario.air_height_m
         self._solids = np.array(
-            [[*each.rectangle_m, each.height_m or air_m] for each in scenario.structures]
+            [
+                [*each.rectangle_m, each.height_m or air_m]
+                for each in scenario.structures
+                if not each.base_m
+            ]
         ).reshape(-1, 5)
         heights_m = [each.height_m or air_m for each in self.protected]
         apart = _apart(self.protected, heights_m)

@@ -104,12 +104,12 @@ class GasRun:
         self, settings: GasSettings, site: BlastSite, recorders: Recorders = _none
     ) -> None:
         self.settings, self.site = settings, site
-        self.grid, owner = _grid(settings, site)
+        self.grid = _grid(settings, site)
         self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
         reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
         self.handover_radius_m = largest_radius_m(self.grid, self.charge, reserved)
         self.notes = self._notes()
-        self.table = _face_table(self.grid, owner)
+        self.table = _face_table(self.grid, site)
         self.loads = FaceLoads(len(self.table.faces))
         self.gauges = _gauges(self.grid, site)
         scale = self._scale = cbrt(self.charge.mass_kg / 100.0)
@@ -242,15 +242,12 @@ class GasRun:
 def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
     """Return the scaled distance of a structure's nearest point in plan, m/kg^(1/3)."""
     distance_m = structure.rectangle_m.distance_to(site.charge.position_m)
-    return hypot(distance_m, site.charge.height_m) / cbrt(site.charge.tnt_kg)
+    up_m = max(site.charge.height_m, structure.base_m - site.charge.height_m)
+    return hypot(distance_m, up_m) / cbrt(site.charge.tnt_kg)
 
 
-def _grid(settings: GasSettings, site: BlastSite) -> tuple[GasGrid, NDArray[np.int64]]:
-    """Return the grid, and what each column of cells belongs to.
-
-    Returns:
-        The grid; index of the structure (-1: none), row and column of the module (3, nx, ny).
-    """
+def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
+    """Return the grid with what is solid in it."""
     cell_m = settings.cell_m
     margin = ceil(settings.margin_m / cell_m)
     low = np.array([site.site_m.left, site.site_m.bottom])
@@ -270,21 +267,19 @@ def _grid(settings: GasSettings, site: BlastSite) -> tuple[GasGrid, NDArray[np.i
             f"a grid of {shape[0]} x {shape[1]} x {shape[2]} cells of {cell_m:g} m would need "
             f"{needed / 2**30:.1f} GiB, must be at most {_MOST_BYTES / 2**30:g}: take larger cells"
         )
-    owner = np.full((3, shape[0], shape[1]), -1)
     grid = replace(grid, solid=np.zeros(shape, dtype=bool))
-    for index, outline in enumerate(site.structures):
-        row, column = _modules_at(outline, grid)
-        here = row >= 0
-        owner[:, here] = np.stack([np.full(here.sum(), index), row[here], column[here]])
+    for outline in site.structures:
         grid.solid[_cells_of(outline, grid, site)] = True
-    return grid, owner
+    return grid
 
 
 def _cells_of(outline: StructureOutline, grid: GasGrid, site: BlastSite) -> NDArray[np.bool_]:
     """Return the cells that a structure fills (nx, ny, nz)."""
     row, column = _modules_at(outline, grid)
     height_m = _heights_m(outline, site.air_height_m, row, column)[:, :, np.newaxis]
-    return np.asarray((row >= 0)[:, :, np.newaxis] & (grid.centres_m(2) < height_m))
+    z_m = grid.centres_m(2)
+    filled = (z_m < height_m) & (z_m > outline.base_m)
+    return np.asarray((row >= 0)[:, :, np.newaxis] & filled)
 
 
 def _modules_at(
@@ -318,12 +313,20 @@ def _heights_m(
     return np.asarray(heights_m[row, column])
 
 
-def _face_table(grid: GasGrid, owner: NDArray[np.int64]) -> FaceTable:
+def _face_table(grid: GasGrid, site: BlastSite) -> FaceTable:
     faces = exposed_faces(grid, grid.solid)
-    behind = faces.solid
-    structure, row, column = owner[:, behind[:, 0], behind[:, 1]]
-    # West, east, south, north by axis and side; what looks up is the roof.
-    face = np.where(faces.axis == 2, len(WALLS), 2 * faces.axis + (faces.side > 0))
+    behind = tuple(faces.solid.T)
+    z_m = grid.centres_m(2)[behind[2]]
+    structure, row, column = np.full((3, len(faces)), -1)
+    for index, outline in enumerate(site.structures):
+        rows, columns = _modules_at(outline, grid)
+        height_m = _heights_m(outline, site.air_height_m, rows, columns)[behind[:2]]
+        own = (rows[behind[:2]] >= 0) & (z_m > outline.base_m) & (z_m < height_m)
+        structure[own] = index
+        row[own], column[own] = (each[behind[:2]][own] for each in (rows, columns))
+    # West, east, south, north by axis and side; what looks up is the roof, or else the underside.
+    upright = 2 * faces.axis + (faces.side > 0)
+    face = np.where(faces.axis == 2, len(WALLS) + (faces.side < 0), upright)
     return FaceTable(faces, structure, row, column, face, faces.centres_m(grid))
 
 

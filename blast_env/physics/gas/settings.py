@@ -13,7 +13,8 @@ from blast_env.units import MODULE_SIDE_M
 from blast_env.values import finite_number
 
 ROOF: Final = "roof"
-FACE_NAMES: Final = (*WALLS, ROOF)
+UNDERSIDE: Final = "underside"
+FACE_NAMES: Final = (*WALLS, ROOF, UNDERSIDE)
 """The faces of a structure; those of `FaceTable.face` count through them."""
 
 CHECKED_SCALED_DISTANCE: Final = (1.7, 8.6)
