@@ -66,6 +66,8 @@ PUBLIC: Final = (
     "blast_env.calibration",
     "blast_env.export",
     "blast_env.reporting",
+    "blast_env.problems",
+    "blast_env.data",
     "blast_agents.training",
     "blast_agents.search",
     "blast_agents.league",

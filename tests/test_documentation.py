@@ -4,6 +4,7 @@
 commands are parsed: names, options and the types and bounds of their values.
 """
 
+import ast
 import doctest
 import importlib.util
 import re
@@ -223,6 +224,20 @@ def test_pages_include_tables_that_exist_and_every_table() -> None:
         for path in re.findall(r"^(?:```\{include\}|:file:) (\S+)$", text, re.MULTILINE):
             included.add((ROOT / page).parent.joinpath(path).resolve())
     assert included == {*(ROOT / "docs" / "studies" / "tables").iterdir()}
+
+
+def test_the_site_knows_the_packages_whose_names_pages_list() -> None:
+    """The build stops otherwise; it has libraries that the tests do not need."""
+    known = re.search(
+        r"^PUBLIC: Final = (\(.*?^\))$", (ROOT / "docs/conf.py").read_text(), re.M | re.S
+    )
+    listed = {
+        name
+        for text in TEXTS.values()
+        for name in re.findall(r"^<!-- names of (\S+) -->", text, re.M)
+    }
+    assert known is not None
+    assert listed == {*ast.literal_eval(known[1])}
 
 
 def test_the_page_of_the_environments_names_every_id() -> None:
