@@ -11,7 +11,7 @@ from blast_env.cli.output import make_table, print_line, progress_bar, result_co
 from blast_env.cli.pieces import print_pieces
 from blast_env.cli.targets import PICTURES
 from blast_env.engines import JUDGE, find_engine
-from blast_env.engines.bays import BAY_COLUMNS
+from blast_env.engines.bays import LOADED_BAY_COLUMNS
 from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation import draw_threats
@@ -129,6 +129,9 @@ class AssessCommand(ChargeOptions):
             for building in each.buildings:
                 table.add_row(name, building, *_row(each, building))
         result_console().print(table)
+        for name, each in found.items():
+            for note in each.notes:
+                print_line(f"{name}: {note}")
 
     def _print_neighbours(self, found: dict[str, Consequences]) -> None:
         if not any(each.neighbours for each in found.values()):
@@ -205,7 +208,7 @@ class AssessCommand(ChargeOptions):
             return write_csv(bays, path)
         from blast_env.recording.excel import SheetTable, write_tables
 
-        tables = [SheetTable("Bays", bays, (*CASE_COLUMNS, *BAY_COLUMNS))]
+        tables = [SheetTable("Bays", bays, (*CASE_COLUMNS, *LOADED_BAY_COLUMNS))]
         pieces = piece_table(found)
         if len(pieces):
             tables.append(SheetTable("Pieces", pieces, (*CASE_COLUMNS, *PIECE_COLUMNS)))

@@ -344,7 +344,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
     """A blast of gas dynamics."""
 
     headers = (
-        *("structure", "protected", "impulse (Pa s)", "to come (Pa s)", "first phase (Pa s)"),
+        *("building", "protected", "impulse (Pa s)", "to come (Pa s)", "first phase (Pa s)"),
         *("peak (kPa)", "arrival (ms)", "most loaded wall", "roof (Pa s)"),
     )
 
@@ -434,14 +434,17 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         return [save_figure(draw(), path) for path, draw in pictures if path is not None]
 
     def print_loads(self, result: "GasResult") -> None:
-        """Print tables of the structures' loads and of the gauges, and how the run went."""
-        structures = result.structures.to_dict("records")
-        scaled = {each["structure"]: _scaled(result, each["structure"]) for each in structures}
+        """Print tables of the buildings' loads and of the gauges, and how the run went."""
+        scaled = {name: _scaled(result, name) for name in result.structures["structure"]}
+        in_range: dict[str, bool] = {}
+        for part in self.blast.scenario.structures:
+            known = in_range.get(part.building_name, True)
+            in_range[part.building_name] = known and bool(scaled[part.name]["in_range"])
         rows = [
             (
-                each["structure"],
+                each["building"],
                 "yes" if each["protected"] else "no",
-                _pa_s_text(scaled[each["structure"]]),
+                f"{'' if in_range[each['building']] else '~'}{each['positive_impulse_pa_s']:,.0f}",
                 _to_come_text(each),
                 f"{each['first_impulse_pa_s']:,.0f}",
                 f"{each['peak_pa'] / PA_PER_KPA:,.1f}",
@@ -449,7 +452,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
                 f"{each['most_loaded_face']} {each['most_loaded_pa_s']:,.0f}",
                 _number(each["roof_impulse_pa_s"], ",.0f"),
             )
-            for each in structures
+            for each in result.buildings.to_dict("records")
         ]
         charge = result.run.site.charge
         self.print_table(charge, f"{charge.height_m:g} m high", rows)
@@ -547,6 +550,7 @@ def _record(
         "impulse": {name: _scaled(result, name) for name in result.structures["structure"]},
     }
     if not isinstance(result, BlastResult):
+        content["buildings"] = _rows(result.buildings)
         content["gauges"] = _rows(result.gauges)
         content["bays"] = _rows(result.bays)
         content["pieces"] = _rows(result.pieces)

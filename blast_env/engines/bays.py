@@ -7,7 +7,7 @@ before them, as in a wall between two parts of a building, have none and are lef
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,18 @@ BAY_COLUMNS: Final = (
 
 LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, *TAIL_COLUMNS)
 """A row a bay of a blast, with what is still to come."""
+
+
+class BayTail(NamedTuple):
+    """How much of the impulse on a bay is still to come.
+
+    Attributes:
+        to_come_pa_s: About that; NaN if not all waves have come.
+        complete: Whether it is at most 2 %.
+    """
+
+    to_come_pa_s: float = np.nan
+    complete: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +133,21 @@ class BayLoads:
         """
         if not self.bays:
             return table_of([], LOADED_BAY_COLUMNS)
+        tails = self.tails(run)
+        rows = [row | tails[str(row["bay"])]._asdict() for row in bay_rows(self.response)]
+        return table_of(rows, LOADED_BAY_COLUMNS)
+
+    def tails(self, run: "GasRun") -> dict[str, BayTail]:
+        """Return how much of its impulse is still to come to each bay, by name.
+
+        Args:
+            run: The run that has recorded them.
+        """
         names = [each.name for each in run.site.structures]
         passed = {name: run.has_passed(index) for index, name in enumerate(names)}
         (middle_s, first_s), time_s = run.tail.since_s, self.response.time_s
-        rows = bay_rows(self.response)
-        for row, pressure in zip(rows, self.response.pressure_pa, strict=True):
+        tails = {}
+        for filled, pressure in zip(self.bays, self.response.pressure_pa, strict=True):
             positive = np.maximum(pressure, 0.0)
             impulse_pa_s, last, before = (
                 float(np.trapezoid(np.where(part, positive, 0.0), time_s))
@@ -136,10 +158,10 @@ class BayLoads:
                 )
             )
             to_come_pa_s = float(still_to_come(last, before))
-            to_come_pa_s = to_come_pa_s if passed[str(row["structure"])] else np.nan
-            row["to_come_pa_s"] = to_come_pa_s
-            row["complete"] = bool(is_complete(impulse_pa_s, to_come_pa_s))
-        return table_of(rows, LOADED_BAY_COLUMNS)
+            to_come_pa_s = to_come_pa_s if passed[filled.bay.structure] else np.nan
+            complete = bool(is_complete(impulse_pa_s, to_come_pa_s))
+            tails[filled.bay.name] = BayTail(to_come_pa_s, complete)
+        return tails
 
 
 def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:

@@ -8,13 +8,14 @@ loads stay, and the response is worked out again.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from blast_env.engines.bays import BAY_COLUMNS, bay_rows
+from blast_env.engines.bays import LOADED_BAY_COLUMNS, BayTail, bay_rows
 from blast_env.engines.contract import Engine
 from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.errors import BlastEnvError
@@ -53,12 +54,14 @@ class BuildingResponse:
         charge: The charge where it went off.
         facade: What became of its bays.
         peak_factor: What its peaks would be multiplied by if cells did not clip them.
+        tails: How much is still to come to its bays, by name, where that is known.
     """
 
     building: str
     charge: Charge
     facade: FacadeResponse
     peak_factor: float = 1.0
+    tails: Mapping[str, BayTail] = field(default_factory=dict)
 
     @cached_property
     def sharpened(self) -> FacadeResponse:
@@ -111,6 +114,18 @@ class Consequences:
     def buildings(self) -> tuple[str, ...]:
         """The buildings with a facade, in the order of the scenario."""
         return tuple(dict.fromkeys(each.building for each in self.responses))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What there is to say of the loads: that bays are not complete."""
+        tails = [tail for each in self.responses for tail in each.tails.values()]
+        late = sum(not each.complete for each in tails)
+        if not late:
+            return ()
+        return (
+            f"{late} of {len(tails)} bays of all charges are not complete: more than 2 % of their"
+            " impulse may still come",
+        )
 
     def of(self, building: str) -> tuple[BuildingResponse, ...]:
         """Return what the charges do to one building."""
@@ -199,20 +214,22 @@ CASE_COLUMNS: Final = (
 )
 """What stands before the columns of bays and of pieces in a table of several charges."""
 
+_NO_TAIL: Final = BayTail()
+
 
 def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
-    """Return one row a layout, charge and bay: `CASE_COLUMNS`, then `BAY_COLUMNS`.
+    """Return one row a layout, charge and bay: `CASE_COLUMNS`, then `LOADED_BAY_COLUMNS`.
 
     Args:
         found: What charges do, by the words for the layout.
     """
     rows = [
-        _case(name, each.charge) | row
+        _case(name, each.charge) | row | each.tails.get(str(row["bay"]), _NO_TAIL)._asdict()
         for name, judged in found.items()
         for each in judged.responses
         for row in bay_rows(each.facade)
     ]
-    return table_of(rows, (*CASE_COLUMNS, *BAY_COLUMNS))
+    return table_of(rows, (*CASE_COLUMNS, *LOADED_BAY_COLUMNS))
 
 
 def piece_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
@@ -291,7 +308,8 @@ def consequences_of(
     responses: list[BuildingResponse] = []
     if result.bay_loads is not None and result.bay_loads.bays:
         factor = peak_factor(result.run.grid.cell_m, charge.tnt_kg)
-        responses = by_building(scenario, result.bay_loads.response, charge, factor)
+        tails = result.bay_loads.tails(result.run)
+        responses = by_building(scenario, result.bay_loads.response, charge, factor, tails)
     return Consequences(
         tuple(responses),
         tuple(neighbours_of(scenario, result, charge)),
@@ -323,7 +341,11 @@ def _blast(
 
 
 def by_building(
-    scenario: Scenario, facade: FacadeResponse, charge: Charge, peak_factor: float = 1.0
+    scenario: Scenario,
+    facade: FacadeResponse,
+    charge: Charge,
+    peak_factor: float = 1.0,
+    tails: Mapping[str, BayTail] = MappingProxyType({}),
 ) -> list[BuildingResponse]:
     """Return what a blast does to each building with a facade.
 
@@ -332,6 +354,7 @@ def by_building(
         facade: What became of all bays of the site.
         charge: The charge where it went off.
         peak_factor: What its peaks would be multiplied by if cells did not clip them.
+        tails: How much is still to come to the bays, by name, where that is known.
     """
     names = {each.name: each.building_name for each in scenario.structures}
     owners = [names[each.bay.structure] for each in facade.bays]
@@ -341,5 +364,6 @@ def by_building(
         part = respond(
             [facade.bays[index] for index in own.tolist()], facade.time_s, facade.pressure_pa[own]
         )
-        found.append(BuildingResponse(building, charge, part, peak_factor))
+        inside = {each.bay.name: tails[each.bay.name] for each in part.bays if tails}
+        found.append(BuildingResponse(building, charge, part, peak_factor, inside))
     return found

@@ -16,7 +16,7 @@ from blast_env.arrays import FloatArray
 from blast_env.calibration.references import Burst, Friedlander, kingery_bulmash
 from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.geometry import layout_counts
+from blast_env.geometry import Rectangle, layout_counts
 from blast_env.physics.scene import WALLS, StructureOutline, WallName
 from blast_env.plan import FAINT, QUIET_INK
 from blast_env.rendering.site_plan import (
@@ -190,7 +190,9 @@ def facades(
 
     Args:
         result: The blast.
-        structure: Name of the structure; the protected one with the largest impulse without it.
+        structure: Name of the structure, or of a building: its parts are unfolded as one, and where
+            one wall of it is behind another, the larger load is shown. The protected building with
+            the largest impulse without it.
         quantity: `"impulse"`, of all positive phases in Pa s, or `"peak"`, overpressure in kPa;
             or how else one is drawn.
         beside: Another result with the same site and charge, drawn above on the same scale:
@@ -203,14 +205,14 @@ def facades(
         UnknownNameError: If there is no such structure or quantity.
     """
     kind, results = kind_of(quantity), both_results(result, beside)
-    outline = _outline(results[0], structure)
+    outline = _walled(results[0], structure)
     walls = [
         {wall: _wall(each, outline, wall, kind) for wall in _LEFT_TO_RIGHT} for each in results
     ]
     scale = Normalize(0.0, _full(walls) if full is None else full)
     lengths = np.array([_length_m(outline, wall) for wall in _LEFT_TO_RIGHT])
     widths = np.maximum(lengths, _LEAST_WALL_SHARE * lengths.sum())
-    height_m = outline.height_m or result.run.site.air_height_m
+    height_m = outline.height_m
     low, high = _WALL_HEIGHTS_IN
     row_in = min(max(_FACADES_IN * height_m / float(widths.sum()), low), high) + 0.85
     figure = Figure(figsize=(_FACADES_IN + 2.2, row_in * len(results) + 0.9), layout="compressed")
@@ -250,7 +252,7 @@ def full_load(result: GasResult, structure: str, quantity: Quantity) -> float:
     Raises:
         UnknownNameError: If there is no such structure or quantity.
     """
-    kind, outline = kind_of(quantity), _outline(result, structure)
+    kind, outline = kind_of(quantity), _walled(result, structure)
     return _full([{wall: _wall(result, outline, wall, kind) for wall in _LEFT_TO_RIGHT}])
 
 
@@ -260,54 +262,90 @@ def _full(walls: Sequence[Mapping[WallName, FloatArray]]) -> float:
     return nice_ceiling(largest) if largest > 0.0 else 1.0
 
 
-def _outline(result: GasResult, structure: str | None) -> StructureOutline:
-    known = {each.name: each for each in result.run.site.structures if each.cells is None}
-    if structure is not None:
-        if structure not in known:
-            raise UnknownNameError("structure", structure, known)
-        return known[structure]
-    table = result.structures
-    if not len(table):
-        raise BlastEnvError(f"{result.blast.scenario.name} has no structure with walls")
-    chosen = table[table["protected"]] if table["protected"].any() else table
-    worst = int(chosen["positive_impulse_pa_s"].to_numpy().argmax())
-    return known[str(chosen["structure"].iloc[worst])]
+@dataclass(frozen=True)
+class _Walled:
+    """A structure, or the parts of a building, as one sees its walls.
+
+    Attributes:
+        name: Its name.
+        parts: Names of the structures.
+        rectangle_m: Around them.
+        height_m: The height of the highest.
+        faces: The walls that count of any of them.
+    """
+
+    name: str
+    parts: tuple[str, ...]
+    rectangle_m: Rectangle
+    height_m: float
+    faces: frozenset[WallName]
+
+    @classmethod
+    def of(cls, name: str, parts: Sequence[StructureOutline], air_height_m: float) -> "_Walled":
+        """Return some structures as one."""
+        return cls(
+            name,
+            tuple(each.name for each in parts),
+            Rectangle.around([each.rectangle_m for each in parts]),
+            max(each.height_m or air_height_m for each in parts),
+            frozenset(face for each in parts for face in each.faces),
+        )
 
 
-def _length_m(outline: StructureOutline, wall: WallName) -> float:
-    left, bottom, right, top = outline.rectangle_m
-    return right - left if _LEFT_TO_RIGHT[wall][0] == "x" else top - bottom
+def _walled(result: GasResult, name: str | None) -> _Walled:
+    """Return the structure or building of a name, or the worst building."""
+    site, scenario = result.run.site, result.blast.scenario
+    known = {each.name: (each,) for each in site.structures if each.cells is None}
+    buildings: dict[str, tuple[StructureOutline, ...]] = {}
+    for each in scenario.structures:
+        own = buildings.get(each.building_name, ())
+        buildings[each.building_name] = (*own, *known[each.name])
+    if name is None:
+        table = result.buildings
+        if not len(table):
+            raise BlastEnvError(f"{scenario.name} has no structure with walls")
+        chosen = table[table["protected"]] if table["protected"].any() else table
+        worst = int(chosen["positive_impulse_pa_s"].to_numpy().argmax())
+        name = str(chosen["building"].iloc[worst])
+    found = {**known, **buildings}  # a building may have the name of a part
+    if name not in found:
+        raise UnknownNameError("structure", name, found)
+    return _Walled.of(name, found[name], site.air_height_m)
 
 
-def _wall(result: GasResult, outline: StructureOutline, wall: WallName, kind: Kind) -> FloatArray:
+def _wall(result: GasResult, walled: _Walled, wall: WallName, kind: Kind) -> FloatArray:
     """Return the load on each cell's face of a wall, by height and along x or y.
 
     nan where something stands before the wall.
     """
     cell_m = result.run.grid.cell_m
     axis = _LEFT_TO_RIGHT[wall][0]
-    low = outline.corner_m["xy".index(axis)]
-    height_m = outline.height_m or result.run.site.air_height_m
-    shape = (round(height_m / cell_m), round(_length_m(outline, wall) / cell_m))
+    low = walled.rectangle_m["xy".index(axis)]
+    shape = (round(walled.height_m / cell_m), round(_length_m(walled, wall) / cell_m))
     values = np.full(shape, np.nan)
     own = result.faces
-    own = own[(own["structure"] == outline.name) & (own["face"] == wall)]
+    own = own[own["structure"].isin(walled.parts) & (own["face"] == wall)]
     along = np.floor((own[f"{axis}_m"].to_numpy() - low) / cell_m).astype(int)
     up = np.floor(own["z_m"].to_numpy() / cell_m).astype(int)
-    values[up, along] = kind.factor * own[kind.column].to_numpy()
+    np.fmax.at(values, (up, along), kind.factor * own[kind.column].to_numpy())
     return values
+
+
+def _length_m(walled: _Walled, wall: WallName) -> float:
+    left, bottom, right, top = walled.rectangle_m
+    return right - left if _LEFT_TO_RIGHT[wall][0] == "x" else top - bottom
 
 
 def _draw_wall(
     axes: Axes,
-    outline: StructureOutline,
+    outline: _Walled,
     wall: WallName,
     values: FloatArray,
     scale: Normalize,
     height_m: float,
 ) -> None:
     axis, falls = _LEFT_TO_RIGHT[wall]
-    low = outline.corner_m["xy".index(axis)]
+    low = outline.rectangle_m["xy".index(axis)]
     high = low + _length_m(outline, wall)
     axes.imshow(
         values,
@@ -328,7 +366,7 @@ def _figures(load: Any) -> str:
 
 
 def _wall_title(
-    outline: StructureOutline,
+    outline: _Walled,
     wall: WallName,
     values: FloatArray,
     before: FloatArray | None,

@@ -10,7 +10,7 @@ import numpy as np
 from blast_env.engines.gas import GasBlast
 from blast_env.evaluation.consequences import Consequences
 from blast_env.geometry import Layout
-from blast_env.physics.scene import WALLS, Charge
+from blast_env.physics.scene import Charge
 from blast_env.plan import (
     INK,
     QUIET_INK,
@@ -55,8 +55,6 @@ _WIDTH_IN: Final = 9.0
 _HEIGHTS_IN: Final = (3.6, 8.5)
 _STILL_PX: Final = 1200
 _STILL_HEIGHT_M: Final = 1.5
-_LEAST_SHARE: Final = 0.1  # of a building's walls, for the walls of a part to be drawn
-_MOST_FACADES: Final = 4
 _BARE, _WALLED = "#D55E00", "#0072B2"  # Okabe and Ito's
 
 _ZONE: Final = (Kinds.BUILD_ZONE, Kinds.KEEP_OUT, Kinds.COST_AREA, Kinds.GATE, Kinds.ACCESS_WAY)
@@ -136,23 +134,10 @@ def blast_pictures(
         if not target.protected or target.name not in walled.loads:
             continue
         pictures.append(_history(bare, walled, target, units))
-        for name in _shown_parts(walled, target):
-            for kind in kinds(units).values():
-                figure = facades(walled.result, name, kind, bare.result)
-                pictures.append((f"{name}: {kind.name}, walls unfolded", png(figure)))
+        for kind in kinds(units).values():
+            figure = facades(walled.result, target.name, kind, bare.result)
+            pictures.append((f"{target.name}: {kind.name}, walls unfolded", png(figure)))
     return tuple(pictures)
-
-
-def _shown_parts(measured: MeasuredBlast, target: ReportedBuilding) -> list[str]:
-    """Return the structures of a building that have most of its walls."""
-    faces = measured.result.faces
-    counts = [
-        int(((faces["structure"] == name) & faces["face"].isin(WALLS)).sum())
-        for name in target.names
-    ]
-    least = _LEAST_SHARE * sum(counts)
-    shown = [name for name, count in zip(target.names, counts, strict=True) if count >= least]
-    return shown[:_MOST_FACADES]
 
 
 def _history(

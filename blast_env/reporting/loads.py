@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from types import MappingProxyType
 from typing import Final
 
@@ -11,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.gas import GasBlast, GasResult
+from blast_env.engines.gas import NOT_COMPLETE, GasBlast, GasResult
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.gas.probes import ARRIVAL_PA
@@ -162,8 +163,10 @@ class WallHistories:
                 for structure in target.structures:
                     if wall in structure.faces:
                         left, bottom, right, top = structure.rectangle_m
-                        x_m, y_m = behind_m[:, 0], behind_m[:, 1]
-                        inside |= (left < x_m) & (x_m < right) & (bottom < y_m) & (y_m < top)
+                        top_m = inf if structure.height_m is None else structure.height_m
+                        x_m, y_m, z_m = behind_m.T
+                        here = (left < x_m) & (x_m < right) & (bottom < y_m) & (y_m < top)
+                        inside |= here & (structure.base_m < z_m) & (z_m < top_m)
                 chosen = np.flatnonzero(inside & (number == index))
                 if len(chosen):
                     members[target.name, wall] = chosen
@@ -184,6 +187,7 @@ class TargetLoad:
         wall_impulse_pa_s: Impulse of all positive phases on it, mean.
         duration_s: How long the mean overpressure on it stays positive at first; NaN if no wave
             comes or the run ends before.
+        complete: Whether at most 2 % of these impulses is still to come.
     """
 
     target: str
@@ -194,6 +198,7 @@ class TargetLoad:
     wall: WallName
     wall_impulse_pa_s: float
     duration_s: float
+    complete: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,9 +232,14 @@ class MeasuredBlast:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Why loads on protected buildings are outside what the engine was checked for."""
+        """Why loads are outside what the engine was checked for, and which are not complete.
+
+        What protected buildings are checked for counts alone; completeness does for all.
+        """
         names = (name for each in self.targets if each.protected for name in each.names)
-        notes = (note for name in names for note in self.result.impulse(name).notes)
+        notes = [note for name in names for note in self.result.impulse(name).notes]
+        late = [name for name, load in self.loads.items() if not load.complete]
+        notes += [f"{name}: {NOT_COMPLETE}" for name in late]
         return tuple(dict.fromkeys(notes))
 
     def _load(self, target: ReportedBuilding, walls: pd.DataFrame) -> TargetLoad:
@@ -245,7 +255,15 @@ class MeasuredBlast:
             wall=wall,
             wall_impulse_pa_s=float(by_wall.max()),
             duration_s=self._duration_s(target.name, wall),
+            complete=self._is_complete(target, wall),
         )
+
+    def _is_complete(self, target: ReportedBuilding, wall: WallName) -> bool:
+        """Return whether the impulses on a building, and on a wall of it, are complete."""
+        buildings, walls = self.result.buildings, self.result.walls
+        on_building = buildings.loc[buildings["building"] == target.name, "complete"]
+        on_wall = walls["structure"].isin(target.names) & (walls["face"] == wall) & walls["counts"]
+        return bool(on_building.all() and walls.loc[on_wall, "complete"].all())
 
     def _duration_s(self, target: str, wall: WallName) -> float:
         """Return how long the first positive phase on a wall lasts."""

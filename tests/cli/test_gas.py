@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 import blast_env
 from blast_env.cli import app
 from blast_env.rendering import pressure_film
-from blast_env.scenario import save_scenario, write_layout
+from blast_env.scenario import Scenario, save_scenario, write_layout
 from tests.gas_sites import WALL, hut
 
 
@@ -130,3 +130,20 @@ def test_a_cell_is_for_gas_alone(site: Path) -> None:
     result = run("simulate", site, "--engine", "event", "--cell", 0.5)
     assert result.exit_code == 2
     assert "engine 'event' has no cells" in " ".join(result.stderr.split())
+
+
+def test_parts_of_a_building_are_one_row(tmp_path: Path) -> None:
+    document = hut().model_dump(exclude_none=True)
+    (whole,) = document["structures"]
+    left, bottom = whole["corner_m"]
+    part = {**whole, "rows": 2, "building": "town_hall"}
+    north = {**part, "name": "north_half", "corner_m": (left, bottom + 1.0)}
+    document["structures"] = [{**part, "name": "south_half"}, north]
+    path = tmp_path / "halves.toml"
+    save_scenario(Scenario.from_document(document, "halves"), path)
+    shown = run("simulate", path, "--engine", "gas", "--until", 0.01).stdout
+    assert shown.count("town_hall") == 1
+    assert "south_half" not in shown
+    told = json.loads(run("simulate", path, "--engine", "gas", "--until", 0.01, "--json").stdout)
+    assert [each["parts"] for each in told["buildings"]] == ["south_half north_half"]
+    assert set(told["impulse"]) == {"south_half", "north_half"}

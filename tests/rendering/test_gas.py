@@ -38,6 +38,7 @@ from blast_env.rendering.pressure_frames import (
     default_section,
 )
 from blast_env.rendering.site_plan import draw_features, legend_of
+from blast_env.scenario import Scenario
 from tests.catalogue_sites import WALL as PIECES
 from tests.catalogue_sites import yard
 from tests.gas_sites import WALL, hut
@@ -203,6 +204,23 @@ def test_walls_show_the_loads_on_their_faces(walled: GasResult) -> None:
     assert bar_of(figure).get_ylabel() == "peak overpressure (kPa)"
     assert figure.axes[0].get_ylabel() == "z (m)"
     assert_all_is_on_the_page(figure)
+
+
+def test_a_building_of_two_parts_is_unfolded_as_one(blast: GasBlast, bare: GasResult) -> None:
+    """The same walls in the same place, on which the same gas arrives."""
+    document = blast.scenario.model_dump(exclude_none=True)
+    (whole,) = document["structures"]
+    part = {**whole, "rows": whole["rows"] // 2, "building": whole["name"]}
+    left, bottom = whole["corner_m"]
+    north = {**part, "name": "north_half", "corner_m": (left, bottom + 0.5 * part["rows"])}
+    document["structures"] = [{**part, "name": "south_half"}, north]
+    halves = replace(blast, scenario=Scenario.from_document(document, "halves")).run()
+    for images in zip(*(map(images_of, map(facades, (bare, halves)))), strict=True):
+        one, two = map(values_of, images)
+        np.testing.assert_array_equal(one, two)
+    words = {facades(each).get_suptitle() for each in (bare, halves)}
+    assert all("walls of hut" in text for text in words)
+    assert len(values_of(images_of(facades(halves, "north_half"))[0])[0]) == part["rows"]
 
 
 def test_neighbouring_walls_share_a_corner(walled: GasResult) -> None:

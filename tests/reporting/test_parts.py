@@ -131,7 +131,7 @@ def test_structures_of_a_building_are_one_target() -> None:
 
 
 def load(impulse_pa_s: float, peak_pa: float) -> TargetLoad:
-    return TargetLoad("hut", 1.0, 1.0, peak_pa, 0.001, "west", impulse_pa_s, 0.01)
+    return TargetLoad("hut", 1.0, 1.0, peak_pa, 0.001, "west", impulse_pa_s, 0.01, complete=True)
 
 
 def test_limit_is_kept_by_loads_up_to_it() -> None:
