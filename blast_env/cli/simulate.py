@@ -461,6 +461,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         cells = " x ".join(str(count) for count in result.run.grid.shape)
         notes = dict.fromkeys(note for each in scaled.values() for note in _notes(each))
         texts = [f"outside what was checked (~): {note}" for note in notes]
+        texts += result.stepped_notes
         what = f"{result.blast.engine.describe()}: {cells} cells"
         self.print_end(result, what, "steps", texts)
 

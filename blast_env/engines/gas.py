@@ -49,6 +49,7 @@ from blast_env.response.damage import BayDamage
 from blast_env.response.facade import peak_factor
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.scenario.build_scene import build_site, draw_threat
+from blast_env.scenario.staircase import stepped_buildings
 from blast_env.tables import table_of
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
@@ -59,6 +60,9 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
 
 NOT_COMPLETE: Final = "more than 2 % of the impulse may still come"
 """Note on a load that is not complete; `GasSettings.until` says what a run waits for."""
+
+STEPPED: Final = "an oblique wall is a staircase of modules, whose peaks are too high"
+"""Note on a building with one; impulses are hardly wrong (`python -m studies.gas oblique`)."""
 
 _PROGRESS_CALLS: Final = 100
 
@@ -253,7 +257,14 @@ class GasResult:
     def buildings(self) -> "pd.DataFrame":
         """One row a building, whose parts are one; see `BUILDING_COLUMNS`."""
         names = {each.name: each.building_name for each in self.blast.scenario.structures}
-        return structure_table(self.run, self.faces, names)
+        stepped = stepped_buildings(self.blast.scenario.structures)
+        return structure_table(self.run, self.faces, names, stepped)
+
+    @property
+    def stepped_notes(self) -> tuple[str, ...]:
+        """What there is to say of peaks on oblique walls, a sentence a building."""
+        stepped = self.buildings["stepped"].to_numpy(dtype=bool)
+        return tuple(f"{name}: {STEPPED}" for name in self.buildings["building"][stepped])
 
     @cached_property
     def gauges(self) -> "pd.DataFrame":

@@ -3,7 +3,7 @@
 Each says of its loads whether they are complete, see `blast_env.physics.gas.tail`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -91,6 +91,7 @@ BUILDING_COLUMNS: Final = (
     Column("building", "", "name of the building, or of the structure that is one by itself"),
     Column("parts", "", "names of its structures"),
     Column("protected", "", "whether the load of one of them counts"),
+    Column("stepped", "", "whether a wall of it is a staircase, as an oblique one is"),
     *_OF_COUNTING_WALLS,
 )
 """A row a building; its loads are means over the walls that count of all its parts."""
@@ -215,7 +216,10 @@ def wall_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
 
 
 def structure_table(
-    run: "GasRun", faces: "pd.DataFrame", buildings: Mapping[str, str] | None = None
+    run: "GasRun",
+    faces: "pd.DataFrame",
+    buildings: Mapping[str, str] | None = None,
+    stepped: Collection[str] = (),
 ) -> "pd.DataFrame":
     """Return one row a structure, or one a building; see `STRUCTURE_COLUMNS`, `BUILDING_COLUMNS`.
 
@@ -223,13 +227,17 @@ def structure_table(
         run: The run.
         faces: Its `face_table`.
         buildings: The building that each structure is a part of, by name.
+        stepped: The buildings with a wall that is a staircase.
     """
     together: dict[str, list[StructureOutline]] = {}
     for outline in run.site.structures:
         if outline.cells is None:
             owner = outline.name if buildings is None else buildings[outline.name]
             together.setdefault(owner, []).append(outline)
-    rows = [_structure_row(run, faces, name, parts) for name, parts in together.items()]
+    rows = [
+        {**_structure_row(run, faces, name, parts), "stepped": name in stepped}
+        for name, parts in together.items()
+    ]
     return table_of(rows, STRUCTURE_COLUMNS if buildings is None else BUILDING_COLUMNS)
 
 

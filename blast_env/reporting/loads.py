@@ -240,6 +240,7 @@ class MeasuredBlast:
         notes = [note for name in names for note in self.result.impulse(name).notes]
         late = [name for name, load in self.loads.items() if not load.complete]
         notes += [f"{name}: {NOT_COMPLETE}" for name in late]
+        notes += self.result.stepped_notes
         return tuple(dict.fromkeys(notes))
 
     def _load(self, target: ReportedBuilding, walls: pd.DataFrame) -> TargetLoad:
