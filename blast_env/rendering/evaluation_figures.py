@@ -10,7 +10,7 @@ import numpy as np
 from blast_env.evaluation.cases import Case
 from blast_env.evaluation.comparison import Comparison
 from blast_env.evaluation.report import LayoutEvaluation
-from blast_env.geometry import Layout, layout_counts
+from blast_env.geometry import Layout, Rectangle, layout_counts
 from blast_env.physics.scene import BlastSite, Charge
 from blast_env.physics.structure import ModularObstacle
 from blast_env.plan import (
@@ -277,22 +277,33 @@ def _name_threats(axes: Axes, seeds: Sequence[int]) -> None:
 
 
 def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: BlastSite) -> None:
-    """Draw the mean load on the modules of one structure, without and with the barrier."""
+    """Draw the mean load on the modules of one building, without and with the barrier.
+
+    Of a building of several parts the impulse is the mean by their weights, as rewards count it.
+    """
     table = evaluation.table.set_index("structure")
     protected = table[table.protected]
-    name = str((protected.weight * protected.unprotected_impulse_pa_s).idxmax())
+    names = {each.name: each.building_name for each in evaluation.scenario.structures}
+    owners = np.array([names[each] for each in protected.index])
+    counted = protected.weight * protected.unprotected_impulse_pa_s
+    name = str(counted.groupby(owners).sum().idxmax())
+    parts = protected[owners == name]
     modules = evaluation.module_table
-    of_structure = modules[modules.structure == name]
+    own = modules[modules.structure.isin(parts.index)]
+    outlines = [each for each in scene.structures if each.name in parts.index]
     columns = ("unprotected_impulse_sim", "impulse_sim")
-    highest = float(of_structure[list(columns)].to_numpy().max())
+    highest = float(own[list(columns)].to_numpy().max())
     scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
     for axes, column, words in zip(panels, columns, ("without", "with"), strict=True):
-        (outline,) = (each for each in scene.structures if each.name == name)
-        obstacle = outline.build()
-        for part, impulse in zip(obstacle.parts, of_structure[column], strict=True):
-            part.impulse, part.hits = float(impulse), int(impulse > 0.0)
-        _draw_structure(axes, obstacle, scale)
-        pa_s = float(table[column.replace("_sim", "_pa_s")][name])
+        for outline in outlines:
+            obstacle = outline.build()
+            impulses = own[own.structure == outline.name][column]
+            for part, impulse in zip(obstacle.parts, impulses, strict=True):
+                part.impulse, part.hits = float(impulse), int(impulse > 0.0)
+            _draw_structure(axes, obstacle, scale)
+        left, bottom, right, top = Rectangle.around([each.rectangle_m for each in outlines])
+        axes.set(xlim=(left - 0.25, right + 0.25), ylim=(bottom - 0.25, top + 0.25))
+        pa_s = float(np.average(parts[column.replace("_sim", "_pa_s")], weights=parts.weight))
         axes.set_title(
             f"{name} {words} barrier\n{pa_s:,.0f} Pa·s",
             fontsize=11,
@@ -313,8 +324,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
 def _draw_structure(axes: Axes, obstacle: ModularObstacle, scale: Normalize) -> None:
     draw_loads(axes, obstacle, scale, linewidth=0.4)
     draw_outline(axes, obstacle)
-    left, bottom, right, top = obstacle.rectangle_m
-    axes.set(xlim=(left - 0.25, right + 0.25), ylim=(bottom - 0.25, top + 0.25), aspect="equal")
+    axes.set_aspect("equal")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     axes.spines[:].set_visible(False)

@@ -8,9 +8,13 @@ from matplotlib.collections import PatchCollection, PathCollection
 from matplotlib.figure import Figure
 
 from blast_env import Charge, load_scenario
+from blast_env.engines.gas import GasEngine
 from blast_env.evaluation import LayoutEvaluation, Threat, evaluate_layout
 from blast_env.rendering.evaluation_figures import evaluation_figure
 from blast_env.rendering.figures import save_figure
+from blast_env.scenario import Scenario
+from tests.gas_sites import WALL as WALL_OF_HUT
+from tests.gas_sites import hut
 
 WALL = [(row, 0) for row in range(22, 32)]
 THREATS = (
@@ -18,6 +22,8 @@ THREATS = (
     Threat(Charge((5.0, 9.0), 100.0), 1),
     Threat(Charge((5.0, 14.0), 15.0), 2),  # no mass that the calibration was made for
 )
+
+THREATS_OF_HUT = (Threat(Charge((2.0, 4.0), 5.0), 0),)
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +118,24 @@ def test_an_empty_layout_and_a_single_threat_can_be_drawn(tmp_path: Path) -> Non
     assert "95 %" not in figure.get_suptitle()
     path = save_figure(figure, tmp_path / "empty.png")
     assert path.stat().st_size > 10_000
+
+
+def test_the_parts_of_a_building_are_drawn_together() -> None:
+    document = hut().model_dump(exclude_none=True)
+    (whole,) = document["structures"]
+    left, bottom = whole["corner_m"]
+    part = {**whole, "rows": 1, "building": "hall", "weight": 0.25}
+    north = {**part, "name": "north", "rows": 3, "weight": 0.75, "corner_m": (left, bottom + 0.5)}
+    document["structures"] = [{**part, "name": "south"}, north]
+    scenario = Scenario.from_document(document, "halves")
+    engine = GasEngine(border_m=0.0, until=0.01)
+    found = evaluate_layout(scenario, WALL_OF_HUT, threats=THREATS_OF_HUT, engine=engine)
+    panels = evaluation_figure(found).axes[2:4]
+    table = found.table.set_index("structure")
+    for axes, column in zip(panels, ("unprotected_impulse_pa_s", "impulse_pa_s"), strict=True):
+        mean = 0.25 * table[column]["south"] + 0.75 * table[column]["north"]
+        assert axes.get_title().startswith("hall with")
+        assert f"{mean:,.0f} Pa·s" in axes.get_title()
+        assert axes.get_ylim() == (bottom - 0.25, bottom + 2.25)
+        drawn = [each for each in axes.collections if isinstance(each, PatchCollection)]
+        assert sum(len(each.get_paths()) for each in drawn) >= 16
