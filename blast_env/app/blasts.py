@@ -242,6 +242,7 @@ def _gas(
     keep_histories(result, folder)
     pictures = tuple(_pictures(result, scale, folder))
     notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]
+    notes += [*result.stepped_notes, *result.gauge_notes]
     return {
         "loads": _gas_loads(result),
         "buildings": tuple(_buildings(result)),
@@ -279,9 +280,9 @@ def _last_seen_s(shot: PressureShot, film_kpa: float) -> float:
 
 
 def _facades_of(result: GasResult) -> list[str]:
-    """Return the structures whose walls are drawn: the protected ones."""
-    table = result.structures
-    return [str(name) for name in table[table["protected"]]["structure"]]
+    """Return the buildings whose walls are drawn: the protected ones."""
+    table = result.buildings
+    return [str(name) for name in table[table["protected"]]["building"]]
 
 
 def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture]:
@@ -290,12 +291,12 @@ def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture
         levels = scale.levels[quantity]
         save_figure(ground_map(result, quantity, levels=levels), folder / name)
         yield Picture(file=name, label=f"{quantity} over the ground")
-    for structure in _facades_of(result):
+    for building in _facades_of(result):
         for quantity in _QUANTITIES[::-1]:
-            name = f"walls_{structure}_{quantity}.png"
-            full = scale.walls.get(structure, {}).get(quantity)
-            save_figure(facades(result, structure, quantity, full=full), folder / name)
-            yield Picture(file=name, label=f"{quantity} on the walls of {structure}")
+            name = f"walls_{building}_{quantity}.png"
+            full = scale.walls.get(building, {}).get(quantity)
+            save_figure(facades(result, building, quantity, full=full), folder / name)
+            yield Picture(file=name, label=f"{quantity} on the walls of {building}")
 
 
 def _gas_loads(result: GasResult) -> tuple[Load, ...]:

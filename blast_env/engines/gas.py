@@ -271,6 +271,12 @@ class GasResult:
         """One row a gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
         return gauge_table(self.run)
 
+    @property
+    def gauge_notes(self) -> tuple[str, ...]:
+        """Which gauges are not complete, a sentence each."""
+        late = ~self.gauges["complete"].to_numpy(dtype=bool)
+        return tuple(f"gauge {name}: {NOT_COMPLETE}" for name in self.gauges["name"][late])
+
     def history(self, gauge: str) -> "pd.DataFrame":
         """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`.
 

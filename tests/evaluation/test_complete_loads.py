@@ -36,3 +36,9 @@ def test_reports_say_it_of_every_building(engine: GasEngine, complete: bool) -> 
     measured = measure(GasBlast(scenario, engine=engine), targets_of(scenario))
     assert measured.loads["hut"].complete == complete
     assert (f"hut: {NOT_COMPLETE}" in measured.notes) != complete
+
+
+@pytest.mark.parametrize(("until", "late"), [(0.012, ["front", "behind"]), ("gauges", [])])
+def test_a_blast_says_which_gauges_are_not_complete(until: str | float, late: list[str]) -> None:
+    found = GasBlast(hut(), engine=GasEngine(border_m=0.0, until=until)).run()
+    assert found.gauge_notes == tuple(f"gauge {name}: {NOT_COMPLETE}" for name in late)
