@@ -164,7 +164,7 @@ def print_record(record: Mapping[str, object], options: EvaluateOptions) -> None
 
 
 _HEADERS: Final = (
-    "structure",
+    "building",
     "protected",
     "without (Pa s)",
     "with (Pa s)",
@@ -231,7 +231,7 @@ def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
 
 
 def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine) -> None:
-    """Print the structures' mean loads, and what the layout does over all threats."""
+    """Print the buildings' mean loads, and what the layout does over all threats."""
     count = len(evaluation.threats)
     table = make_table(
         f"{evaluation.scenario.name}: {layout_counts(evaluation.layout, 'barrier')} against none, "
@@ -239,7 +239,7 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine
         _HEADERS,
         text_columns=2,
     )
-    for row in evaluation.table.to_dict("records"):
+    for row in evaluation.building_table.to_dict("records"):
         reduction = Estimate(row["reduction"], row["reduction_low"], row["reduction_high"])
         table.add_row(
             str(row["structure"]),

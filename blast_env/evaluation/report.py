@@ -2,8 +2,8 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -112,6 +112,46 @@ def structure_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
     """Return one row a structure; see `STRUCTURE_COLUMNS`."""
     pairs = zip(_by_structure(evaluation.loads), _by_structure(evaluation.unprotected), strict=True)
     return table_of([_structure_row(loads, bare) for loads, bare in pairs], STRUCTURE_COLUMNS)
+
+
+def building_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
+    """Return one row a building, whose parts are one; see `STRUCTURE_COLUMNS`.
+
+    Impulses on parts are averaged by their weights, as rewards count them; the peak is the largest.
+    """
+    names = {each.name: each.building_name for each in evaluation.scenario.structures}
+    loads, bare = (
+        zip(*(_together(each.structures, names) for each in blasts), strict=True)
+        for blasts in (evaluation.loads, evaluation.unprotected)
+    )
+    rows = [_structure_row(*each) for each in zip(loads, bare, strict=True)]
+    return table_of(rows, STRUCTURE_COLUMNS)
+
+
+def _together(loads: Sequence[StructureLoad], names: Mapping[str, str]) -> list[StructureLoad]:
+    """Return the loads of a blast on buildings, by the building that each structure is part of."""
+    parts: dict[str, list[StructureLoad]] = {}
+    for load in loads:
+        parts.setdefault(names[load.name], []).append(load)
+    return [_of_building(name, own) for name, own in parts.items()]
+
+
+def _of_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
+    if len(parts) == 1:
+        return replace(parts[0], name=name)
+    counted = [each for each in parts if each.protected] or parts
+    weights = [each.weight for each in counted]
+    peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
+    return replace(
+        counted[0],
+        name=name,
+        weight=sum(weights),
+        impulse_sim=sum(each.impulse_sim for each in parts),
+        transferred_impulse_sim=sum(each.transferred_impulse_sim for each in parts),
+        impulse_pa_s=float(np.average([each.impulse_pa_s for each in counted], weights=weights)),
+        peak_pa=max(peaks_pa, default=None),
+        in_range=all(each.in_range for each in counted),
+    )
 
 
 def module_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
@@ -492,6 +532,11 @@ class LayoutEvaluation:
     def table(self) -> "pd.DataFrame":
         """One row a structure; the columns are `tables.STRUCTURE_COLUMNS`."""
         return structure_reductions(self)
+
+    @cached_property
+    def building_table(self) -> "pd.DataFrame":
+        """One row a building, whose parts are one; the columns are those of `table`."""
+        return building_reductions(self)
 
     @cached_property
     def module_table(self) -> "pd.DataFrame":

@@ -132,8 +132,13 @@ def test_the_parts_of_a_building_are_drawn_together() -> None:
     found = evaluate_layout(scenario, WALL_OF_HUT, threats=THREATS_OF_HUT, engine=engine)
     panels = evaluation_figure(found).axes[2:4]
     table = found.table.set_index("structure")
+    (hall,) = found.building_table.to_dict("records")
+    assert (hall["structure"], hall["weight"], hall["protected"]) == ("hall", 1.0, True)
+    assert hall["reduction"] == pytest.approx(found.mean_reduction)
+    assert hall["peak_pa"] == table["peak_pa"].max()
     for axes, column in zip(panels, ("unprotected_impulse_pa_s", "impulse_pa_s"), strict=True):
         mean = 0.25 * table[column]["south"] + 0.75 * table[column]["north"]
+        assert mean == pytest.approx(hall[column])
         assert axes.get_title().startswith("hall with")
         assert f"{mean:,.0f} Pa·s" in axes.get_title()
         assert axes.get_ylim() == (bottom - 0.25, bottom + 2.25)
