@@ -7,13 +7,17 @@ how many cells a core moves on in a second. docs/howto/app.md holds it against b
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cbrt, ceil, dist
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from blast_env.geometry import Layout
 from blast_env.physics.gas.settings import GasSettings
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 from blast_env.scenario.zone import source_bounds_m
+
+if TYPE_CHECKING:
+    from blast_env.reporting import StudyOptions
 
 _STEP_S_PER_M: Final = 0.9e-3
 """Time step over the side of a cell, as the sound in the products allows it."""
@@ -82,6 +86,46 @@ def cost_of_blast(scenario: Scenario, charge: AnyCharge, cell_m: float) -> CostG
         steps=ceil(time_s / (_STEP_S_PER_M * cell_m)),
         memory_bytes=_PROCESS_BYTES + _BYTES_PER_CELL * cells,
     )
+
+
+@dataclass(frozen=True)
+class ReportCost:
+    """What a report costs, part by part.
+
+    Attributes:
+        parts: What `run_study` says when it does a part, and its blasts.
+    """
+
+    parts: tuple[tuple[str, tuple[CostGuess, ...]], ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario, layout: Layout, options: "StudyOptions") -> "ReportCost":
+        """Return what a report costs, about; nothing is run for it.
+
+        Raises:
+            BlastEnvError: If there are too many threats, or a front cannot be read.
+        """
+        # Here, because reports need an extra.
+        from blast_env.reporting.study import blasts_of, threats_of
+
+        threats = threats_of(scenario, options)
+        one = {size: cost_of_blast(scenario, threats[0].charge, size) for size in options.sizes_m}
+        parts = blasts_of(scenario, layout, options, threats)
+        return cls(tuple((label, (one[cell_m],) * count) for label, count, cell_m in parts))
+
+    @property
+    def blasts(self) -> tuple[CostGuess, ...]:
+        """What every blast costs."""
+        return tuple(each for _, costs in self.parts for each in costs)
+
+    def share(self, label: str, share: float) -> float | None:
+        """Return the share of the whole that is done at a share of a part; `None` of no part."""
+        costs_s = {name: sum(each.seconds for each in costs) for name, costs in self.parts}
+        if label not in costs_s:
+            return None
+        names = list(costs_s)
+        before_s = sum(costs_s[name] for name in names[: names.index(label)])
+        return min((before_s + share * costs_s[label]) / sum(costs_s.values()), 1.0)
 
 
 def cost_words(costs: Sequence[CostGuess], with_films: bool = False) -> str:

@@ -17,7 +17,7 @@ from blast_env.app.work import Status, Task, read_status, write_status, write_ta
 from blast_env.files import make_folder
 
 _GRACE_S: Final = 5.0
-"""How long work may take to stop before its process is ended."""
+"""How long work may take to stop with the server before its process is ended."""
 
 _MOST_READINGS: Final = 2
 
@@ -125,7 +125,7 @@ class Workers:
             return
         for process in self._processes:
             if process.folder == folder and process.stop_by_s is None:
-                process.stop_by_s = monotonic() + _GRACE_S
+                process.stop_by_s = monotonic() + read_status(folder).grace_s
                 process.send("stop")
 
     def is_known(self, folder: Path) -> bool:

@@ -135,8 +135,37 @@ def plan_svg(
     )
 
 
+def plan_legend(scenario: Scenario, layout: Layout) -> str:
+    """Return what the colours and lines of the plan stand for, as HTML; what is on top first."""
+    features = [*site_features(scenario, layout), *vehicle_features(scenario, layout)]
+    shown = {each.title: each for each in features if each.kind is not Kinds.SITE}
+    entries = [
+        (title, "".join(_swatch(each)))
+        for title, each in sorted(shown.items(), key=lambda pair: -pair[1].kind.level)
+    ]
+    zone = scenario.build_zone
+    if zone is not None and not Placement.of(scenario, layout).usable.all():
+        blocked = '<rect x="1" y="1" width="22" height="12" fill="url(#blocked)"></rect>'
+        entries.append(("nothing may stand there", _BLOCKED + blocked))
+    return "".join(
+        f'<span><svg width="24" height="14" aria-hidden="true">{drawn}</svg>{escape(title)}</span>'
+        for title, drawn in entries
+    )
+
+
+def _swatch(feature: Feature) -> Iterator[str]:
+    """Yield the sign of a feature in the legend, in 24 x 14 pixels."""
+    look = feature.kind.look
+    if len(feature.places_m) > 2:
+        area = [(1.0, 1.0), (23.0, 1.0), (23.0, 13.0), (1.0, 13.0)]
+        return _areas(feature.kind, feature.colour, [area])
+    if len(feature.places_m) == 2:
+        return iter([_line(look, (1.0, 7.0), (23.0, 7.0))])
+    return iter([f'<g transform="translate(12 7) scale(0.75)">{_sign(look, 0.0, 0.0)}</g>'])
+
+
 def _named(feature: Feature) -> Feature:
-    """Return a feature with its label; the page has no legend that would explain the zone."""
+    """Return a feature with its label; zones are named where they are."""
     is_zone = feature.kind is Kinds.BUILD_ZONE
     return replace(feature, label=feature.name) if is_zone else feature
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from blast_env.app import placing
-from blast_env.app.cost import CostGuess, cost_of_blast
+from blast_env.app.cost import CostGuess, ReportCost, cost_of_blast
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
@@ -30,6 +30,7 @@ from blast_env.app.work import (
     BlastTask,
     FilmTask,
     ProposalTask,
+    ReportChoice,
     ReportTask,
     SearchTask,
     Status,
@@ -255,23 +256,24 @@ class Session:
         )
         return self._begin(task, f"film {path.name}")
 
-    def report(self, page: Path, pdf: Path | None = None) -> Path:
+    def report(
+        self, page: Path, pdf: Path | None = None, choice: ReportChoice | None = None
+    ) -> Path:
         """Report on the layout that is edited, by gas dynamics, under the chosen threats.
 
         Args:
             page: The page to write, .html.
             pdf: The same as PDF.
+            choice: What is to be in it.
 
         Raises:
             BlastEnvError: If the layout is empty, or it cannot be begun.
         """
-        if not self.design.layout:
-            raise BlastEnvError(
-                f"layout {SLOTS[self.design.active]} is empty: there is nothing to report on"
-            )
+        self._check_for_report()
         task = ReportTask(
             **self._what(self.design.layout),
             threats=self._threats_as_data(),
+            choice=choice or ReportChoice(),
             cache=str(self.work.cache),
             path=str(page),
             pdf=None if pdf is None else str(pdf),
@@ -293,6 +295,11 @@ class Session:
     def jobs(self, most: int | None = None) -> list[tuple[Path, Status]]:
         """Return the work that was asked for, the last first; the last few, if `most` says so."""
         return jobs_of(self.folder.jobs, most)
+
+    @property
+    def is_at_work(self) -> bool:
+        """Whether the work that was asked for last is still to be done."""
+        return any(not status.is_over for _, status in self.jobs(1))
 
     def _begin(self, task: Task, title: str) -> Path:
         return self.workers.begin(task, self.folder.jobs, title)
@@ -316,6 +323,23 @@ class Session:
                 keys[self.key(layout, threat)] = threat.charge
         there = self.folder.blasts_there()
         return tuple(self._cost(charge) for key, charge in keys.items() if key not in there)
+
+    def cost_of_report(self, choice: ReportChoice) -> ReportCost:
+        """Return what a report on the layout that is edited costs.
+
+        Raises:
+            BlastEnvError: If the layout is empty, or there are too many threats.
+        """
+        self._check_for_report()
+        charges = (each.charge for each in self.chosen_threats())
+        options = choice.options(charges, self.work.cache)
+        return ReportCost.of(self.scenario, self.design.layout, options)
+
+    def _check_for_report(self) -> None:
+        if not self.design.layout:
+            raise BlastEnvError(
+                f"layout {SLOTS[self.design.active]} is empty: there is nothing to report on"
+            )
 
     def cost_of_search(self, budget: int) -> tuple[CostGuess, ...]:
         """Return what the blasts of a search cost; nothing with particles."""

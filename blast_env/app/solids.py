@@ -13,7 +13,8 @@ _ZONE: Final[Colour] = (185, 217, 195)
 _GROUND_M: Final = 0.1
 _LINE_M: Final = 0.3
 _SIGN_M: Final = 0.6
-_SEE_THROUGH: Final = 0.45
+SEE_THROUGH: Final = 0.45
+"""Opacity of what has no height."""
 
 
 class SolidBox(NamedTuple):
@@ -54,7 +55,7 @@ def _standing(feature: Feature, air_m: float) -> SolidBox:
     colour = feature.colour if feature.kind is Kinds.BARRIER else feature.kind.look.line
     name = str(feature.properties.get("item", feature.name))
     top_m = height_m if isinstance(height_m, float) else air_m
-    opacity = 1.0 if known else _SEE_THROUGH
+    opacity = 1.0 if known else SEE_THROUGH
     base_m = feature.properties.get("base_m", 0.0)
     assert isinstance(base_m, float)
     return _box(feature.bounds_m, base_m, top_m, colour or EXPLOSIVE, opacity, name)

@@ -15,6 +15,7 @@ from blast_agents.search import LayoutProblem, Progress, find_proposer
 
 from blast_env.app import placing
 from blast_env.app.blasts import run_blasts, warm_engines
+from blast_env.app.cost import ReportCost
 from blast_env.app.offers import PACKAGED, proposed, title_of
 from blast_env.app.work import (
     BlastTask,
@@ -34,6 +35,7 @@ from blast_env.geometry import Layout
 from blast_env.scenario import Scenario
 
 _LEAST_PAUSE_S: Final = 0.1
+_WRITING_S: Final = 300.0  # of a report with its pictures, on a busy computer
 _REALISATIONS: Final = 8  # of the particle model, divided among the charges
 
 
@@ -195,17 +197,23 @@ def _film(task: FilmTask, teller: Teller) -> None:
 
 def _report(task: ReportTask, teller: Teller) -> None:
     # Reports need an extra, and most work is no report.
-    from blast_env.reporting import StudyOptions, run_study, write_report
+    from blast_env.reporting import run_study, write_report
 
     scenario, page = scenario_of(task.scenario), Path(task.path)
+    layout = placing.layout_from(scenario, task.layout)
+    options = task.choice.options((each.charge for each in task.threats), Path(task.cache))
+    cost = ReportCost.of(scenario, layout, options)
+    teller.tell(grace_s=_WRITING_S)
 
-    def tell(what: str, share: float) -> None:
-        if teller.is_due:
-            teller.tell(text=what, share=min(max(share, 0.0), 1.0))
+    def tell(what: str, part: float) -> None:
+        share = cost.share(what, part)
+        if teller.is_due or share is None:
+            teller.tell(text=what, share=teller.status.share if share is None else share)
 
-    charges = tuple(each.charge for each in task.threats)
-    options = StudyOptions(charges=charges, cache=Path(task.cache))
-    study = run_study(scenario, placing.layout_from(scenario, task.layout), options, tell)
+    study = run_study(scenario, layout, options, tell)
     written = write_report(study, page, None if task.pdf is None else Path(task.pdf))
-    words = " and ".join(path.name for path in written)
-    teller.tell(state="done", share=1.0, text=f"wrote {words}", file=str(written[-1]))
+    words = f"wrote {' and '.join(path.name for path in written)}"
+    if study.stopped:
+        words = f"stopped before: {study.stopped}; {words} with what was done"
+    state = "stopped" if study.stopped else "done"
+    teller.tell(state=state, share=1.0, text=words, file=str(written[-1]))

@@ -1,7 +1,8 @@
 """Work that a page asks for, as files: what is to be done, how far it has come, what came of it."""
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field, TypeAdapter
 
@@ -10,7 +11,11 @@ from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.physics.scene import Charge
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge, VehicleSource
+
+if TYPE_CHECKING:
+    from blast_env.reporting import StudyOptions
 
 TASK: Final = "task.json"
 STATUS: Final = "status.json"
@@ -138,13 +143,38 @@ class FilmTask(Kept):
     path: str
 
 
+class ReportChoice(Kept):
+    """What is to be in a report; see `StudyOptions`."""
+
+    cells_m: tuple[float, float] = (0.5, 0.25)
+    items: bool = True
+    target: int = LevelOfProtection.LOW
+
+    def options(self, charges: Iterable[AnyCharge], cache: Path) -> "StudyOptions":
+        """Return the options of a report under some charges.
+
+        Raises:
+            BlastEnvError: If there are too many.
+        """
+        from blast_env.reporting import StudyOptions  # needs an extra
+
+        return StudyOptions(
+            charges=tuple(charges),
+            cells_m=self.cells_m,
+            items=self.items,
+            target=LevelOfProtection(self.target),
+            cache=cache,
+        )
+
+
 class ReportTask(Kept):
-    """A report on one layout by gas dynamics, with cells of two sizes.
+    """A report on one layout by gas dynamics.
 
     Attributes:
         scenario: The site as a document.
         layout: The layout.
         threats: Those that it is held against.
+        choice: What is to be in it.
         cache: Folder for the loads of blasts.
         path: The page, .html.
         pdf: The same as PDF; `None` for none.
@@ -154,6 +184,7 @@ class ReportTask(Kept):
     scenario: dict[str, Any]
     layout: tuple[tuple[Any, ...], ...]
     threats: tuple[ThreatOf, ...]
+    choice: ReportChoice = ReportChoice()
     cache: str
     path: str
     pdf: str | None = None
@@ -177,6 +208,7 @@ class Status(Kept):
         layout: The best layout so far, or the one that is proposed; `None` without one.
         file: A file that was made.
         began_s: When it began, seconds since 1970; 0 for not yet.
+        grace_s: How long it may take to stop, and to keep what it has, before it is ended.
     """
 
     state: State = "waiting"
@@ -186,6 +218,7 @@ class Status(Kept):
     layout: tuple[tuple[Any, ...], ...] | None = None
     file: str | None = None
     began_s: float = 0.0
+    grace_s: float = 5.0
 
     def left_s(self, now_s: float) -> float | None:
         """Return how long it still takes, if it goes on as until now; `None` if that is unknown."""

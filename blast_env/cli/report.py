@@ -1,20 +1,18 @@
 """`blast-env report`: what an engineer hands over."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from blast_env.app.cost import CostGuess, cost_of_blast, cost_words
+from blast_env.app.cost import ReportCost, cost_words
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import SCENARIO_HELP, CacheOptions, ProcessOptions
 from blast_env.cli.output import message_console, print_line, progress_bar
 from blast_env.engines import JUDGE, find_engine
 from blast_env.errors import UnknownNameError
-from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import Scenario, check_layout, load_layout, load_scenario
+from blast_env.scenario import check_layout, load_layout, load_scenario
 
 if TYPE_CHECKING:
     from blast_env.reporting import StudyOptions
@@ -26,8 +24,8 @@ class ReportCommand(ProcessOptions, CacheOptions):
 
     A verdict first, then what was assumed: site and threats, bill of quantities, loads with two
     sizes of cells, damage, film stills, what each item is worth, other masses and places, where
-    every number comes from, and everything to repeat it. Stopped (Ctrl-C) after the loads, it
-    writes what is done.
+    every number comes from, and everything to repeat it. Stopped (Ctrl-C) after the loads with the
+    coarser cells, it writes what is done.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -43,7 +41,9 @@ class ReportCommand(ProcessOptions, CacheOptions):
     )
     most_threats: int = option(2, "How many of those, 1 to 6.", flag="--threats")
     cells_m: tuple[float, float] = option(
-        (0.5, 0.25), "Sides of the cells of gas dynamics, m.", metavar="COARSE FINE"
+        (0.5, 0.25),
+        "Sides of the cells of gas dynamics, m; the same twice is one size.",
+        metavar="COARSE FINE",
     )
     limits: tuple[str, ...] = option(
         (),
@@ -71,10 +71,16 @@ class ReportCommand(ProcessOptions, CacheOptions):
         check_targets(self.out, self.pdf)
         options = self._study_options()
         check_layout(scenario, layout)
-        parts = _costs(scenario, layout, options)
-        message_console().print(cost_words([cost for _, costs in parts for cost in costs]))
+        cost = ReportCost.of(scenario, layout, options)
+        message_console().print(cost_words(cost.blasts))
         with progress_bar(f"report on {scenario.name}") as progress:
-            study = run_study(scenario, layout, options, _told(parts, progress))
+
+            def tell(label: str, part: float) -> None:
+                share = cost.share(label, part)
+                if share is not None:
+                    progress(share)
+
+            study = run_study(scenario, layout, options, tell)
         if study.stopped:
             message_console().print(
                 f"stopped before: {study.stopped}; what was done by then is written"
@@ -99,34 +105,3 @@ class ReportCommand(ProcessOptions, CacheOptions):
             raise UnknownNameError("level of protection", self.target, levels)
         given["target"] = levels[self.target]
         return StudyOptions(**given)
-
-
-_Parts = tuple[tuple[str, list[CostGuess]], ...]
-
-
-def _costs(scenario: Scenario, layout: Layout, options: "StudyOptions") -> _Parts:
-    """Return what each part of a report costs, about."""
-    from blast_env.reporting.study import blasts_of, threats_of
-
-    threats = threats_of(scenario, options)
-    worst = threats[0].charge
-    return tuple(
-        (label, [cost_of_blast(scenario, worst, cell_m)] * count)
-        for label, count, cell_m in blasts_of(scenario, layout, options, threats)
-    )
-
-
-def _told(parts: _Parts, progress: Callable[[float], None]) -> Callable[[str, float], None]:
-    """Return what turns the share of a part that is done into that of the whole."""
-    costs_s = {label: sum(each.seconds for each in costs) for label, costs in parts}
-    whole_s = sum(costs_s.values())
-
-    def tell(label: str, share: float) -> None:
-        before_s = 0.0
-        for each, cost_s in costs_s.items():
-            if label == each:
-                progress(min((before_s + share * cost_s) / whole_s, 1.0))
-                return
-            before_s += cost_s
-
-    return tell

@@ -156,6 +156,8 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "standing": _standing(verdict),
         "spread": _spread(study),
         "bay_tables": _bay_tables(study),
+        "two_sizes": coarse != fine,
+        "cells": f"cells of {' and '.join(f'{cell_m} m' for cell_m in options.sizes_m)}",
         "grid_error": study.grid_error,
         "worth_map": worth_map(scenario, study.items) if study.items else None,
         "mass_figure": mass_figure(study.masses, options.units) if study.masses else None,
@@ -309,13 +311,14 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
         span = f"{_percent(line.least)} to {_percent(line.most)}"
         found.append((f"{line.name}: reduction", span, "1 - impulse with / without, all threats"))
     found.append(("cost of the layout", f"{study.cost:,.10g}", "bill of quantities"))
-    found.append(
-        (
-            "difference between the cells",
-            _percent(study.grid_error),
-            "largest difference of a reduction between the two sizes of cells",
+    if isfinite(study.grid_error):
+        found.append(
+            (
+                "difference between the cells",
+                _percent(study.grid_error),
+                "largest difference of a reduction between the two sizes of cells",
+            )
         )
-    )
     if verdict.barrier is not None:
         where = f"rigid bodies under the pressures on their sides; {blasts(sides[1][1])}"
         found.append(("pieces of the barrier", _standing(verdict), where))

@@ -1,7 +1,7 @@
 """Everything that a report needs to know, blast by blast."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -16,7 +16,7 @@ from blast_env.errors import BlastEnvError, shortened
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.evaluation.consequences import Consequences, consequences_of
 from blast_env.export.bill import LayoutPlan, bill_of_quantities
-from blast_env.geometry import Element, Layout, Measure, Piece, layout_text
+from blast_env.geometry import Element, Layout, Piece, layout_text, standing
 from blast_env.reporting.figures import (
     Picture,
     blast_pictures,
@@ -68,7 +68,7 @@ class StudyOptions:
         charges: The threats; without any, the worst place of each source.
         most_threats: How many of those at most, 1 to 6.
         cells_m: Sides of cells, two of them, the coarser one first: loads with both say what the
-            grid does.
+            grid does. The same twice is one size, and nothing is said of that.
         limits: What buildings may take.
         target: Level of protection that buildings with facades must reach.
         units: Units of loads.
@@ -107,12 +107,17 @@ class StudyOptions:
             if not low <= value <= high:
                 raise BlastEnvError(f"{name} is {value}, must be {low} to {high}")
         coarse, fine = self.cells_m
-        if not coarse > fine:
+        if not coarse >= fine:
             raise BlastEnvError(
                 f"cells are {coarse:g} m and {fine:g} m, must be two sizes, the coarser one first"
             )
         for cell_m in self.cells_m:
             GasEngine(cell_m=cell_m)
+
+    @property
+    def sizes_m(self) -> tuple[float, ...]:
+        """The sides of cells, each once."""
+        return tuple(dict.fromkeys(self.cells_m))
 
     @property
     def coarse(self) -> GasEngine:
@@ -181,8 +186,10 @@ class Study:
 
     @property
     def grid_error(self) -> float:
-        """Largest difference of a reduction between the two sizes of cells."""
+        """Largest difference of a reduction between the two sizes of cells; NaN with one."""
         coarse, fine = self.options.cells_m
+        if coarse == fine:
+            return float("nan")
         differences = [
             abs(
                 self.pair(target, threat, coarse).reduction
@@ -207,7 +214,8 @@ def run_study(
 ) -> Study:
     """Run all blasts of a report.
 
-    Whoever stops it (`KeyboardInterrupt`) after the threats gets a report on what is done by then.
+    Whoever stops it (`KeyboardInterrupt`) after the threats with the coarser cells gets a report on
+    what is done by then.
 
     Args:
         scenario: The scenario.
@@ -231,15 +239,16 @@ def run_study(
     front = front_layouts(options.front, scenario)
     bill = bill_of_quantities(LayoutPlan(scenario, cells))
     runs = Runs(scenario, cells, options, targets, threats, progress)
-    runs.run_threats()
     stills: tuple[Picture, ...] = ()
     masses: dict[str, tuple[Outcome, ...]] = {}
     left_out: tuple[str, ...] = ()
     items: tuple[ItemWorth, ...] = ()
     places: tuple[Outcome, ...] = ()
     points: tuple[FrontPoint, ...] = ()
-    part = _FILM
+    part = f"cells of {options.cells_m[1]:g} m"
     try:
+        runs.run_threats()
+        part = _FILM
         stills = runs.film() if options.stills else ()
         part = _MASSES_PART
         masses, left_out = runs.other_masses()
@@ -251,8 +260,9 @@ def run_study(
         points = runs.front_points(front)
         part = ""
     except KeyboardInterrupt:
+        options = runs.options_of_what_is_done()
         progress(f"stopped before: {part}", 1.0)
-    fine_m, coarse_m = options.cells_m[1], options.cells_m[0]
+    coarse_m, fine_m = options.cells_m
     return Study(
         scenario=scenario,
         layout=cells,
@@ -261,11 +271,11 @@ def run_study(
         threats=threats,
         bill=bill,
         cost=Placement.of(scenario, cells).cost,
-        pairs=tuple(runs.pairs),
+        pairs=tuple(each for each in runs.pairs if each.cell_m in options.cells_m),
         bare=runs.consequences(fine_m, walled=False),
         walled=runs.consequences(fine_m, walled=True),
         walled_coarse=runs.consequences(coarse_m, walled=True),
-        pictures=runs.pictures,
+        pictures=runs.pictures[fine_m],
         stills=stills,
         items=items,
         masses=masses,
@@ -286,11 +296,11 @@ def blasts_of(
     Labels are those that `run_study` tells; of parts with several, what they begin with.
     """
     coarse_m = options.cells_m[0]
-    count, items = len(threats), len(layout) if options.items else 0
+    count, items = len(threats), len(standing(layout)) if options.items else 0
     parts: list[tuple[str, int, float]] = [
         (f"{threat.name} {words}, cells of {cell_m:g} m", 1, cell_m)
+        for cell_m in options.sizes_m
         for threat in threats
-        for cell_m in options.cells_m
         for words in (_BARE, _WALLED)
     ]
     parts.append((_FILM, 2 if options.stills else 0, coarse_m))
@@ -324,37 +334,53 @@ class Runs:
         self.scenario, self.layout, self.options = scenario, layout, options
         self.targets, self.threats, self.progress = targets, threats, progress
         self.pairs: list[LoadPair] = []
-        self.pictures: dict[str, tuple[Picture, ...]] = {}
+        self.pictures: dict[float, dict[str, tuple[Picture, ...]]] = {}
         self.notes: list[str] = []
         self.digests: list[tuple[str, str]] = []
         self._found: dict[tuple[float, bool], list[Consequences]] = {}
         self._evaluator = BlastEvaluator(scenario, options.coarse, cache=options.cache)
 
     def run_threats(self) -> None:
-        """Run every threat with both sizes of cells, without and with the layout."""
-        for threat in self.threats:
-            for cell_m in self.options.cells_m:
+        """Run every threat with both sizes of cells, without and with the layout.
+
+        The coarser ones first: with them alone there is a report, if it is stopped then.
+        """
+        for cell_m in self.options.sizes_m:
+            for threat in self.threats:
                 both = [self._measured(threat, cell_m, layout) for layout in ((), self.layout)]
                 self.pairs += self._pairs(threat, cell_m, both[0], both[1])
                 for is_walled, measured in enumerate(both):
                     charge = threat.against(self.scenario, self.layout if is_walled else ())
                     found = consequences_of(self.scenario, measured.result, charge)
                     self._found.setdefault((cell_m, bool(is_walled)), []).append(found)
-            # Of the finer cells: only these two results are in memory at once.
-            self.pictures[threat.name] = (
-                *self._damage_pictures(threat.name),
-                risk_picture(*both),
-                *blast_pictures(both[0], both[1], self.options.units),
-            )
+                # Drawn now, because only these two results are in memory at once.
+                self.pictures.setdefault(cell_m, {})[threat.name] = (
+                    *self._damage_pictures(threat.name, cell_m),
+                    risk_picture(*both),
+                    *blast_pictures(both[0], both[1], self.options.units),
+                )
+
+    def options_of_what_is_done(self) -> StudyOptions:
+        """Return the options of a report on what is done: with the coarser cells alone, perhaps.
+
+        Raises:
+            KeyboardInterrupt: If not even these are done.
+        """
+        done = [self.options.cells_m[0], self.options.cells_m[1]]
+        done = [
+            cell_m for cell_m in done if len(self.pictures.get(cell_m, {})) == len(self.threats)
+        ]
+        if not done:
+            raise KeyboardInterrupt
+        return replace(self.options, cells_m=(done[0], done[-1]))
 
     def consequences(self, cell_m: float, *, walled: bool) -> Consequences:
         """Return what all threats did, with such cells, without the layout or with it."""
         return Consequences.together(self._found[cell_m, walled])
 
-    def _damage_pictures(self, threat: str) -> tuple[Picture, ...]:
+    def _damage_pictures(self, threat: str, cell_m: float) -> tuple[Picture, ...]:
         """Return the damage of the buildings with facades under the last threat."""
-        fine_m = self.options.cells_m[1]
-        bare, walled = (self._found[fine_m, is_walled][-1] for is_walled in (False, True))
+        bare, walled = (self._found[cell_m, is_walled][-1] for is_walled in (False, True))
         return damage_pictures(self.scenario, self.layout, bare, walled, threat)
 
     def _measured(self, threat: NamedCharge, cell_m: float, layout: Layout) -> MeasuredBlast:
@@ -428,9 +454,8 @@ class Runs:
 
     def item_worths(self) -> tuple[ItemWorth, ...]:
         """Return what every module or piece is worth: the impulse where it alone is left out."""
-        fewer = [
-            self.layout[:index] + self.layout[index + 1 :] for index in range(len(self.layout))
-        ]
+        pieces = standing(self.layout)
+        fewer = [tuple(each for each in self.layout if each != piece) for piece in pieces]
         charges = [each.charge for each in self.threats]
         impulses = self._loads(_ITEMS, ((), self.layout, *fewer), charges)
         bare, whole, without = impulses[0], impulses[1], impulses[2:]
@@ -441,8 +466,7 @@ class Runs:
                 self.scenario.zone.element_rectangle_m(element),
                 float(worth),
             )
-            for element, worth in zip(self.layout, worths, strict=True)
-            if not isinstance(element, Measure)
+            for element, worth in zip(pieces, worths, strict=True)
         ]
         return tuple(sorted(items, key=lambda each: -each.worth))
 

@@ -53,6 +53,24 @@ class BuildingLine:
 
 
 @dataclass(frozen=True)
+class OtherGlass:
+    """All windows with the glass of another component.
+
+    Attributes:
+        title: What people call it.
+        cost: What the measures of the site ask for it, without those that the layout takes already;
+            `None` where they do not put it into all windows.
+        passes: Whether the buildings pass with it behind the layout.
+        passes_bare: The same without the layout.
+    """
+
+    title: str
+    cost: float | None
+    passes: bool
+    passes_bare: bool
+
+
+@dataclass(frozen=True)
 class ReportVerdict:
     """Does the layout do?
 
@@ -64,7 +82,7 @@ class ReportVerdict:
         buildings: The buildings with a facade.
         limits: The limits that were given.
         barrier: The barrier under the threat that tilts a piece most.
-        glazing: With which other glass the buildings would pass behind the layout, and without.
+        glazing: Other glass in all windows.
     """
 
     passes: bool | None
@@ -74,7 +92,7 @@ class ReportVerdict:
     buildings: tuple[BuildingLine, ...]
     limits: tuple[KeptLimit, ...]
     barrier: BarrierResponse | None
-    glazing: tuple[tuple[str, bool, bool], ...]
+    glazing: tuple[OtherGlass, ...]
 
     @property
     def word(self) -> str:
@@ -93,7 +111,7 @@ def verdict_of(study: Study) -> ReportVerdict:
     kept, kept_bare = ([each.kept for each in limits], [each.kept_bare for each in limits])
     asked = [f"{len(limits)} limits of loads"] if limits else []
     doubt = ""
-    glazing: tuple[tuple[str, bool, bool], ...] = ()
+    glazing: tuple[OtherGlass, ...] = ()
     if study.walled.buildings:
         asked.insert(0, f"level of protection {target.label!r}")
         kept.append(study.walled.passes(target))
@@ -139,16 +157,30 @@ def _line(study: Study, name: str) -> BuildingLine:
     )
 
 
-def _glazing(study: Study) -> Iterator[tuple[str, bool, bool]]:
-    """Yield other glass: its title, and whether buildings pass with it behind the layout, and not.
-
-    Where a building has panes at all.
-    """
+def _glazing(study: Study) -> Iterator[OtherGlass]:
+    """Yield other glass, where a building has panes at all."""
     if not any(each.facade.panes for each in study.walled.responses):
         return
-    for glazing in other_glazing(study.scenario).values():
+    for name, glazing in other_glazing(study.scenario).items():
         walled, bare = (
             each.with_glazing(glazing).passes(study.options.target)
             for each in (study.walled, study.bare)
         )
-        yield glazing.title, walled, bare
+        yield OtherGlass(glazing.title, _price(study, name), walled, bare)
+
+
+def _price(study: Study, glazing: str) -> float | None:
+    """Return what the site's measures ask for a glass in all windows that do not have it yet.
+
+    Of measures that overlap, the dearest that can be left out are.
+    """
+    bays = [bay for bay in study.scenario.named_bays(study.layout) if bay.glazing]
+    missing = [bay.bay for bay in bays if bay.glazing != glazing]
+    taken = [each for each in study.scenario.zone.hardening if each.glazing == glazing]
+    for measure in sorted(taken, key=lambda each: -each.cost):
+        fewer = [each for each in taken if each is not measure]
+        if all(any(each.covers(bay) for each in fewer) for bay in missing):
+            taken = fewer
+    if not all(any(each.covers(bay) for each in taken) for bay in missing):
+        return None
+    return sum(each.cost for each in taken)

@@ -1,16 +1,18 @@
 """What work costs, told before it begins."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from blast_env.app.cost import CostGuess, cost_of_blast, cost_words, time_words
+from blast_env.app.cost import CostGuess, ReportCost, cost_of_blast, cost_words, time_words
 from blast_env.app.folder import WorkFolder
 from blast_env.app.records import RECORD, EngineRecord
 from blast_env.app.session import Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
 from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.reporting import StudyOptions
 from blast_env.scenario import load_scenario
 from tests.app.here import Here
 from tests.gas_sites import WALL, hut
@@ -52,6 +54,21 @@ def test_only_what_is_not_there_is_counted(tmp_path: Path) -> None:
     assert len(session.cost_of_search(50)) == 50
     session.engine = EngineRecord()
     assert session.cost([0]) == session.cost_of_search(50) == ()
+
+
+def test_a_report_costs_its_blasts_and_its_parts_are_shares_of_that() -> None:
+    options = StudyOptions(charges=(threats_of(hut())[0].charge,))
+    cost = ReportCost.of(hut(), WALL, options)
+    sizes = [each.cells for each in cost.blasts]
+    assert len(sizes) == 4 + 2 + 4 + (len(WALL) + 2) + 2
+    assert sum(each == max(sizes) for each in sizes) == 2
+    shares = [cost.share(label, share) or 0.0 for label, _ in cost.parts for share in (0.0, 1.0)]
+    assert shares[0] == 0.0
+    assert shares[-1] == pytest.approx(1.0)
+    assert shares == sorted(shares)
+    assert cost.share("no part", 0.5) is None
+    one = ReportCost.of(hut(), WALL, replace(options, cells_m=(0.5, 0.5), items=False))
+    assert len(one.blasts) == 2 + 2 + 4 + 2
 
 
 def test_words() -> None:

@@ -2,9 +2,11 @@
 
 import os
 import signal
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic, sleep
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,7 +14,7 @@ from blast_env import reporting
 from blast_env.app import blasts, offers
 from blast_env.app.design import SLOTS
 from blast_env.app.folder import WorkFolder
-from blast_env.app.jobs import Workers, settle
+from blast_env.app.jobs import Workers, _Process, settle
 from blast_env.app.placing import plain
 from blast_env.app.records import (
     BlastRecord,
@@ -25,7 +27,7 @@ from blast_env.app.records import (
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.verdicts import verdict_rows
-from blast_env.app.work import Status, ThreatOf, read_status, write_status
+from blast_env.app.work import ReportChoice, Status, ThreatOf, read_status, write_status
 from blast_env.engines import find_engine
 from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError
@@ -34,6 +36,7 @@ from blast_env.evaluation.consequences import consequences
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.reporting import StudyOptions
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Scenario, load_scenario
 from tests.app.here import Here
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
@@ -471,16 +474,22 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: dict[str, object] = {}
+    told: list[float] = []
+    stopped = ""
 
     def study(
         scenario: Scenario, layout: Layout, options: StudyOptions, tell: Callable[..., None]
-    ) -> str:
-        asked.update(scenario=scenario, layout=layout, charges=options.charges)
-        tell("loads", 0.5)
-        return "study"
+    ) -> SimpleNamespace:
+        asked.update(scenario=scenario, layout=layout, options=options)
+        for label in ("film", "other places", "stopped before: nothing"):
+            sleep(0.11)  # more often nobody is told
+            tell(label, 0.5)
+            status = state_of(session)
+            told.append(status.share)
+            assert (status.text, status.grace_s) == (label, 300.0)
+        return SimpleNamespace(stopped=stopped)
 
-    def write(found: object, page: Path, pdf: Path | None) -> list[Path]:
-        assert found == "study"
+    def write(_: object, page: Path, pdf: Path | None) -> list[Path]:
         return [page] if pdf is None else [page, pdf]
 
     monkeypatch.setattr(reporting, "run_study", study)
@@ -489,12 +498,40 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     with pytest.raises(BlastEnvError, match="layout A is empty"):
         session.report(tmp_path / "r.html")
     session.put("wall", session.design.with_layout(WALL))
-    session.report(tmp_path / "r.html", tmp_path / "r.pdf")
+    choice = ReportChoice(cells_m=(0.5, 0.5), items=False, target=3)
+    session.report(tmp_path / "r.html", tmp_path / "r.pdf", choice)
+    cost = session.cost_of_report(choice)
+    shares = [cost.share("film", 0.5), cost.share("other places", 0.5)]
+    assert told == [*shares, shares[-1]]  # of the whole, and what is no part changes nothing
     status = state_of(session)
     assert (status.state, status.file) == ("done", str(tmp_path / "r.pdf"))
     assert status.text == "wrote r.html and r.pdf"
-    assert asked == {
-        "scenario": session.scenario,
-        "layout": WALL,
-        "charges": tuple(each.charge for each in session.chosen_threats()),
-    }
+    charges = tuple(each.charge for each in session.chosen_threats())
+    options = StudyOptions(
+        charges=charges,
+        cells_m=(0.5, 0.5),
+        items=False,
+        target=LevelOfProtection.MEDIUM,
+        cache=session.work.cache,
+    )
+    assert asked == {"scenario": session.scenario, "layout": WALL, "options": options}
+    stopped = "other masses"
+    session.report(tmp_path / "r.html")
+    status = state_of(session)
+    assert (status.state, status.file) == ("stopped", str(tmp_path / "r.html"))
+    assert status.text == "stopped before: other masses; wrote r.html with what was done"
+
+
+def test_a_report_that_is_stopped_may_take_time_to_write(tmp_path: Path) -> None:
+    workers = Workers()
+    folder = tmp_path / "job"
+    folder.mkdir()
+    process = _Process(subprocess.Popen(["sleep", "60"], stdin=subprocess.PIPE, text=True), folder)
+    workers._processes.append(process)
+    for grace_s in (5.0, 300.0):
+        write_status(Status(state="running", grace_s=grace_s), folder)
+        process.stop_by_s = None
+        workers.stop(folder)
+        assert process.stop_by_s is not None
+        assert grace_s - 4.0 < process.stop_by_s - monotonic() <= grace_s
+    process.end()

@@ -14,7 +14,7 @@ from blast_env.cli import app
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.consequences import Consequences
-from blast_env.geometry import Layout, layout_text
+from blast_env.geometry import Layout, Measure, layout_text
 from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Limit, Study, StudyOptions, run_study, write_report
 from blast_env.reporting.loads import MeasuredBlast, measure, targets_of
@@ -23,9 +23,11 @@ from blast_env.reporting.study import Runs, blasts_of
 from blast_env.reporting.threats import chief_threats
 from blast_env.reporting.verdict import verdict_of
 from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.components import catalogue
 from blast_env.scenario import Scenario, save_scenario, write_layout
+from blast_env.scenario.catalogue import Hardening
 from tests.catalogue_sites import WALL, yard
-from tests.reporting.sites import LAYOUT, small_hut
+from tests.reporting.sites import LAYOUT, glazed_hut, small_hut
 
 
 @pytest.fixture(scope="module")
@@ -252,7 +254,9 @@ def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: s
     assert f">{verdict.word}<" in first
     assert f"<td>{line.broken[1]:.1f} of 8</td>" in first
     assert "costs 4" in first
-    assert all(f"all windows: {title}" in page for title, _, _ in verdict.glazing)
+    assert all(f"all windows: {each.title}" in page for each in verdict.glazing)
+    assert page.count("no price given in the site file") == len(verdict.glazing) - 1
+    assert "0 for the glass" in page  # of the windows as they are
     bays = page[page.index("Bay by bay") :]
     assert all(f"hut/{wall}/1/1" in bays for wall in ("west", "east", "south", "north"))
 
@@ -293,6 +297,54 @@ def test_a_report_that_is_stopped_has_what_was_done(monkeypatch: pytest.MonkeyPa
     assert stopped.stopped == "other masses"
     assert stopped.pairs
     assert "This report was stopped before: other masses" in report_html(stopped, ["blast-env"])
+
+
+def test_stopped_among_the_finer_cells_a_report_has_the_coarser_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sizes: list[float] = []
+
+    def measured(blast: GasBlast, *rest: object) -> MeasuredBlast:
+        sizes.append(blast.engine.cell_m)
+        if len(sizes) == 4:
+            raise KeyboardInterrupt
+        return measure(blast, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("blast_env.reporting.study.measure", measured)
+    stopped = run_study(glazed_hut(), LAYOUT, StudyOptions(stills=0))
+    assert sizes == [0.5, 0.5, 0.25, 0.25]
+    assert stopped.stopped == "cells of 0.25 m"
+    assert {each.cell_m for each in stopped.pairs} == {0.5}
+    page = report_html(stopped, ["blast-env"])
+    assert "This report was stopped before: cells of 0.25 m" in page
+    assert "there is one size of cells alone" in page
+    assert "nan" not in page.lower().replace("dynamics", "")
+    sizes[:] = [0.5] * 2
+    with pytest.raises(KeyboardInterrupt):  # nothing is done yet
+        run_study(glazed_hut(), LAYOUT, StudyOptions(stills=0, cells_m=(0.5, 0.5)))
+
+
+def test_other_glass_has_the_price_of_the_measures_that_put_it_into_all_windows(
+    study: Study,
+) -> None:
+    glass = "window_laminated_6"
+    west = Hardening(name="w", glazing=glass, walls=("west",), cost=10.0)
+    others = Hardening(name="o", glazing=glass, walls=("east", "south", "north"), cost=20.0)
+    every = Hardening(name="e", glazing=glass, cost=50.0)
+
+    def price(*measures: Hardening, taken: tuple[Measure, ...] = ()) -> float | None:
+        zone = study.scenario.zone.model_copy(update={"hardening": measures})
+        site = study.scenario.model_copy(update={"build_zone": zone})
+        verdict = verdict_of(replace(study, scenario=site, layout=(*LAYOUT, *taken)))
+        title = catalogue()[glass].title
+        return next(each.cost for each in verdict.glazing if each.title == title)
+
+    assert price() is None
+    assert price(west) is None
+    assert price(west, others) == 30.0
+    assert price(west, others, every) == 30.0
+    assert price(west, every) == 50.0
+    assert price(west, others, taken=(Measure.named("w"),)) == 20.0
 
 
 def test_the_blasts_that_are_counted_before_are_those_that_are_run(study: Study) -> None:

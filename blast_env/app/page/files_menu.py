@@ -2,19 +2,34 @@
 
 from collections.abc import Callable
 from functools import partial
+from typing import Final
 
 import tomli_w
 from nicegui import events, ui
 
+from blast_env.app.cost import cost_words
 from blast_env.app.design import SLOTS
 from blast_env.app.page.uploads import complain, file_upload, read_upload, site_upload
 from blast_env.app.session import Session
 from blast_env.app.sources import layout_of_file
+from blast_env.app.work import ReportChoice
 from blast_env.errors import BlastEnvError
 from blast_env.export import SUFFIXES, LayoutPlan, export_layout
 from blast_env.files import scratch_folder
 from blast_env.provenance import versions
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Scenario
+
+_TWO_SIZES: Final = "both"
+_CELLS: Final = {
+    _TWO_SIZES: "0.5 and 0.25 m: says what the grid does",
+    "coarse": "0.5 m alone: much quicker",
+}
+_LEVELS: Final = {
+    int(level): f"level of protection: {level.label}"
+    for level in LevelOfProtection
+    if level > LevelOfProtection.BELOW_STANDARDS
+}
 
 
 def _menu(words: str, icon: str) -> ui.menu:
@@ -112,14 +127,66 @@ class FilesMenu:
 
     def _save_report(self, as_pdf: bool) -> None:
         session = self._session
-        name = f"{session.scenario.name}_{SLOTS[session.design.active]}"
-        page = session.folder.path / f"{name}.html"
         try:
-            session.report(page, page.with_suffix(".pdf") if as_pdf else None)
+            session.cost_of_report(ReportChoice())  # refuses what cannot be reported on
         except BlastEnvError as error:
             complain(error)
             return
-        ui.notify(
-            "the report is on its way, gas dynamics with cells of 0.5 and 0.25 m: it can be"
-            " downloaded on the right when it is there"
+        ReportDialog(session, as_pdf)
+
+
+class ReportDialog:
+    """What is to be in a report, and what that costs.
+
+    Args:
+        session: The design.
+        as_pdf: Whether the report is written as PDF, too.
+    """
+
+    def __init__(self, session: Session, as_pdf: bool) -> None:
+        self._session, self._as_pdf = session, as_pdf
+        with ui.dialog(value=True) as self._dialog, ui.card().classes("w-[480px]"):
+            kind = "PDF" if as_pdf else "HTML page"
+            ui.label(f"Report on layout {SLOTS[session.design.active]}: {kind}").style(
+                "font-weight: 600"
+            )
+            self._cells = ui.select(_CELLS, value=_TWO_SIZES, label="cells of gas dynamics")
+            self._target = ui.select(_LEVELS, value=ReportChoice().target, label="has to reach")
+            self._target.visible = bool(session.scenario.bays)
+            self._items = ui.switch("what each piece is worth, left out alone", value=True)
+            for element in (self._cells, self._target):
+                element.props("dense outlined options-dense").classes("w-full")
+            self._cost = ui.label().props('aria-live="polite"')
+            ui.label(
+                "It can be stopped: what is done by then is written, once the loads with the"
+                " coarser cells are there."
+            ).classes("be-quiet")
+            with ui.row():
+                ui.button("begin", on_click=self._begin).props("no-caps")
+                ui.button("cancel", on_click=self._dialog.close).props("flat no-caps")
+        for each in (self._cells, self._items):
+            each.on_value_change(self._say_cost)
+        self._say_cost()
+
+    @property
+    def _choice(self) -> ReportChoice:
+        sizes = (0.5, 0.25) if self._cells.value == _TWO_SIZES else (0.5, 0.5)
+        return ReportChoice(
+            cells_m=sizes, items=bool(self._items.value), target=int(self._target.value)
         )
+
+    def _say_cost(self) -> None:
+        self._cost.text = cost_words(self._session.cost_of_report(self._choice).blasts)
+
+    def _begin(self) -> None:
+        session = self._session
+        name = f"{session.scenario.name}_{SLOTS[session.design.active]}"
+        page = session.folder.path / f"{name}.html"
+        self._dialog.close()
+        try:
+            pdf = page.with_suffix(".pdf") if self._as_pdf else None
+            session.report(page, pdf, self._choice)
+        except BlastEnvError as error:
+            complain(error)
+            return
+        ui.notify("the report is on its way: it can be downloaded on the right when it is there")

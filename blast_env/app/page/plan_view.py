@@ -6,8 +6,8 @@ from typing import Any, Final
 from nicegui import events, ui
 
 from blast_env.app.editor import Editor, Tool
-from blast_env.app.plan import PixelView, overlay_svg, plan_svg, words_of_place
-from blast_env.app.solids import boxes
+from blast_env.app.plan import PixelView, overlay_svg, plan_legend, plan_svg, words_of_place
+from blast_env.app.solids import SEE_THROUGH, boxes
 
 WIDTH_PX, HEIGHT_PX = 680, 560
 
@@ -87,6 +87,7 @@ class PlanPanel:
             "wheel.prevent", self._wheel, ["deltaY", "offsetX", "offsetY"], throttle=0.05
         )
         self._overlay = self._image.add_layer()
+        self._legend = ui.html("", sanitize=False).classes("be-legend")
         with ui.row().classes("be-status items-center no-wrap"):
             with ui.column().classes("grow gap-0").props('role="status" aria-live="polite"'):
                 self._words = ui.label()
@@ -135,6 +136,7 @@ class PlanPanel:
         over = overlay_svg(self._view, editor.scenario, editor.ghost, editor.cursor)
         if plan != self._drawn[0]:
             self._image.content = plan
+            self._legend.content = plan_legend(editor.scenario, editor.layout)
         if over != self._drawn[1]:
             self._overlay.content = over
         self._drawn = (plan, over)
@@ -275,7 +277,7 @@ class SolidView:
         if solids == self._drawn:
             return
         self._drawn = solids
-        self._see_through.set_visibility(any(each.opacity < 1.0 for each in solids))
+        self._see_through.set_visibility(any(each.opacity == SEE_THROUGH for each in solids))
         self._scene.clear()
         with self._scene:
             for each in solids:

@@ -13,6 +13,8 @@ from blast_env.scenario import ObjectiveSection
 
 _FILM: Final = "film"
 _GAUGES: Final = "gauges"
+_NOTHING: Final = "No blast yet for the layouts as they are now: press Blast."
+_RUNNING: Final = "Work is under way: how far it has come is said under Work."
 _DAMAGE: Final = "damage of "
 _COLUMNS: Final = (
     ("layout", "layout", "left"),
@@ -92,18 +94,16 @@ class ResultsView:
             large = ui.switch("large", value=False)
             large.on_value_change(lambda e: self._enlarge(e.value))
         with ui.element("div").classes("be-results"):
-            self._empty = ui.label(
-                "No blast yet for the layouts as they are now: press Blast on the right."
-            ).classes("be-quiet")
-            self._bar = ui.html(_BAR, sanitize=False).classes("w-full")
-            self._cards = ui.element("div").classes("be-cards")
-            self._chart = ui.column().classes("w-full")
+            self._empty = ui.label().classes("be-quiet")
             verdict_columns = [
                 {"name": name, "field": name, "label": label, "align": align}
                 for name, label, align in _VERDICT_COLUMNS
             ]
             self._verdicts = ui.table(columns=verdict_columns, rows=[], row_key="id")
-            self._verdicts.props("dense flat bordered").classes("w-full mt-2")
+            self._verdicts.props("dense flat bordered").classes("be-verdicts w-full mb-2")
+            self._bar = ui.html(_BAR, sanitize=False).classes("w-full")
+            self._cards = ui.element("div").classes("be-cards")
+            self._chart = ui.column().classes("w-full")
             self._unglazed = ui.label(
                 "Whether windows break and walls fail is said of structures with windows or wall "
                 "panels: choose them on the left, and blast by gas."
@@ -142,7 +142,8 @@ class ResultsView:
         there = [
             (each, frames_in(session.folder.blast_of(each.key))) for each in session.shown(threat)
         ]
-        options = (self._what, self._threat, self._with_bare, self._large)
+        running = session.is_at_work
+        options = (self._what, self._threat, self._with_bare, self._large, running)
         blasts = session.folder.blasts_there()
         state = (options, session.engine, there, tuple(threats), blasts, session.scenario)
         if state == self._state:
@@ -163,6 +164,7 @@ class ResultsView:
         self._table.rows = [_row(each, k) for k, each in enumerate(rows)]
         self._table.visible = bool(rows)
         self._empty.visible = not found
+        self._empty.text = _RUNNING if running else _NOTHING
         self._show_notes(records)
 
     def _found(self, there: Sequence[tuple[Shown, int]], threat: NamedThreat) -> Iterator[_Found]:

@@ -35,7 +35,9 @@ class StartPage:
     def _begin(self, message: str) -> None:
         if message:
             ui.label(message).classes("be-refused")
-        ui.label("Begin with a site").classes("be-head")
+        ui.label("Begin with a site of your own").classes("be-head")
+        site_upload("drop a file here, or press +", self._sessions.workers, self._create)
+        ui.label("or with one of these").classes("be-head")
         for name in bundled_scenarios():
             with ui.row().classes("be-site w-full items-center"):
                 button = ui.button(name, icon="add", on_click=lambda _, n=name: self._bundled(n))
@@ -48,9 +50,6 @@ class StartPage:
             ui.button("generated site", icon="casino", on_click=self._generated).props(
                 "no-caps dense outline"
             )
-        ui.separator()
-        ui.label("or from a file").classes("be-quiet")
-        site_upload("drop a file here, or press +", self._sessions.workers, self._create)
 
     def _designs(self) -> None:
         ui.label("Go on with a design").classes("be-head")

@@ -107,6 +107,7 @@ class WorkPanel:
         self._runs = {each.name: each for each in runs}
         self._filling = False
         self._cards: list[_Card] | None = None
+        self._there: frozenset[str] = frozenset()
         self._build()
 
     @property
@@ -306,9 +307,14 @@ class WorkPanel:
         engine = session.engine
         self._engine.value = next(name for name, (each, _) in _ENGINES.items() if each == engine)
         self._filling = False
-        self._cost.visible = not engine.is_first_look
-        self._cost.text = cost_words(session.cost([design.active]), with_films=True)
+        self._say_cost()
         self._say_cost_of_search()
+
+    def _say_cost(self) -> None:
+        session = self._session
+        self._there = session.folder.blasts_there()
+        self._cost.visible = not session.engine.is_first_look
+        self._cost.text = cost_words(session.cost([session.design.active]), with_films=True)
 
     def _say_cost_of_search(self) -> None:
         costs = []
@@ -343,6 +349,8 @@ class WorkPanel:
 
     def follow(self) -> None:
         """Show how far work has come."""
+        if self._session.folder.blasts_there() != self._there:
+            self._say_cost()
         jobs = self._session.jobs(_SHOWN_JOBS)
         cards = self._cards
         if cards is not None and len(cards) == len(jobs):
@@ -381,7 +389,7 @@ class WorkPanel:
                     words = "take it" if status.is_over else "take best so far"
                     take = ui.button(words, icon="input", on_click=lambda: self._take(card.status))
                     take.props("dense outline no-caps size=sm")
-                if status.file and status.state == "done":
+                if status.file and status.state in ("done", "stopped"):
                     fetch = partial(ui.download.file, status.file)
                     button = ui.button("download", icon="download", on_click=lambda: fetch())
                     button.props("dense outline no-caps size=sm")

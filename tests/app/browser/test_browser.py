@@ -6,6 +6,7 @@ command itself, in a process of its own.
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -457,27 +458,43 @@ def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
     page.button("Save as").click()
     sleep(0.5)
     page.button("report on this layout (.html)").click()
+    page.sees("blasts of gas: about")
+    page.shoot("report_cost")
+    page.button("begin").click()
     page.until(lambda: "wrote pump_house_A.html" in page.text(), 1800.0)
     page.shoot("map_report_done")
     page.button("download").click()
     (report,) = page.until(lambda: [*(tmp_path / "downloads").glob("*.html")])
-    assert "In short" in report.read_text(encoding="utf-8")
+    assert "<h3>Verdict</h3>" in report.read_text(encoding="utf-8")
     reached("the report")
     (PICTURES / "map_to_report.txt").write_text("\n".join(stages) + "\n")
     assert not page.faults()
 
 
-def test_the_verdict_on_a_site_of_100_m(page: Page, tmp_path: Path) -> None:
-    """Windows, a layout and what gas says of them, by the page alone; the times are kept."""
+def large_site() -> Scenario:
+    """An office on 100 m, a charge, walls to choose from, and no word of windows yet."""
+    document = office_park().model_dump(mode="json", exclude_none=True)
+    document["charge"] = document["charge"][:1]
+    wall = {"name": "t_wall", "from_catalogue": "t_wall_3_6", "cost": 900.0, "stock": 12}
+    document["build_zone"] |= {"items": [wall], "budget": 20000.0}
+    del document["build_zone"]["stock"]
+    return Scenario.from_document(document, "office_park")
+
+
+def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) -> None:
+    """Windows, a layout, the verdict, better glass and a report by the page alone; with times."""
     began_s = monotonic()
     stages: list[str] = []
 
     def reached(stage: str) -> None:
         stages.append(f"{monotonic() - began_s:.0f} s: {stage}")
+        PICTURES.mkdir(parents=True, exist_ok=True)
+        (PICTURES / "site_of_100_m.txt").write_text("\n".join(stages) + "\n")
 
-    document = office_park().model_dump(mode="json", exclude_none=True)
-    document["charge"] = document["charge"][:1]
-    save_scenario(Scenario.from_document(document, "office_park"), tmp_path / "office_park.toml")
+    def verdicts() -> list[str]:
+        return [each.text for each in page.all(".be-verdicts tbody tr")]
+
+    save_scenario(large_site(), tmp_path / "office_park.toml")
     page.open()
     page.all("input[type=file]")[0].send_keys(str(tmp_path / "office_park.toml"))
     page.until(lambda: "/design/" in page.driver.current_url)
@@ -487,22 +504,48 @@ def test_the_verdict_on_a_site_of_100_m(page: Page, tmp_path: Path) -> None:
     page.until(lambda: "office_west" in [each.get_property("value") for each in page.all("input")])
     page.choose("windows", "window, 6 mm annealed")
     page.until(lambda: any("6 mm annealed" in each.text for each in page.all(".q-select")))
-    reached("its windows")
+    page.button("measure").click()
+    page.sees("glass1, cost 1000")
+    page.shoot("large_measure")
+    reached("its windows, and better glass as a measure")
     page.choose("by", "rule: wall near the building")
     page.button("Propose").click()
     page.button("take it").click()
-    page.sees("30 of 30 modules")
+    page.until(lambda: re.search(r"[1-9]\d* of 13 pieces", page.text()))
+    page.shoot("large_plan")
     reached("a layout by rule")
     page.sees("2 blasts of gas: about")
     page.button("Blast").click()
-    page.sees("left", 300.0)
+    page.until(lambda: re.search(r", [\d.]+ (s|min) left", page.text()), 300.0)
     page.shoot("large_running")
-    page.until(lambda: "running" not in page.text(), 900.0)
-    page.sees("level of protection")
-    page.until(lambda: len(page.all(".q-table")[0].find_elements(By.CSS_SELECTOR, "tbody tr")) == 2)
+    page.until(lambda: len(verdicts()) == 2, 1800.0)
+    page.until(lambda: page.film_widths() == [640, 640])
     page.shoot("large_verdict")
     reached("the verdict of gas dynamics, without and with the layout")
-    (PICTURES / "site_of_100_m.txt").write_text("\n".join(stages) + "\n")
+    before = verdicts()
+    next(each for each in page.all(".q-toggle") if "glass1" in each.text).click()
+    page.until(lambda: len(verdicts()) == 2 and verdicts()[1] != before[1])
+    assert verdicts()[0] == before[0]
+    page.choose("picture", "damage of")
+    page.until(lambda: [each.get_property("naturalWidth") > 0 for each in page.all(".be-card img")])
+    sleep(3.0)
+    page.shoot("large_damage")
+    reached("the verdict with better glass, without a blast")
+    page.button("Save as").click()
+    sleep(0.5)
+    page.button("report on this layout (.pdf)").click()
+    page.choose("cells of gas dynamics", "0.5 m alone")
+    page.sees("blasts of gas: about")
+    page.shoot("large_report_cost")
+    page.button("begin").click()
+    page.until(lambda: re.search(r", [\d.]+ (s|min) left", page.text()), 900.0)
+    page.shoot("large_report_running")
+    page.until(lambda: "wrote office_park_A.html and" in page.text(), 3600.0)
+    page.button("download").click()
+    (report,) = page.until(lambda: [*(tmp_path / "downloads").glob("*.pdf")])
+    assert report.read_bytes().startswith(b"%PDF")
+    shutil.copy(report, PICTURES / "large_report.pdf")
+    reached("the report with cells of 0.5 m")
     assert not page.faults()
 
 
@@ -553,6 +596,9 @@ def test_a_report_goes_on_while_its_page_is_loaded_anew(page: Page) -> None:
     page.button("Save as").click()
     sleep(0.5)
     page.button("report on this layout (.html)").click()
+    page.sees("blasts of gas: about")
+    page.shoot("report_cost")
+    page.button("begin").click()
     page.sees("report visitor_entrance_A.html")
     page.driver.refresh()
     page.sees("report visitor_entrance_A.html")
