@@ -31,7 +31,7 @@ class ReadingLimits:
         wall_s: Time on the clock, everywhere. It is longer, because a computer may be busy.
     """
 
-    processor_s: int = 8
+    processor_s: int = 6
     memory_bytes: int = 350_000_000
     wall_s: float = 60.0
 

@@ -88,7 +88,9 @@ def changed(scenario: Scenario, edit: Callable[[Document], None]) -> Scenario:
     """
     document = document_of(scenario)
     edit(document)
-    _fit_catalogue(document)
+    zone = scenario.build_zone
+    is_whole = zone is not None and zone.stock == sum(zone.catalogue.stocks)
+    _fit_catalogue(document, zone.stock if zone is not None and is_whole else None)
     return Scenario.from_document(document, scenario.name)
 
 
@@ -373,15 +375,22 @@ def with_charge_area(
     return after, SiteThing(ThingKind.CHARGE, len(after.charge) - 1)
 
 
-def _fit_catalogue(document: Document) -> None:
-    """Let the stock of a zone be no more than its catalogue has, and an empty one be none."""
+def _fit_catalogue(document: Document, whole: int | None) -> None:
+    """Let the stock of a zone be no more than its catalogue has, and an empty one be none.
+
+    Args:
+        document: The scenario.
+        whole: The stock before, if it was all that the catalogue had: it goes on to be that.
+    """
     zone = document.get("build_zone") or {}
     if "items" not in zone:
         return
     if not zone["items"]:
         del zone["items"]
-    elif zone.get("stock", 0) > sum(item["stock"] for item in zone["items"]):
-        del zone["stock"]
+    elif zone.get("stock", 0) > sum(item["stock"] for item in zone["items"]) or (
+        zone.get("stock") == whole
+    ):
+        zone.pop("stock", None)
 
 
 def _own(document: Document, thing: SiteThing) -> Document:

@@ -433,7 +433,8 @@ class Session:
     def _facades(self, shown: Shown, threat: NamedThreat) -> FacadeVerdict | None:
         charge = charge_against(self.scenario, shown.layout, threat.charge)
         folder = self.folder.blast_of(shown.key)
-        return FacadeVerdict.read(self.scenario, shown.layout, charge, folder)
+        cell_m = self.engine.cell_m or 0.5
+        return FacadeVerdict.read(self.scenario, shown.layout, charge, cell_m, folder)
 
     def waves(self, threat: NamedThreat) -> Sequence[tuple[str, BlastRecord]]:
         """Return the blasts with gauges under a threat, by the names of the layouts."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from blast_env.app.records import BlastRecord, Verdict, VerdictRow
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.consequences import BuildingResponse, by_building
+from blast_env.evaluation.consequences import BuildingResponse, by_building, peak_factor
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
@@ -57,6 +57,7 @@ class FacadeVerdict:
         pressure_pa: Mean overpressure on each bay (bays, times).
         charge: The charge where it went off.
         scenario: The site.
+        cell_m: Side of the cells.
     """
 
     bays: tuple[FilledBay, ...]
@@ -64,10 +65,11 @@ class FacadeVerdict:
     pressure_pa: FloatArray
     charge: Charge
     scenario: Scenario
+    cell_m: float
 
     @classmethod
     def read(
-        cls, scenario: Scenario, layout: Layout, charge: Charge, folder: Path
+        cls, scenario: Scenario, layout: Layout, charge: Charge, cell_m: float, folder: Path
     ) -> "FacadeVerdict | None":
         """Return the verdict of a blast that is kept; `None` without histories of the facades."""
         try:
@@ -81,12 +83,13 @@ class FacadeVerdict:
         if not rows:
             return None
         bays = tuple(known[names[row]] for row in rows)
-        return cls(bays, time_s, pressure[rows].astype(np.float64), charge, scenario)
+        return cls(bays, time_s, pressure[rows].astype(np.float64), charge, scenario, cell_m)
 
     def buildings(self) -> list[BuildingResponse]:
         """Return what becomes of the buildings."""
         found = respond(self.bays, self.time_s, self.pressure_pa)
-        return by_building(self.scenario, found, self.charge)
+        factor = peak_factor(self.cell_m, self.charge.tnt_kg)
+        return by_building(self.scenario, found, self.charge, factor)
 
     def verdicts(self) -> tuple[Verdict, ...]:
         """Return that in numbers."""
@@ -128,6 +131,7 @@ def _verdict(building: BuildingResponse) -> Verdict:
     return Verdict(
         building=building.building,
         level=facade.level_of_protection,
+        sharper_level=building.sharpened.level_of_protection,
         panes=facade.panes,
         broken=facade.broken_panes,
         condition=facade.worst_condition.label,
@@ -149,17 +153,24 @@ def verdict_rows(
             found.setdefault((name, verdict.building), []).append((record.threat, verdict))
     for (name, _), own in found.items():
         if len(own) > 1:
-            worst = max((each for _, each in own), key=lambda each: (-each.level, each.broken))
+            worst = max((each for _, each in own), key=_badness)
             yield _verdict_row(name, f"worst of {len(own)}", worst)
         yield from (_verdict_row(name, threat, each) for threat, each in own)
 
 
+def _badness(verdict: Verdict) -> tuple[int, int, float]:
+    return -verdict.level, -verdict.sharper_level, verdict.broken
+
+
 def _verdict_row(layout: str, threat: str, verdict: Verdict) -> VerdictRow:
+    level = LevelOfProtection(verdict.level).label
+    if verdict.sharper_level < verdict.level:
+        level += f"; {LevelOfProtection(verdict.sharper_level).label} if peaks are sharp"
     return VerdictRow(
         layout=layout,
         threat=threat,
         building=verdict.building,
-        level=LevelOfProtection(verdict.level).label,
+        level=level,
         panes=f"{verdict.broken:.1f} of {verdict.panes}" if verdict.panes else _DASH,
         condition=verdict.condition if verdict.panes else _DASH,
         damage=verdict.damage or _DASH,

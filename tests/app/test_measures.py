@@ -8,7 +8,7 @@ from nicegui import ui
 from nicegui.testing import User
 
 from blast_env.app import edits, placing
-from blast_env.app.edits import ThingKind
+from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session, Sessions
@@ -62,6 +62,9 @@ def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> No
     facade = found.responses[0].facade
     assert after.panes == f"{facade.broken_panes:.1f} of {facade.panes}" != before.panes
     assert after.condition == facade.worst_condition.label
+    sharper = found.responses[0].sharpened.level_of_protection
+    assert sharper < facade.level_of_protection
+    assert after.level == f"{facade.level_of_protection.label}; {sharper.label} if peaks are sharp"
     assert after.damage == before.damage  # its walls are as they were
     assert blasted.verdicts()[0] == bare
     assert {row.cost for row in blasted.comparison()} == {"0", "70"}
@@ -142,6 +145,9 @@ def test_the_budget_pays_or_it_is_said(blasted: Session) -> None:
 def test_a_measure_is_added_to_a_site_with_items_and_windows() -> None:
     site, thing = edits.added(hardened_hut(), ThingKind.MEASURE, (0.0, 0.0), (0.0, 0.0))
     assert thing.number == 2
+    assert site.zone.stock == hardened_hut().zone.stock + 1  # or it could not be taken
+    fewer = edits.with_values(site, SiteThing(ThingKind.ZONE), {"stock": 3})
+    assert edits.added(fewer, ThingKind.MEASURE, (0.0, 0.0), (0.0, 0.0))[0].zone.stock == 3
     dearer = edits.with_values(site, thing, {"cost": 12.0, "wall": "concrete_200"})
     assert (dearer.zone.hardening[2].cost, dearer.zone.hardening[2].wall) == (12.0, "concrete_200")
     assert len(edits.removed(dearer, thing).zone.hardening) == 2

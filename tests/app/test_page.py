@@ -239,7 +239,7 @@ def test_an_unknown_design_leads_to_the_list_with_a_message(tmp_path: Path) -> N
     async def story(user: User, sessions: Sessions) -> None:
         await user.open("/design/nothing")
         await user.should_see("there is no design 'nothing'")
-        await user.should_see("Begin with a site")
+        await user.should_see("Begin with a site of your own")
         response = await user.http_client.get("/blasts/nothing/key/000.jpg")
         assert response.status_code == 404
 

@@ -101,6 +101,9 @@ class ResultsView:
             ]
             self._verdicts = ui.table(columns=verdict_columns, rows=[], row_key="id")
             self._verdicts.props("dense flat bordered").classes("be-verdicts w-full mb-2")
+            self._sharp = ui.label(
+                "Cells clip peaks: where a level is lower if peaks are sharp, take smaller cells."
+            ).classes("be-quiet mb-2")
             self._bar = ui.html(_BAR, sanitize=False).classes("w-full")
             self._cards = ui.element("div").classes("be-cards")
             self._chart = ui.column().classes("w-full")
@@ -157,6 +160,7 @@ class ResultsView:
         verdicts = session.verdicts()
         self._verdicts.rows = [_row(each, k) for k, each in enumerate(verdicts)]
         self._verdicts.visible = bool(verdicts)
+        self._sharp.visible = any("; " in each.level for each in verdicts)
         self._unglazed.visible = bool(found) and not verdicts
         rows = session.comparison()
         judge = LoadJudge(session.scenario)
