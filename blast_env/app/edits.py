@@ -387,9 +387,9 @@ def _fit_catalogue(document: Document, whole: int | None) -> None:
         return
     if not zone["items"]:
         del zone["items"]
-    elif zone.get("stock", 0) > sum(item["stock"] for item in zone["items"]) or (
-        zone.get("stock") == whole
-    ):
+        return
+    pieces = sum(item["stock"] for item in zone["items"]) + len(zone.get("hardening", ()))
+    if zone.get("stock", 0) > pieces or zone.get("stock") == whole:
         zone.pop("stock", None)
 
 
