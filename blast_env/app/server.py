@@ -91,6 +91,8 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
                 path = sessions.of(design_id).damage_file(key, name)
         except BlastEnvError as error:
             raise HTTPException(404, str(error)) from error
+        finally:
+            sessions.leave(design_id)  # unless a page looks at it
         return FileResponse(path, headers=_KEPT_BY_BROWSER)
 
     app.add_static_file(local_file=_PAGE_FILES / "player.js", url_path="/player.js")

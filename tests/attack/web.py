@@ -98,6 +98,7 @@ class Victim:
             f"/design/{self.design_id}",
             "/player.js",
             f"/blasts/{self.design_id}/key/000.jpg",
+            f"/damage/{self.design_id}/key/damage_0_0.png",
             "/_nicegui_ws/socket.io/?EIO=4&transport=polling",
             "/favicon.ico",
         )
@@ -369,6 +370,8 @@ def paths(server: Victim) -> Iterator[Attempt]:
                 f"/blasts/{up}/{up}/{name}",
                 f"/blasts/{design}/{up}/{name}",
                 f"/blasts/{design}/key/{up}{name}",
+                f"/damage/{up}/{up}/{name}",
+                f"/damage/{design}/key/{up}{name}",
                 f"/design/{up}{name}",
                 f"/player.js/{up}/{name}",
                 f"/_nicegui/{up}/{up}/{name}",
