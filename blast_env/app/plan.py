@@ -155,10 +155,10 @@ def plan_legend(scenario: Scenario, layout: Layout) -> str:
 
 def _swatch(feature: Feature) -> Iterator[str]:
     """Yield the sign of a feature in the legend, in 24 x 14 pixels."""
-    look = feature.kind.look
+    look = feature.look
     if len(feature.places_m) > 2:
         area = [(1.0, 1.0), (23.0, 1.0), (23.0, 13.0), (1.0, 13.0)]
-        return _areas(feature.kind, feature.colour, [area])
+        return _areas(feature.kind, look, feature.colour, [area])
     if len(feature.places_m) == 2:
         return iter([_line(look, (1.0, 7.0), (23.0, 7.0))])
     return iter([f'<g transform="translate(12 7) scale(0.75)">{_sign(look, 0.0, 0.0)}</g>'])

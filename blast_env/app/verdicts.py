@@ -15,12 +15,12 @@ import numpy as np
 
 from blast_env.app.records import BlastRecord, Verdict, VerdictRow
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.consequences import BuildingResponse, by_building, peak_factor
+from blast_env.evaluation.consequences import BuildingResponse, by_building
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import FilledBay, respond
+from blast_env.response.facade import FilledBay, peak_factor, respond
 from blast_env.scenario import Scenario
 
 _BAYS: Final = "bays.npz"
