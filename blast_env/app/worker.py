@@ -5,6 +5,7 @@ standard input ends, because the server did, the process stops in the same way a
 """
 
 import _thread
+import signal
 import sys
 import threading
 import traceback
@@ -84,6 +85,8 @@ def _end(folder: Path, state: str, text: str) -> None:
 
 def main() -> None:
     """Work until the standard input ends."""
+    # A server in the background of a script ignores it, and this process would not hear `stop`.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     inbox = _Inbox(sys.stdin)
     with suppress(KeyboardInterrupt):
         warm_up()

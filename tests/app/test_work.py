@@ -414,7 +414,9 @@ def test_a_search_is_stopped_and_keeps_its_best_and_its_process_goes_on(
     tmp_path: Path, workers: Workers
 ) -> None:
     session = session_on(tmp_path, BALLISTIC_COURTYARD, workers)
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as in the background of a script
     workers.prepare()
+    signal.signal(signal.SIGINT, before)
     first, second = session.search("random", 100_000), session.search("random", 4)
     while read_status(first).layout is None:
         wait(workers, first, "waiting", "running")
