@@ -14,6 +14,7 @@ from blast_env.cli import app
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.consequences import Consequences
+from blast_env.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.geometry import Layout, Measure, layout_text
 from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Limit, Study, StudyOptions, run_study, write_report
@@ -28,6 +29,7 @@ from blast_env.scenario import Scenario, save_scenario, write_layout
 from blast_env.scenario.catalogue import Hardening
 from tests.catalogue_sites import WALL, yard
 from tests.reporting.sites import LAYOUT, glazed_hut, small_hut
+from tests.scenario.test_hardening import TAKEN, glazed_yard
 
 
 @pytest.fixture(scope="module")
@@ -345,6 +347,14 @@ def test_other_glass_has_the_price_of_the_measures_that_put_it_into_all_windows(
     assert price(west, others, every) == 30.0
     assert price(west, every) == 50.0
     assert price(west, others, taken=(Measure.named("w"),)) == 20.0
+
+
+def test_measures_are_in_the_bill_without_sizes(study: Study) -> None:
+    bill = bill_of_quantities(LayoutPlan(glazed_yard(), (TAKEN,)))
+    page = report_html(replace(study, bill=bill), ["blast-env"])
+    row = re.search(r"<tr><td class=\"l\">glass</td>.*</tr>", page)
+    assert row is not None
+    assert row[0].count("<td></td>") == 3
 
 
 def test_the_blasts_that_are_counted_before_are_those_that_are_run(study: Study) -> None:
