@@ -1,9 +1,9 @@
 """`blast-env judge`: submissions to the benchmark, played again by gas dynamics."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from math import isnan
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +13,7 @@ from blast_env.cli.output import make_table, print_line, progress_bar, result_co
 from blast_env.engines import JUDGE, find_engine
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator
-from blast_env.files import make_folder
+from blast_env.files import make_folder, write_atomically
 from blast_env.problems import (
     BUDGETS,
     DEFINITIONS,
@@ -31,10 +31,11 @@ from blast_env.problems import (
     play,
     secret_sites,
     shipped_standings,
+    standings_page,
+    standings_tables,
     stored_references,
 )
 from blast_env.problems.references import cell_key
-from blast_env.statistics import Estimate
 
 _OWN_SITES: Final = 8
 
@@ -47,7 +48,7 @@ class JudgeCommand(ProcessOptions, CacheOptions):
     shown. With --method a method of your own is run first, and its submission is written.
     """
 
-    submissions: tuple[Path, ...] = argument("Files of submissions.", default=())
+    submissions: tuple[Path, ...] = argument("Files of submissions, judged ones too.", default=())
     method: str | None = option(
         None, "Run this method first: a search's name, or your own as module:object."
     )
@@ -68,11 +69,13 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         None, "Folder for the submission of --method and for what was judged.", writes=FOLDER
     )
 
+    page: Path | None = option(None, "Write the standings as a page: .md.", writes=(".md",))
+
     def __call__(self) -> None:
         """Judge, and print the table."""
         if self.out is not None:
             make_folder(self.out)
-        submitted = [Submission.load(path) for path in self.submissions]
+        submitted = [_submission(path) for path in self.submissions]
         judged = [self._judged(each, DEFINITIONS, stored_references()) for each in submitted]
         if self.method is not None:
             definitions = self._definitions()
@@ -81,7 +84,12 @@ class JudgeCommand(ProcessOptions, CacheOptions):
             judged.append(self._judged(submission, definitions, references))
         elif self.secret is not None:
             raise BlastEnvError("--secret is given without --method: layouts cannot be known yet")
-        _print_standings((*shipped_standings(), *judged))
+        together = (*shipped_standings(), *judged)
+        _print_standings(together)
+        if self.page is not None:
+            with write_atomically(self.page) as temporary:
+                temporary.write_text(standings_page(together), "utf-8")
+            print_line(f"wrote {self.page}")
 
     def _definitions(self) -> Mapping[str, Definition]:
         if self.secret is not None:
@@ -164,26 +172,19 @@ def _file_name(method: str) -> str:
     return "".join(letter if letter.isalnum() else "_" for letter in method)
 
 
+def _submission(path: Path) -> Submission:
+    """Read a submission, or one that was judged before."""
+    with suppress(BlastEnvError):
+        return JudgedSubmission.load(path).submission
+    return Submission.load(path)
+
+
 def _print_standings(judged: Sequence[JudgedSubmission]) -> None:
     """Print a row a submission, the best first; those on other problems are other tables."""
-    groups: dict[tuple[frozenset[str], float], list[JudgedSubmission]] = {}
-    for each in judged:
-        groups.setdefault((frozenset(each.problems), each.cell_m), []).append(each)
-    for (problems, cell_m), own in groups.items():
-        title = f"{len(problems)} problems, judged with cells of {cell_m:g} m"
-        headers = ("method", "runs", *(f"{budget:,} blasts" for budget in BUDGETS), "score")
-        table = make_table(title, headers)
-        for each in sorted(own, key=lambda each: -each.area().value):
-            cells = [score_text(each.score(budget)) for budget in BUDGETS]
-            table.add_row(each.method, str(len(each.runs)), *cells, score_text(each.area()))
+    for each in standings_tables(judged):
+        table = make_table(each.title, each.headers)
+        for row in each.rows:
+            table.add_row(*row)
         result_console().print(table)
-        print_line(f"problems: {', '.join(sorted(problems))}")
-    if not groups:
+    if not judged:
         print_line("no submissions come with the package")
-
-
-def score_text(score: Estimate) -> str:
-    """Return a score with its 95 % interval, where there is one."""
-    if isnan(score.low):
-        return f"{score.value:.2f}"
-    return f"{score.value:.2f} ({score.low:.2f} to {score.high:.2f})"

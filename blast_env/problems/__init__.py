@@ -18,6 +18,7 @@ from blast_env.problems.judging import (
 from blast_env.problems.problem import BenchmarkProblem, Evaluated, make
 from blast_env.problems.references import KnownLayout, ScoreReference, stored_references
 from blast_env.problems.space import LayoutSpace
+from blast_env.problems.standings import standings_page, standings_tables
 from blast_env.problems.submissions import Asked, Method, Run, Submission, play
 
 __all__ = [
@@ -43,5 +44,7 @@ __all__ = [
     "play",
     "secret_sites",
     "shipped_standings",
+    "standings_page",
+    "standings_tables",
     "stored_references",
 ]

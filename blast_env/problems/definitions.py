@@ -21,7 +21,7 @@ from blast_env.scenario import PointSource, Scenario, VehicleCharge, load_scenar
 from blast_env.scenario.build_scene import draw_threat
 from blast_env.sites import FAMILIES, generate_site
 
-Family = Literal["told", "hidden", "vehicle", "unseen"]
+Family = Literal["told", "hidden", "vehicle", "unseen", "response"]
 
 BUDGETS: Final = (0, 50, 200, 1000)
 """Gas blasts that a method may spend on a problem."""

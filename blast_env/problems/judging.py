@@ -108,6 +108,15 @@ class JudgedSubmission:
         return write_runs(path, self)
 
     @property
+    def submission(self) -> Submission:
+        """The same as it was submitted, to be judged again."""
+        runs = (
+            Run(each.problem, each.budget, each.seed, each.blasts, each.layout)
+            for each in self.runs
+        )
+        return Submission(self.method, tuple(runs), self.note)
+
+    @property
     def problems(self) -> tuple[str, ...]:
         """The problems that were entered."""
         return tuple(dict.fromkeys(run.problem for run in self.runs))
@@ -221,13 +230,15 @@ def shares_of(
     evaluator: BlastEvaluator,
     processes: int = 1,
 ) -> list[float]:
-    """Return what layouts leave of the load without a barrier, under the judge's threats."""
+    """Return what layouts leave of what counts without a barrier, under the judge's threats."""
     case, counts = definition.case, definition.scenario.objective
     pairs = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
     loads = [each.load(counts) for each in evaluator.loads_of_many(pairs, processes)]
     of_layout = [
-        case.combined(loads[first : first + len(case.threats)])
-        for first in range(0, len(loads), len(case.threats))
+        case.counted(loads[first : first + len(case.threats)], layout)
+        for layout, first in zip(
+            ((), *layouts), range(0, len(loads), len(case.threats)), strict=True
+        )
     ]
     if not of_layout[0] > 0.0:
         raise BlastEnvError(f"{definition.name}: nothing arrives without a barrier")

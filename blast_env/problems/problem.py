@@ -76,7 +76,7 @@ class BenchmarkProblem:
 
     @property
     def family(self) -> str:
-        """What is known of the charge: `told`, `hidden`, `vehicle`, `unseen`."""
+        """The family: `told`, `hidden`, `vehicle`, `unseen` or `response`."""
         return self.definition.family
 
     @property
@@ -144,7 +144,8 @@ class BenchmarkProblem:
         """Return the share of the load without a barrier that is left with a layout.
 
         It takes a blast for each threat, unless the same was asked before. The blasts without a
-        barrier are free.
+        barrier are free. Where the response of facades counts, it is the share of that; measures
+        that harden a facade take no blast of their own.
 
         Args:
             layout: (row, column) of each module, or pieces (row, column, item, turned).
@@ -179,8 +180,7 @@ class BenchmarkProblem:
             each.load(self.scenario.objective)
             for each in self.evaluator.loads_of_many(pairs + bare)
         ]
-        combined = self.case.combined
-        share = combined(counted[:count]) / combined(counted[count:])
+        share = self.case.counted(counted[:count], checked) / self.case.counted(counted[count:])
         self.history.append(Evaluated(checked, share, count, self.blasts))
         return share
 

@@ -21,11 +21,13 @@ class LayoutSpace:
 
     **A choice a place.** A place is a cell on which something may have its lower left cell. Choice
     0 is nothing, choice k is the k-th thing that may stand there: one without a catalogue, so that
-    choices are binary, more with one. Not every vector is legal.
+    choices are binary, more with one. Each measure that hardens facades follows as a place of its
+    own. Not every vector is legal.
 
     **Random keys.** Any vector of numbers from 0 to 1 is a legal layout. There are three keys for
     each piece of the stock: what is set down (or nothing), and where. If it may not stand there, it
-    stands on the nearest place where it may; if there is none, it is left out.
+    stands on the nearest place where it may; if there is none, it is left out. A measure is set
+    down like a piece, wherever that is.
 
     Attributes:
         scenario: The scenario; it has a build zone.
@@ -39,20 +41,24 @@ class LayoutSpace:
 
     @cached_property
     def options(self) -> tuple[tuple[Element, ...], ...]:
-        """What may stand on each place, place by place, row by row."""
-        legal, catalogue = self._empty.legal, self._empty.catalogue
-        rows, columns = self._empty.free.nonzero()
-        return tuple(
+        """What may stand on each place, place by place, row by row; then each measure."""
+        catalogue = self._empty.catalogue
+        is_measure = np.array([each.is_measure for each in catalogue.variants])
+        pieces = self._empty.legal & ~is_measure[:, None, None]
+        found = [
             tuple(
                 catalogue.element_at(int(variant), int(row), int(column))
-                for variant in legal[:, row, column].nonzero()[0]
+                for variant in pieces[:, row, column].nonzero()[0]
             )
-            for row, column in zip(rows, columns, strict=True)
-        )
+            for row, column in zip(*pieces.any(axis=0).nonzero(), strict=True)
+        ]
+        measures = self._empty.legal[:, :1, :1].any(axis=(1, 2)) & is_measure
+        found += [(catalogue.element_at(int(each), 0, 0),) for each in measures.nonzero()[0]]
+        return tuple(found)
 
     @cached_property
     def places(self) -> tuple[Cell, ...]:
-        """The places, in the order of the vector."""
+        """The places, in the order of the vector; (0, 0) for a measure."""
         return tuple((options[0][0], options[0][1]) for options in self.options)
 
     @cached_property
@@ -92,15 +98,17 @@ class LayoutSpace:
         """
         choices = np.zeros(len(self.options), dtype=np.int64)
         for element in Placement.of(self.scenario, layout).layout:
-            place = self._place_of[element[0], element[1]]
-            choices[place] = 1 + self.options[place].index(element)
+            place, choice = self._place_of[element]
+            choices[place] = choice
         return choices
 
     @cached_property
     def key_sizes(self) -> tuple[int, int, int]:
-        """How many values each of a piece's keys tells apart: things, rows and columns."""
-        catalogue = self._empty.catalogue
-        return 1 + len(catalogue.variants), catalogue.shape[0], catalogue.shape[1]
+        """How many values each of a piece's keys tells apart: things, rows and columns.
+
+        Things that fit nowhere on the site, such as a wall across a narrow strip, are none of them.
+        """
+        return 1 + len(self._fitting), *self._empty.catalogue.shape
 
     @property
     def keys(self) -> int:
@@ -140,13 +148,14 @@ class LayoutSpace:
         placement = self._empty
         sizes = np.array(self.key_sizes)
         for own in np.clip(given, 0.0, 1.0).reshape(-1, KEYS_PER_PIECE):
-            variant, row, column = np.minimum((own * sizes).astype(int), sizes - 1)
-            if variant == len(placement.catalogue.variants):
+            thing, row, column = np.minimum((own * sizes).astype(int), sizes - 1)
+            if thing == len(self._fitting):
                 continue
+            variant = self._fitting[thing]
             rows, columns = placement.legal[variant].nonzero()
             if len(rows):
                 nearest = int(np.argmin((rows - row) ** 2 + (columns - column) ** 2))
-                place = int(variant), int(rows[nearest]), int(columns[nearest])
+                place = variant, int(rows[nearest]), int(columns[nearest])
                 placement = placement.place(placement.catalogue.element_at(*place))
         return placement.layout
 
@@ -167,5 +176,15 @@ class LayoutSpace:
         return tuple(reasons)
 
     @cached_property
-    def _place_of(self) -> dict[Cell, int]:
-        return {cell: index for index, cell in enumerate(self.places)}
+    def _fitting(self) -> tuple[int, ...]:
+        """The variants that may stand somewhere on the empty site."""
+        return tuple(self._empty.legal.any(axis=(1, 2)).nonzero()[0].tolist())
+
+    @cached_property
+    def _place_of(self) -> dict[Element, tuple[int, int]]:
+        """Place and choice of each thing that may stand alone."""
+        return {
+            element: (place, choice)
+            for place, options in enumerate(self.options)
+            for choice, element in enumerate(options, start=1)
+        }

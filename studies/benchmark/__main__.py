@@ -25,7 +25,7 @@ from blast_env.problems import (
 )
 from blast_env.problems.references import cell_key
 from studies.benchmark.methods import OUTSIDE
-from studies.benchmark.references import known_layouts, published_before
+from studies.benchmark.references import known_layouts, published_before, submitted_layouts
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 _STORED = Path("blast_env/problems/data/references.json")
@@ -36,20 +36,31 @@ _REFERENCES = TypeAdapter(dict[str, ScoreReference])
 def references(
     cache: Annotated[Path, typer.Option(help="Folder in which blasts are kept.")],
     out: Annotated[Path, typer.Option(help="The file.")] = _STORED,
+    submission: Annotated[
+        list[Path] | None, typer.Option(help="Submission with layouts of its problems.")
+    ] = None,
     most_s: Annotated[float, typer.Option(help="Stop before a problem after so many s.")] = 1e9,
 ) -> None:
-    """Play the rules and all layouts that are known, on every problem that has no reference yet."""
+    """Play the rules and all layouts that are known, on every problem that has no reference yet.
+
+    Problems of the submissions get new ones: their layouts are known, too. That is for versions
+    that nobody has entered yet, since it moves what scores 1.
+    """
     with user_errors():
         known = _REFERENCES.validate_json(out.read_bytes()) if out.exists() else {}
+        found = submitted_layouts([Submission.load(path) for path in submission or ()])
         published, began = published_before(cache, DEFINITIONS), monotonic()
         engine = find_engine(JUDGE, 0.5)
         for name, definition in DEFINITIONS.items():
-            if name in known and known[name].digest == definition.digest:
+            stored = known.get(name)
+            if stored and stored.digest == definition.digest and name not in found:
                 continue
             if monotonic() - began > most_s:
                 break
             evaluator = BlastEvaluator(definition.scenario, engine, cache=published)
-            more = known_layouts(definition, published)
+            more = known_layouts(definition, published) | found.get(name, {})
+            if stored:
+                more = {stored.best.method: stored.best.layout} | more
             known[name] = reference_of(definition, evaluator, more, cell_key(0.5))
             best, rule = known[name].best, known[name].rule
             print_line(

@@ -2,7 +2,7 @@
 
 import json
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from blast_agents.benchmark import find_method
@@ -10,7 +10,7 @@ from blast_agents.benchmark import find_method
 from blast_env.data import PublishedBlasts
 from blast_env.evaluation import DiskCache
 from blast_env.geometry import Layout
-from blast_env.problems import Definition, make
+from blast_env.problems import Definition, Submission, make
 from blast_env.scenario import Charge, Placement, VehicleCharge, load_layout
 
 DATA = Path("docs/data")
@@ -44,6 +44,16 @@ def known_layouts(definition: Definition, published: PublishedBlasts) -> dict[st
     if scenario.zone.items:
         found["package"] = find_method("package")(make(definition, 0), 0)
     return {name: tuple(sorted(layout)) for name, layout in found.items()}
+
+
+def submitted_layouts(submissions: Iterable[Submission]) -> dict[str, dict[str, Layout]]:
+    """Return the layouts of submissions by problem, and by what found them."""
+    found: dict[str, dict[str, Layout]] = defaultdict(dict)
+    for each in submissions:
+        for run in each.runs:
+            method = f"{each.method}, {run.budget:,} blasts, seed {run.seed}"
+            found[run.problem][method] = run.layout
+    return found
 
 
 def published_before(folder: Path, definitions: Mapping[str, Definition]) -> PublishedBlasts:

@@ -7,7 +7,7 @@ from blast_agents.benchmark import find_method
 
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import BudgetError
-from blast_env.geometry import Layout, Piece
+from blast_env.geometry import Layout, Measure, Piece
 from blast_env.problems import (
     DEFINITIONS,
     Asked,
@@ -21,6 +21,7 @@ from blast_env.problems import (
 )
 from blast_env.scenario import PointSource
 from tests.problems.row import RowEngine
+from tests.scenario.test_hardening import glazed_yard
 
 WALL = [Piece(12, 0, "low_wall", True)]
 
@@ -83,6 +84,20 @@ def test_a_method_that_asks_for_more_is_refused() -> None:
         play(greedy, Asked([lambda budget: problem(budget)], (5,)))
 
 
+def test_where_facades_count_measures_take_no_blast() -> None:
+    """What counts is the shortfall or, of a layout that passes, its share of the budget."""
+    definition = Definition("yard", "response")
+    vars(definition)["scenario"] = glazed_yard(target="medium")
+    own = make(definition, len(definition.case.threats), engine="surrogate")
+    measures = [Measure.named("glass"), Measure.named("panels")]
+    assert own.evaluate(()) == 1.0
+    spent = own.blasts
+    shares = [own.evaluate(measures[:1]), own.evaluate(measures)]
+    assert own.blasts == spent
+    assert shares[1] < 1.0
+    assert own.judged(measures) < 1.0
+
+
 def test_every_version_says_what_it_said() -> None:
     """The digest has the site, the charges and the budgets; a change needs a new version."""
     known = stored_references()
@@ -115,6 +130,7 @@ def test_families_ask_what_they_say() -> None:
         points = [each for each in scenario.charge if isinstance(each, PointSource)]
         if definition.family == "hidden" and len(points) == len(scenario.charge):
             assert len(case.threats) == len(practice.threats) == len(points)
+        assert (definition.family == "response") == scenario.objective.is_response
         if definition.family == "told":
             assert case.charges == practice.charges
 

@@ -6,9 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Piece
+from blast_env.geometry import Measure, Piece
 from blast_env.problems import DEFINITIONS, LayoutSpace, make
 from blast_env.scenario import Placement, load_scenario
+from tests.catalogue_sites import WALL
+from tests.scenario.test_hardening import glazed_yard
 
 SITES = ("control_room", "courtyard", "hotel_forecourt", "shopping_street", "perimeter_gate")
 
@@ -34,7 +36,9 @@ def test_keys_reach_what_the_budget_pays_for() -> None:
     space = LayoutSpace(load_scenario("control_room"))
     assert space.most_pieces == 6
     rng = np.random.default_rng(0)
-    assert max(len(space.from_keys(rng.random(space.keys))) for _ in range(50)) >= 4
+    pieces = [len(space.from_keys(rng.random(space.keys))) for _ in range(50)]
+    assert max(pieces) >= 4
+    assert min(pieces) >= 1  # walls across the strip fit nowhere, and no key asks for one
 
 
 def test_choices_are_binary_without_a_catalogue() -> None:
@@ -42,6 +46,19 @@ def test_choices_are_binary_without_a_catalogue() -> None:
     assert yard.is_binary
     assert not street.is_binary
     assert len(yard.places) == int(Placement.empty("courtyard").free.sum())
+
+
+def test_every_measure_is_a_place_of_its_own() -> None:
+    """All of them can be taken together, beside what stands on the cell (0, 0)."""
+    space = LayoutSpace(glazed_yard())
+    layout = (*WALL[:1], Measure.named("glass"), Measure.named("panels"))
+    choices = space.choices_of(layout)
+    assert choices[-2:].tolist() == [1, 1]
+    assert space.choices[-2:].tolist() == [2, 2]
+    assert sorted(space.layout(choices)) == sorted(layout)
+    rng = np.random.default_rng(0)
+    drawn = [space.from_keys(rng.random(space.keys)) for _ in range(30)]
+    assert any(sum(isinstance(each, Measure) for each in own) == 2 for own in drawn)
 
 
 def test_a_vector_of_use_to_nobody_is_refused() -> None:
