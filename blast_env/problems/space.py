@@ -178,7 +178,7 @@ class LayoutSpace:
     @cached_property
     def _fitting(self) -> tuple[int, ...]:
         """The variants that may stand somewhere on the empty site."""
-        return tuple(self._empty.legal.any(axis=(1, 2)).nonzero()[0].tolist())
+        return tuple(np.flatnonzero(self._empty.legal.any(axis=(1, 2))).tolist())
 
     @cached_property
     def _place_of(self) -> dict[Element, tuple[int, int]]:

@@ -494,6 +494,7 @@ CODE_NOT_RUN: Final = {
     ("docs/researchers/benchmark.md", 3): "needs Nevergrad, which the project does not have",
     ("docs/researchers/benchmark.md", 5): "needs BoTorch, which the project does not have",
     ("docs/researchers/benchmark.md", 6): "needs SMAC, which the project does not have",
+    ("docs/researchers/benchmark.md", 8): "needs Minari and jax, which the project does not have",
     ("docs/howto/cluster.md", 2): "needs Slurm and submitit",
     ("docs/researchers/libraries.md", 6): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
