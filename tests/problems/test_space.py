@@ -38,7 +38,8 @@ def test_keys_reach_what_the_budget_pays_for() -> None:
     rng = np.random.default_rng(0)
     pieces = [len(space.from_keys(rng.random(space.keys))) for _ in range(50)]
     assert max(pieces) >= 4
-    assert min(pieces) >= 1  # walls across the strip fit nowhere, and no key asks for one
+    # Walls across the strip fit nowhere. Were they asked for, two things of five would be set down.
+    assert np.mean(pieces) > 0.4 * space.most_pieces
 
 
 def test_choices_are_binary_without_a_catalogue() -> None:
