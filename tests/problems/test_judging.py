@@ -4,7 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from blast_env.cli import app
+from blast_env.cli.judge import _submission
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Piece
 from blast_env.problems import (
@@ -123,6 +126,16 @@ def test_tables_have_the_best_method_first_and_what_it_takes_off() -> None:
     page = standings_page((replace(few, note="a | b"), best))
     assert r"| few | a \| b |" in page
     assert f"Load taken off in {NAME}, %" in page
+
+
+def test_the_command_takes_both_kinds_of_files_and_writes_the_page(tmp_path: Path) -> None:
+    own = judged(run(13), run(14, 50))
+    for path in (own.save(tmp_path / "judged.json"), own.submission.save(tmp_path / "own.json")):
+        assert _submission(path) == own.submission
+    page = tmp_path / "page.md"
+    result = CliRunner().invoke(app, ["judge", "--page", str(page)])
+    assert result.exit_code == 0, result.output
+    assert page.read_text("utf-8") == standings_page(shipped_standings())
 
 
 def test_standings_that_come_with_the_package_are_of_its_problems() -> None:
