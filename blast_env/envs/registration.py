@@ -12,7 +12,10 @@ WITHOUT_BUILD_ZONE: Final = frozenset({"free_field"})
 """Bundled scenarios in which nothing can be placed; named here, since loading all takes time."""
 
 FOR_GAS: Final = frozenset(
-    {"control_room", "hotel_forecourt", "school_and_clinic", "shopping_street", "visitor_entrance"}
+    {
+        *("clinic_front", "control_room", "guard_post", "hotel_forecourt", "ministry_kerb"),
+        *("school_and_clinic", "school_wing", "shopping_street", "visitor_entrance"),
+    }
 )
 """Bundled scenarios with heights and a catalogue, which have no calibration: their environments are
 of gas dynamics."""

@@ -103,8 +103,16 @@ def with_items() -> tuple[str, ...]:
 
 
 def studied_scenarios() -> tuple[str, ...]:
-    """Return the names of the bundled scenarios in which something can be placed."""
-    return tuple(name for name in bundled_scenarios() if load_scenario(name).build_zone is not None)
+    """Return the names of the bundled scenarios in which something is placed to lower a load.
+
+    Those in which the response of facades counts are in `studies.response_sites`.
+    """
+    loaded = {name: load_scenario(name) for name in bundled_scenarios()}
+    return tuple(
+        name
+        for name, each in loaded.items()
+        if each.build_zone is not None and not each.objective.is_response
+    )
 
 
 def study_scenario(

@@ -1,0 +1,37 @@
+"""Sites whose facades count: the layouts found are theirs, and one where blasts are cheap."""
+
+import pytest
+
+from blast_env.engines import find_engine
+from blast_env.scenario import Placement, load_layout, load_scenario
+from studies.response_sites import FOUND, OLDER, SITES, glazed, reaches, site_charges
+
+
+@pytest.mark.parametrize("name", SITES)
+def test_what_was_found_is_for_the_site_as_it_is_and_within_its_budget(name: str) -> None:
+    scenario = load_scenario(name)
+    found = load_layout(FOUND / f"{name}.json", scenario)
+    budget = scenario.zone.budget
+    assert budget is not None
+    assert 0.0 < Placement.of(scenario, found).cost <= budget
+    assert all(each.facade is not None for each in scenario.structures if each.protected)
+
+
+def test_the_guard_post_fails_empty_and_passes_with_what_was_found() -> None:
+    scenario, engine = load_scenario("guard_post"), find_engine("gas", 0.5)
+    found = load_layout(FOUND / "guard_post.json", scenario)
+    charges = site_charges(scenario)
+    assert len(charges) == 2
+    assert not reaches(scenario, (), charges, engine)
+    assert reaches(scenario, found, charges, engine)
+
+
+@pytest.mark.parametrize("name", OLDER)
+def test_an_older_site_gets_a_facade_and_a_charge_and_stays_as_it_is_otherwise(name: str) -> None:
+    bare, changed = load_scenario(name), glazed(name, 10.0)
+    assert changed.bays
+    assert {each.tnt_kg for each in changed.charge} == {10.0}
+    assert changed.build_zone == bare.build_zone
+    assert [each.rectangle_m for each in changed.structures] == [
+        each.rectangle_m for each in bare.structures
+    ]
