@@ -131,12 +131,16 @@ def test_a_blast_is_what_it_was(scene: str, engine: str) -> None:
 
 
 CONTENT_HASHES: Final = {
+    "clinic_front": "d2fc02932afa74582250ccb52aea44d016093c32f7caea6bf4e0582c31c3a036",
     "control_room": "f0b4d497dccfd3fb5c7fa88a4d7442000a78207db5b421985695c92a320c52d6",
     "courtyard": "76c48339ea3f457b906e152fbc0abd85ec13b276c4ecda0be3a9c6dcc0131cb7",
     "free_field": "2356d490bee5e2af05f7c80a219c16f8ceb886210f1e0a53aa86954cd4b1ac54",
+    "guard_post": "b3e7c92fdc6c21707a99fae4f1df109cf74a41f24a77c779c6dd27bafa34332e",
     "hotel_forecourt": "9b5360183b00680dc721c96579e47652bc6abe59af04289e67d32bae9f932c69",
+    "ministry_kerb": "82c433ab302fd18f47b4dd6db7aece86e894f3a3803265551b017d64e18b6d7c",
     "perimeter_gate": "06955a399c03dbe9aad722de7981e16cb7405f389b4c56d1034d496c08e1a94d",
     "school_and_clinic": "e7108ad01f9785be89d65ae66993d201b389c62a96647a8958b896f78e93ac6a",
+    "school_wing": "d126f782267a92b2807d52648ac3bc0d87d33376edd0e2204ebb41ad2e61ec7e",
     "shopping_street": "fc400c0490aff067a563d800e38ec8f09d76fd246359914dfb8171af907a1004",
     "street_junction": "57291072154f0caa826fe1cb6e4e0682b528042494dd445e303e23d0f1557ff2",
     "visitor_entrance": "5bffa26f5e878df20c765c6d284d7b247fd49a4b5c286013580a98c04dbc0297",
