@@ -162,7 +162,7 @@ def _engine(settings: TrainingSettings, options: EvaluateOptions) -> Engine:
     """Return the engine that judges: with the run's cells, if it judged by that one, too."""
     own = settings.judge
     engine = own if own.name == options.engine else options.engine
-    return find_engine(engine, options.cell_m, options.until)
+    return find_engine(engine, options.cell_m, options.until, options.cells)
 
 
 def _fixed(case: Case, options: EvaluateOptions) -> Case:

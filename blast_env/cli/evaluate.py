@@ -47,7 +47,7 @@ class EvaluateCommand(EvaluateOptions):
         scenario = load_scenario(self.scenario or _SCENARIO)
         layout = load_layout(path, scenario)
         plan = LayoutPlan(scenario, layout, provenance=LayoutFile.load(path).provenance)
-        engine = find_engine(self.engine, self.cell_m, self.until)
+        engine = find_engine(self.engine, self.cell_m, self.until, self.cells)
         report_layout(plan, BlastEvaluator(scenario, engine, cache=self.cache), self)
 
     def _evaluate_run(self, run: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Final
 from blast_env.cli.command import FOLDER, Target, option
 from blast_env.cli.options import (
     CELL_HELP,
+    CELLS_HELP,
     CVAR_HELP,
     ENGINE_HELP,
     UNTIL_HELP,
@@ -63,6 +64,7 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
     )
     engine: str = option(JUDGE, ENGINE_HELP)
     cell_m: float | None = option(None, CELL_HELP)
+    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
     until: str | None = option(None, UNTIL_HELP, show_default="structures")
     cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
     export: Path | None = option(

@@ -17,6 +17,10 @@ ENGINE_HELP: Final = (
     f"{' and '.join(CALIBRATED_ENGINES)} are the paper's particles."
 )
 CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.5."
+CELLS_HELP: Final = (
+    "Whether cells of gas dynamics grow with the blast. uniform: no; on large sites coarse: soon, "
+    "for search; fine: later, for final statements."
+)
 UNTIL_HELP: Final = (
     "What a blast of gas dynamics waits for. structures: those protected; walls: all; "
     "gauges; or a number of seconds."

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 from blast_env.cli.command import argument, option, options_of
 from blast_env.cli.options import (
     CELL_HELP,
+    CELLS_HELP,
     ENGINE_HELP,
     SCENARIO_HELP,
     UNTIL_HELP,
@@ -76,6 +77,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
     )
     side_by_side: bool = option(False, "Show in all pictures the site without the barrier as well.")
     cell_m: float | None = option(None, CELL_HELP, panel=_GAS_PANEL)
+    cells: str | None = option(None, CELLS_HELP, panel=_GAS_PANEL, show_default="uniform")
     until: str | None = option(None, UNTIL_HELP, panel=_GAS_PANEL, show_default="structures")
     impulse_map: Path | None = option(
         None, "Write a map of the impulse over the ground.", writes=PICTURES, panel=_GAS_PANEL
@@ -128,7 +130,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
         scenario = scenario.with_simulation(self.preset)
         # A layout is for the site of the file; preset and stand-off are this command's.
         layout: Layout = () if self.layout is None else tuple(load_layout(self.layout, site))
-        engine = find_engine(self.engine, self.cell_m, self.until)
+        engine = find_engine(self.engine, self.cell_m, self.until, self.cells)
         self._check(engine, layout)
         charge = self.fixed(scenario, draw_threat(scenario, self.seed))
         shown = self._shown(scenario, layout, engine, charge)

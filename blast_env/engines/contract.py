@@ -394,7 +394,10 @@ JUDGE: Final = "gas"
 
 
 def find_engine(
-    engine: str | Engine, cell_m: float | None = None, until: str | float | None = None
+    engine: str | Engine,
+    cell_m: float | None = None,
+    until: str | float | None = None,
+    cells: str | None = None,
 ) -> Engine:
     """Return an engine by its name, or the engine itself.
 
@@ -402,6 +405,7 @@ def find_engine(
         engine: The name, or the engine.
         cell_m: Side of the cells of gas dynamics; that of the engine unless given.
         until: What a blast of gas dynamics waits for; as the engine says unless given.
+        cells: Whether cells of gas dynamics grow, and how soon; as the engine says unless given.
 
     Raises:
         UnknownNameError: If there is no engine of that name.
@@ -411,7 +415,7 @@ def find_engine(
     found = _made(engine) if isinstance(engine, str) else engine
     if not isinstance(found, Engine):
         raise BlastEnvError(f"engine is {value_text(engine)}, must be a name or an engine")
-    return found.configured(cell_m=cell_m, until=until)
+    return found.configured(cell_m=cell_m, until=until, cells=cells)
 
 
 def _made(name: str) -> Engine:

@@ -76,6 +76,7 @@ class GasEngine(GasSettings, Engine):
     checked_for: ClassVar[str] = "what gas dynamics was checked for"
     options: ClassVar[tuple[EngineOption, ...]] = (
         EngineOption("cell_m", "Side of the cells of gas dynamics, m."),
+        EngineOption("cells", "Whether cells of gas dynamics grow with the blast."),
         EngineOption("until", "What a blast of gas dynamics waits for."),
     )
     unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingGas"
@@ -119,11 +120,11 @@ class GasEngine(GasSettings, Engine):
     @property
     def words(self) -> str:
         """Its name, and the side of its cells."""
-        return f"{self.name}, cells of {self.cell_m:g} m"
+        return f"{self.name}, {self.cell_words}"
 
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
         """Return in a line which engine spoke, and with which cells."""
-        return f"{super().describe(scenarios)}, cells of {self.cell_m:g} m"
+        return f"{super().describe(scenarios)}, {self.cell_words}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -429,7 +430,8 @@ class GasResult:
             "charge height (m)": charge.height_m,
             "charge TNT equivalent (kg)": charge.tnt_kg,
             "engine": self.engine_name,
-            "cell (m)": blast.engine.cell_m,
+            "cell (m)": blast.engine.smallest_m,
+            "kind of cells": blast.engine.cells,
             "margin (m)": blast.engine.margin_m,
             "border (m)": blast.engine.border_m,
             "engine version": known["engine"],

@@ -25,6 +25,7 @@ def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
     progress: Callable[[float], None] | None = ...,
     cell_m: float | None = ...,
     until: str | float | None = ...,
+    cells: str | None = ...,
 ) -> "GasResult": ...
 
 
@@ -48,6 +49,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     cell_m: float | None = None,
     until: str | float | None = None,
+    cells: str | None = None,
 ) -> BlastOutcome:
     """Run a blast to its end.
 
@@ -64,6 +66,8 @@ def simulate(
         cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
         until: What a blast of gas dynamics waits for: `"structures"` that are protected, all
             `"walls"`, or the `"gauges"`; or how many seconds it lasts. Structures unless given.
+        cells: Whether cells of gas dynamics grow with the blast: `"uniform"` unless given,
+            `"coarse"` or `"fine"`; for large sites, see `GasSettings`.
 
     Returns:
         A `BlastResult` of the particle engines, a `GasResult` of gas dynamics.
@@ -77,8 +81,9 @@ def simulate(
         BlastEnvError: If the seed is no integer, negative or too large.
     """
     # Anything else is refused where it is read.
-    cells = tuple(layout) if isinstance(layout, Iterable) else layout
-    return find_engine(engine, cell_m, until).blast(scenario, cells, seed, charge).run(progress)
+    elements = tuple(layout) if isinstance(layout, Iterable) else layout
+    found = find_engine(engine, cell_m, until, cells)
+    return found.blast(scenario, elements, seed, charge).run(progress)
 
 
 def simulate_many(

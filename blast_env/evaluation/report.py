@@ -608,6 +608,7 @@ def evaluate_layout(
     cache: str | Path | BlastCache | None = None,
     progress: Callable[[float], None] | None = None,
     cell_m: float | None = None,
+    cells: str | None = None,
 ) -> LayoutEvaluation:
     """Return how much a layout takes off the protected structures, and how sure that is.
 
@@ -627,6 +628,7 @@ def evaluate_layout(
         progress: Called with the share of the blasts that is done.
         cell_m: Side of the cells of gas dynamics, 0.5 m unless given. A seed then only draws the
             charge: a charge has one realisation, and no calibration is needed.
+        cells: Whether those grow with the blast, see `GasSettings`.
 
     Raises:
         LayoutError: If the layout does not fit the build zone.
@@ -638,7 +640,7 @@ def evaluate_layout(
             `processes` or `cvar_level` is out of bounds, or if nothing arrives at the protected
             structures even without a barrier.
     """
-    evaluator = BlastEvaluator(scenario, find_engine(engine, cell_m), cache=cache)
+    evaluator = BlastEvaluator(scenario, find_engine(engine, cell_m, cells=cells), cache=cache)
     drawn = draw_threats(evaluator.scenario, seeds) if threats is None else tuple(threats)
     return evaluate_against(
         evaluator, layout, drawn, processes, cvar_level=cvar_level, progress=progress

@@ -118,8 +118,7 @@ def gas_subtitle(blasts: Sequence[GasBlast]) -> str:
     place = " and ".join(f"({x_m:.1f} m, {y_m:.1f} m)" for x_m, y_m in places_m)
     if charge.height_m > 0.0:
         place += f", {charge.height_m:g} m high"
-    cell_m = blasts[-1].engine.cell_m
-    return f"charge {charge.tnt_kg:g} kg TNT at {place}, gas in cells of {cell_m:g} m"
+    return f"charge {charge.tnt_kg:g} kg TNT at {place}, gas in {blasts[-1].engine.cell_words}"
 
 
 def check_comparable(blasts: Sequence[GasBlast]) -> None:

@@ -16,7 +16,7 @@ from blast_env.engines.gas import NOT_COMPLETE, GasBlast, GasResult
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.gas.probes import ARRIVAL_PA
-from blast_env.physics.gas.solver import GasSolver
+from blast_env.physics.gas.solver import Gas
 from blast_env.physics.scene import WALLS, WallName
 from blast_env.scenario import AnyStructure, Scenario
 from blast_env.units import MS_PER_S, PA_PER_KPA, PA_PER_PSI
@@ -131,7 +131,7 @@ class WallHistories:
         self._times: list[float] = []
         self._means: list[list[float]] = []
 
-    def record(self, solver: GasSolver, step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step; its pressures are means over it."""
         if self._members is None:
             self._members = self._walls(solver)
@@ -151,7 +151,7 @@ class WallHistories:
             return None
         return np.array(self._means)[:, keys.index((target, wall))]
 
-    def _walls(self, solver: GasSolver) -> dict[tuple[str, WallName], NDArray[np.int64]]:
+    def _walls(self, solver: Gas) -> dict[tuple[str, WallName], NDArray[np.int64]]:
         """Return the faces of each wall that counts."""
         faces = solver.faces
         behind_m = np.asarray(solver.grid.origin_m) + solver.grid.cell_m * (faces.solid + 0.5)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from blast_env.engines.gas import GasBlast, GasResult
+from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.solver import GasSolver
 from blast_env.physics.gas.source import set_charge
 from blast_env.scenario import Scenario
 
@@ -97,9 +99,11 @@ def load_from_radius(blast: GasBlast, radius_m: float, until_s: float) -> float:
         until_s: When the load is looked at.
 
     Raises:
-        BlastEnvError: If the radius is within the charge.
+        BlastEnvError: If the radius is within the charge, or cells are not uniform.
     """
     run = blast.engine.start_on(blast.site)
+    if not isinstance(run.solver, GasSolver):
+        raise BlastEnvError(f"cells are {blast.engine.cells!r}, must be 'uniform' here")
     set_charge(run.solver, run.charge, radius_m)
     run.solver.advance(until_s)
     return protected_impulse_pa_s(GasResult(blast, run))

@@ -11,7 +11,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.geometry import stacked_runs
 from blast_env.physics.gas.engine import GasRun
-from blast_env.physics.gas.solver import GasSolver
+from blast_env.physics.gas.solver import Gas
 from blast_env.scenario import Scenario
 from blast_env.units import MODULE_SIDE_M
 
@@ -78,7 +78,7 @@ class _Projected:
     area: FloatArray
     history: list[FloatArray] = field(default_factory=list)
 
-    def record(self, solver: GasSolver, step_s: float) -> None:  # noqa: ARG002
+    def record(self, solver: Gas, step_s: float) -> None:  # noqa: ARG002
         """Add a step."""
         pressure = solver.wall_overpressure_pa()
         chosen = self.bay >= 0

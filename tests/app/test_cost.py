@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from blast_env.app.cost import CostGuess, ReportCost, cost_of_blast, cost_words, time_words
@@ -26,7 +27,7 @@ def test_steps_are_about_those_of_a_blast() -> None:
     told = cost_of_blast(scenario, charge, 0.5)
     run = GasBlast(scenario, (), 0, GasEngine(), charge).run()
     assert told.steps == pytest.approx(run.steps, rel=0.33)
-    assert told.cells == pytest.approx(run.run.solver.state[0].size, rel=0.01)
+    assert told.cells == pytest.approx(np.prod(run.run.grid.array_shape), rel=0.01)
 
 
 def test_half_the_cells_cost_sixteen_times_as_much_inside() -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.doubling import DoublingSolver, shape_to_double
 from blast_env.physics.gas.faces import Faces, exposed_faces
 from blast_env.physics.gas.grid import GasGrid, layers_to
 from blast_env.physics.gas.opening import opening_of
@@ -28,7 +29,7 @@ from blast_env.physics.gas.settings import (
     is_complete,
     still_to_come,
 )
-from blast_env.physics.gas.solver import GasSolver, Recorder, Settling, state_bytes
+from blast_env.physics.gas.solver import Gas, GasSolver, Recorder, Settling, state_bytes
 from blast_env.physics.gas.source import (
     GasCharge,
     clearance_m,
@@ -114,7 +115,7 @@ class GasRun:
         self.gauges = _gauges(self.grid, site)
         scale = self._scale = cbrt(self.charge.mass_kg / 100.0)
         own = [self.loads] if self.gauges is None else [self.loads, self.gauges]
-        self.solver = GasSolver(
+        solver = GasSolver(
             self.grid,
             faces=self.table.faces,
             recorders=(*own, *recorders(self.grid)),
@@ -123,7 +124,9 @@ class GasRun:
             settling=Settling(settings.settled_s * scale, _HOTTEST),
             threads=settings.threads,
         )
-        set_charge(self.solver, self.charge, self.handover_radius_m)
+        set_charge(solver, self.charge, self.handover_radius_m)
+        doubled_s = [self.charge.profile(run_m).time_s for run_m in settings.doubled_m]
+        self.solver: Gas = DoublingSolver(solver, doubled_s) if doubled_s else solver
         if self.gauges is not None:
             _add_opening(self.gauges, self.grid, self.charge, self.handover_radius_m)
         self.end_reason: EndReason | None = None
@@ -230,7 +233,7 @@ class GasRun:
                 f"the charge is {clear:.2g} m from a solid, below the {least:.2g} m "
                 "that its source needs"
             )
-        cells = cbrt(self.charge.mass_kg) / self.settings.cell_m
+        cells = cbrt(self.charge.mass_kg) / self.settings.smallest_m
         if cells < CHECKED_CELLS:
             notes.append(
                 f"{cells:.2g} cells per m/kg^(1/3) of the charge, checked from {CHECKED_CELLS:g}: "
@@ -248,18 +251,20 @@ def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
 
 def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
     """Return the grid with what is solid in it."""
-    cell_m = settings.cell_m
+    cell_m = settings.smallest_m
     margin = ceil(settings.margin_m / cell_m)
     low = np.array([site.site_m.left, site.site_m.bottom])
     high = np.array([site.site_m.right, site.site_m.top])
     plan = np.ceil(np.round((high - low) / cell_m, 9)).astype(int) + 2 * margin
     shape = (int(plan[0]), int(plan[1]), ceil(round(site.air_height_m / cell_m, 9)))
+    skirt = layers_to(settings.border_m / cell_m)
+    shape = shape_to_double(shape, skirt, len(settings.doubled_m))
     origin = low - margin * cell_m
     grid = GasGrid(
         cell_m,
         np.broadcast_to(np.False_, shape),
         (float(origin[0]), float(origin[1]), 0.0),
-        skirt=layers_to(settings.border_m / cell_m),
+        skirt=skirt,
     )
     needed = state_bytes(grid, "single", with_fuel=True)
     if needed > _MOST_BYTES:

@@ -11,7 +11,7 @@ pressure of its cell.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numba import njit
@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.solver import GasSolver
-from blast_env.physics.gas.state import Reals
+from blast_env.physics.gas.solver import Gas
 
 ARRIVAL_PA: Final = 1000.0
 """Overpressure at which a wave has arrived, unless said otherwise."""
@@ -156,7 +155,7 @@ class FaceLoads(LoadTable):
     def __init__(self, count: int, arrival_pa: float = ARRIVAL_PA) -> None:
         super().__init__(count, arrival_pa, is_mean=True)
 
-    def record(self, solver: GasSolver, step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step."""
         self.add(solver.wall_overpressure_pa(), solver.time_s, step_s)
 
@@ -185,7 +184,7 @@ class PatchHistories:
         self._steps: list[float] = []
         self._history: list[NDArray[np.float32]] = []
 
-    def record(self, solver: GasSolver, step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step: the mean over its time, in its middle."""
         over = solver.wall_pressure[self._members] - 1.0
         sums = np.bincount(self._patch, weights=over, minlength=len(self.faces))
@@ -243,7 +242,7 @@ class Gauges(LoadTable):
                 self._history.append(overpressure)
                 self.add(overpressure, float(time), float(step_s))
 
-    def record(self, solver: GasSolver, step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step."""
         overpressure = solver.overpressure_at(self.cells)
         self._times.append(solver.time_s)
@@ -261,31 +260,6 @@ class Gauges(LoadTable):
         return np.array(self._history).reshape(len(self._times), len(self.cells))
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _add_to_map(
-    state: Reals,
-    layer: int,
-    box: NDArray[np.int64],
-    peak: NDArray[np.float32],
-    impulse: NDArray[np.float32],
-    step: float,
-    gamma_1: Any,
-) -> None:
-    """Add a step to the maps of a layer, in the units of the state (y, x)."""
-    real = state.dtype.type
-    half, one = real(0.5), real(1.0)
-    if not box[0] <= layer < box[1]:
-        return
-    for y in range(box[2], box[3]):
-        for x in range(box[4], box[5]):
-            density = state[0, layer, y, x]
-            mx, my, mz = state[1, layer, y, x], state[2, layer, y, x], state[3, layer, y, x]
-            motion = half * (mx * mx + my * my + mz * mz) / density
-            over = gamma_1 * (state[4, layer, y, x] - motion) - one
-            peak[y, x] = max(peak[y, x], np.float32(over))
-            impulse[y, x] += np.float32(step * max(over, real(0.0)))
-
-
 class GroundMap:
     """Recorder of the peak overpressure and the positive impulse in one layer of cells.
 
@@ -300,25 +274,14 @@ class GroundMap:
             raise BlastEnvError(f"layer is {layer}, but must be 0 to {nz - 1}")
         self._layer = layer
         self._solid = grid.solid[:, :, layer]
-        self._inner = grid.inner[1:]
-        self._lead = int(grid.lead[2])
-        shape = grid.array_shape[1::-1]
-        self._peak = np.zeros(shape, dtype=np.float32)
-        self._impulse = np.zeros(shape, dtype=np.float32)
-        self._unit_pa = 1.0
+        self._peak = np.zeros(self._solid.shape, dtype=np.float32)
+        self._impulse = np.zeros(self._solid.shape, dtype=np.float32)
 
-    def record(self, solver: GasSolver, step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step."""
-        self._unit_pa = solver.pressure_pa
-        _add_to_map(
-            solver.state,
-            self._layer + self._lead,
-            solver.box,
-            self._peak,
-            self._impulse,
-            step_s,
-            solver.state.dtype.type(0.4),
-        )
+        over = solver.overpressure_in(2, self._layer).astype(np.float32)
+        np.maximum(self._peak, over, out=self._peak)
+        self._impulse += np.float32(step_s) * np.maximum(over, np.float32(0.0))
 
     @property
     def peak_pa(self) -> NDArray[np.float64]:
@@ -331,8 +294,7 @@ class GroundMap:
         return self._trimmed(self._impulse)
 
     def _trimmed(self, values: NDArray[np.float32]) -> NDArray[np.float64]:
-        inner = values[self._inner].T.astype(np.float64)
-        return np.where(self._solid, np.nan, self._unit_pa * inner)
+        return np.where(self._solid, np.nan, values.astype(np.float64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -368,7 +330,7 @@ class Snapshots:
         self._times = sorted(times_s)
         self._solid = np.take(grid.solid, layer, axis=axis)
 
-    def record(self, solver: GasSolver, step_s: float) -> None:  # noqa: ARG002
+    def record(self, solver: Gas, step_s: float) -> None:  # noqa: ARG002
         """Take a picture if it is time; one picture of a step stands for all times in it."""
         due = 0
         while due < len(self._times) and self._times[due] <= solver.time_s:

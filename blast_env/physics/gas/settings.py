@@ -1,7 +1,9 @@
 """What a run of gas dynamics can be told, and what its results are made of; without Numba."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isclose, nan
+from math import floor, inf, isclose, log2, nan
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -25,6 +27,14 @@ CHECKED_CELLS: Final = 9.2
 COMPLETE: Final = 0.02
 """Share of an impulse that may still come where it counts as complete."""
 
+UNIFORM: Final = "uniform"
+_CELLS_RUN: Final[Mapping[str, float]] = MappingProxyType({"coarse": 80.0, "fine": 130.0})
+"""How many cells the front runs before they are doubled (docs/engineers/gas.md)."""
+CELLS: Final = (UNIFORM, *_CELLS_RUN)
+"""What cells can be."""
+_GROWING_M: Final = 0.25
+_LARGEST_M: Final = 1.0
+
 _MOST_REST: Final = 4.0
 """The sum of the series over what came last, at most: for a ratio of 0.8."""
 _WAITED_FOR: Final = ("structures", "walls", "gauges")
@@ -38,6 +48,9 @@ class GasSettings:
 
     Attributes:
         cell_m: Side of a cell; a module's side must be a whole number of them.
+        cells: "uniform", or how cells grow with the blast: they are 0.25 m, or `cell_m` if that is
+            less, until its front has run so many of them, then twice as large, up to 1 m: "coarse"
+            for search on large sites, "fine" for final statements there.
         margin_m: How far the cells keep their size outside the site.
         border_m: How far the open borders are beyond that, and above the air, at least; the cells
             between grow outwards.
@@ -58,9 +71,13 @@ class GasSettings:
     settled_s: float = 0.06
     threads: int = 1
     until: str | float = "structures"
+    cells: str = UNIFORM
 
     def __post_init__(self) -> None:
         """Check the arguments."""
+        if self.cells not in CELLS:
+            known = ", ".join(repr(each) for each in CELLS)
+            raise BlastEnvError(f"cells is {value_text(self.cells)}, must be one of {known}")
         cell_m = finite_number("cell_m", self.cell_m)
         cells = MODULE_SIDE_M / cell_m if cell_m >= _LEAST_CELL_M else 0.0
         if not (cells >= 1.0 and isclose(cells, round(cells), rel_tol=1e-9)):
@@ -75,6 +92,26 @@ class GasSettings:
             raise BlastEnvError(f"settled_s is {self.settled_s:g}, must be above 0")
         if self.until not in _WAITED_FOR:
             object.__setattr__(self, "until", _seconds(self.until))
+
+    @property
+    def smallest_m(self) -> float:
+        """Side of the smallest cells."""
+        return self.cell_m if self.cells == UNIFORM else min(self.cell_m, _GROWING_M)
+
+    @property
+    def doubled_m(self) -> tuple[float, ...]:
+        """How far the front has run in the open when cells become twice as large."""
+        run_cells = _CELLS_RUN.get(self.cells)
+        if run_cells is None:
+            return ()
+        count = floor(log2(_LARGEST_M / self.smallest_m) + 1e-9)
+        return tuple(run_cells * self.smallest_m * 2.0**k for k in range(count))
+
+    @property
+    def cell_words(self) -> str:
+        """Its cells, for people."""
+        kind = "cells of" if self.cells == UNIFORM else f"{self.cells} cells from"
+        return f"{kind} {self.smallest_m:g} m"
 
     @property
     def until_s(self) -> float | None:

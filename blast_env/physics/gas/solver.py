@@ -90,10 +90,54 @@ class Settling(NamedTuple):
     hottest: float
 
 
+class Gas(Protocol):
+    """A gas on its way, as those see it who look at it; see `GasSolver` for what everything is."""
+
+    grid: GasGrid
+    faces: Faces
+    recorders: "tuple[Recorder, ...]"
+    pressure_pa: float
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time so far."""
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+
+    @property
+    def cell_updates(self) -> int:
+        """Cells moved on so far."""
+
+    @property
+    def lifted(self) -> int:
+        """Cells that had to be lifted to the floor so far."""
+
+    @property
+    def wall_pressure(self) -> Reals:
+        """Mean pressures on the faces during the last step, in the solver's units (n,)."""
+
+    def step(self) -> None:
+        """Make a time step."""
+
+    def advance(self, until_s: float) -> None:
+        """Go on until the simulated time is at least `until_s`."""
+
+    def wall_overpressure_pa(self) -> NDArray[np.float64]:
+        """Return the mean overpressures on the faces during the last step (n,)."""
+
+    def overpressure_at(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the overpressures in some cells, x, y and z (n, 3)."""
+
+    def overpressure_in(self, axis: int, layer: int) -> NDArray[np.float64]:
+        """Return the overpressures in a layer of cells, along the two other axes."""
+
+
 class Recorder(Protocol):
     """Something that looks at the gas after every step."""
 
-    def record(self, solver: "GasSolver", step_s: float) -> None:
+    def record(self, solver: Gas, step_s: float) -> None:
         """Look at the gas after a step of `step_s`."""
 
 
@@ -203,11 +247,20 @@ class GasSolver:
         velocity_m_s: Sequence[ArrayLike] = (0.0, 0.0, 0.0),
         pressure_pa: ArrayLike,
         fuel_kg_m3: ArrayLike = 0.0,
+        start: tuple[int, int, int] | None = None,
     ) -> None:
-        """Set the gas in the air cells, from arrays over x, y and z or values for all of them."""
-        density = np.broadcast_to(np.asarray(density_kg_m3, dtype=np.float64), self.grid.shape)
-        pressure = np.broadcast_to(np.asarray(pressure_pa, dtype=np.float64), self.grid.shape)
-        air = ~self.grid.solid
+        """Set the gas in the air cells, from arrays over x, y and z or values for all of them.
+
+        Arrays may be of a part of the grid, of which `start` is the first cell; the rest is still.
+        """
+        if start is not None:
+            self.state[:] = self._still[:, None, None, None]
+        shape = self.grid.shape if start is None else np.shape(density_kg_m3)
+        part = tuple(slice(a, a + n) for a, n in zip(start or (0, 0, 0), shape, strict=True))
+        density = np.broadcast_to(np.asarray(density_kg_m3, dtype=np.float64), shape)
+        pressure = np.broadcast_to(np.asarray(pressure_pa, dtype=np.float64), shape)
+        solid = self.grid.solid[part]
+        air = ~solid
         for name, values in (("density_kg_m3", density), ("pressure_pa", pressure)):
             least = values[air].min(initial=np.inf)
             if not least > 0.0:
@@ -215,14 +268,14 @@ class GasSolver:
         density = density / self.density_kg_m3
         pressure = pressure / self.pressure_pa
         energy = pressure / (GAMMA - 1.0)
-        self._put(state.DENSITY, density)
+        self._put(state.DENSITY, density, part, solid)
         for k, component in enumerate(velocity_m_s):
             velocity = np.asarray(component, dtype=np.float64) / self.velocity_m_s
-            self._put(state.X_MOMENTUM + k, density * velocity)
+            self._put(state.X_MOMENTUM + k, density * velocity, part, solid)
             energy = energy + 0.5 * density * velocity * velocity
-        self._put(ENERGY, energy)
+        self._put(ENERGY, energy, part, solid)
         if len(self.state) > state.FUEL:
-            self._put(state.FUEL, np.asarray(fuel_kg_m3) / self.density_kg_m3)
+            self._put(state.FUEL, np.asarray(fuel_kg_m3) / self.density_kg_m3, part, solid)
         self._signal = 0.0
         if self._skip:
             self.box = self._whole.copy()
@@ -266,6 +319,42 @@ class GasSolver:
             self._settle(self._settling)
         for recorder in self.recorders:
             recorder.record(self, step_s)
+
+    def on_double_cells(self, grid: GasGrid, faces: Faces) -> "GasSolver":
+        """Return a solver that goes on with this gas on cells of twice the side.
+
+        Args:
+            grid: What `with_double_cells` makes of this one's.
+            faces: Faces on it.
+        """
+        other = GasSolver(
+            grid,
+            faces=faces,
+            precision="single" if self.state.dtype == np.float32 else "double",
+            with_fuel=len(self.state) > state.FUEL,
+            burning=self._burning,
+            settling=self._settling,
+            threads=self._threads,
+            courant=self._courant,
+            skip_still_air=self._skip,
+            pressure_pa=self.pressure_pa,
+            density_kg_m3=self.density_kg_m3,
+        )
+        starts = []
+        for axis in range(3):
+            low, high = self.grid.skirts[axis]
+            first, end = MARGIN + low, MARGIN + low + self.grid.shape[axis]
+            pairs = np.arange(first, end, 2)
+            starts.append(np.concatenate((np.arange(first), pairs, np.arange(end, end + high + 3))))
+        x, y, z = starts
+        state.merge(self.state, self._code, other.state, other._code, z, y, x)
+        other.time_s, other.steps = self.time_s, self.steps
+        other.cell_updates, other._lifted = self.cell_updates, self._lifted
+        other._signal = self._signal
+        if self._skip:
+            other.box = other._whole.copy()
+            state.tighten(other.state, other._still, other.box, max(other._code.shape))
+        return other
 
     def density(self) -> NDArray[np.float64]:
         """Return the density, kg/m^3 (nx, ny, nz)."""
@@ -428,11 +517,16 @@ class GasSolver:
         inner = values[ENERGY] - real(0.5) * motion / values[state.DENSITY]
         return (real(GAMMA - 1.0) * inner - real(1.0)).astype(np.float64)
 
-    def _put(self, component: int, values: NDArray[np.float64]) -> None:
-        """Set a component in the air cells; solid cells keep still air."""
-        inner = self.state[(component, *self.grid.inner)]
-        values = np.broadcast_to(values, self.grid.shape)
-        inner[:] = np.where(self.grid.solid, float(self._still[component]), values).T
+    def _put(
+        self,
+        component: int,
+        values: NDArray[np.float64],
+        part: tuple[slice, ...],
+        solid: NDArray[np.bool_],
+    ) -> None:
+        """Set a component in the air cells of a part; solid cells keep still air."""
+        inner = self.state[(component, *self.grid.inner)].T[part]
+        inner[:] = np.where(solid, float(self._still[component]), values)
 
     def _get(self, component: int) -> NDArray[np.float64]:
         inner = self.state[(component, *self.grid.inner)]

@@ -208,7 +208,7 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
     if radius_m is None:
         radius_m = largest_radius_m(grid, charge)
     profile = charge.profile(radius_m)
-    density, momentum, energy, fuel = lay(profile, grid, charge)
+    start, (density, momentum, energy, fuel) = lay(profile, grid, charge)
     velocity = momentum / density
     inner = energy - 0.5 * (momentum * velocity).sum(axis=0)
     solver.set_state(
@@ -216,6 +216,7 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
         velocity_m_s=tuple(velocity),
         pressure_pa=(GAMMA - 1.0) * inner,
         fuel_kg_m3=fuel,
+        start=start,
     )
     solver.time_s = profile.time_s
 
@@ -276,33 +277,40 @@ def least_clearance_m(grid: GasGrid, charge: GasCharge) -> float:
 
 def lay(
     profile: RadialProfile, grid: GasGrid, charge: GasCharge
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return a blast as means over the cells of a grid.
+) -> tuple[tuple[int, int, int], tuple[Floats, Floats, Floats, Floats]]:
+    """Return a blast as means over the cells of a grid that it has reached.
 
     Each mean is over points spread evenly in the cell, at least 4 along each edge and 16 where the
     front has run two cells. Mirror images of a scene give the same numbers to the last bit if
     centre and cells are exact in binary.
 
     Returns:
-        Density, momentum along x, y and z, energy and unburnt fuel, per volume: (nx, ny, nz),
-        (3, nx, ny, nz), (nx, ny, nz) and (nx, ny, nz). Still air in solid cells.
+        The first of those cells; density, momentum along x, y and z, energy and unburnt fuel, per
+        volume: (nx, ny, nz), (3, nx, ny, nz), (nx, ny, nz) and (nx, ny, nz). Still air in solid
+        cells.
     """
     wanted = _SAMPLES_PER_RADIUS * grid.cell_m / profile.front_m
     samples = 2 ** ceil(log2(min(max(wanted, _LEAST_SAMPLES), _MOST_SAMPLES)))
     centre = _centre(charge)
     still = np.array([AIR_DENSITY_KG_M3, 0.0, AIR_PRESSURE_PA / (GAMMA - 1.0), 0.0])
     excess = profile.state - still[:, None]
-    result = np.zeros((6, *grid.shape))
+    middle = (np.array(centre) - np.array(grid.origin_m)) / grid.cell_m
+    front = profile.front_m / grid.cell_m
+    low = np.maximum(np.floor(middle - front), 0.0).astype(np.int64)
+    high = np.minimum(np.ceil(middle + front), grid.shape).astype(np.int64)
+    solid = grid.solid[tuple(slice(a, b) for a, b in zip(low, high, strict=True))]
+    solid = np.ascontiguousarray(solid)
+    result = np.zeros((6, *solid.shape))
     heights = (centre[2],) if centre[2] == 0.0 else (centre[2], -centre[2])
     for height in heights:  # the ground is a mirror
         place = np.array([centre[0], centre[1], height])
         place = (place - np.array(grid.origin_m)) / grid.cell_m
         shell = profile.shell_m / grid.cell_m
-        front = profile.front_m / grid.cell_m
-        _lay(result, grid.solid, excess, shell, front, place, samples)
+        _lay(result, solid, low, excess, shell, front, place, samples)
     result[0] += still[0]
     result[4] += still[2]
-    return result[0], result[1:4], result[4], result[5]
+    start = (int(low[0]), int(low[1]), int(low[2]))
+    return start, (result[0], result[1:4], result[4], result[5])
 
 
 def _centre(charge: GasCharge) -> tuple[float, float, float]:
@@ -373,6 +381,7 @@ def _unit_profiles(explosive: Explosive) -> _Profiles:
 def _lay(
     result: Floats,
     solid: NDArray[np.bool_],
+    low: NDArray[np.int64],
     excess: Floats,
     shell: float,
     front: float,
@@ -384,23 +393,21 @@ def _lay(
     Points on the two sides of the centre are summed apart, outwards from it, and then put
     together, so that a mirrored scene makes the same sums.
     """
-    nx, ny, nz = solid.shape
     halves = np.empty((8, 6))
-    for i in range(nx):
-        for j in range(ny):
-            for k in range(nz):
-                x = max(i - place[0], place[0] - i - 1.0, 0.0)
-                y = max(j - place[1], place[1] - j - 1.0, 0.0)
-                z = max(k - place[2], place[2] - k - 1.0, 0.0)
-                if solid[i, j, k] or x * x + y * y + z * z >= front * front:
-                    continue
-                halves[:] = 0.0
-                for side in range(8):
-                    _add_side(halves[side], i, j, k, side, excess, shell, place, samples)
-                for m in range(6):
-                    total = (halves[0, m] + halves[1, m]) + (halves[2, m] + halves[3, m])
-                    total += (halves[4, m] + halves[5, m]) + (halves[6, m] + halves[7, m])
-                    result[m, i, j, k] += total / samples**3
+    for a, b, c in np.ndindex(solid.shape):
+        i, j, k = a + low[0], b + low[1], c + low[2]
+        x = max(i - place[0], place[0] - i - 1.0, 0.0)
+        y = max(j - place[1], place[1] - j - 1.0, 0.0)
+        z = max(k - place[2], place[2] - k - 1.0, 0.0)
+        if solid[a, b, c] or x * x + y * y + z * z >= front * front:
+            continue
+        halves[:] = 0.0
+        for side in range(8):
+            _add_side(halves[side], i, j, k, side, excess, shell, place, samples)
+        for m in range(6):
+            total = (halves[0, m] + halves[1, m]) + (halves[2, m] + halves[3, m])
+            total += (halves[4, m] + halves[5, m]) + (halves[6, m] + halves[7, m])
+            result[m, a, b, c] += total / samples**3
 
 
 @njit(error_model="numpy")

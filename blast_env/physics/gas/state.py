@@ -122,3 +122,46 @@ def _is_still(state: Reals, still: Reals, box: NDArray[np.int64], axis: int, lay
                     if state[k, z, y, x] != still[k]:
                         return False
     return True
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def merge(
+    fine: Reals,
+    fine_code: NDArray[np.int8],
+    coarse: Reals,
+    coarse_code: NDArray[np.int8],
+    z_start: NDArray[np.int64],
+    y_start: NDArray[np.int64],
+    x_start: NDArray[np.int64],
+) -> None:
+    """Set cells of air to the means over the air of the smaller ones that they hold.
+
+    Args:
+        fine: State of the smaller cells.
+        fine_code: Their codes.
+        coarse: State of the larger ones, changed; those that hold no air stay as they are.
+        coarse_code: Their codes.
+        z_start: Which layer of the smaller cells each one of the larger ones begins with, one more
+            than there are (nz + 1,).
+        y_start: The same along y.
+        x_start: The same along x.
+    """
+    real = coarse.dtype.type
+    sums = np.zeros(len(coarse))
+    for i in range(MARGIN, coarse.shape[1] - MARGIN):
+        for j in range(MARGIN, coarse.shape[2] - MARGIN):
+            for k in range(MARGIN, coarse.shape[3] - MARGIN):
+                if coarse_code[i, j, k] != AIR:
+                    continue
+                sums[:] = 0.0
+                count = 0
+                for z in range(z_start[i], z_start[i + 1]):
+                    for y in range(y_start[j], y_start[j + 1]):
+                        for x in range(x_start[k], x_start[k + 1]):
+                            if fine_code[z, y, x] == AIR:
+                                count += 1
+                                for m in range(len(coarse)):
+                                    sums[m] += fine[m, z, y, x]
+                if count > 0:
+                    for m in range(len(coarse)):
+                        coarse[m, i, j, k] = real(sums[m] / count)

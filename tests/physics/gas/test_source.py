@@ -13,12 +13,14 @@ from blast_env.physics.gas.source import (
     LEAST_RADIUS_CELLS,
     TNT,
     GasCharge,
+    RadialProfile,
     clearance_m,
     largest_radius_m,
     lay,
     least_clearance_m,
     set_charge,
 )
+from blast_env.physics.gas.spherical import Floats
 
 STILL_J_M3 = 101_325.0 / 0.4
 
@@ -29,10 +31,25 @@ def empty_grid(cell_m: float = 0.5, cells: int = 24) -> GasGrid:
     return GasGrid(cell_m, solid, (-cells * cell_m, -cells * cell_m, 0.0))
 
 
+def laid(
+    profile: RadialProfile, grid: GasGrid, charge: GasCharge
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return a blast over the whole of a grid."""
+    start, (density, momentum, energy, fuel) = lay(profile, grid, charge)
+    after = [n - at - m for n, at, m in zip(grid.shape, start, density.shape, strict=True)]
+    around = list(zip(start, after, strict=True))
+    return (
+        np.pad(density, around, constant_values=1.225),
+        np.pad(momentum, [(0, 0), *around]),
+        np.pad(energy, around, constant_values=STILL_J_M3),
+        np.pad(fuel, around),
+    )
+
+
 def laid_over_given(charge: GasCharge, radius_m: float, grid: GasGrid) -> list[float]:
     """Return energy and fuel on the grid over those of the whole sphere."""
     profile = charge.profile(radius_m)
-    _, _, energy, fuel = lay(profile, grid, charge)
+    _, _, energy, fuel = laid(profile, grid, charge)
     _, energy_j, fuel_kg = profile.totals()
     volume = grid.cell_m**3
     return [(energy - STILL_J_M3).sum() * volume / energy_j, fuel.sum() * volume / fuel_kg]
@@ -62,7 +79,7 @@ def test_mass_of_a_charge_is_laid() -> None:
     charge = GasCharge(20.0, (0.1, 0.2, 3.3))
     grid = empty_grid()
     profile = charge.profile(2.0)
-    density, _, _, _ = lay(profile, grid, charge)
+    density, _, _, _ = laid(profile, grid, charge)
     laid_kg = (density - 1.225).sum() * grid.cell_m**3
     assert laid_kg == pytest.approx(profile.totals()[0], rel=5e-3)
 
@@ -72,8 +89,8 @@ def test_a_mirrored_charge_is_laid_as_the_mirror_image() -> None:
     one = GasCharge(50.0, (0.25, -1.5, 2.0))
     other = GasCharge(50.0, (-0.25, -1.5, 2.0))
     profile = one.profile(2.0)
-    density, momentum, energy, fuel = lay(profile, grid, one)
-    density2, momentum2, energy2, fuel2 = lay(profile, grid, other)
+    density, momentum, energy, fuel = laid(profile, grid, one)
+    density2, momentum2, energy2, fuel2 = laid(profile, grid, other)
     assert np.array_equal(density, density2[::-1])
     assert np.array_equal(energy, energy2[::-1])
     assert np.array_equal(fuel, fuel2[::-1])
@@ -87,7 +104,7 @@ def test_a_charge_is_laid_symmetrically(place: tuple[float, float, float]) -> No
     solid = np.zeros((25, 25, 12), dtype=np.bool_) if shift else np.zeros((24, 24, 12), np.bool_)
     grid = GasGrid(0.5, solid, (-6.0, -6.0, 0.0))
     charge = GasCharge(50.0, place)
-    density, momentum, energy, _ = lay(charge.profile(2.0), grid, charge)
+    density, momentum, energy, _ = laid(charge.profile(2.0), grid, charge)
     assert np.array_equal(density, density[::-1])
     assert np.array_equal(energy, energy[:, ::-1])
     assert np.array_equal(momentum[0], -momentum[0, ::-1])
@@ -100,7 +117,7 @@ def test_momentum_points_away_from_the_charge() -> None:
     grid = empty_grid()
     charge = GasCharge(20.0, (0.0, 0.0, 3.0))
     profile = charge.profile(2.5)
-    _, momentum, _, _ = lay(profile, grid, charge)
+    _, momentum, _, _ = laid(profile, grid, charge)
     x, y, z = np.meshgrid(*(grid.centres_m(axis) for axis in range(3)), indexing="ij")
     outwards = momentum[0] * x + momentum[1] * y + momentum[2] * (z - 3.0)
     assert profile.state[1].min() >= 0.0
