@@ -14,7 +14,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium as gym
 import numpy as np
@@ -25,11 +25,17 @@ from blast_env.arrays import FloatArray
 from blast_env.engines import simulate
 from blast_env.runner import run_all
 from blast_env.scenario import Scenario
+from blast_env.units import MODULE_SIDE_M
+
+if TYPE_CHECKING:  # Numba takes half a second to import
+    from blast_env.engines.gas import GasEngine
 
 ENV_ID: Final = "BlastBarrier-v0"
 
 _LOT_S: Final = 3.0
 """How long one process is to have work: shorter lots measure how processes begin."""
+
+_SHORTEST_M: Final = 20.0
 
 _PACKAGES: Final = ("numpy", "numba", "pymunk")
 
@@ -92,6 +98,10 @@ def peak_memory_mb(scenario: Scenario, engine: str) -> float:
 
 def _peak_memory_mb(scenario: Scenario, engine: str) -> float:
     simulate(scenario, engine=engine)
+    return _own_memory_mb()
+
+
+def _own_memory_mb() -> float:
     try:
         # Linux hands the maximum of getrusage on from the process that started this one.
         status = Path("/proc/self/status").read_text(encoding="utf-8")
@@ -101,6 +111,116 @@ def _peak_memory_mb(scenario: Scenario, engine: str) -> float:
 
         kilobytes = 1 if platform.system() == "Darwin" else 1024
         return kilobytes * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+
+
+def street(length_m: float) -> Scenario:
+    """Return a street between an office and a school, on which the cost of large sites is measured.
+
+    At 100 m: an L-shaped office of four storeys, 25 m from a van of 500 kg at the kerb, and a
+    school behind a wall of its own. Other lengths have all of it in proportion, in whole modules.
+
+    Args:
+        length_m: Length of the site; at least 20 m.
+    """
+    share = length_m / 100.0
+
+    def whole_m(at_100_m: float) -> float:
+        return max(round(at_100_m * share / MODULE_SIDE_M), 1) * MODULE_SIDE_M
+
+    def solid(
+        name: str, box_m: tuple[float, float, float, float], height_m: float, *, protected: bool
+    ) -> dict[str, Any]:
+        left_m, bottom_m, width_m, depth_m = (whole_m(each) for each in box_m)
+        return {
+            "kind": "ModularObstacle",
+            "name": name,
+            "corner_m": (left_m, bottom_m),
+            "rows": round(depth_m / MODULE_SIDE_M),
+            "columns": round(width_m / MODULE_SIDE_M),
+            "height_m": whole_m(height_m),
+            "protected": protected,
+        }
+
+    name = f"street_{length_m:g}_m"
+    document = {
+        "schema_version": 2,
+        "name": name,
+        "site": {
+            "width_m": whole_m(100.0),
+            "height_m": whole_m(80.0),
+            "air_height_m": whole_m(19.0),
+        },
+        "charge": [
+            {
+                "kind": "point",
+                "position_m": (whole_m(45.0), whole_m(28.0)),
+                "tnt_kg": 500.0 * share**3,
+            }
+        ],
+        "structures": [
+            solid("office_front", (22.0, 55.0, 56.0, 14.0), 13.0, protected=True),
+            solid("office_wing", (64.0, 69.0, 14.0, 10.0), 13.0, protected=True),
+            solid("school", (16.0, 4.0, 44.0, 10.0), 7.5, protected=True),
+            solid("school_wall", (10.0, 18.0, 65.0, 0.5), 2.0, protected=False),
+        ],
+        "build_zone": {
+            "corner_m": (whole_m(22.0), whole_m(31.0)),
+            "rows": round(whole_m(23.0) / MODULE_SIDE_M),
+            "columns": round(whole_m(56.0) / MODULE_SIDE_M),
+            "stock": 40,
+            "height_m": whole_m(3.0),
+        },
+    }
+    return Scenario.from_document(document, name)
+
+
+@dataclass(frozen=True)
+class SiteCost:
+    """What a blast on a street of some length costs.
+
+    Attributes:
+        length_m: Length of the site.
+        cells: Its cells, for people.
+        count: The smallest cells that there are, those around the site included.
+        steps: Steps.
+        cell_updates: Cells moved on; a step counts as two.
+        told_s: What was told before.
+        cpu_s: Processor time, from scenario to loads.
+        memory_mb: Peak memory of the process.
+    """
+
+    length_m: float
+    cells: str
+    count: int
+    steps: int
+    cell_updates: int
+    told_s: float
+    cpu_s: float
+    memory_mb: float
+
+
+def site_cost(length_m: float, engine: "GasEngine") -> SiteCost:
+    """Run a blast on a street of some length, in a process of its own."""
+    with get_context("spawn").Pool(1) as pool:
+        return pool.apply(_site_cost, (length_m, engine))
+
+
+def _site_cost(length_m: float, engine: "GasEngine") -> SiteCost:
+    engine.blast(street(_SHORTEST_M)).run()  # compiles what is not on disk yet
+    began = process_time()
+    result = engine.blast(street(length_m)).run()
+    cpu_s = process_time() - began
+    solver, told = result.run.solver, result.run.told
+    return SiteCost(
+        length_m=length_m,
+        cells=engine.cell_words,
+        count=told.cells,
+        steps=result.steps,
+        cell_updates=solver.cell_updates,
+        told_s=told.seconds,
+        cpu_s=cpu_s,
+        memory_mb=_own_memory_mb(),
+    )
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,19 @@ import pytest
 from typer.testing import CliRunner
 
 from blast_env import Scenario, benchmark, load_scenario, simulate
-from blast_env.benchmark import Crowd, blast_cost, crowd, environment_cost, random_action
+from blast_env.benchmark import (
+    Crowd,
+    blast_cost,
+    crowd,
+    environment_cost,
+    random_action,
+    site_cost,
+    street,
+)
 from blast_env.cli import app
+from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
+from blast_env.scenario.build_scene import draw_charge
 from tests.envs.small import small_document
 from tests.gas_sites import hut
 
@@ -74,3 +84,36 @@ def test_the_command_prints_a_row_a_scenario_and_engine(monkeypatch: pytest.Monk
     refused = CliRunner().invoke(app, ["bench", "--engine", "steam"])
     assert refused.exit_code == 2
     assert "steam" in refused.output
+
+
+def test_a_street_keeps_its_proportions() -> None:
+    """In whole modules; so does the cube root of the charge."""
+    long, short = street(100.0), street(50.0)
+    assert [each.name for each in long.structures] == [each.name for each in short.structures]
+    for one, other in zip(long.structures, short.structures, strict=True):
+        near, far = np.array(other.rectangle_m), np.array(one.rectangle_m)
+        assert near == pytest.approx(far / 2.0, abs=0.75)
+    heavy_kg, light_kg = (draw_charge(each, 0).tnt_kg for each in (long, short))
+    assert heavy_kg == pytest.approx(8.0 * light_kg)
+
+
+def test_the_cost_of_a_large_site_is_that_of_its_blast() -> None:
+    cost = site_cost(20.0, GasEngine())
+    assert (cost.length_m, cost.cells) == (20.0, "cells of 0.5 m")
+    assert 1e-6 * cost.cell_updates / cost.cpu_s > 1.0
+    assert 100.0 < cost.memory_mb < 1000.0
+    assert 0.2 < cost.told_s / (cost.cell_updates / 2.0 / 50e6) < 5.0
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--site", "small"), "--site is 'small', must be 'large'"),
+        (("--site", "large", "--length", "2"), "--length is 2, must be 20 to 200"),
+        (("--length", "50"), "--length needs --site large"),
+    ],
+)
+def test_wrong_options_of_large_sites_are_named(options: tuple[str, ...], words: str) -> None:
+    refused = CliRunner().invoke(app, ["bench", *options])
+    assert refused.exit_code == 2
+    assert words in " ".join(refused.output.split())

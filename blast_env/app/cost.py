@@ -1,17 +1,13 @@
-"""What work by gas dynamics costs, told before it begins.
-
-A small model of the solver: the cells that there are, the steps until the loads are complete, and
-how many cells a core moves on in a second. docs/howto/app.md holds it against blasts that were run.
-"""
+"""What work by gas dynamics costs, told before it begins; see `physics.gas.cost`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cbrt, ceil, dist
+from math import ceil, dist
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from blast_env.geometry import Layout
+from blast_env.physics.gas.cost import CostGuess as CostGuess
+from blast_env.physics.gas.cost import cost_of_run
 from blast_env.physics.gas.settings import GasSettings
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 from blast_env.scenario.zone import source_bounds_m
@@ -19,52 +15,13 @@ from blast_env.scenario.zone import source_bounds_m
 if TYPE_CHECKING:
     from blast_env.reporting import StudyOptions
 
-_STEP_S_PER_M: Final = 0.9e-3
-"""Time step over the side of a cell, as the sound in the products allows it."""
-
-_SETTLED_S: Final = 0.026
-"""How long loads come on after the front, over the cube root of the charge's mass in kg."""
-
-_FRONT_M_S: Final = 390.0
-_CELLS_PER_S: Final = 50e6
 _DRAWING_S: Final = 2.5
-_BYTES_PER_CELL: Final = 60.0
-_PROCESS_BYTES: Final = 450e6
-
-
-@dataclass(frozen=True)
-class CostGuess:
-    """What one blast costs, about.
-
-    Attributes:
-        cells: Cells, those around the site included.
-        steps: Steps until the loads are complete.
-        memory_bytes: Memory of the process.
-    """
-
-    cells: int
-    steps: int
-    memory_bytes: float
-
-    @property
-    def seconds(self) -> float:
-        """Time on a core that does nothing else; film and maps not included."""
-        return self.cells * self.steps / _CELLS_PER_S
 
 
 def cost_of_blast(scenario: Scenario, charge: AnyCharge, cell_m: float) -> CostGuess:
     """Return what a blast by gas dynamics costs, about; nothing is built for it."""
-    # Here, because it imports Numba, and the page is there before anybody asks.
-    from blast_env.physics.gas.grid import GasGrid, layers_to
-
-    settings = GasSettings(cell_m=cell_m)
     site = scenario.site
-    margin = 2 * ceil(settings.margin_m / cell_m)
     sides_m = (site.width_m, site.height_m, scenario.air_height_m)
-    nx, ny, nz = (ceil(round(side_m / cell_m, 9)) for side_m in sides_m)
-    shape = (nx + margin, ny + margin, nz)
-    skirt = layers_to(settings.border_m / cell_m)
-    grid = GasGrid(cell_m, np.broadcast_to(np.False_, shape), skirt=skirt)
     if isinstance(charge, VehicleCharge):
         tnt_kg, place_m = charge.source.tnt_kg, source_bounds_m(charge.source).centre
     else:
@@ -79,13 +36,7 @@ def cost_of_blast(scenario: Scenario, charge: AnyCharge, cell_m: float) -> CostG
         ),
         default=dist((0.0, 0.0), sides_m[:2]),
     )
-    cells = int(np.prod(grid.array_shape))
-    time_s = _SETTLED_S * cbrt(tnt_kg) + far_m / _FRONT_M_S
-    return CostGuess(
-        cells=cells,
-        steps=ceil(time_s / (_STEP_S_PER_M * cell_m)),
-        memory_bytes=_PROCESS_BYTES + _BYTES_PER_CELL * cells,
-    )
+    return cost_of_run(GasSettings(cell_m=cell_m), sides_m, tnt_kg, far_m)
 
 
 @dataclass(frozen=True)

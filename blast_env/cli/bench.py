@@ -4,11 +4,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from blast_env.benchmark import BlastCost, blast_cost, crowd, environment_cost, hardware
+from blast_env.benchmark import (
+    BlastCost,
+    blast_cost,
+    crowd,
+    environment_cost,
+    hardware,
+    site_cost,
+)
 from blast_env.cli.command import Command, option
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
 from blast_env.engines import ENGINE_NAMES, find_engine
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, value_text
+from blast_env.physics.gas.settings import CELLS, UNIFORM
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.units import MS_PER_S
 
@@ -34,6 +42,25 @@ _ENVIRONMENT_HEADERS: Final = (
 )
 
 
+_SITE_HEADERS: Final = (
+    "length (m)",
+    "cells",
+    "smallest",
+    "steps",
+    "CPU (s)",
+    "told (s)",
+    "million cell updates per CPU s",
+    "memory (MB)",
+)
+_LARGE: Final = "large"
+_LENGTHS_M: Final = (20.0, 50.0, 100.0, 200.0)
+_LONGEST_UNIFORM_M: Final = 100.0
+_ELSEWHERE: Final = (
+    "elsewhere, million cell updates per s: rhoCentralFoam 1.3 (a core), MFC 59 (96 cores) and 222 "
+    "(an H100), AthenaK above 1,000 (a Grace Hopper)"
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class BenchCommand(Command):
     """Time blasts and the environment on this machine, and measure the memory.
@@ -49,9 +76,20 @@ class BenchCommand(Command):
     processes: int = option(2, "Processes that run blasts at once; 1: do not time them.", min=1)
     memory: bool = option(True, "Also measure the memory of a process that runs a blast.")
     environment: bool = option(True, "Also time `BlastBarrier-v0`.")
+    site: str | None = option(
+        None, "large: how the cost of gas dynamics grows with the site, and nothing else."
+    )
+    length_m: tuple[float, ...] = option(
+        (), "With --site large: length, m; may be given several times; else 20 to 200."
+    )
 
     def __call__(self) -> None:
         """Print the tables."""
+        if self.site is not None:
+            self._print_sites()
+            return
+        if self.length_m:
+            raise BlastEnvError("--length needs --site large")
         scenarios = [load_scenario(each) for each in self.scenario or ("courtyard",)]
         engines = [find_engine(each).name for each in self.engine or ENGINE_NAMES]
         print_line(hardware())
@@ -66,6 +104,41 @@ class BenchCommand(Command):
             self._print_crowds(pairs, costs)
         if self.environment:
             self._print_environments(pairs)
+
+    def _print_sites(self) -> None:
+        if self.site != _LARGE:
+            raise BlastEnvError(f"--site is {value_text(self.site)}, must be {_LARGE!r}")
+        lengths_m = self.length_m or _LENGTHS_M
+        for length_m in lengths_m:
+            if not _LENGTHS_M[0] <= length_m <= _LENGTHS_M[-1]:
+                bounds = f"{_LENGTHS_M[0]:g} to {_LENGTHS_M[-1]:g}"
+                raise BlastEnvError(f"--length is {length_m:g}, must be {bounds}")
+        from blast_env.engines.gas import GasEngine  # Numba takes half a second to import
+
+        print_line(hardware())
+        pairs = [
+            (length_m, GasEngine(cells=cells))
+            for length_m in lengths_m
+            for cells in CELLS
+            if cells != UNIFORM or length_m <= _LONGEST_UNIFORM_M
+        ]
+        table = make_table("a blast on a street, by its length", _SITE_HEADERS, 2)
+        with progress_bar("blasts") as progress:
+            for done, (length_m, engine) in enumerate(pairs):
+                each = site_cost(length_m, engine)
+                table.add_row(
+                    f"{each.length_m:g}",
+                    each.cells,
+                    f"{each.count:,}",
+                    f"{each.steps:,}",
+                    f"{each.cpu_s:.1f}",
+                    f"{each.told_s:.1f}",
+                    f"{1e-6 * each.cell_updates / each.cpu_s:.1f}",
+                    f"{each.memory_mb:.0f}",
+                )
+                progress((done + 1) / len(pairs))
+        result_console().print(table)
+        print_line(_ELSEWHERE)
 
     def _print_blasts(self, costs: Sequence[BlastCost]) -> None:
         table = make_table(f"a blast: medians of {self.repeats} seeds", _BLAST_HEADERS, 2)

@@ -12,6 +12,7 @@ import typer
 from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
 
 from blast_env.arrays import FloatArray
+from blast_env.benchmark import street
 from blast_env.cli.cluster import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.engines.gas import GasBlast, GasEngine
@@ -26,6 +27,7 @@ from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from studies.gas.cells import CellLoads, cell_loads, difference
 from studies.gas.corners import EXPERIMENT, REGIONS, ExperimentalBand, corner_waves
+from studies.gas.growing import OFF_COLUMNS, cell_choice, engine_with
 from studies.gas.judgement import Judgement
 from studies.gas.judgement import judge as judgement
 from studies.gas.loads import (
@@ -355,6 +357,40 @@ def oblique(
             )
     headers = ("degrees", "impulse (Pa s)", "along the normal", "peak of faces (kPa)", "largest")
     print_line(markdown_table((*headers, "peak of bays (kPa)", "largest of bays"), rows))
+
+
+@app.command()
+def growing(
+    length: Annotated[float, typer.Option(min=20.0, help="Of the site, m.")] = 100.0,
+    choices: Annotated[str, typer.Option(help="Sides in m, `coarse` and `fine`.")] = (
+        "0.5,coarse,fine,0.25"
+    ),
+) -> None:
+    """Print what cells that grow with the blast change and cost, against the last choice."""
+    with user_errors():
+        site = street(length)
+        charge = draw_charge(site, 0)
+        layouts = {"no barrier": (), "wall near the building": wall_near_building(site, charge)}
+        engines = [engine_with(choice) for choice in choices.split(",")]
+        found = {
+            name: [cell_choice(site, layout, engine) for engine in engines]
+            for name, layout in layouts.items()
+        }
+        rows = []
+        for name, of_layout in found.items():
+            for each, bare in zip(of_layout, found["no barrier"], strict=True):
+                ways = [each.off_percent(of_layout[-1], column) for column in OFF_COLUMNS]
+                rows.append(
+                    (
+                        *(each.cells, name, f"{each.cpu_s:.0f}", f"{1e-6 * each.updates:.0f}"),
+                        *(f"{each.impulse_pa_s:.1f}",),
+                        f"{100.0 * (1.0 - each.impulse_pa_s / bare.impulse_pa_s):.2f}",
+                        *(f"{mean:.1f}, {most:.1f}" for mean, most in ways),
+                    )
+                )
+        headers = ("cells", "layout", "CPU s", "million updates", "impulse (Pa s)")
+        off = ("impulse of walls off by (%): mean, most", "peak of walls")
+        print_line(markdown_table((*headers, "taken off (%)", *off), rows))
 
 
 @app.command()

@@ -73,7 +73,7 @@ def test_a_report_costs_its_blasts_and_its_parts_are_shares_of_that() -> None:
 
 
 def test_words() -> None:
-    cost = CostGuess(cells=2_000_000, steps=750, memory_bytes=0.5e9)
+    cost = CostGuess(cells=2_000_000, steps=750, memory_bytes=0.5e9, moved=1.5e9)
     assert cost_words([cost]) == "a blast of gas: about 30 s on a free core, 0.5 GB"
     assert "50 blasts of gas: about 25 min" in cost_words([cost] * 50)
     assert "nothing to run" in cost_words([])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.cost import CostGuess, cost_of_run
 from blast_env.physics.gas.doubling import DoublingSolver, shape_to_double
 from blast_env.physics.gas.faces import Faces, exposed_faces
 from blast_env.physics.gas.grid import GasGrid, layers_to
@@ -29,7 +30,7 @@ from blast_env.physics.gas.settings import (
     is_complete,
     still_to_come,
 )
-from blast_env.physics.gas.solver import Gas, GasSolver, Recorder, Settling, state_bytes
+from blast_env.physics.gas.solver import Gas, GasSolver, Recorder, Settling
 from blast_env.physics.gas.source import (
     GasCharge,
     clearance_m,
@@ -42,7 +43,6 @@ from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
 
 _SOUND_M_S: Final = 340.0
-_MOST_BYTES: Final = 8 * 2**30
 # A charge sends more than one wave: its products swing between too wide and too narrow. All times
 # are those of 100 kg, and grow with the cube root of the mass. A run ends at one of few times that
 # are the same for all layouts, so that their loads can be compared.
@@ -86,6 +86,7 @@ class GasRun:
     Attributes:
         site: What stands where.
         settings: How it is run.
+        told: What it would cost, as guessed before it began.
         grid: The grid.
         solver: The solver.
         charge: The charge.
@@ -105,6 +106,9 @@ class GasRun:
         self, settings: GasSettings, site: BlastSite, recorders: Recorders = _none
     ) -> None:
         self.settings, self.site = settings, site
+        watched = _watched(site, settings.until)
+        self.told = _cost(settings, site, watched)
+        self.told.check(settings)
         self.grid = _grid(settings, site)
         self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
         reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
@@ -130,7 +134,6 @@ class GasRun:
         if self.gauges is not None:
             _add_opening(self.gauges, self.grid, self.charge, self.handover_radius_m)
         self.end_reason: EndReason | None = None
-        watched = _watched(site, settings.until)
         self._groups = _groups(self.table, site, settings.until, watched)
         gauges = [each.position_m for each in site.gauges]
         places = [] if settings.until != "gauges" and watched else gauges
@@ -242,6 +245,15 @@ class GasRun:
         return tuple(notes)
 
 
+def _cost(settings: GasSettings, site: BlastSite, watched: Sequence[int]) -> CostGuess:
+    """Return what a run costs, about."""
+    left, bottom, right, top = site.site_m
+    x_m, y_m = site.charge.position_m
+    ways_m = [hypot(x - x_m, y - y_m) for x, y in _corners_m(site, watched)]
+    sides_m = (right - left, top - bottom, site.air_height_m)
+    return cost_of_run(settings, sides_m, site.charge.tnt_kg, max(ways_m, default=0.0))
+
+
 def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
     """Return the scaled distance of a structure's nearest point in plan, m/kg^(1/3)."""
     distance_m = structure.rectangle_m.distance_to(site.charge.position_m)
@@ -266,12 +278,6 @@ def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
         (float(origin[0]), float(origin[1]), 0.0),
         skirt=skirt,
     )
-    needed = state_bytes(grid, "single", with_fuel=True)
-    if needed > _MOST_BYTES:
-        raise BlastEnvError(
-            f"a grid of {shape[0]} x {shape[1]} x {shape[2]} cells of {cell_m:g} m would need "
-            f"{needed / 2**30:.1f} GiB, must be at most {_MOST_BYTES / 2**30:g}: take larger cells"
-        )
     grid = replace(grid, solid=np.zeros(shape, dtype=bool))
     for outline in site.structures:
         grid.solid[_cells_of(outline, grid, site)] = True

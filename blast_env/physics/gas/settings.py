@@ -28,12 +28,14 @@ COMPLETE: Final = 0.02
 """Share of an impulse that may still come where it counts as complete."""
 
 UNIFORM: Final = "uniform"
-_CELLS_RUN: Final[Mapping[str, float]] = MappingProxyType({"coarse": 80.0, "fine": 130.0})
-"""How many cells the front runs before they are doubled (docs/engineers/gas.md)."""
-CELLS: Final = (UNIFORM, *_CELLS_RUN)
-"""What cells can be."""
-_GROWING_M: Final = 0.25
+_GROWING: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
+    {"coarse": (0.5, 90.0), "fine": (0.25, 130.0)}
+)
+"""Side of the smallest cells, m, and how many of its cells the front runs before they are doubled
+(docs/engineers/gas.md)."""
 _LARGEST_M: Final = 1.0
+CELLS: Final = (UNIFORM, *_GROWING)
+"""What cells can be."""
 
 _MOST_REST: Final = 4.0
 """The sum of the series over what came last, at most: for a ratio of 0.8."""
@@ -48,9 +50,10 @@ class GasSettings:
 
     Attributes:
         cell_m: Side of a cell; a module's side must be a whole number of them.
-        cells: "uniform", or how cells grow with the blast: they are 0.25 m, or `cell_m` if that is
-            less, until its front has run so many of them, then twice as large, up to 1 m: "coarse"
-            for search on large sites, "fine" for final statements there.
+        cells: "uniform", or how cells grow with the blast: until its front has run so many of them,
+            then they are twice as large, up to 1 m. "coarse", for search on large sites, begins
+            with 0.5 m, "fine", for final statements there, with 0.25 m; or with `cell_m` if that is
+            less.
         margin_m: How far the cells keep their size outside the site.
         border_m: How far the open borders are beyond that, and above the air, at least; the cells
             between grow outwards.
@@ -94,23 +97,27 @@ class GasSettings:
             object.__setattr__(self, "until", _seconds(self.until))
 
     @property
+    def is_growing(self) -> bool:
+        """Whether cells grow with the blast."""
+        return self.cells != UNIFORM
+
+    @property
     def smallest_m(self) -> float:
         """Side of the smallest cells."""
-        return self.cell_m if self.cells == UNIFORM else min(self.cell_m, _GROWING_M)
+        return min(self.cell_m, _GROWING[self.cells][0]) if self.is_growing else self.cell_m
 
     @property
     def doubled_m(self) -> tuple[float, ...]:
         """How far the front has run in the open when cells become twice as large."""
-        run_cells = _CELLS_RUN.get(self.cells)
-        if run_cells is None:
+        if not self.is_growing:
             return ()
         count = floor(log2(_LARGEST_M / self.smallest_m) + 1e-9)
-        return tuple(run_cells * self.smallest_m * 2.0**k for k in range(count))
+        return tuple(_GROWING[self.cells][1] * self.smallest_m * 2.0**k for k in range(count))
 
     @property
     def cell_words(self) -> str:
         """Its cells, for people."""
-        kind = "cells of" if self.cells == UNIFORM else f"{self.cells} cells from"
+        kind = f"{self.cells} cells from" if self.is_growing else "cells of"
         return f"{kind} {self.smallest_m:g} m"
 
     @property

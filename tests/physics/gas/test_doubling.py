@@ -5,10 +5,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from blast_env.benchmark import street
+from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.physics.gas.doubling import DoublingSolver, shape_to_double, with_double_cells
 from blast_env.physics.gas.faces import exposed_faces
 from blast_env.physics.gas.grid import FaceKind, GasGrid
 from blast_env.physics.gas.probes import FaceLoads, Gauges, GroundMap
+from blast_env.physics.gas.settings import CELLS
 from blast_env.physics.gas.solver import Gas, GasSolver, Settling
 from blast_env.physics.gas.source import GasCharge, set_charge
 
@@ -129,3 +132,14 @@ def test_a_mirrored_site_has_the_mirrored_loads() -> None:
     plain = run(DOUBLED_S, 0.02, grid).ground.positive_impulse_pa_s
     other = run(DOUBLED_S, 0.02, turned).ground.positive_impulse_pa_s
     assert other[:, ::-1] == pytest.approx(plain, rel=1e-3, abs=0.1, nan_ok=True)
+
+
+def test_a_blast_on_growing_cells_has_about_the_loads_of_uniform_ones() -> None:
+    """On a street of 36 m, against cells that are small to the end; for a part of the work."""
+    site = street(36.0)
+    small, growing = (GasBlast(site, engine=GasEngine(cells=cells)).run() for cells in CELLS[:2])
+    assert isinstance(growing.run.solver, DoublingSolver)
+    assert growing.run.solver.current.grid.cell_m == 1.0
+    assert growing.run.solver.cell_updates < 0.7 * small.run.solver.cell_updates
+    for load, other in zip(small.loads().structures, growing.loads().structures, strict=True):
+        assert other.impulse_pa_s == pytest.approx(load.impulse_pa_s, rel=0.05)

@@ -1,0 +1,68 @@
+"""What cells that grow with the blast do to the loads on each wall of a large site, and cost."""
+
+from dataclasses import dataclass
+from time import process_time
+from typing import Final
+
+import numpy as np
+import pandas as pd
+
+from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.geometry import Layout
+from blast_env.physics.gas.settings import CELLS
+from blast_env.scenario import Scenario
+from studies.gas.loads import protected_impulse_pa_s
+
+OFF_COLUMNS: Final = ("positive_impulse_pa_s", "peak_pa")
+_SMALL_LOAD: Final = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class CellChoice:
+    """A blast with one choice of cells.
+
+    Attributes:
+        cells: The choice, for people.
+        impulse_pa_s: Impulse on the protected structures.
+        walls: Impulse and largest overpressure on each wall and roof of what is protected.
+        updates: Cells moved on; a step counts as two.
+        cpu_s: Time of a core.
+    """
+
+    cells: str
+    impulse_pa_s: float
+    walls: pd.DataFrame
+    updates: int
+    cpu_s: float
+
+    def off_percent(self, other: "CellChoice", column: str) -> tuple[float, float]:
+        """Return the mean and the largest distance from another choice over the walls.
+
+        Those count that have at least a twentieth of the largest impulse.
+        """
+        impulse = other.walls["positive_impulse_pa_s"]
+        counting = np.asarray(impulse > _SMALL_LOAD * impulse.max())
+        off = 100.0 * (self.walls[column] / other.walls[column] - 1.0)[counting].abs()
+        return float(off.mean()), float(off.max())
+
+
+def engine_with(choice: str) -> GasEngine:
+    """Return the engine with cells that are `coarse` or `fine`, or of one side in m."""
+    return GasEngine(cells=choice) if choice in CELLS else GasEngine(cell_m=float(choice))
+
+
+def cell_choice(scenario: Scenario, layout: Layout, engine: GasEngine) -> CellChoice:
+    """Run a blast with a choice of cells."""
+    began = process_time()
+    result = GasBlast(scenario, layout, 0, engine).run()
+    cpu_s = process_time() - began
+    protected = [each.name for each in scenario.structures if each.protected]
+    walls = result.walls[result.walls["structure"].isin(protected)]
+    walls = walls.set_index(["structure", "face"])[[*OFF_COLUMNS]]
+    return CellChoice(
+        engine.cell_words,
+        protected_impulse_pa_s(result),
+        walls,
+        result.run.solver.cell_updates,
+        cpu_s,
+    )
