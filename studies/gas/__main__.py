@@ -365,13 +365,14 @@ def growing(
     choices: Annotated[str, typer.Option(help="Sides in m, `coarse` and `fine`.")] = (
         "0.5,coarse,fine,0.25"
     ),
+    until: Annotated[float | None, typer.Option(help="When blasts end, s.")] = None,
 ) -> None:
     """Print what cells that grow with the blast change and cost, against the last choice."""
     with user_errors():
         site = street(length)
         charge = draw_charge(site, 0)
         layouts = {"no barrier": (), "wall near the building": wall_near_building(site, charge)}
-        engines = [engine_with(choice) for choice in choices.split(",")]
+        engines = [engine_with(choice, until) for choice in choices.split(",")]
         found = {
             name: [cell_choice(site, layout, engine) for engine in engines]
             for name, layout in layouts.items()

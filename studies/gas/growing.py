@@ -46,9 +46,12 @@ class CellChoice:
         return float(off.mean()), float(off.max())
 
 
-def engine_with(choice: str) -> GasEngine:
+def engine_with(choice: str, until_s: float | None = None) -> GasEngine:
     """Return the engine with cells that are `coarse` or `fine`, or of one side in m."""
-    return GasEngine(cells=choice) if choice in CELLS else GasEngine(cell_m=float(choice))
+    until = "structures" if until_s is None else until_s
+    if choice in CELLS:
+        return GasEngine(cells=choice, until=until)
+    return GasEngine(cell_m=float(choice), until=until)
 
 
 def cell_choice(scenario: Scenario, layout: Layout, engine: GasEngine) -> CellChoice:

@@ -398,7 +398,7 @@ SMALLER: Final[dict[str, str]] = {
     " --scenario control_room --scenario school_and_clinic --scenario hotel_forecourt"
     " --scenario shopping_street --scenario courtyard": "--repeats 1 --no-memory",
     "blast-env bench --site large": "--length 20",
-    "python -m studies.gas growing": "--length 20 --choices coarse,0.5",
+    "python -m studies.gas growing --until 0.5": "--length 20 --choices coarse,0.5",
     "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
     "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,
     "blast-env train --scenario courtyard --threat hidden --steps 40960"
