@@ -255,6 +255,6 @@ def test_bad_input_is_named(bare: GasResult) -> None:
     with pytest.raises(BlastEnvError, match=r"would need .* GiB, must be at most 8"):
         GasEngine(cell_m=0.5 / 64).start_on(bare.run.site)
     with pytest.raises(BlastEnvError, match=r"would take .* h of a core, must be at most 6: take"):
-        GasEngine(until=1e4).start_on(bare.run.site)
+        GasEngine(until=1e5).start_on(bare.run.site)
     with pytest.raises(BlastEnvError, match=r"cells is 'large', must be one of 'uniform', 'coarse"):
         blast_env.simulate(HUT, engine="gas", cells="large")
