@@ -32,6 +32,7 @@ from blast_env.engines.contract import load_plugin
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import Charge
+from blast_env.physics.structure import ModularObstacle
 from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario
 from blast_env.scenario.build_scene import draw_threat
 from blast_env.units import MS_PER_S, PA_PER_KPA
@@ -256,7 +257,7 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
     """A blast of particles."""
 
     headers = (
-        *("structure", "protected", "modules", "hits", "impulse m|v| (sim)"),
+        *("building", "protected", "modules", "hits", "impulse m|v| (sim)"),
         *("transferred (sim)", "impulse (Pa s)", "first hit (ms)"),
     )
 
@@ -308,23 +309,27 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         return [figures.save_figure(draw(), path) for path, draw in pictures if path is not None]
 
     def print_loads(self, result: BlastResult) -> None:
-        """Print a table of the structures' loads, and how the run went."""
+        """Print a table of the buildings' loads, and how the run went."""
         blast, scene = result.blast, result.blast.scene
         scaled = {
             each.name: _scaled(result, each.name) for each in result.obstacles if each.cells is None
         }
+        names = {each.name: each.building_name for each in blast.scenario.structures}
+        buildings: dict[str, list[ModularObstacle]] = {}
+        for obstacle in result.obstacles:
+            buildings.setdefault(names.get(obstacle.name, obstacle.name), []).append(obstacle)
         rows = [
             (
-                each.name,
-                "yes" if each.protected else "no",
-                f"{len(each.parts):,}",
-                f"{each.hits:,}",
-                f"{each.impulse:,.0f}",
-                f"{each.transferred_impulse:,.0f}",
-                _pa_s_text(scaled.get(each.name, {})),
-                "never" if each.first_hit_s is None else f"{MS_PER_S * each.first_hit_s:.1f}",
+                name,
+                "yes" if any(each.protected for each in parts) else "no",
+                f"{sum(len(each.parts) for each in parts):,}",
+                f"{sum(each.hits for each in parts):,}",
+                f"{sum(each.impulse for each in parts):,.0f}",
+                f"{sum(each.transferred_impulse for each in parts):,.0f}",
+                _pa_s_text(_mean_of(parts, scaled)),
+                _first_hit_text(parts),
             )
-            for each in result.obstacles
+            for name, parts in buildings.items()
         ]
         self.print_table(scene.charge, f"seed {blast.seed}", rows)
         notes = {str(each["error"]) for each in scaled.values() if "error" in each}
@@ -333,6 +338,24 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         what = f"{blast.particle_engine.describe([blast.scenario])}: {len(scene.balls):,} balls"
         texts = [f"impulse (Pa s): {note}" for note in sorted(notes)]
         self.print_end(result, what, result.step_name, texts)
+
+
+def _mean_of(
+    parts: Sequence[ModularObstacle], scaled: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Return the impulse on a building: the mean over its parts by their weights."""
+    counted = [each for each in parts if each.protected] or parts
+    found = [scaled.get(each.name, {}) for each in counted]
+    if not all("pa_s" in each for each in found):
+        return {}
+    total = sum(each.weight for each in counted)
+    mean = sum(each.weight * own["pa_s"] / total for each, own in zip(counted, found, strict=True))
+    return {"pa_s": mean, "in_range": all(each["in_range"] for each in found)}
+
+
+def _first_hit_text(parts: Sequence[ModularObstacle]) -> str:
+    times_s = [each.first_hit_s for each in parts if each.first_hit_s is not None]
+    return f"{MS_PER_S * min(times_s):.1f}" if times_s else "never"
 
 
 def _named(path: Path | None, is_bare: bool) -> Path | None:

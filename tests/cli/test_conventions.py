@@ -114,8 +114,7 @@ def test_the_loads_of_a_blast_are_readable_in_80_columns(engine: str, hut_file: 
     shown = run("simulate", hut_file, "--engine", engine).stdout
     table = shown[: shown.index(f"engine {engine} ")].splitlines()
     assert max(map(len, table)) <= NARROW
-    owner = "building" if engine == "gas" else "structure"
-    assert {owner, "protected", "hut"} <= set(shown.split())
+    assert {"building", "protected", "hut"} <= set(shown.split())
     assert "…" not in shown
 
 

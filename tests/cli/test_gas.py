@@ -144,6 +144,9 @@ def test_parts_of_a_building_are_one_row(tmp_path: Path) -> None:
     shown = run("simulate", path, "--engine", "gas", "--until", 0.01).stdout
     assert shown.count("town_hall") == 1
     assert "south_half" not in shown
+    rows = run("simulate", path, "--engine", "event").stdout.splitlines()
+    (row,) = (line.split() for line in rows if "half" in line or "town_hall" in line)
+    assert row[:3] == ["town_hall", "yes", "16"]
     told = json.loads(run("simulate", path, "--engine", "gas", "--until", 0.01, "--json").stdout)
     assert [each["parts"] for each in told["buildings"]] == ["south_half north_half"]
     assert set(told["impulse"]) == {"south_half", "north_half"}
