@@ -97,24 +97,22 @@ class NumberedActions:
     Attributes:
         catalogue: What can be placed.
         choices: See `Actions.choices`.
-        first: The first action of each choice, and the one that finishes (choices + 1,).
+        first: The first action of each choice (choices,).
+        finish: The action that finishes; the others are below it.
     """
 
     catalogue: Catalogue
     choices: tuple[IntArray, ...]
     first: tuple[int, ...]
+    finish: int
 
     @classmethod
     def of(cls, actions: Actions, catalogue: Catalogue) -> "NumberedActions":
         """Return the actions for a catalogue."""
         choices = actions.choices(catalogue)
         counts = [int(each.max(initial=-1)) + 1 for each in choices]
-        return cls(catalogue, choices, tuple(np.cumsum([0, *counts]).tolist()))
-
-    @property
-    def finish(self) -> int:
-        """The number of the action that finishes; the others are below it."""
-        return self.first[-1]
+        *first, finish = np.cumsum([0, *counts]).tolist()
+        return cls(catalogue, choices, tuple(first), finish)
 
     def mask(self, chosen: Chosen) -> NDArray[np.bool_]:
         """Return which actions are legal (actions,); to finish is, where nothing is chosen yet."""

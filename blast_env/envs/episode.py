@@ -101,7 +101,10 @@ class Episode:
 
     def observe(self) -> Array:
         """Return the observation: what is not possible after what was chosen is shown as taken."""
-        return self.observation.observe(self.placement.limited_to(self.chosen.possible))
+        placement = self.placement
+        if self.chosen.choices:
+            placement = placement.limited_to(self.chosen.possible)
+        return self.observation.observe(placement)
 
     def act(self, action: int, reward: Reward, illegal: IllegalActions) -> dict[str, float]:
         """Place a module or a piece, choose a part of it, or finish; return the reward's terms.

@@ -526,16 +526,6 @@ def particle_problems(
         sources: The sources of the charges.
         structures: The structures; all must stand on the ground.
     """
-    yield from raised_problems(structures)
-    for index, source in enumerate(sources):
-        try:
-            for_charge(parameters, source.tnt_kg)
-        except BlastEnvError as error:
-            yield Problem(f"charge[{index}].tnt_kg", str(error).removeprefix("tnt_kg "))
-
-
-def raised_problems(structures: Sequence[AnyStructure]) -> Iterator[Problem]:
-    """Yield the structures that begin above the ground, which particles do not know."""
     for index, structure in enumerate(structures):
         if structure.base_m > 0.0:
             message = (
@@ -543,6 +533,11 @@ def raised_problems(structures: Sequence[AnyStructure]) -> Iterator[Problem]:
                 f" nothing would pass below {structure.name!r}; engine 'gas' takes it"
             )
             yield Problem(f"structures[{index}].base_m", message)
+    for index, source in enumerate(sources):
+        try:
+            for_charge(parameters, source.tnt_kg)
+        except BlastEnvError as error:
+            yield Problem(f"charge[{index}].tnt_kg", str(error).removeprefix("tnt_kg "))
 
 
 def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:

@@ -186,8 +186,6 @@ class Placement:
         Args:
             possible: As `legal`, and nothing that is not.
         """
-        if possible is self.legal:
-            return self
         limited = Placement(self.scenario, self.layout)
         vars(limited).update(_empty_zone=self._empty_zone, legal=possible)
         return limited
