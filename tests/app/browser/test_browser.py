@@ -489,6 +489,22 @@ def large_site() -> Scenario:
     return Scenario.from_document(document, "office_park")
 
 
+def on_a_phone(page: Page, name: str) -> None:
+    """Leave pictures of the plan, the results and the work on the screen of a phone."""
+    for width, height in ((390, 844), (WIDTH, HEIGHT)):
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < WIDTH}
+        page.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        sleep(2.0)
+        if width < WIDTH:
+            for view in ("Plan", "Results"):
+                page.button(view).click()
+                sleep(2.0)
+                page.shoot(f"{name}_{view.lower()}")
+            page.driver.execute_script("window.scrollTo(0, document.body.scrollHeight)")
+            sleep(1.0)
+            page.shoot(f"{name}_work")
+
+
 def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) -> None:
     """Windows, a layout, the verdict, better glass and a report by the page alone; with times."""
     began_s = monotonic()
@@ -539,6 +555,7 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     sleep(3.0)
     page.shoot("large_damage")
     reached("the verdict with better glass, without a blast")
+    on_a_phone(page, "large_phone")
     page.button("Save as").click()
     sleep(0.5)
     page.button("report on this layout (.pdf)").click()
