@@ -147,3 +147,32 @@ def test_totals_are_printed_with_the_unit_of_what_counts(
     printed = capsys.readouterr().out
     assert f"without barrier: mean {evaluation.unprotected_load:,.0f} Pa," in printed
     assert "psi s" not in printed
+
+
+class Cracking(ObjectiveSection):
+    """An objective of one's own: impulse counts beyond what a wall bears, 100 Pa s."""
+
+    def load(self, impulse_pa_s: float, *others: Any, **more: Any) -> float:
+        return super().load(max(impulse_pa_s - 100.0, 0.0), *others, **more)
+
+    def text(self, load: float) -> str:
+        return f"{load:.0f} Pa s of cracking"
+
+
+def test_an_objective_of_ones_own_is_one_class_and_then_counts_everywhere(
+    measured: tuple[dict[str, float], dict[str, float]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = hut().model_copy(update={"objective": Cracking()})
+    bare, walled = (each["impulse"] - 100.0 for each in measured)
+    assert walled > 0.0
+    evaluation = evaluate_against(BlastEvaluator(own, "gas"), WALL, [NEAR])
+    assert (evaluation.unprotected_load, evaluation.load) == pytest.approx((bare, walled))
+    print_means(evaluation.comparison, own.objective)
+    assert f"with barrier: mean {walled:.0f} Pa s of cracking" in capsys.readouterr().out
+    env = BlastBarrierEnv(scenario=own, engine="gas")
+    env.reset(seed=0, options={"charge_position_m": NEAR.charge.position_m, "layout": WALL})
+    _, _, _, _, info = env.step(env.placement.catalogue.finish)
+    counted = info["impulse_pa_s"] - 100.0
+    assert info["reward_terms"]["impulse"] == pytest.approx(-counted / PA_PER_PSI)
+    problem = LayoutProblem(BlastEvaluator(own, "gas"), Case(own, (NEAR,)))
+    assert problem.load(WALL) == pytest.approx(walled)
