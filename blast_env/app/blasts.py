@@ -34,7 +34,7 @@ from blast_env.app.verdicts import keep_histories
 from blast_env.app.work import BlastTask, ThreatOf, scenario_of
 from blast_env.calibration.model import CalibrationError
 from blast_env.documents import read_text
-from blast_env.engines import Blast, find_engine
+from blast_env.engines import Blast
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.files import make_folder, write_atomically
@@ -221,9 +221,7 @@ def _mean_loads(loads: Sequence[BlastLoads]) -> tuple[Load, ...]:
 def _gas(
     task: BlastTask, scenario: Scenario, layout: Layout, charge: AnyCharge, folder: Path, tell: Tell
 ) -> dict[str, Any]:
-    engine = find_engine("gas", task.engine.cell_m)
-    if not isinstance(engine, GasEngine):
-        raise AssertionError("the engine gas is gas dynamics")
+    engine = GasEngine().configured(cell_m=task.engine.cell_m)
     blast = GasBlast(scenario, layout, 0, engine, charge)
     section = default_section(blast.site)
     height_m = min(_PLAN_HEIGHT_M, 0.5 * blast.site.air_height_m)
