@@ -107,7 +107,8 @@ class Rival:
         """Return the rival layouts of a bundled site; an older one gets a facade and a charge."""
         older = name in OLDER
         scenario = glazed(name, tnt_kg) if older else load_scenario(name)
-        zone = scenario.zone.model_dump(mode="json", exclude_none=True) | {"hardening": []}
+        zone = scenario.zone.model_dump(mode="json", exclude={"stock"}, exclude_none=True)
+        zone["hardening"] = []  # no measure changes an impulse
         bare = _changed(scenario, objective={}, build_zone=zone)
         problem = LayoutProblem(BlastEvaluator(bare, "gas"), Case(bare, _threats(bare)))
         by_impulse = find_proposer(_SEARCH).propose(problem, budget).layout
