@@ -77,7 +77,7 @@ ACTIONS: Final[Mapping[str, Actions]] = MappingProxyType(
 
 
 @dataclass(frozen=True, eq=False)
-class Chosen:
+class ActionChoice:
     """What has been chosen so far of the next thing to place.
 
     Attributes:
@@ -114,7 +114,7 @@ class NumberedActions:
         *first, finish = np.cumsum([0, *counts]).tolist()
         return cls(catalogue, choices, tuple(first), finish)
 
-    def mask(self, chosen: Chosen) -> NDArray[np.bool_]:
+    def mask(self, chosen: ActionChoice) -> NDArray[np.bool_]:
         """Return which actions are legal (actions,); to finish is, where nothing is chosen yet."""
         mask = np.zeros(self.finish + 1, dtype=np.bool_)
         options = self.choices[chosen.choices]
@@ -122,7 +122,7 @@ class NumberedActions:
         mask[-1] = chosen.choices == 0
         return mask
 
-    def narrowed(self, chosen: Chosen, action: int) -> Chosen | Element | None:
+    def narrowed(self, chosen: ActionChoice, action: int) -> ActionChoice | Element | None:
         """Return what is chosen after an action.
 
         Choices that leave no choice are passed over.
@@ -144,4 +144,4 @@ class NumberedActions:
         if made == len(self.choices):
             return self.catalogue.element(int(possible.argmax()))
         possible.flags.writeable = False
-        return Chosen(possible, made)
+        return ActionChoice(possible, made)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.engines import Engine
-from blast_env.envs.actions import Actions, Chosen, NumberedActions
+from blast_env.envs.actions import ActionChoice, Actions, NumberedActions
 from blast_env.envs.arguments import (
     ResetOptions,
     strategy,
@@ -79,14 +79,14 @@ class Episode:
     initial: Layout
     placement: Placement
     actions: NumberedActions
-    chosen: Chosen = field(init=False)
+    chosen: ActionChoice = field(init=False)
     illegal_actions: int = 0
     begun: bool = False
     ended: bool = False
 
     def __post_init__(self) -> None:
         """Begin with nothing chosen."""
-        self.chosen = Chosen(self.placement.legal)
+        self.chosen = ActionChoice(self.placement.legal)
 
     def action_mask(self) -> NDArray[np.bool_]:
         """Return which actions are legal (actions,); see `NumberedActions.mask`.
@@ -149,17 +149,19 @@ class Episode:
             for threat in case.threats
         )
 
-    def _after(self, action: int, illegal: IllegalActions) -> tuple[Placement, Chosen, bool, bool]:
+    def _after(
+        self, action: int, illegal: IllegalActions
+    ) -> tuple[Placement, ActionChoice, bool, bool]:
         """Return placement and choice after an action, whether it is illegal, whether it ends."""
         placement, chosen = self.placement, self.chosen
         finishes = action == self.actions.finish and chosen.choices == 0
         found = None if finishes else self.actions.narrowed(chosen, action)
         is_illegal = not finishes and found is None
-        if isinstance(found, Chosen):
+        if isinstance(found, ActionChoice):
             chosen = found
         elif found is not None:
             placement = placement.place(found)
-            chosen = Chosen(placement.legal)
+            chosen = ActionChoice(placement.legal)
         exhausted = self.illegal_actions + is_illegal >= illegal.limit
         return placement, chosen, is_illegal, finishes or exhausted or placement.is_full
 

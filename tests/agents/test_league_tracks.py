@@ -114,7 +114,8 @@ def test_bundled_vehicles_are_for_engines_that_can_judge_them() -> None:
     """Their scenarios name no calibration, so particles have no loads in Pa s to compare."""
     particles = [track.name for track in find_tracks("all", 1, 1)]
     gas = [track.name for track in find_tracks("all", 1, 1, noisy=False)]
-    of_gas = ["vehicle_hotel_forecourt", "vehicle_shopping_street", "item_sites"]
+    vehicles = ("hotel_forecourt", "ministry_kerb", "shopping_street")
+    of_gas = [*(f"vehicle_{name}" for name in vehicles), "item_sites"]
     assert [name for name in gas if name not in particles] == of_gas
     assert "sites" in particles
     with pytest.raises(BlastEnvError, match="--engine gas"):

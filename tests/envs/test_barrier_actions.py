@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from blast_env.envs.actions import ACTIONS, Chosen, ItemThenPlace, NumberedActions
+from blast_env.envs.actions import ACTIONS, ActionChoice, ItemThenPlace, NumberedActions
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation
 from blast_env.envs.play import CursorControl
@@ -35,11 +35,11 @@ def actions_for(actions: NumberedActions, placement: Placement, element: Element
     """Return the actions that place an element: at each choice, the one that leads there."""
     variant = placement.catalogue.variant_number(element)
     place = (variant, element[0], element[1])
-    chosen, made = Chosen(placement.legal), []
+    chosen, made = ActionChoice(placement.legal), []
     while True:
         made.append(actions.first[chosen.choices] + int(actions.choices[chosen.choices][place]))
         found = actions.narrowed(chosen, made[-1])
-        if not isinstance(found, Chosen):
+        if not isinstance(found, ActionChoice):
             assert found == element
             return made
         chosen = found
@@ -64,14 +64,14 @@ def test_choices_lead_to_what_is_legal_and_nowhere_else(name: str, scenario: Sce
     """By the masks, from an empty zone and from one in which something stands."""
     actions = numbered(name, scenario)
 
-    def elements(chosen: Chosen) -> list[Element]:
+    def elements(chosen: ActionChoice) -> list[Element]:
         mask = actions.mask(chosen)
         assert mask[-1] == (chosen.choices == 0)
         found: list[Element] = []
         for action in np.flatnonzero(mask[:-1]).tolist():
             after = actions.narrowed(chosen, action)
             assert after is not None
-            found += elements(after) if isinstance(after, Chosen) else [after]
+            found += elements(after) if isinstance(after, ActionChoice) else [after]
         return found
 
     placement = Placement.empty(scenario)
@@ -79,7 +79,7 @@ def test_choices_lead_to_what_is_legal_and_nowhere_else(name: str, scenario: Sce
         legal = [
             scenario.zone.catalogue.element(a) for a in np.flatnonzero(placement.legal).tolist()
         ]
-        found = elements(Chosen(placement.legal))
+        found = elements(ActionChoice(placement.legal))
         assert sorted(found) == sorted(legal)
         placement = placement.place(legal[len(legal) // 2])
 
@@ -144,7 +144,9 @@ def test_a_measure_needs_no_place() -> None:
     actions = numbered("item_then_block", scenario)
     catalogue, placement = scenario.zone.catalogue, Placement.empty(scenario)
     measure = next(i for i, each in enumerate(catalogue.variants) if each.is_measure)
-    assert actions.narrowed(Chosen(placement.legal), measure) == catalogue.element_at(measure, 0, 0)
+    assert actions.narrowed(ActionChoice(placement.legal), measure) == catalogue.element_at(
+        measure, 0, 0
+    )
 
 
 @pytest.mark.parametrize("name", BY_CHOICE)

@@ -295,7 +295,7 @@ def test_a_report_that_is_stopped_has_what_was_done(monkeypatch: pytest.MonkeyPa
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Runs, "other_masses", stop)
-    stopped = run_study(small_hut(), LAYOUT, StudyOptions(stills=0, cells_m=(0.5, 0.25)))
+    stopped = run_study(small_hut(), LAYOUT, StudyOptions(stills=0, cells_m=(0.5, 0.5)))
     assert stopped.stopped == "other masses"
     assert stopped.pairs
     assert "This report was stopped before: other masses" in report_html(stopped, ["blast-env"])
