@@ -135,7 +135,7 @@ CONTENT_HASHES: Final = {
     "control_room": "f0b4d497dccfd3fb5c7fa88a4d7442000a78207db5b421985695c92a320c52d6",
     "courtyard": "76c48339ea3f457b906e152fbc0abd85ec13b276c4ecda0be3a9c6dcc0131cb7",
     "free_field": "2356d490bee5e2af05f7c80a219c16f8ceb886210f1e0a53aa86954cd4b1ac54",
-    "guard_post": "b3e7c92fdc6c21707a99fae4f1df109cf74a41f24a77c779c6dd27bafa34332e",
+    "guard_post": "3af6055e299e890df10ead2a60427c9acd0c5ada29aabbc46bae005948a8b5de",
     "hotel_forecourt": "9b5360183b00680dc721c96579e47652bc6abe59af04289e67d32bae9f932c69",
     "ministry_kerb": "82c433ab302fd18f47b4dd6db7aece86e894f3a3803265551b017d64e18b6d7c",
     "perimeter_gate": "06955a399c03dbe9aad722de7981e16cb7405f389b4c56d1034d496c08e1a94d",
