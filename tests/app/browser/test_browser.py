@@ -605,7 +605,7 @@ def test_a_closed_tab_leaves_its_work_running(page: Page) -> None:
     page.driver.switch_to.window(second)
     sleep(2.0)
     page.driver.get(address)
-    page.sees("after 50 of 50", 300.0)
+    page.sees("of 50 (particles", 300.0)
     page.button("take it").click()
     page.sees("16 of 16 modules")
 
