@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.engines import Engine, find_engine
+from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.cases import Case, Threat, draw_threats
 from blast_env.evaluation.comparison import Comparison, loads_of_both
@@ -601,7 +601,7 @@ def evaluate_layout(
     layout: Sequence[Element],
     seeds: Iterable[int] = range(16),
     processes: int = 1,
-    engine: str | Engine = "event",
+    engine: str | Engine = JUDGE,
     *,
     threats: Iterable[Threat] | None = None,
     cvar_level: float = CVAR_LEVEL,
@@ -621,7 +621,7 @@ def evaluate_layout(
         layout: (row, column) of the build-zone cells that hold a barrier module, in any order.
         seeds: At least one, none twice; 16 or more for an interval worth having.
         processes: Worker processes; they change nothing but the time.
-        engine: Name of an engine, or an engine.
+        engine: Name of an engine, or an engine: gas dynamics unless told otherwise.
         threats: Used instead of threats drawn with `seeds`.
         cvar_level: The worst share 1 - `cvar_level` of the threats makes the CVaR.
         cache: Folder or cache of blasts that were run before; see `BlastEvaluator`.

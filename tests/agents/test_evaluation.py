@@ -23,7 +23,7 @@ def test_each_layout_meets_the_threat_of_its_case_alone() -> None:
     comparison = compare(Evaluators("event"), cases, WALLS)
     threats = draw_threats(small_scenario(), range(3))
     for index, (threat, layout) in enumerate(zip(threats, WALLS, strict=True)):
-        expected = evaluate_layout(small_scenario(), layout, threats=[threat])
+        expected = evaluate_layout(small_scenario(), layout, engine="event", threats=[threat])
         assert comparison.loads[index, 0] == pytest.approx(expected.impulse_pa_s.value)
         assert cases[index].charge == threat.charge
     assert comparison.case_reductions[1] == 0.0
@@ -33,7 +33,7 @@ def test_the_record_has_what_the_comparison_found() -> None:
     cases = unseen_cases(SETTINGS, SOURCE, range(4))
     evaluators = Evaluators("event")
     comparison = compare(evaluators, cases, [WALLS[0]] * 4, cvar_level=0.5)
-    expected = evaluate_layout(small_scenario(), WALLS[0], range(4), cvar_level=0.5)
+    expected = evaluate_layout(small_scenario(), WALLS[0], range(4), engine="event", cvar_level=0.5)
     assert comparison.mean == pytest.approx(expected.impulse_pa_s)
     assert comparison.unprotected_mean == pytest.approx(expected.unprotected_impulse_pa_s)
     assert (comparison.cvar, comparison.unprotected_cvar) == pytest.approx(

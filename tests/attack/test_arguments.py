@@ -33,7 +33,12 @@ def blast(**changes: Any) -> Callable[[], Any]:
 
 
 def evaluation(**changes: Any) -> Callable[[], Any]:
-    arguments = {"scenario": "courtyard", "layout": (), "seeds": (0, 1)} | changes
+    arguments = {
+        "scenario": "courtyard",
+        "layout": (),
+        "seeds": (0, 1),
+        "engine": "event",
+    } | changes
     return lambda: evaluate_layout(**arguments)
 
 

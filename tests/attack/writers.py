@@ -53,7 +53,7 @@ def _figure() -> Figure:
 
 @cache
 def _evaluation() -> LayoutEvaluation:
-    return evaluate_layout("courtyard", (), (0, 1))
+    return evaluate_layout("courtyard", (), (0, 1), engine="event")
 
 
 def _mp4(path: Path) -> None:

@@ -41,7 +41,7 @@ def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: P
     options = ("--seeds", "3", "--first-seed", "7", "--processes", "2", "--out", out)
     result = evaluate("--layout", layout, *options)
     assert result.exit_code == 0, result.output
-    expected = evaluate_layout(load_scenario("courtyard"), CELLS, (7, 8, 9))
+    expected = evaluate_layout(load_scenario("courtyard"), CELLS, (7, 8, 9), engine="event")
     content = json.loads((out / "evaluation.json").read_text())
     assert content == expected.to_dict()
     low, high = (100.0 * end for end in expected.ci95)

@@ -53,7 +53,7 @@ def test_a_visible_threat_gets_a_layout_for_each_charge(visible: Path, tmp_path:
         path = export / f"layout_{number}.json"
         layout = load_layout(path, scenario)
         assert layout == agent.propose(scenario, threat.charge)
-        expected = evaluate_layout(scenario, layout, threats=[threat])
+        expected = evaluate_layout(scenario, layout, engine="event", threats=[threat])
         assert table["load"][number - 1] == pytest.approx(expected.load)
         provenance = LayoutFile.load(path).provenance
         assert provenance["charge"]["position_m"] == list(
@@ -85,7 +85,10 @@ def test_a_hidden_threat_gets_one_layout(hidden: Path, tmp_path: Path) -> None:
     layout = load_agent(hidden).propose(scenario, None)
     assert sorted(map(tuple, content["layout"])) == sorted(layout)
     seeds = SeedRange.JUDGEMENT.seeds(0, 3)
-    assert content["result"] == evaluate_layout(scenario, layout, seeds).to_dict()["result"]
+    assert (
+        content["result"]
+        == evaluate_layout(scenario, layout, seeds, engine="event").to_dict()["result"]
+    )
     assert content["provenance"]["threat"] == "hidden"
     assert content["files"] == [str(export)]
     space = readfile(export).modelspace()

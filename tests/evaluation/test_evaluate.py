@@ -98,13 +98,13 @@ def test_modules_are_named_as_in_a_blast(evaluation: LayoutEvaluation) -> None:
 
 def test_evaluate_layout_draws_the_threats_of_its_seeds(evaluation: LayoutEvaluation) -> None:
     """In two processes and with the cells in another order: the same to the last digit."""
-    again = evaluate_layout(COURTYARD, WALL[::-1], SEEDS, processes=2)
+    again = evaluate_layout(COURTYARD, WALL[::-1], SEEDS, processes=2, engine="event")
     assert again.to_dict() == evaluation.to_dict()
 
 
 def test_threats_may_be_given_instead_of_seeds(evaluator: BlastEvaluator) -> None:
     light = [Threat(Charge((10.0, 15.0), 15.0), seed) for seed in (0, 1)]
-    evaluation = evaluate_layout(COURTYARD, FEW, threats=[*light, THREATS[0]])
+    evaluation = evaluate_layout(COURTYARD, FEW, threats=[*light, THREATS[0]], engine="event")
     assert evaluation.threats == (*light, THREATS[0])
     assert not evaluation.in_range
     assert evaluation.threat_table.in_range.tolist() == [False, False, True]
@@ -164,19 +164,19 @@ def test_a_file_that_cannot_be_written_leaves_nothing(
 
 def test_unusable_arguments_are_named(evaluator: BlastEvaluator) -> None:
     with pytest.raises(LayoutError, match=r"cell \(20, 0\) must stay empty"):
-        evaluate_layout(COURTYARD, [(20, 0)], SEEDS)
+        evaluate_layout(COURTYARD, [(20, 0)], SEEDS, engine="event")
     with pytest.raises(BlastEnvError, match="seeds: there are none"):
-        evaluate_layout(COURTYARD, FEW, [])
+        evaluate_layout(COURTYARD, FEW, [], engine="event")
     with pytest.raises(BlastEnvError, match=r"seeds\[1\] is -1, must be an integer from 0"):
-        evaluate_layout(COURTYARD, FEW, [0, -1])
+        evaluate_layout(COURTYARD, FEW, [0, -1], engine="event")
     with pytest.raises(BlastEnvError, match="processes is -2, must be a whole number"):
-        evaluate_layout(COURTYARD, FEW, SEEDS, processes=-2)
+        evaluate_layout(COURTYARD, FEW, SEEDS, processes=-2, engine="event")
     with pytest.raises(BlastEnvError, match="cvar_level is 1, must be at least 0 and below 1"):
-        evaluate_layout(COURTYARD, FEW, SEEDS, cvar_level=1.0)
+        evaluate_layout(COURTYARD, FEW, SEEDS, engine="event", cvar_level=1.0)
     with pytest.raises(BlastEnvError, match="threats: there are none"):
-        evaluate_layout(COURTYARD, FEW, threats=[])
+        evaluate_layout(COURTYARD, FEW, engine="event", threats=[])
     with pytest.raises(BlastEnvError, match=r"threats\[1\] .* is there already"):
-        evaluate_layout(COURTYARD, FEW, threats=[THREATS[0], THREATS[0]])
+        evaluate_layout(COURTYARD, FEW, engine="event", threats=[THREATS[0]] * 2)
 
 
 def test_a_structure_that_nothing_reaches_has_nothing_to_reduce() -> None:
@@ -194,4 +194,4 @@ def test_a_structure_that_nothing_reaches_has_nothing_to_reduce() -> None:
     yard = Scenario.from_document(document, "yard")
     threats = draw_threats(yard, [0])
     with pytest.raises(BlastEnvError, match="nothing arrives at the protected structures"):
-        evaluate_layout(yard, (), threats=threats)
+        evaluate_layout(yard, (), engine="event", threats=threats)

@@ -28,7 +28,7 @@ THREATS_OF_HUT = (Threat(Charge((2.0, 4.0), 5.0), 0),)
 
 @pytest.fixture(scope="module")
 def evaluation() -> LayoutEvaluation:
-    return evaluate_layout(load_scenario("courtyard"), WALL, threats=THREATS)
+    return evaluate_layout(load_scenario("courtyard"), WALL, engine="event", threats=THREATS)
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,9 @@ def test_title_and_legend_say_how_much_how_sure_and_where_not_to_trust_it(
 
 
 def test_an_empty_layout_and_a_single_threat_can_be_drawn(tmp_path: Path) -> None:
-    evaluation = evaluate_layout(load_scenario("courtyard"), [], threats=THREATS[:1])
+    evaluation = evaluate_layout(
+        load_scenario("courtyard"), [], engine="event", threats=THREATS[:1]
+    )
     figure = evaluation_figure(evaluation)
     assert "no barrier: reduction of the impulse 0 %" in figure.get_suptitle()
     assert "95 %" not in figure.get_suptitle()
