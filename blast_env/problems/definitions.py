@@ -127,6 +127,7 @@ def _charge(threat: Threat) -> object:
 _STREETS: Final = ("control_room", "school_and_clinic", "visitor_entrance")
 _OPEN: Final = ("courtyard", "perimeter_gate", "street_junction")
 _PUBLIC_VEHICLES: Final = (5103,)
+_FACADES: Final = ("clinic_front", "guard_post", "school_wing", "ministry_kerb")
 
 
 def _definitions() -> tuple[Definition, ...]:
@@ -136,6 +137,7 @@ def _definitions() -> tuple[Definition, ...]:
         *(Definition(site, "hidden") for site in (*_STREETS, *_OPEN)),
         *(Definition(site, "vehicle") for site in ("hotel_forecourt", "shopping_street")),
         *(Definition(f"{_GENERATED}{seed}", "vehicle") for seed in _PUBLIC_VEHICLES),
+        *(Definition(site, "response") for site in _FACADES),
     )
 
 
