@@ -236,7 +236,9 @@ class ResultsView:
             return "" if record is not None else "loads to come"
         judge = LoadJudge(self._session.scenario)
         noun = "" if judge.objective.quantity == "impulse" else f"{judge.objective.noun} "
-        return f"{noun}{judge.text(judge.together(record))} on what is protected"
+        parts = sum(each.protected for each in self._session.scenario.structures)
+        added = f" ({parts} structures added up by weight)" if parts > 1 else ""
+        return f"{noun}{judge.text(judge.together(record))} on what is protected{added}"
 
     def _show_chart(self, threat: NamedThreat) -> None:
         self._chart.clear()
