@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from blast_env import save_scenario
-from tests.agents.search_cases import small_scenario
+from tests.reporting.sites import small_hut
 
 SLOW = ("matplotlib", "numba", "pandas", "pyarrow", "pymunk", "scipy", "torch", "xlsxwriter")
 """What takes a tenth of a second or more to import."""
@@ -74,5 +74,5 @@ app(sys.argv[1:], standalone_mode=False)
 @pytest.mark.parametrize("engine", ["gas", "event"])
 def test_it_starts_and_runs_a_blast_without_what_windows_lacks(engine: str, tmp_path: Path) -> None:
     site = tmp_path / "site.toml"
-    save_scenario(small_scenario(), site)
+    save_scenario(small_hut(), site)
     assert f"engine {engine} " in python(ON_WINDOWS, "simulate", site, "--engine", engine)

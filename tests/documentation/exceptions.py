@@ -152,10 +152,8 @@ _LEAGUE: Final = "--cases 1 --seeds 1 --budgets 4 --methods random"
 
 SMALLER: Final[dict[str, str]] = {
     # README.md
-    "blast-env evaluate --layout wall.json --scenario courtyard --engine gas --seeds 4": (
-        "--seeds 1"
-    ),
-    "blast-env report courtyard --layout wall.json --out report.html --pdf report.pdf": (
+    "blast-env evaluate --layout walls.json --scenario visitor_entrance --seeds 4": "--seeds 1",
+    "blast-env report visitor_entrance --layout walls.json --out report.html --pdf report.pdf": (
         "--threats 1 --places 1 --stills 1 --no-items"
     ),
     "python -m studies.gas judge": "--random-layouts 1 --charges 1 --seeds 1",

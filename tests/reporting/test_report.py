@@ -37,6 +37,14 @@ def page(study: Study) -> str:
     return report_html(study, ["blast-env", "report", "a site.toml"])
 
 
+@pytest.fixture
+def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spare a study its pictures, which take as long as its blasts."""
+    for name in ("blast_pictures", "damage_pictures"):
+        monkeypatch.setattr(f"blast_env.reporting.study.{name}", lambda *_: ())
+    monkeypatch.setattr("blast_env.reporting.study.risk_picture", lambda *_: ("risk", b""))
+
+
 @pytest.fixture(scope="module")
 def measured() -> MeasuredBlast:
     scenario = small_hut()
@@ -290,6 +298,7 @@ def test_every_number_of_the_verdict_names_its_blast(study: Study, page: str) ->
     assert "bill of quantities" in table
 
 
+@pytest.mark.usefixtures("_without_pictures")
 def test_a_report_that_is_stopped_has_what_was_done(monkeypatch: pytest.MonkeyPatch) -> None:
     def stop(_: Runs) -> None:
         raise KeyboardInterrupt
@@ -301,6 +310,7 @@ def test_a_report_that_is_stopped_has_what_was_done(monkeypatch: pytest.MonkeyPa
     assert "This report was stopped before: other masses" in report_html(stopped, ["blast-env"])
 
 
+@pytest.mark.usefixtures("_without_pictures")
 def test_stopped_among_the_finer_cells_a_report_has_the_coarser_ones(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -357,6 +367,7 @@ def test_measures_are_in_the_bill_without_sizes(study: Study) -> None:
     assert row[0].count("<td></td>") == 3
 
 
+@pytest.mark.usefixtures("_without_pictures")
 def test_the_blasts_that_are_counted_before_are_those_that_are_run(study: Study) -> None:
     """Each part that is told of is one that was counted."""
     told: list[str] = []
