@@ -23,7 +23,7 @@ def arguments(name: str) -> dict[str, Any]:
     return dict(_CHEAP.get(name, {"realisations": 1, "engine": ThinEngine()}))
 
 
-_SHORT: Final = GasEngine(border_m=0.0, until=0.02)
+_SHORT: Final = GasEngine(border_m=0.0, until=0.005)
 
 _CHEAP: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
     {
