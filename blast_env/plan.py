@@ -1,6 +1,6 @@
 """What is on a site, as one list that every picture, drawing and map shows.
 
-A kind of thing says once what legends call it and how it looks. The back ends (matplotlib, pygame,
+A kind of thing says once what legends call it and how it looks. The back ends (matplotlib,
 the page's SVG, DXF and GeoJSON) draw any kind by its geometry and its look; none of them has a list
 of its own. So a new condition of the build zone is one more feature in `zone_features`.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, overload
 
 import joblib
 
@@ -10,6 +10,9 @@ from blast_env.errors import BlastEnvError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+Tell = Callable[[float], None]
+"""Told which share of some work is done."""
 
 Workers = Literal["processes", "threads"]
 """What does the work. Threads copy nothing, and pay with compiled engines, which let other threads
@@ -91,9 +94,11 @@ def workers_told() -> int:
     return int(joblib.effective_n_jobs(None))
 
 
-def share_of(
-    progress: Callable[[float], None] | None, done: int, whole: int, part: int = 1
-) -> Callable[[float], None] | None:
+@overload
+def share_of(progress: Tell, done: int, whole: int, part: int = 1) -> Tell: ...
+@overload
+def share_of(progress: Tell | None, done: int, whole: int, part: int = 1) -> Tell | None: ...
+def share_of(progress: Tell | None, done: int, whole: int, part: int = 1) -> Tell | None:
     """Return a function that reports the share of a part as a share of the whole.
 
     Args:

@@ -5,7 +5,7 @@ does not change when a layout is added, and what was drawn before stays comparab
 """
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -53,7 +53,7 @@ from blast_env.rendering.pressure_frames import (
     default_section,
 )
 from blast_env.rendering.style import render_extra
-from blast_env.runner import share_of
+from blast_env.runner import Tell, share_of
 from blast_env.scenario import AnyCharge, Scenario, load_scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.statistics import mean_estimate
@@ -73,8 +73,6 @@ _PLAN_HEIGHT_M: Final = 1.5
 _MOST_POINTS: Final = 600  # of a gauge's history
 _LEAST_SHOWN: Final = 0.05  # of the end of a film's scale
 _QUALITY: Final = 82
-
-Tell = Callable[[float], None]
 
 
 class Scale(Kept):
@@ -125,7 +123,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
         work += both[::-1] if task.engine.is_first_look else both
     work = list(dict.fromkeys(work))
     for number, (threat, cells) in enumerate(work):
-        part = share_of(tell, number, len(work)) or tell
+        part = share_of(tell, number, len(work))
         _run_one(task, scenario, threat, cells, part)
 
 
@@ -176,13 +174,13 @@ def _particles(
     times_s = np.linspace(0.0, plan.end_s, FRAMES).tolist()
     run = blast.start()
     frames = (paint_at(run, painter, time_s, plan.real_time_factor) for time_s in times_s)
-    _write_film(frames, times_s, folder, share_of(tell, 0, 10, 5) or tell)
+    _write_film(frames, times_s, folder, share_of(tell, 0, 10, 5))
     notes = [*scenario.height_notes]
     if scenario.objective.needs_peaks:
         noun = scenario.objective.noun
         return {"loads": (), "notes": (*notes, f"no loads: {noun} counts here; blast it with gas")}
     try:
-        loads = _particle_loads(task, scenario, layout, charge, share_of(tell, 5, 10, 5) or tell)
+        loads = _particle_loads(task, scenario, layout, charge, share_of(tell, 5, 10, 5))
     except CalibrationError as error:
         return {"loads": (), "notes": (*notes, f"no loads: {error}")}
     notes += dict.fromkeys(note for each in loads for own in each.structures for note in own.notes)
@@ -225,7 +223,7 @@ def _gas(
     blast = GasBlast(scenario, layout, 0, engine, charge)
     section = default_section(blast.site)
     height_m = min(_PLAN_HEIGHT_M, 0.5 * blast.site.air_height_m)
-    told = share_of(tell, 0, 100, 60) or tell
+    told = share_of(tell, 0, 100, 60)
     shot = record_planes(blast, height_m, section, told, ground_recorders)
     result = shot.result
     bare_charge = charge_against(scenario, (), charge)
@@ -236,7 +234,7 @@ def _gas(
     painter = PressurePainter([shot], scale.film_kpa, _FILM_PX)
     times_s = np.linspace(0.0, scale.until_s, FRAMES).tolist()
     frames = (painter.paint(time_s, "") for time_s in times_s)
-    _write_film(frames, times_s, folder, share_of(tell, 60, 100, 25) or tell)
+    _write_film(frames, times_s, folder, share_of(tell, 60, 100, 25))
     keep_histories(result, folder)
     pictures = tuple(_pictures(result, scale, folder))
     notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]

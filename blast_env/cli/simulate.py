@@ -33,6 +33,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import ModularObstacle
+from blast_env.runner import Tell, share_of
 from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario
 from blast_env.scenario.build_scene import draw_threat
 from blast_env.units import MS_PER_S, PA_PER_KPA
@@ -46,8 +47,6 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
 
 _GAS_PANEL: Final = "Gas dynamics only"
 _PARTICLES_PANEL: Final = "Particles only"
-
-_Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,23 +194,23 @@ class ShownBlast(ABC, Generic[_AnyBlast, _AnyResult]):
     def check(self) -> None:
         """Refuse options of no use before anything is run."""
 
-    def run(self, progress: _Progress) -> tuple[_AnyResult | None, _AnyResult]:
+    def run(self, progress: Tell) -> tuple[_AnyResult | None, _AnyResult]:
         """Run the blast, and the one without a barrier where it is to stand beside it."""
         bare = replace(self.blast, layout=()) if self.command.side_by_side else None
         if self.command.film is not None:
             return self.write_film(self.command.film, bare, progress)
         if bare is None:
             return None, self.run_one(self.blast, progress)
-        first = self.run_one(bare, lambda share: progress(0.5 * share))
-        return first, self.run_one(self.blast, lambda share: progress(0.5 + 0.5 * share))
+        first = self.run_one(bare, share_of(progress, 0, 2))
+        return first, self.run_one(self.blast, share_of(progress, 1, 2))
 
     @abstractmethod
-    def run_one(self, blast: _AnyBlast, progress: _Progress) -> _AnyResult:
+    def run_one(self, blast: _AnyBlast, progress: Tell) -> _AnyResult:
         """Run one blast to its end."""
 
     @abstractmethod
     def write_film(
-        self, path: Path, bare: _AnyBlast | None, progress: _Progress
+        self, path: Path, bare: _AnyBlast | None, progress: Tell
     ) -> tuple[_AnyResult | None, _AnyResult]:
         """Write the film of the blast, and of the other beside it; return their results."""
 
@@ -267,12 +266,12 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         if self.command.side_by_side and film is not None and film.suffix.lower() != ".mp4":
             raise BlastEnvError(f"--film {film}: of two blasts of particles it must be .mp4")
 
-    def run_one(self, blast: Blast, progress: _Progress) -> BlastResult:
+    def run_one(self, blast: Blast, progress: Tell) -> BlastResult:
         """Run one blast to its end."""
         return blast.run(progress)
 
     def write_film(
-        self, path: Path, bare: Blast | None, progress: _Progress
+        self, path: Path, bare: Blast | None, progress: Tell
     ) -> tuple[BlastResult | None, BlastResult]:
         """Write the film of the blast, and of the other beside it; return their results."""
         # Here, because films need the extra `render`.
@@ -403,7 +402,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         if gauge is not None and gauge not in names:
             raise UnknownNameError("gauge", gauge, names)
 
-    def run_one(self, blast: "GasBlast", progress: _Progress) -> "GasResult":
+    def run_one(self, blast: "GasBlast", progress: Tell) -> "GasResult":
         """Run one blast to its end."""
         return blast.run(progress, self._recorders)
 
@@ -418,7 +417,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         return ground_recorders
 
     def write_film(
-        self, path: Path, bare: "GasBlast | None", progress: _Progress
+        self, path: Path, bare: "GasBlast | None", progress: Tell
     ) -> "tuple[GasResult | None, GasResult]":
         """Write the film of the blast, and of the other beside it; return their results."""
         # Here, because films need the extra `render`.

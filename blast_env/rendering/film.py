@@ -1,15 +1,15 @@
 """Films of blasts, alone and side by side."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
+from itertools import chain
 from math import floor, inf
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
 from tempfile import TemporaryFile
-from types import TracebackType
-from typing import Final, Protocol, Self
+from typing import IO, Final
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from blast_env.plan import PAGE
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.frames import FramePainter
 from blast_env.rendering.style import nice_load, nice_numbers, render_extra, shown_until_s
+from blast_env.runner import Tell, share_of
 from blast_env.units import MS_PER_S
 from blast_env.values import path_of
 
@@ -29,209 +30,16 @@ with render_extra():
     import imageio_ffmpeg
     from PIL import Image
 
-
-_GIF_COLOURS = 128
-
-
-class FilmFile(Protocol):
-    """A film on its way to a file; a context manager that finishes the file at its end."""
-
-    def append(self, frame: Frame) -> None:
-        """Add a frame, uint8 (height, width, 3)."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None: ...
-
-
-class Mp4File:
-    """An MP4 film: H.264 in yuv420p, which every player knows.
-
-    Frames go to ffmpeg; its exit status and the frames in the finished file are looked at, so that
-    a film is whole when the block ends well. (imageio's writer looks at neither.)
-
-    Args:
-        path: The file.
-        frames_per_s: Frames a second.
-        title: Title in the metadata.
-        comment: Comment in the metadata.
-    """
-
-    def __init__(self, path: Path, frames_per_s: float, title: str, comment: str) -> None:
-        self._path = path
-        self._rate = str(Fraction(frames_per_s).limit_denominator())
-        self._metadata = ["-metadata", f"title={title}", "-metadata", f"comment={comment}"]
-        # Not a pipe, which would fill and stop ffmpeg; closed by `__exit__`.
-        self._messages = TemporaryFile()  # noqa: SIM115
-        self._encoder: Popen[bytes] | None = None
-        self._frames = 0
-
-    def append(self, frame: Frame) -> None:
-        """Add a frame with even width and height.
-
-        Raises:
-            BlastEnvError: If it cannot be written.
-        """
-        if self._encoder is None:
-            self._encoder = self._started(frame.shape[1], frame.shape[0])
-        assert self._encoder.stdin is not None
-        try:
-            self._encoder.stdin.write(np.ascontiguousarray(frame).data)
-        except OSError as error:  # ffmpeg has gone, and has said why
-            raise self._failure() from error
-        self._frames += 1
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        with self._messages:
-            if kind is None:
-                self._finish()
-            elif self._encoder is not None:
-                self._encoder.kill()
-                self._encoder.communicate()
-
-    def _started(self, width: int, height: int) -> Popen[bytes]:
-        """Return an encoder that waits for frames of a size."""
-        try:
-            program = imageio_ffmpeg.get_ffmpeg_exe()
-        except RuntimeError as error:
-            raise BlastEnvError(f"films need ffmpeg: {error}") from error
-        raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", self._rate]
-        coded = ["-an", "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"]
-        return Popen(
-            [
-                *(program, "-y", "-v", "error", *raw, "-i", "-", *coded),
-                *("-movflags", "+faststart", *self._metadata, str(self._path)),
-            ],
-            stdin=PIPE,
-            stdout=DEVNULL,
-            stderr=self._messages,
-            start_new_session=True,  # Ctrl-C is for us
-        )
-
-    def _finish(self) -> None:
-        """Let the encoder end, and make sure that all is there."""
-        if self._encoder is None:
-            raise BlastEnvError("the film cannot be written: it has no frames")
-        try:
-            self._encoder.communicate()
-        except BrokenPipeError:
-            pass
-        except BaseException:
-            self._encoder.kill()
-            raise
-        if self._encoder.wait() != 0:
-            raise self._failure()
-        try:
-            found, _ = imageio_ffmpeg.count_frames_and_secs(str(self._path))
-        except RuntimeError as error:
-            raise BlastEnvError("the film cannot be written: it cannot be read again") from error
-        if found != self._frames:
-            raise BlastEnvError(
-                f"the film cannot be written: {found} of {self._frames} frames are in the file"
-            )
-
-    def _failure(self) -> BlastEnvError:
-        """Return the error with what ffmpeg has said last."""
-        assert self._encoder is not None
-        self._encoder.wait()
-        self._messages.seek(0)
-        said = self._messages.read().decode(errors="replace").split("\n")
-        last = [line.strip() for line in said if line.strip()][-1:]
-        reason = last[0] if last else f"ffmpeg ended with status {self._encoder.returncode}"
-        return BlastEnvError(f"the film cannot be written: {reason}")
-
-
-class GifFile:
-    """An animated GIF that plays for ever.
-
-    All frames share the colours of the first one, so that still parts cost nothing and nothing
-    flickers: it must have every colour of the film.
-
-    Args:
-        path: The file.
-        frames_per_s: Frames a second; rounded so that a frame lasts whole hundredths of a second.
-        comment: Comment in the file.
-    """
-
-    def __init__(self, path: Path, frames_per_s: float, comment: str) -> None:
-        self._path = path
-        self._duration_ms = 10 * max(round(100.0 / frames_per_s), 2)
-        self._comment = comment
-        self._images: list[Image.Image] = []
-
-    def append(self, frame: Frame) -> None:
-        """Add a frame."""
-        image = Image.fromarray(frame)
-        if not self._images:
-            colours = image.quantize(_GIF_COLOURS, method=Image.Quantize.MAXCOVERAGE)
-            self._images.append(colours)
-            return
-        palette = self._images[0]
-        self._images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        if kind is not None:
-            return
-        first, *others = self._images
-        try:
-            first.save(
-                self._path,
-                format="GIF",
-                save_all=True,
-                append_images=others,
-                duration=self._duration_ms,
-                loop=0,
-                optimize=False,
-                comment=self._comment.encode(),
-            )
-        except OSError as failure:
-            raise BlastEnvError(f"the film cannot be written: {failure}") from failure
-
-
 SUFFIXES = (".mp4", ".gif")
 """The kinds of film files that can be written."""
 
-
-Progress = Callable[[float], None]
-
-
 _SHORTEST_S, _USUAL_S, _LONGEST_S = 8.0, 10.0, 12.0
-
-
-_SHARE_OF_FIRST_RUNS: Final = 0.2  # of the progress
-
-
+_TENTHS_OF_FIRST_RUNS: Final = 2  # of the progress
 _MOST_FRAMES = 15_000
-
-
 _GIF_FRAMES_PER_S = 12.5
-
-
 _GIF_MOST_FRAMES = 300
-
-
 _GIF_WIDTH_PX = 640
+_GIF_COLOURS = 128
 
 
 @dataclass(frozen=True)
@@ -334,7 +142,7 @@ def write_film(
     frames_per_s: float = 25.0,
     slow_motion: float | None = None,
     width_px: int = 960,
-    progress: Progress = lambda _: None,
+    progress: Tell = lambda _: None,
     full_impulse: float | None = None,
 ) -> BlastResult:
     """Write a film of a blast; return what happened in it.
@@ -395,19 +203,117 @@ def paint_at(run: BlastRun, painter: FramePainter, time_s: float, note: str) -> 
     return painter.paint(balls, run.obstacles, time_s, note)
 
 
-def open_film(suffix: str, path: Path, plan: FilmPlan, title: str, comment: str) -> FilmFile:
-    """Return a film of the kind that a suffix names, open for its frames.
+def save_frames(
+    frames: Iterable[Frame], path: Path, suffix: str, plan: FilmPlan, title: str, comment: str
+) -> None:
+    """Write a film of the kind that a suffix names.
 
     Args:
-        suffix: One of `SUFFIXES`.
+        frames: Its frames, uint8 (height, width, 3) with even width and height.
         path: The file; its own suffix does not matter.
+        suffix: One of `SUFFIXES`.
         plan: The plan, for a GIF one from `for_gif`.
         title: Title in the metadata; a GIF has none.
         comment: Comment in the metadata.
+
+    Raises:
+        BlastEnvError: If it cannot be written.
     """
     if suffix == ".gif":
-        return GifFile(path, plan.frames_per_s, comment)
-    return Mp4File(path, plan.frames_per_s, title, comment)
+        _save_gif(frames, path, plan.frames_per_s, comment)
+        return
+    metadata = ["-metadata", f"title={title}", "-metadata", f"comment={comment}"]
+    with TemporaryFile() as messages:  # not a pipe, which would fill and stop ffmpeg
+        _save_mp4(iter(frames), path, plan.frames_per_s, metadata, messages)
+
+
+def _save_mp4(
+    frames: Iterator[Frame], path: Path, frames_per_s: float, metadata: list[str], said: IO[bytes]
+) -> None:
+    """Write H.264 in yuv420p, which every player knows.
+
+    ffmpeg's exit status and the frames in the finished file are looked at, so that a film is whole
+    when this ends well. (imageio's writer looks at neither.)
+    """
+    first = next(frames)
+    rate = str(Fraction(frames_per_s).limit_denominator())
+    size = f"{first.shape[1]}x{first.shape[0]}"
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", rate]
+    coded = ["-an", "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"]
+    try:
+        program = imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError as error:
+        raise BlastEnvError(f"films need ffmpeg: {error}") from error
+    encoder = Popen(
+        [
+            *(program, "-y", "-v", "error", *raw, "-i", "-", *coded),
+            *("-movflags", "+faststart", *metadata, str(path)),
+        ],
+        stdin=PIPE,
+        stdout=DEVNULL,
+        stderr=said,
+        start_new_session=True,  # Ctrl-C is for us
+    )
+    assert encoder.stdin is not None
+    count = 0
+    try:
+        for frame in chain([first], frames):
+            try:
+                encoder.stdin.write(np.ascontiguousarray(frame).data)
+            except OSError:  # ffmpeg has gone, and has said why
+                break
+            count += 1
+        with suppress(BrokenPipeError):
+            encoder.communicate()
+    except BaseException:
+        encoder.kill()
+        encoder.communicate()
+        raise
+    if encoder.wait() != 0:
+        said.seek(0)
+        lines = said.read().decode(errors="replace").split("\n")
+        last = [line.strip() for line in lines if line.strip()][-1:]
+        reason = last[0] if last else f"ffmpeg ended with status {encoder.returncode}"
+        raise BlastEnvError(f"the film cannot be written: {reason}")
+    try:
+        found, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+    except RuntimeError as error:
+        raise BlastEnvError("the film cannot be written: it cannot be read again") from error
+    if found != count:
+        raise BlastEnvError(
+            f"the film cannot be written: {found} of {count} frames are in the file"
+        )
+
+
+def _save_gif(frames: Iterable[Frame], path: Path, frames_per_s: float, comment: str) -> None:
+    """Write an animated GIF that plays for ever.
+
+    All frames share the colours of the first one, so that still parts cost nothing and nothing
+    flickers: it must have every colour of the film.
+    """
+    pictures = (Image.fromarray(frame) for frame in frames)
+    first = next(pictures).quantize(_GIF_COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    others = [each.quantize(palette=first, dither=Image.Dither.NONE) for each in pictures]
+    try:
+        first.save(
+            path,
+            format="GIF",
+            save_all=True,
+            append_images=others,
+            duration=10 * max(round(100.0 / frames_per_s), 2),  # whole hundredths of a second
+            loop=0,
+            optimize=False,
+            comment=comment.encode(),
+        )
+    except OSError as failure:
+        raise BlastEnvError(f"the film cannot be written: {failure}") from failure
+
+
+def told_of(frames: Iterable[Frame], plan: FilmPlan, progress: Tell) -> Iterator[Frame]:
+    """Yield frames, and tell which share of a film they are."""
+    for number, frame in enumerate(frames, start=1):
+        yield frame
+        progress(number / plan.frame_count)
 
 
 def _comment(plan: FilmPlan, panels: Sequence[FilmPanel]) -> str:
@@ -466,7 +372,7 @@ def write_side_by_side(
     frames_per_s: float = 25.0,
     slow_motion: float | None = None,
     width_px: int = 1600,
-    progress: Progress = lambda _: None,
+    progress: Tell = lambda _: None,
 ) -> tuple[BlastResult, ...]:
     """Write a film of blasts side by side; return what happened in each.
 
@@ -499,35 +405,27 @@ def _write(
     frames_per_s: float,
     slow_motion: float | None,
     width_px: int,
-    progress: Progress,
+    progress: Tell,
     full_impulse: float | None = None,
 ) -> tuple[BlastResult, ...]:
     """Write a film of blasts; see `write_film` and `write_side_by_side`."""
     suffix = known_suffix(path)
     with write_atomically(path) as temporary:
-        results = tuple(_first_runs(panels, progress))
+        running = share_of(progress, 0, 10, _TENTHS_OF_FIRST_RUNS)
+        results = tuple(
+            panel.blast.run(share_of(running, number, len(panels)))
+            for number, panel in enumerate(panels)
+        )
         plans = [plan_film(result, frames_per_s, slow_motion) for result in results]
         plan = max(plans, key=lambda each: each.end_s)
         if suffix == ".gif":
             plan, width_px = for_gif(plan, width_px)
         painters = _painters(panels, results, width_px // len(panels), full_impulse)
         title = " | ".join(panel.title or panel.blast.scenario.name for panel in panels)
-        with open_film(suffix, temporary, plan, title, _comment(plan, panels)) as film:
-            for number, frame in enumerate(_frames(panels, painters, plan), start=1):
-                film.append(frame)
-                drawn = number / plan.frame_count
-                progress(_SHARE_OF_FIRST_RUNS + (1.0 - _SHARE_OF_FIRST_RUNS) * drawn)
+        drawing = share_of(progress, _TENTHS_OF_FIRST_RUNS, 10, 10 - _TENTHS_OF_FIRST_RUNS)
+        frames = told_of(_frames(panels, painters, plan), plan, drawing)
+        save_frames(frames, temporary, suffix, plan, title, _comment(plan, panels))
     return results
-
-
-def _first_runs(panels: Sequence[FilmPanel], progress: Progress) -> Iterator[BlastResult]:
-    part = _SHARE_OF_FIRST_RUNS / len(panels)
-    for number, panel in enumerate(panels):
-        yield panel.blast.run(partial(_tell_part, progress, part * number, part))
-
-
-def _tell_part(progress: Progress, before: float, part: float, share: float) -> None:
-    progress(before + part * share)
 
 
 def _painters(

@@ -1,6 +1,6 @@
 """Frames of a blast after the paper's Figure 4, drawn in memory: no display is needed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -13,7 +13,6 @@ from blast_env.physics.scene import Scene
 from blast_env.physics.structure import ModularObstacle
 from blast_env.plan import (
     BARRIER,
-    BORDER,
     EXPLOSIVE,
     PROTECTED,
     STANDING,
@@ -22,24 +21,15 @@ from blast_env.plan import (
     blast_features,
     without,
 )
-from blast_env.rendering.canvas import (
-    Frame,
-    FrameView,
-    Sheet,
-    Sign,
-    ball_sign,
-    colour_bar,
-    disc,
-    draw_destroyed,
+from blast_env.rendering.canvas import Frame, SiteSheet
+from blast_env.rendering.site_plan import (
     draw_features,
-    draw_grid,
-    draw_obstacle,
-    legend,
-    module_sign,
-    names_layer,
-    pixels_of,
-    scale_bar,
-    signs_of,
+    draw_loads,
+    draw_outline,
+    legend_of,
+    load_colours,
+    show_loads,
+    write_names,
 )
 from blast_env.rendering.style import (
     AIR,
@@ -47,14 +37,22 @@ from blast_env.rendering.style import (
     free_flight_impulse,
     nice_ceiling,
     render_extra,
+    unit_interval,
 )
 from blast_env.units import MS_PER_S, UNITS_PER_M
 
 with render_extra():
-    import pygame
+    from matplotlib.artist import Artist
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.colors import Normalize
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
-_SHARE_OF_CLOCK: Final = 0.45  # of the width
-_SMALLEST_RADIUS_PX = 2.0
+_SMALLEST_RADIUS_PX: Final = 2.0
+_SMALLEST_RIMMED_PX: Final = 3.5
+_RIM: Final = 0.72  # of the brightness of a ball
+_POINTS_PER_IN: Final = 72.0
 
 SIMULATION_UNITS: Final = LoadUnit()
 """Loads without a calibration."""
@@ -78,6 +76,10 @@ class FramePainter:
         unit: In what loads are shown.
         remark: A third line, quiet as the second.
 
+    Attributes:
+        sheet: The page of the frames.
+        full_impulse: Impulse of a module that has the last colour.
+
     Raises:
         BlastEnvError: If the width is out of bounds.
     """
@@ -99,35 +101,32 @@ class FramePainter:
             full_impulse = nice_ceiling(free_flight_impulse(scene))
         self.full_impulse = full_impulse
         self._unit = unit
-        self._scene = scene
-        self._sheet = Sheet(scene.site_m, width_px)
         features = blast_features(blast.scenario, blast.layout, scene.charge)
-        self._on_ground = without(features, Kinds.SITE, *STANDING)
-        signs = self._signs()
-        self._size_px = (width_px, max(self._sheet.height_px(signs), height_px))
-        usual_title, usual_subtitle = blast_title(blast)
-        lines = (
-            usual_title if title is None else title,
-            usual_subtitle if subtitle is None else subtitle,
-            remark,
-        )
-        self._ground = self._sheet.ground(lines, signs, self._size_px[1])
-        for feature in self._on_ground:
+        on_ground = without(features, Kinds.SITE, *STANDING)
+        handles = [*_signs(scene), *legend_of(on_ground)]
+        self.sheet = SiteSheet(scene.site_m, width_px, handles, True, height_px)
+        colours = ScalarMappable(Normalize(0.0, unit.factor * full_impulse), load_colours())
+        self.sheet.add_scale(colours, f"{unit.label}; white: not hit")
+        for feature in on_ground:
             if feature.kind is Kinds.BUILD_ZONE:
-                draw_grid(self._ground, self.view, feature.bounds_m)
-        draw_features(self._ground, self.view, self._on_ground)
-        self._names = names_layer(self._sheet.small, self.view, features, self._size_px)
-        self._discs: dict[tuple[int, int], pygame.Surface] = {}
+                self.sheet.draw_grid(feature.bounds_m)
+        draw_features(self.sheet.axes, on_ground)
+        self.sheet.let_move(write_names(self.sheet.axes, features, inside=False))
+        usual_title, usual_subtitle = blast_title(blast)
+        self.sheet.write(
+            (
+                usual_title if title is None else title,
+                usual_subtitle if subtitle is None else subtitle,
+                remark,
+            )
+        )
+        self._balls: dict[tuple[int, int], Line2D] = {}
+        self._loads: dict[str, tuple[tuple[PolyCollection, LineCollection], Sequence[Artist]]] = {}
 
     @property
     def size_px(self) -> tuple[int, int]:
         """Width and height of the frames."""
-        return self._size_px
-
-    @property
-    def view(self) -> FrameView:
-        """The site in the frames."""
-        return self._sheet.view
+        return self.sheet.size_px
 
     def paint(
         self,
@@ -144,15 +143,9 @@ class FramePainter:
             time_s: Simulated time.
             note: A remark under the time, e.g. the real-time factor of a film.
         """
-        surface = self._ground.copy()
-        self._draw_balls(surface, balls)
-        for obstacle in obstacles:
-            draw_obstacle(surface, self.view, obstacle, self.full_impulse)
-        surface.blit(self._names, (0, 0))
-        pygame.draw.rect(surface, BORDER, self._sheet.border, 3)
         lines = (f"{time_s * MS_PER_S:.2f} ms", note, self._so_far(obstacles))
-        self._sheet.write(surface, lines, _SHARE_OF_CLOCK, right=True)
-        return pixels_of(surface)
+        standing = (artist for each in obstacles for artist in self._standing(each))
+        return self.sheet.frame(lines, (*self._flying(balls), *standing))
 
     def _so_far(self, obstacles: Sequence[ModularObstacle]) -> str:
         """Return the loads on what is protected at this moment."""
@@ -160,72 +153,69 @@ class FramePainter:
         loads = [f"{each.name} {self._unit.of_structure(each)}" for each in protected]
         return f"so far: {', '.join(loads)}" if loads else ""
 
-    def _signs(self) -> list[pygame.Surface]:
-        """Return what explains the frames: the scale, the signs, the colours of the loads."""
-        sheet, room_px = self._sheet, self._sheet.room_px
-        return [
-            scale_bar(sheet.small, self.view.pixels_per_m, round(0.14 * sheet.width_px)),
-            legend(sheet.small, self._legend_signs(), round(0.55 * sheet.width_px)),
-            colour_bar(
-                sheet.small,
-                self.full_impulse,
-                min(round(0.24 * sheet.width_px), room_px),
-                self._unit,
-            ),
-        ]
+    def _standing(self, obstacle: ModularObstacle) -> list[Artist]:
+        """Return the modules in the colours of their loads, and the outline that tells the role."""
+        axes, known = self.sheet.axes, self._loads.get(obstacle.name)
+        if known is None:
+            loads = draw_loads(axes, obstacle, Normalize(0.0, self.full_impulse), 0.3)
+            known = self._loads[obstacle.name] = (loads, draw_outline(axes, obstacle))
+        show_loads(known[0], obstacle)
+        return [*known[0], *known[1]]
 
-    def _legend_signs(self) -> list[Sign]:
-        """Return what the signs of the frames mean."""
-        scene = self._scene
-        signs: list[Sign] = [("explosive ball", ball_sign(EXPLOSIVE))]
-        if scene.parameters.air.spacing_units > 0.0:
-            signs.append(("air ball", ball_sign(AIR)))
-        for each in scene.structures:
-            if each.cells is not None:
-                signs.append(("barrier module", module_sign(BARRIER, 2)))
-            elif each.protected:
-                signs.append((Kinds.PROTECTED_STRUCTURE.words, module_sign(PROTECTED, 3)))
-            else:
-                signs.append((Kinds.STRUCTURE.words, module_sign(STRUCTURE, 2)))
-        if any(each.capacity is not None for each in scene.structures):
-            signs.append(("destroyed module", draw_destroyed))
-        ground = signs_of(self._on_ground)
-        return [*dict(signs).items(), *ground]
-
-    def _draw_balls(self, surface: pygame.Surface, balls: BallStates) -> None:
-        """Draw the air, and the explosive balls over it."""
-        centres = self.view.pixels(balls.position / UNITS_PER_M)
-        radius_px = np.maximum(
-            balls.radius / UNITS_PER_M * self.view.pixels_per_m, _SMALLEST_RADIUS_PX
-        )
-        quarters = np.rint(4.0 * radius_px).astype(np.int64)
-        surface.set_clip(self.view.rectangle(self.view.site_m))
+    def _flying(self, balls: BallStates) -> Iterator[Artist]:
+        """Yield the air, and the explosive balls over it."""
+        centres_m = balls.position / UNITS_PER_M
+        radius_px = balls.radius / UNITS_PER_M * self.sheet.pixels_per_m
+        quarters = np.rint(4.0 * np.maximum(radius_px, _SMALLEST_RADIUS_PX)).astype(np.int64)
         for kind in (CollisionType.AirBall, CollisionType.ExplosionBall):
             of_kind = balls.kind == kind
             for size in np.unique(quarters[of_kind]).tolist():
-                image = self._disc(kind, size)
-                half = image.get_width() / 2.0
-                corners = np.rint(centres[of_kind & (quarters == size)] - half).astype(int)
-                surface.fblits([(image, (x, y)) for x, y in corners.tolist()])
-        surface.set_clip(None)
+                markers = self._markers(kind, size)
+                markers.set_data(*centres_m[of_kind & (quarters == size)].T)
+                yield markers
 
-    def _disc(self, kind: CollisionType, quarters: int) -> pygame.Surface:
-        """Return the image of a ball; the radius is in quarters of a pixel."""
+    def _markers(self, kind: CollisionType, quarters: int) -> Line2D:
+        """Return what draws the balls of a kind and a radius, which is in quarters of a pixel."""
         key = (int(kind), quarters)
-        if key not in self._discs:
-            colour = EXPLOSIVE if kind == CollisionType.ExplosionBall else AIR
-            self._discs[key] = disc(quarters / 4.0, colour)
-        return self._discs[key]
+        if key not in self._balls:
+            markers = _ball(kind)
+            pt_per_px = _POINTS_PER_IN / self.sheet.figure.dpi
+            rim_pt = pt_per_px if quarters / 4.0 >= _SMALLEST_RIMMED_PX else 0.0
+            markers.set(markersize=quarters / 2.0 * pt_per_px - rim_pt, markeredgewidth=rim_pt)
+            self._balls[key] = self.sheet.axes.add_line(markers)
+            markers.set_animated(True)
+        return self._balls[key]
 
 
-def balls_at_start(scene: Scene) -> BallStates:
-    """Return the balls of a scene before anything has moved, to paint it without an engine."""
-    balls = scene.balls
-    return BallStates(
-        index=np.arange(len(balls)),
-        kind=balls.kind,
-        position=balls.position,
-        velocity=balls.velocity,
-        mass=balls.mass,
-        radius=balls.radius,
+def _ball(kind: CollisionType) -> Line2D:
+    colour = unit_interval(EXPLOSIVE if kind == CollisionType.ExplosionBall else AIR)
+    red, green, blue = (_RIM * channel for channel in colour)
+    return Line2D(
+        [], [], marker="o", linestyle="", color=colour, markeredgecolor=(red, green, blue)
     )
+
+
+def _signs(scene: Scene) -> list[Artist]:
+    """Return the legend entries of balls and modules."""
+    kinds = {"explosive ball": CollisionType.ExplosionBall}
+    if scene.parameters.air.spacing_units > 0.0:
+        kinds["air ball"] = CollisionType.AirBall
+    signs: list[Artist] = []
+    for label, kind in kinds.items():
+        signs.append(_ball(kind))
+        signs[-1].set_label(label)
+    outlines = {}
+    for each in scene.structures:
+        if each.cells is not None:
+            outlines["barrier module"] = (BARRIER, 1.0)
+        elif each.protected:
+            outlines[Kinds.PROTECTED_STRUCTURE.words] = (PROTECTED, 2.0)
+        else:
+            outlines[Kinds.STRUCTURE.words] = (STRUCTURE, 1.4)
+    for label, (colour, width) in outlines.items():
+        edge = unit_interval(colour)
+        signs.append(Patch(facecolor="white", edgecolor=edge, linewidth=width, label=label))
+    if any(each.capacity is not None for each in scene.structures):
+        cross = Line2D([], [], marker="x", linestyle="", color="black", label="destroyed module")
+        signs.append(cross)
+    return signs

@@ -1,8 +1,9 @@
 """Maps of the ground: peak overpressure and impulse of a blast of the gas engine."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import cbrt, inf, isfinite
-from typing import Final
+from types import MappingProxyType
+from typing import Any, Final
 
 import numpy as np
 
@@ -55,6 +56,12 @@ _MOST_OF_THE_GROUND: Final = 0.93
 _MAP_WIDTHS_IN: Final = (6.0, 7.4)
 _RISKS: Final = ("#fdeec2", "#f9c46b", "#d9682b", "#7a1f2b")  # darker is worse
 _FINER: Final = "spherical stage, finer than the grid"
+_FINER_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
+    {"color": unit_interval(INK), "linewidth": 1.4, "linestyle": (0, (1.0, 2.0))}
+)
+_OPEN_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
+    {"color": "0.15", "linewidth": 1.2, "linestyle": (0, (4.0, 2.0))}
+)
 _MAP_HEIGHTS_IN: Final = (3.4, 7.0)
 
 
@@ -133,15 +140,9 @@ def ground_map(
             [_on_site(each, value)[2] for each, value in zip(results, values, strict=True)]
         )
     scale = LogNorm(levels[0], levels[-1])
-    figure = Figure(figsize=_map_size_in(result.run.site, len(results)), layout="constrained")
-    plans = figure.subplots(1, len(results), squeeze=False, sharex=True, sharey=True)[0]
+    figure, plans = _plans(results)
     for axes, each, value in zip(plans, results, values, strict=True):
         _draw_ground(axes, each, value, levels, scale)
-        if beside is not None:
-            axes.set_title(layout_words(each.blast), fontsize=11)
-    for axes in plans[1:]:
-        axes.set_ylabel("")
-        axes.tick_params(left=False, labelleft=False)
     bar = figure.colorbar(
         ScalarMappable(scale, loads_and_solids()),
         ax=list(plans),
@@ -156,15 +157,10 @@ def ground_map(
     features = [feature for each in results for feature in _features(each)]
     handles = legend_of(without_counts(features) if len(results) > 1 else features)
     if result.run.charge.on_ground:
-        handles.append(
-            Line2D([], [], color=unit_interval(INK), linestyle=(0, (1.0, 2.0)), label=_FINER)
-        )
-    write_legend(figure, handles)
+        handles.append(Line2D([], [], **_FINER_STYLE, label=_FINER))
     height_m = result.run.grid.centres_m(2)[0]
-    title, subtitle = gas_heading(results, f"{kind.name} over the ground")
-    write_heading(figure, title, f"{subtitle}; {height_m:g} m above the ground")
-    for axes, each in zip(plans, results, strict=True):
-        write_names(axes, _features(each))
+    note = f"{height_m:g} m above the ground"
+    _write(figure, results, handles, f"{kind.name} over the ground", note)
     return figure
 
 
@@ -182,46 +178,74 @@ def threshold_map(result: GasResult, beside: GasResult | None = None) -> Figure:
         BlastEnvError: If a blast was run without the recorders, or site or charge differ.
     """
     results, thresholds = both_results(result, beside), ground_thresholds()
-    width_in, height_in = _map_size_in(result.run.site, len(results))
-    figure = Figure(figsize=(width_in, height_in + 0.9), layout="constrained")
-    plans = figure.subplots(1, len(results), squeeze=False, sharex=True, sharey=True)[0]
+    figure, plans = _plans(results, 0.9)
     levels = [each.peak_pa for each in thresholds]
     for axes, each in zip(plans, results, strict=True):
-        features, site_m = _features(each), each.run.site.site_m
-        draw_plan(axes, [feature for feature in features if feature.kind is Kinds.SITE])
         x_m, y_m, inside = _on_site(each, ground_values(each, "peak"))
         shown = axes.contourf(
             x_m, y_m, inside.T, levels=[*levels, np.inf], colors=_RISKS, extend="neither", zorder=1
         )
         shown.set_clip_path(axes.patches[0])
-        reach = 0.03 * max(site_m.right, site_m.top)
-        axes.set_xlim(site_m.left - reach, site_m.right + reach)
-        axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
+        charge = each.run.site.charge
         for threshold in thresholds:
-            distance_m = open_distance_m(threshold.peak_pa, each.run.site.charge)
-            if not isfinite(distance_m):
-                continue
-            circle = Circle(each.run.site.charge.position_m, distance_m, fill=False, zorder=2)
-            circle.set(edgecolor="0.15", linewidth=1.2, linestyle=(0, (4.0, 2.0)))
-            axes.add_patch(circle)
-            circle.set_clip_path(axes.patches[0])
-        draw_features(axes, without(features, Kinds.SITE))
-        add_outline(axes, site_m, edgecolor=unit_interval(BORDER), linewidth=1.8)
-        if beside is not None:
-            axes.set_title(layout_words(each.blast), fontsize=11)
+            distance_m = open_distance_m(threshold.peak_pa, charge)
+            if isfinite(distance_m):
+                _add_circle(axes, charge, distance_m, **_OPEN_STYLE)
+        _draw_standing(axes, each)
     handles: list[Artist] = [
         Patch(facecolor=colour, edgecolor="0.4", label=_risk_words(each, result.run.site.charge))
         for each, colour in zip(thresholds, _RISKS, strict=True)
     ]
-    handles.append(
-        Line2D([], [], color="0.15", linestyle=(0, (4.0, 2.0)), label="the same in the open, curve")
+    handles.append(Line2D([], [], **_OPEN_STYLE, label="the same in the open, curve"))
+    handles += legend_of(without_counts(_features(result)))
+    title, note = (
+        "where windows and eardrums are at risk",
+        "cells clip peaks: dashed is the safe side",
     )
-    write_legend(figure, [*handles, *legend_of(without_counts(_features(result)))])
-    title, subtitle = gas_heading(results, "where windows and eardrums are at risk")
-    write_heading(figure, title, f"{subtitle}; cells clip peaks: dashed is the safe side")
-    for axes, each in zip(plans, results, strict=True):
-        write_names(axes, _features(each))
+    _write(figure, results, handles, title, note)
     return figure
+
+
+def _plans(results: Sequence[GasResult], more_in: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
+    """Return a figure with the ground of each site, to draw upon."""
+    width_in, height_in = _map_size_in(results[0].run.site, len(results))
+    figure = Figure(figsize=(width_in, height_in + more_in), layout="constrained")
+    plans = figure.subplots(1, len(results), squeeze=False, sharex=True, sharey=True)[0]
+    for axes, each in zip(plans, results, strict=True):
+        draw_plan(axes, [feature for feature in _features(each) if feature.kind is Kinds.SITE])
+        if len(results) > 1:
+            axes.set_title(layout_words(each.blast), fontsize=11)
+    for axes in plans[1:]:
+        axes.set_ylabel("")
+        axes.tick_params(left=False, labelleft=False)
+    return figure, list(plans)
+
+
+def _draw_standing(axes: Axes, result: GasResult) -> None:
+    """Draw what is on a site over its ground, and bring all of it into view."""
+    site_m = result.run.site.site_m
+    draw_features(axes, without(_features(result), Kinds.SITE))
+    add_outline(axes, site_m, edgecolor=unit_interval(BORDER), linewidth=1.8)
+    reach = 0.03 * max(site_m.right, site_m.top)
+    axes.set_xlim(site_m.left - reach, site_m.right + reach)
+    axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
+
+
+def _add_circle(axes: Axes, charge: Charge, radius_m: float, **style: Any) -> None:
+    circle = Circle(charge.position_m, radius_m, fill=False, zorder=2, **style)
+    axes.add_patch(circle)
+    circle.set_clip_path(axes.patches[0])
+
+
+def _write(
+    figure: Figure, results: Sequence[GasResult], handles: Sequence[Artist], what: str, note: str
+) -> None:
+    """Write legend, heading and names."""
+    write_legend(figure, handles)
+    title, subtitle = gas_heading(results, what)
+    write_heading(figure, title, f"{subtitle}; {note}")
+    for axes, each in zip(figure.axes, results, strict=False):
+        write_names(axes, _features(each))
 
 
 def open_distance_m(peak_pa: float, charge: Charge) -> float:
@@ -284,11 +308,8 @@ def _contour_levels(parts: Sequence[FloatArray]) -> list[float]:
 def _draw_ground(
     axes: Axes, result: GasResult, values: FloatArray, levels: Sequence[float], scale: Normalize
 ) -> None:
-    grid, site_m = result.run.grid, result.run.site.site_m
-    features = _features(result)
-    draw_plan(axes, [each for each in features if each.kind is Kinds.SITE])
     x_m, y_m, inside = _on_site(result, values)
-    half = grid.cell_m / 2.0
+    half = result.run.grid.cell_m / 2.0
     image = axes.imshow(
         inside.T,
         norm=scale,
@@ -299,33 +320,14 @@ def _draw_ground(
         zorder=1,
     )
     image.set_clip_path(axes.patches[0])
-    reach = 0.03 * max(site_m.right, site_m.top)
-    axes.set_xlim(site_m.left - reach, site_m.right + reach)
-    axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
     lines = axes.contour(
         x_m, y_m, inside.T, levels=levels, colors=[unit_interval(INK)], linewidths=0.7
     )
     _write_levels(axes, lines, result)
-    draw_features(axes, without(features, Kinds.SITE))
-    add_outline(axes, site_m, edgecolor=unit_interval(BORDER), linewidth=1.8)
+    _draw_standing(axes, result)
     if result.run.charge.on_ground:
-        circle = _taken_over(result)
-        axes.add_patch(circle)
-        circle.set_clip_path(axes.patches[0])
-
-
-def _taken_over(result: GasResult) -> Circle:
-    """Return how far the front was when the grid took over: inside, peaks are sharper."""
-    return Circle(
-        result.run.site.charge.position_m,
-        result.run.handover_radius_m,
-        fill=False,
-        edgecolor=unit_interval(INK),
-        linewidth=1.4,
-        linestyle=(0, (1.0, 2.0)),
-        label=_FINER,
-        zorder=2,
-    )
+        # How far the front was when the grid took over: inside, peaks are sharper.
+        _add_circle(axes, result.run.site.charge, result.run.handover_radius_m, **_FINER_STYLE)
 
 
 def _write_levels(axes: Axes, lines: QuadContourSet, result: GasResult) -> None:

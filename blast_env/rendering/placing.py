@@ -8,17 +8,19 @@ from typing import Final
 import numpy as np
 
 from blast_env.engines import Blast, BlastResult
-from blast_env.geometry import Cell, Element
+from blast_env.geometry import Cell, Element, Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import Colour
 from blast_env.plan import (
-    BORDER,
     EXPLOSIVE,
-    FAINT,
     PROTECTED,
     Feature,
+    FeatureKind,
     Kinds,
+    Look,
+    area_feature,
     barrier_features,
+    in_order,
     rectangles_of,
     site_features,
     source_features,
@@ -26,49 +28,22 @@ from blast_env.plan import (
     without,
     without_counts,
 )
-from blast_env.rendering.canvas import (
-    Frame,
-    Sheet,
-    Sign,
-    draw_features,
-    draw_grid,
-    hatch,
-    legend,
-    names_layer,
-    pixels_of,
-    scale_bar,
-    signs_of,
-)
+from blast_env.rendering.canvas import Frame, SiteSheet
 from blast_env.rendering.film import paint_at, plan_film
 from blast_env.rendering.frames import FramePainter
-from blast_env.rendering.style import nice_ceiling, render_extra
+from blast_env.rendering.site_plan import add_outline, draw_features, legend_of, write_names
+from blast_env.rendering.style import nice_ceiling, render_extra, unit_interval
 from blast_env.scenario import AnySource, BuildZone, Placement, PointSource, Scenario, VehicleSource
 from blast_env.scenario.build_scene import build_site
 from blast_env.units import MODULE_SIDE_M
 
 with render_extra():
-    import pygame
+    from matplotlib.artist import Artist
 
 FREE: Final[Colour] = (214, 238, 219)
-_UNAVAILABLE: Final[Colour] = (226, 228, 232)
-_HATCH: Final[Colour] = (158, 164, 174)
-_LEGEND_SHARE: Final = 0.83  # of the width
-_SHARE_OF_LINES: Final = 0.6  # of the width
-
-
-def _draw_free(surface: pygame.Surface, place: pygame.Rect) -> None:
-    pygame.draw.rect(surface, FREE, place)
-    pygame.draw.rect(surface, FAINT, place, 1)
-
-
-def _draw_unavailable(surface: pygame.Surface, place: pygame.Rect) -> None:
-    surface.fill(_UNAVAILABLE, place)
-    hatch(surface, place, _HATCH)
-
-
-_CELLS: Final[tuple[Sign, ...]] = (
-    ("free cell", _draw_free),
-    ("cell not available", _draw_unavailable),
+_FREE_CELL: Final = FeatureKind("free_cell", "free cell", 1.12, Look(fill=FREE))
+_NO_CELL: Final = FeatureKind(
+    "no_cell", "cell not available", 1.1, Look(fill=(226, 228, 232), hatched=True)
 )
 
 
@@ -89,21 +64,19 @@ class PlacingPainter:
     ) -> None:
         self._scenario = scenario
         self._has_vehicles = any(isinstance(source, VehicleSource) for source in sources)
-        self._sheet = Sheet(build_site(scenario).site_m, width_px)
-        self._view = self._sheet.view
         given = without(site_features(scenario), Kinds.SITE, Kinds.CHARGE_PLACE)
         self._features = (*given, *source_features(sources))
-        signs = self._signs()
         blast_px = FramePainter(_fullest_blast(scenario), width_px=width_px).size_px[1]
-        height_px = max(self._sheet.height_px(signs), blast_px)
-        lines = (scenario.name, sources_text(sources))
-        self._ground = self._sheet.ground(lines, signs, height_px)
+        site_m = build_site(scenario).site_m
+        self._sheet = SiteSheet(site_m, width_px, self._handles(), False, blast_px)
+        if scenario.build_zone is not None:
+            self._sheet.draw_grid(scenario.build_zone.rectangle_m)
+        self._sheet.write((scenario.name, sources_text(sources)))
 
     @property
     def size_px(self) -> tuple[int, int]:
         """Width and height of the frames."""
-        width, height = self._ground.get_size()
-        return width, height
+        return self._sheet.size_px
 
     def paint(
         self, placement: Placement, lines: Sequence[str] = (), marked: Element | None = None
@@ -115,73 +88,57 @@ class PlacingPainter:
             lines: At most two lines of text for the upper right corner.
             marked: What may be placed next, outlined; in another colour where it may not be.
         """
-        surface = self._ground.copy()
-        if self._scenario.build_zone is not None:
-            self._draw_cells(surface, self._scenario.build_zone, placement)
-        features = self._of(placement)
-        draw_features(surface, self._view, features)
-        names = names_layer(self._sheet.small, self._view, features, self.size_px)
-        surface.blit(names, (0, 0))
+        axes, features = self._sheet.axes, self._of(placement)
+        moving = [*draw_features(axes, features), *write_names(axes, features)]
         if marked is not None:
-            self._mark(surface, placement, marked)
-        pygame.draw.rect(surface, BORDER, self._sheet.border, 3)
-        self._sheet.write(surface, lines, _SHARE_OF_LINES, right=True)
-        return pixels_of(surface)
+            moving += self._mark(placement, marked)
+        frame = self._sheet.frame(lines, moving)
+        for artist in moving:
+            artist.remove()
+        return frame
 
     def _of(self, placement: Placement) -> tuple[Feature, ...]:
-        """Return everything that a frame shows."""
+        """Return everything that a frame shows, the lowest first."""
         scenario, layout = placement.scenario, placement.layout
-        vehicles = vehicle_features(scenario, layout) if self._has_vehicles else ()
-        below = [each for each in vehicles if each.kind is Kinds.REACHED]
+        found = [*self._features]
+        if self._has_vehicles:
+            found += vehicle_features(scenario, layout)
         zone = scenario.build_zone
-        barrier = () if zone is None else barrier_features(zone, layout)
-        return (*below, *self._features, *barrier, *without(vehicles, Kinds.REACHED))
+        if zone is not None:
+            found.append(area_feature(_NO_CELL, zone.rectangle_m, ""))
+            free_m = rectangles_of(placement.open_ground, zone.corner_m)
+            found += [area_feature(_FREE_CELL, each, "") for each in free_m]
+            found += barrier_features(zone, layout)
+        return in_order(found)
 
     def cell_at(self, place_px: tuple[int, int]) -> Cell | None:
         """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one."""
         zone = self._scenario.build_zone
         if zone is None:
             return None
-        left_px, bottom_px = self._view.rectangle(zone.rectangle_m).bottomleft
-        side_px = MODULE_SIDE_M * self._view.pixels_per_m
-        cell = floor((bottom_px - place_px[1]) / side_px), floor((place_px[0] - left_px) / side_px)
+        x_m, y_m = np.subtract(self._sheet.place_m(*place_px), zone.corner_m)
+        cell = floor(y_m / MODULE_SIDE_M), floor(x_m / MODULE_SIDE_M)
         return cell if _is_in(zone, cell) else None
 
-    def _mark(self, surface: pygame.Surface, placement: Placement, element: Element) -> None:
+    def _mark(self, placement: Placement, element: Element) -> list[Artist]:
         """Outline what may be placed next."""
         zone = placement.scenario.zone
         colour = PROTECTED if placement.explain(element) is None else EXPLOSIVE
-        inside = [cell for cell in placement.catalogue.cells(element) if _is_in(zone, cell)]
-        places = [self._view.rectangle(zone.cell_rectangle_m(cell)) for cell in inside]
-        if places:
-            around = places[0].unionall(places[1:]).inflate(4, 4)
-            pygame.draw.rect(surface, colour, around, 3)
+        cells = [cell for cell in placement.catalogue.cells(element) if _is_in(zone, cell)]
+        if not cells:
+            return []
+        around = Rectangle.around([zone.cell_rectangle_m(cell) for cell in cells])
+        style = {"edgecolor": unit_interval(colour), "linewidth": 2.2}
+        return [add_outline(self._sheet.axes, around, **style)]
 
-    def _signs(self) -> list[pygame.Surface]:
-        """Return what explains the frames: the scale and the signs."""
-        placement, width_px = Placement.empty(self._scenario), self._sheet.width_px
-        zone = self._scenario.zone
-        # One of each item: they differ in colour.
+    def _handles(self) -> list[Artist]:
+        """Return the entries of the legend: one of each item, since they differ in colour."""
+        placement = Placement.empty(self._scenario)
         catalogue = placement.catalogue
         numbers = {each.name: number for number, each in enumerate(catalogue.variants)}
         one_each = [catalogue.element_at(number, 0, 0) for number in numbers.values()]
-        shown = without_counts((*self._of(placement), *barrier_features(zone, one_each)))
-        return [
-            scale_bar(self._sheet.small, self._view.pixels_per_m, round(0.14 * width_px)),
-            legend(
-                self._sheet.small,
-                [*signs_of(shown), *_CELLS],
-                round(_LEGEND_SHARE * self._sheet.room_px),
-            ),
-        ]
-
-    def _draw_cells(self, surface: pygame.Surface, zone: BuildZone, placement: Placement) -> None:
-        """Draw which cells are free and which are not."""
-        whole = self._view.rectangle(zone.rectangle_m)
-        _draw_unavailable(surface, whole)
-        for free_m in rectangles_of(placement.open_ground, zone.corner_m):
-            surface.fill(FREE, self._view.rectangle(free_m))
-        draw_grid(surface, self._view, zone.rectangle_m)
+        barrier = barrier_features(self._scenario.zone, one_each)
+        return legend_of(without_counts((*self._of(placement), *barrier)))
 
 
 def _is_in(zone: BuildZone, cell: Cell) -> bool:

@@ -1,6 +1,6 @@
 """Films of overpressure in the air, alone and side by side."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import cbrt
 from pathlib import Path
@@ -20,7 +20,14 @@ from blast_env.physics.gas.solver import Recorder
 from blast_env.physics.scene import BlastSite
 from blast_env.plan import PAGE
 from blast_env.rendering.canvas import Frame
-from blast_env.rendering.film import FilmPlan, for_gif, known_suffix, open_film, plan_until
+from blast_env.rendering.film import (
+    FilmPlan,
+    for_gif,
+    known_suffix,
+    plan_until,
+    save_frames,
+    told_of,
+)
 from blast_env.rendering.gas import (
     PA_PER_KPA,
     check_comparable,
@@ -35,12 +42,12 @@ from blast_env.rendering.pressure_frames import (
     default_section,
 )
 from blast_env.rendering.style import nice_ceiling
+from blast_env.runner import Tell, share_of
 
 _EVERY_S: Final = 0.0002  # of 100 kg
 _LONGEST_S: Final = 4.0  # of 100 kg
 _CURVES: Final = (0.2, 30.0)  # scaled distances, m/kg^(1/3), that both kinds of burst have
 _LONGEST_WAY_M: Final = 100.0
-_SHARE_OF_RUNS: Final = 0.5  # of the progress
 _NARROWEST_PX, _WIDEST_PX = 480, 4096
 PLAN_HEIGHT_M: Final = 1.5
 """Height of the plan of a film unless another is given."""
@@ -58,7 +65,7 @@ def write_pressure_film(
     slow_motion: float | None = None,
     width_px: int | None = None,
     further: Recorders = lambda _: (),
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Tell = lambda _: None,
 ) -> tuple[GasResult, ...]:
     """Run a blast and write a film of the overpressure in plan and in a section.
 
@@ -94,25 +101,21 @@ def write_pressure_film(
         raise BlastEnvError(f"width_px is {width_px}, must be {_NARROWEST_PX} to {_WIDEST_PX}")
     section = default_section(blast.site) if section is None else section
     with write_atomically(path) as temporary:
-        shots = []
-        for number, each in enumerate(blasts):
-            part = _SHARE_OF_RUNS / len(blasts)
-            shots.append(
-                record_planes(
-                    each, height_m, section, _part(progress, number * part, part), further
-                )
-            )
+        running = share_of(progress, 0, 2)
+        shots = [
+            record_planes(each, height_m, section, share_of(running, number, len(blasts)), further)
+            for number, each in enumerate(blasts)
+        ]
         end_s = max(shot.result.time_s for shot in shots)
         plan = plan_until(end_s, frames_per_s, slow_motion)
         if suffix == ".gif":
             plan, width_px = for_gif(plan, width_px)
         full_kpa = scale_end_kpa([shot.result for shot in shots]) if full_kpa is None else full_kpa
         painter = PressurePainter(shots, full_kpa, width_px - width_px % 2)
-        with open_film(suffix, temporary, plan, blast.scenario.name, _comment(shots, plan)) as film:
-            for number in range(plan.frame_count):
-                film.append(painter.paint(plan.time_s(number), plan.real_time_factor))
-                drawn = (number + 1) / plan.frame_count
-                progress(_SHARE_OF_RUNS + (1.0 - _SHARE_OF_RUNS) * drawn)
+        times_s = map(plan.time_s, range(plan.frame_count))
+        frames = (painter.paint(time_s, plan.real_time_factor) for time_s in times_s)
+        told = told_of(frames, plan, share_of(progress, 1, 2))
+        save_frames(told, temporary, suffix, plan, blast.scenario.name, _comment(shots, plan))
     return tuple(shot.result for shot in shots)
 
 
@@ -200,11 +203,6 @@ def _free_field_peak_kpa(site: BlastSite) -> float:
     return nice_ceiling(float(peak_pa) / PA_PER_KPA)
 
 
-def _part(progress: Callable[[float], None], first: float, part: float) -> Callable[[float], None]:
-    """Return the progress of a part of the work."""
-    return lambda share: progress(first + part * share)
-
-
 def _comment(shots: Sequence["PressureShot"], plan: FilmPlan) -> str:
     blasts = [shot.result.blast for shot in shots]
     scenario, layouts = blasts[-1].scenario, " | ".join(map(layout_words, blasts))
@@ -228,7 +226,7 @@ def record_planes(
     blast: GasBlast,
     height_m: float,
     section: VerticalSection,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Tell = lambda _: None,
     further: Recorders = lambda _: (),
 ) -> PressureShot:
     """Run a blast and take pictures of two planes all the while.

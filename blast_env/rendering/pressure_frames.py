@@ -4,9 +4,10 @@ They begin at the detonation: until the grid takes a blast over, its spherical s
 """
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
+from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -21,7 +22,6 @@ from blast_env.physics.gas.engine import GasRun
 from blast_env.physics.gas.opening import Opening
 from blast_env.physics.gas.probes import Snapshot
 from blast_env.physics.scene import BlastSite, StructureOutline
-from blast_env.physics.structure import Colour
 from blast_env.plan import (
     BARRIER,
     BORDER,
@@ -37,7 +37,7 @@ from blast_env.plan import (
     blast_features,
     without,
 )
-from blast_env.rendering.canvas import Frame
+from blast_env.rendering.canvas import BAR_LABELS_PX, Frame, Sheet
 from blast_env.rendering.gas import (
     MINUS,
     PA_PER_KPA,
@@ -45,7 +45,6 @@ from blast_env.rendering.gas import (
     layout_words,
 )
 from blast_env.rendering.site_plan import (
-    draw_charge,
     draw_features,
     legend_of,
     rectangle_patch,
@@ -57,10 +56,8 @@ with render_extra():
     from matplotlib import colormaps
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import AsinhNorm
-    from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
     from matplotlib.lines import Line2D
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
@@ -69,7 +66,9 @@ _FINER: Final = 4  # pixels drawn along a cell
 _COLOURS: Final = "RdBu_r"  # lightness falls to both sides, and red and blue are safe
 _LINEAR_SHARE: Final = 0.1  # of the scale
 _TICKS: Final = (1.0, 0.5, 0.2, 0.05)
-_CUT: Final = (0, (6, 3, 1, 3))  # dashes and dots, points
+_CUT_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
+    {"color": unit_interval(INK), "linewidth": 0.8, "linestyle": (0, (6, 3, 1, 3))}
+)
 
 
 @dataclass(frozen=True)
@@ -245,10 +244,9 @@ class _Picture(NamedTuple):
 
 
 # Lengths in pixels.
-_DPI: Final = 100
 _LEFT_PX, _GAP_PX, _RIGHT_PX = 66, 40, 22
 _HEADER_PX, _TITLE_PX, _TITLES_PX, _AXIS_PX, _BETWEEN_PX = 62, 22, 46, 48, 26
-_BAR_PX, _BAR_LABELS_PX, _LEGEND_PX = 14, 52, 30
+_BAR_PX, _LEGEND_PX = 14, 30
 _LEGEND_ENTRY_PX: Final = 155
 _MOST_HIGH: Final = 0.8  # of a panel's width
 _SHARE_OF_TITLES: Final = 0.74  # of the width; the clock has the rest
@@ -264,7 +262,7 @@ class PressurePainter:
         most_high_px: Most height of the frames, for panels that would be higher otherwise.
 
     Attributes:
-        figure: The figure; its moving parts show the last moment painted.
+        sheet: The page; its moving parts show the last moment painted.
         scale: The colour scale, kPa.
     """
 
@@ -279,40 +277,29 @@ class PressurePainter:
         self.scale = AsinhNorm(_LINEAR_SHARE * full_kpa, -full_kpa, full_kpa)
         self._per_unit = 0.5 / float(np.arcsinh(1.0 / _LINEAR_SHARE))
         self._colours: Frame = colormaps[_COLOURS](np.arange(256), bytes=True)
-        site_m = shots[0].result.run.site.site_m
-        self._site_m = site_m
-        self._high_m = shots[0].result.run.site.air_height_m
+        site = shots[0].result.run.site
+        self._site_m = site.site_m
         along = 1 - shots[0].section.normal
-        low, high = site_m[along], site_m[along + 2]
-        self._section_m = Rectangle(low, 0.0, high, self._high_m)
-        self._moving: list[tuple[Axes, Artist]] = []
+        low, high = site.site_m[along], site.site_m[along + 2]
+        self._section_m = Rectangle(low, 0.0, high, site.air_height_m)
         self._images: list[_Picture] = []
         handles = self._handles()
-        figure = self._arrange(width_px, most_high_px, len(handles))
-        self.figure = figure
-        canvas: Any = FigureCanvasAgg  # partly without types
-        self._canvas = canvas(figure)
+        self.sheet, self._axes, bar_px = self._arrange(width_px, most_high_px, len(handles))
         for number in range(len(shots)):
             self._draw_plan(number)
             self._draw_section(number)
-        self._draw_bar()
-        figure.legend(
-            handles=handles,
-            loc="lower center",
-            ncols=self._legend_columns,
-            fontsize=8,
-            frameon=False,
-            bbox_to_anchor=(0.5, 0.0),
-            borderaxespad=0.3,
-        )
-        self._write_header()
-        self._canvas.draw()
-        self._ground = self._canvas.copy_from_bbox(figure.bbox)
+        self._draw_bar(bar_px)
+        self.sheet.add_legend(handles, max(width_px // _LEGEND_ENTRY_PX, 2))
+        blasts = [shot.result.blast for shot in shots]
+        barrier = "" if len(shots) > 1 else f", {layout_words(blasts[0])}"
+        title = f"{blasts[-1].scenario.name}: overpressure{barrier}"
+        self.sheet.write_heading((title, gas_subtitle(blasts)), _SHARE_OF_TITLES)
+        self.sheet.add_clock(1.0 - _SHARE_OF_TITLES)
 
     @property
     def size_px(self) -> tuple[int, int]:
         """Width and height of the frames."""
-        return self._size_px
+        return self.sheet.size_px
 
     def paint(self, time_s: float, note: str = "") -> Frame:
         """Return a frame, uint8 (height, width, 3).
@@ -329,14 +316,7 @@ class PressurePainter:
             else:
                 pixels = each.smooth(values)
             each.image.set_data(self.colours(pixels.T / PA_PER_KPA))
-        self._clock.set_text(f"{time_s * MS_PER_S:.1f} ms")
-        self._note.set_text(note)
-        self._canvas.restore_region(self._ground)
-        for axes, artist in self._moving:
-            axes.draw_artist(artist)
-        for text in (self._clock, self._note):
-            self.figure.draw_artist(text)
-        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+        return self.sheet.frame((f"{time_s * MS_PER_S:.1f} ms", note))
 
     def colours(self, overpressure_kpa: FloatArray) -> Frame:
         """Return the colours of overpressures, uint8 (..., 4)."""
@@ -346,15 +326,16 @@ class PressurePainter:
         index = np.clip((share + 0.5) * (last + 1), 0.0, last).astype(np.intp)
         return self._colours[index]
 
-    def _arrange(self, width_px: int, most_high_px: float, legend_entries: int) -> Figure:
-        """Lay out the page in pixels: a plan above a section a blast, scale and legend below."""
+    def _arrange(
+        self, width_px: int, most_high_px: float, legend_entries: int
+    ) -> tuple[Sheet, list[list[Axes]], float]:
+        """Return the page, a plan above a section a blast, and where the colour bar ends."""
         count = len(self.shots)
         plan, section = self._site_m, self._section_m
         panel_px = (width_px - _LEFT_PX - _RIGHT_PX - (count - 1) * _GAP_PX) / count
         widest_m = max(plan.right - plan.left, section.right - section.left)
-        self._legend_columns = max(width_px // _LEGEND_ENTRY_PX, 2)
-        lines = -(-legend_entries // self._legend_columns)
-        below_px = round(_BAR_PX + _BAR_LABELS_PX + 12 + lines * _LEGEND_PX * 0.66)
+        lines = -(-legend_entries // max(width_px // _LEGEND_ENTRY_PX, 2))
+        below_px = round(_BAR_PX + BAR_LABELS_PX + 12 + lines * _LEGEND_PX * 0.66)
         first_px = _HEADER_PX + (_TITLES_PX if count > 1 else _TITLE_PX)
         around_px = first_px + 2 * _AXIS_PX + _BETWEEN_PX + below_px
         heights_m = [each.top - each.bottom for each in (plan, section)]
@@ -365,33 +346,20 @@ class PressurePainter:
         )
         heights_px = [per_m * height_m for height_m in heights_m]
         height_px = round(around_px + sum(heights_px))
-        height_px += height_px % 2
-        figure = Figure(figsize=((width_px + 0.5) / _DPI, (height_px + 0.5) / _DPI), dpi=_DPI)
-        self._size_px = (width_px, height_px)
-        self._below_px = below_px
-        self._axes = []
+        sheet = Sheet(width_px, height_px + height_px % 2)
+        panels = []
         for number in range(count):
             middle_px = _LEFT_PX + number * (panel_px + _GAP_PX) + panel_px / 2.0
             top_px = float(first_px)
             pair = []
             for each, high_px in zip((plan, section), heights_px, strict=True):
                 wide_px = per_m * (each.right - each.left)
-                box = (middle_px - wide_px / 2.0, top_px + high_px, wide_px, high_px)
-                axes = figure.add_axes(self._share(*box))
-                axes.set_xlim(each.left, each.right)
-                axes.set_ylim(each.bottom, each.top)
-                axes.tick_params(labelsize=8)
+                axes = sheet.panel(middle_px - wide_px / 2.0, top_px + high_px, wide_px, high_px)
+                axes.set(xlim=(each.left, each.right), ylim=(each.bottom, each.top))
                 pair.append(axes)
                 top_px += high_px + _AXIS_PX + _BETWEEN_PX
-            self._axes.append(pair)
-        return figure
-
-    def _share(
-        self, left_px: float, bottom_px: float, wide_px: float, high_px: float
-    ) -> tuple[float, float, float, float]:
-        """Return a box as shares of the page; its bottom is counted from the page's top."""
-        width, height = self._size_px
-        return left_px / width, 1.0 - bottom_px / height, wide_px / width, high_px / height
+            panels.append(pair)
+        return sheet, panels, sheet.size_px[1] - below_px + _BAR_PX
 
     def _draw_plan(self, number: int) -> None:
         axes, shot = self._axes[number][0], self.shots[number]
@@ -402,12 +370,10 @@ class PressurePainter:
             for rectangle in _parts(outline):
                 is_cut = outline.base_m < height_m < top_m
                 self._add_solid(axes, rectangle, outline, is_cut=is_cut)
-        self._let_move(axes, draw_features(axes, _on_ground(shot)))
-        before = len(axes.lines)
+        self.sheet.let_move(draw_features(axes, _on_ground(shot)))
         line = axes.axhline if shot.section.axis == "y" else axes.axvline
-        line(shot.layer_m(1), color=unit_interval(INK), linewidth=0.8, linestyle=_CUT)
-        self._let_move(axes, axes.lines[before:])
-        self._frame(axes, ("x (m)", "y (m)" if number == 0 else ""), BORDER)
+        self.sheet.let_move([line(shot.layer_m(1), **_CUT_STYLE)])
+        self.sheet.frame_axes(axes, ("x (m)", "y (m)" if number == 0 else ""), BORDER)
         axes.set_title(f"plan at z = {height_m:g} m", fontsize=9, loc="left")
         if len(self.shots) > 1:
             axes.annotate(
@@ -434,12 +400,12 @@ class PressurePainter:
                     self._add_solid(axes, rectangle, outline, is_cut=True)
         charge = site.charge
         if abs(charge.position_m[shot.section.normal] - at_m) <= shot.result.run.grid.cell_m:
-            star = draw_charge(axes, (charge.position_m[along], charge.height_m))
-            self._let_move(axes, star)
-        before = len(axes.lines)
-        axes.axhline(shot.layer_m(0), color=unit_interval(INK), linewidth=0.8, linestyle=_CUT)
-        self._let_move(axes, axes.lines[before:])
-        self._frame(axes, (f"{'xy'[along]} (m)", "z (m)" if number == 0 else ""), QUIET_INK)
+            place_m = (charge.position_m[along], charge.height_m)
+            star = Feature(Kinds.CHARGE, (place_m,), "charge")
+            self.sheet.let_move(draw_features(axes, [star]))
+        self.sheet.let_move([axes.axhline(shot.layer_m(0), **_CUT_STYLE)])
+        labels = (f"{'xy'[along]} (m)", "z (m)" if number == 0 else "")
+        self.sheet.frame_axes(axes, labels, QUIET_INK)
         axes.set_title(f"section at {shot.section.axis} = {at_m:g} m", fontsize=9, loc="left")
 
     def _add_image(self, number: int, plane: int) -> None:
@@ -461,7 +427,7 @@ class PressurePainter:
         image.set_clip_path(axes.patch)
         image.set_data(self.colours(np.zeros((2, 2))))
         axes.add_artist(image)
-        self._let_move(axes, [image])
+        self.sheet.let_move([image])
         distances_m = shot.distances_m(plane, _FINER)
         self._images.append(_Picture(number, plane, image, Smooth(air), distances_m))
 
@@ -478,45 +444,16 @@ class PressurePainter:
             patch.set(edgecolor=unit_interval(edge), linewidth=2.0)
             colour = unit_interval(FAINT)
         patch.set(facecolor=colour if is_cut else "none")
-        axes.add_patch(patch)
-        self._let_move(axes, [patch])
+        self.sheet.let_move([axes.add_patch(patch)])
 
-    def _frame(self, axes: Axes, labels: tuple[str, str], colour: Colour) -> None:
-        axes.set_xlabel(labels[0], fontsize=9, labelpad=2.0)
-        axes.set_ylabel(labels[1], fontsize=9)
-        if not labels[1]:
-            axes.tick_params(labelleft=False)
-        for spine in axes.spines.values():
-            spine.set_color(unit_interval(colour))
-            spine.set_linewidth(1.2)
-        self._let_move(axes, list(axes.spines.values()))
-
-    def _let_move(self, axes: Axes, artists: Sequence[Artist]) -> None:
-        """Leave artists out of the ground, and draw them in every frame, in this order."""
-        for artist in artists:
-            artist.set_animated(True)
-            self._moving.append((axes, artist))
-
-    def _draw_bar(self) -> None:
-        width, height = self._size_px
-        wide_px = min(0.7 * width, 720.0)
-        bottom_px = height - self._below_px + _BAR_PX
-        place = self.figure.add_axes(
-            self._share((width - wide_px) / 2.0, bottom_px, wide_px, _BAR_PX)
-        )
-        bar = self.figure.colorbar(
-            ScalarMappable(self.scale, _COLOURS),
-            cax=place,
-            orientation="horizontal",
-            extend="both",
-            format=FuncFormatter(_signed),
-        )
+    def _draw_bar(self, bottom_px: float) -> None:
+        colours = ScalarMappable(self.scale, _COLOURS)
+        label = "overpressure (kPa), the same scale everywhere"
+        bar = self.sheet.add_bar(colours, bottom_px, label, FuncFormatter(_signed), "both")
         full = float(self.scale.vmax or 0.0)
         marks = [sign * share * full for share in _TICKS for sign in (-1.0, 1.0)]
-        place.xaxis.set_major_locator(FixedLocator(sorted({*marks, 0.0})))
-        place.xaxis.set_minor_locator(NullLocator())
-        place.tick_params(labelsize=8)
-        bar.set_label("overpressure (kPa), the same scale everywhere", fontsize=9)
+        bar.ax.xaxis.set_major_locator(FixedLocator(sorted({*marks, 0.0})))
+        bar.ax.xaxis.set_minor_locator(NullLocator())
 
     def _handles(self) -> list[Artist]:
         features = [
@@ -528,58 +465,7 @@ class PressurePainter:
         for handle in handles:
             if isinstance(handle, Line2D) and handle.get_marker() == "*":
                 handle.set_markersize(10.0)
-        ink = unit_interval(INK)
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=ink,
-                linewidth=0.8,
-                linestyle=(0, (6, 3, 1, 3)),
-                label="cut of the other view",
-            )
-        )
-        return handles
-
-    def _write_header(self) -> None:
-        width, height = self._size_px
-        blast = self.shots[-1].result.blast
-        title = f"{blast.scenario.name}: overpressure"
-        if len(self.shots) == 1:
-            title += f", {layout_words(blast)}"
-        quiet = unit_interval(QUIET_INK)
-        for text, top_px, size, colour, bold in (
-            (title, 10, 12, unit_interval(INK), True),
-            (gas_subtitle([shot.result.blast for shot in self.shots]), 36, 8.5, quiet, False),
-        ):
-            line = self.figure.text(
-                12 / width,
-                1.0 - top_px / height,
-                text,
-                va="top",
-                fontsize=size,
-                color=colour,
-                fontweight="bold" if bold else "normal",
-            )
-            wide_px = line.get_window_extent(self._canvas.get_renderer()).width
-            line.set_fontsize(size * min(1.0, _SHARE_OF_TITLES * width / wide_px))
-        self._clock, self._note = (
-            self.figure.text(
-                1.0 - 12 / width,
-                1.0 - top_px / height,
-                "",
-                ha="right",
-                va="top",
-                fontsize=size,
-                color=colour,
-                fontweight="bold" if bold else "normal",
-                animated=True,
-            )
-            for top_px, size, colour, bold in (
-                (10, 12, unit_interval(INK), True),
-                (36, 8.5, quiet, False),
-            )
-        )
+        return [*handles, Line2D([], [], **_CUT_STYLE, label="cut of the other view")]
 
 
 def _signed(value: float, position: int | None) -> str:  # noqa: ARG001

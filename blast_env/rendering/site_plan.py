@@ -29,7 +29,7 @@ with render_extra():
     from matplotlib import patheffects
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.collections import LineCollection, PatchCollection
+    from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -77,11 +77,11 @@ def rectangle_patch(rectangle: Rectangle) -> RectanglePatch:
     return RectanglePatch((left, bottom), right - left, top - bottom)
 
 
-def add_outline(axes: Axes, rectangle: Rectangle, **style: object) -> None:
+def add_outline(axes: Axes, rectangle: Rectangle, **style: object) -> Artist:
     """Add the outline of a rectangle in metres; `style` is matplotlib's."""
     patch = rectangle_patch(rectangle)
     patch.set(**({"fill": False} | style))
-    axes.add_patch(patch)
+    return axes.add_patch(patch)
 
 
 def draw_site(axes: Axes, site_m: Rectangle, margin: float = 0.03) -> None:
@@ -230,17 +230,14 @@ def write_legend(figure: Figure, handles: Sequence[Artist]) -> int:
     return lines
 
 
-def draw_outline(axes: Axes, obstacle: Obstacle, linewidth: float = 1.6) -> None:
+def draw_outline(axes: Axes, obstacle: Obstacle, linewidth: float = 1.6) -> list[Artist]:
     """Draw the outline of a structure in the colour of its role; a barrier has none."""
-    if obstacle.cells is None:
-        colour = PROTECTED if obstacle.protected else STRUCTURE
-        add_outline(
-            axes,
-            obstacle.rectangle_m,
-            edgecolor=unit_interval(colour),
-            linewidth=1.5 * linewidth if obstacle.protected else linewidth,
-            zorder=3,
-        )
+    if obstacle.cells is not None:
+        return []
+    colour = PROTECTED if obstacle.protected else STRUCTURE
+    width = 1.5 * linewidth if obstacle.protected else linewidth
+    style = {"edgecolor": unit_interval(colour), "linewidth": width, "zorder": 3}
+    return [add_outline(axes, obstacle.rectangle_m, **style)]
 
 
 def draw_loads(
@@ -249,7 +246,7 @@ def draw_loads(
     scale: Normalize,
     linewidth: float = 0.4,
     factor: float = 1.0,
-) -> PatchCollection:
+) -> tuple[PolyCollection, LineCollection]:
     """Draw the modules in the colours of their loads; one that was not hit stays white.
 
     Args:
@@ -260,38 +257,40 @@ def draw_loads(
         factor: From the impulses to the unit of the scale.
 
     Returns:
-        The modules; its array has their loads in their order, masked where nothing hit.
+        The modules, and the crosses on those that are destroyed.
     """
-    impulse = np.ma.masked_array(
-        [factor * part.impulse for part in obstacle.parts],
-        [part.hits == 0 for part in obstacle.parts],
-    )
     is_barrier = obstacle.cells is not None
-    modules = PatchCollection(
-        [rectangle_patch(part.rectangle_m) for part in obstacle.parts],
+    left, bottom, right, top = np.array([part.rectangle_m for part in obstacle.parts]).T
+    corners = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
+    modules = PolyCollection(
+        np.moveaxis(corners, 2, 0).tolist(),
         cmap=load_colours(),
         norm=scale,
         edgecolor=unit_interval(BARRIER if is_barrier else STRUCTURE),
         linewidth=2.0 * linewidth if is_barrier else linewidth,
     )
-    modules.set_array(impulse)
-    axes.add_collection(modules)
+    crosses = LineCollection([], colors=[unit_interval(INK)], linewidths=2.0 * linewidth)
+    show_loads((modules, crosses), obstacle, factor)
+    for each in (modules, crosses):
+        axes.add_collection(each, autolim=False)
+    return modules, crosses
+
+
+def show_loads(
+    drawn: tuple[PolyCollection, LineCollection], obstacle: ModularObstacle, factor: float = 1.0
+) -> None:
+    """Show the loads of now on what `draw_loads` has drawn."""
+    modules, crosses = drawn
+    impulse = [factor * part.impulse for part in obstacle.parts]
+    modules.set_array(np.ma.masked_array(impulse, [part.hits == 0 for part in obstacle.parts]))
     destroyed = [part.rectangle_m for part in obstacle.parts if part.destroyed]
-    crosses = [
-        line
-        for left, bottom, right, top in destroyed
-        for line in (((left, bottom), (right, top)), ((left, top), (right, bottom)))
-    ]
-    if crosses:
-        axes.add_collection(
-            LineCollection(crosses, colors=[unit_interval(INK)], linewidths=2.0 * linewidth)
-        )
-    return modules
-
-
-def draw_charge(axes: Axes, position_m: tuple[float, float]) -> list[Artist]:
-    """Draw a star at the charge."""
-    return draw_features(axes, [Feature(Kinds.CHARGE, (position_m,), "charge")])
+    crosses.set_segments(
+        [
+            line
+            for left, bottom, right, top in destroyed
+            for line in (((left, bottom), (right, top)), ((left, top), (right, bottom)))
+        ]
+    )
 
 
 _GAP_PT: Final = 4.0
@@ -301,7 +300,7 @@ _FAR_PT: Final = 7.0  # from where on a name is joined to its own by a line
 
 def write_names(
     axes: Axes, features: Sequence[Feature], view: View = PLAN, *, inside: bool = True
-) -> None:
+) -> list[Artist]:
     """Write the labels of features inside or beside them, so that none covers anything.
 
     To be called last: places are found in the figure as it is laid out then.
@@ -311,11 +310,14 @@ def write_names(
         features: What is on it, and with it everything that is not to be covered.
         view: How the picture shows the site.
         inside: Whether names may stand on what they belong to; not where it has colours to read.
+
+    Returns:
+        The names, and the lines that join them to their own.
     """
     figure = axes.get_figure(root=True)
     labels = labels_of(features)[::-1]  # what is on top has the first choice
     if figure is None or not labels:
-        return
+        return []
     texts = [_text(axes, label.text, label.feature.kind) for label in labels]
     _lay_out(figure)
     pixels_per_pt = figure.dpi / 72.0
@@ -331,13 +333,15 @@ def write_names(
         far=_FAR_PT * pixels_per_pt,
         others=_other_texts(axes, texts),
     )
-    to_data = axes.transData.inverted()
+    to_data, written = axes.transData.inverted(), list[Artist](texts)
     for text, each in zip(texts, settled, strict=True):
         x, y = to_data.transform(each.place.centre).tolist()
         text.set_position((x, y))
         if each.leader is not None:
             ends = to_data.transform(each.leader)
-            axes.add_line(Line2D(*ends.T, color=text.get_color(), linewidth=0.6, zorder=5.9))
+            leader = Line2D(*ends.T, color=text.get_color(), linewidth=0.6, zorder=5.9)
+            written.append(axes.add_line(leader))
+    return written
 
 
 def _text(axes: Axes, words: str, kind: FeatureKind) -> Text:

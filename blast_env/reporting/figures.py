@@ -1,6 +1,6 @@
 """The pictures of a report, as PNG."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 from typing import Final
@@ -38,6 +38,7 @@ from blast_env.rendering.style import count_of, render_extra, unit_interval
 from blast_env.reporting.loads import MeasuredBlast, ReportedBuilding, UnitSystem
 from blast_env.reporting.outcomes import FrontPoint, ItemWorth, Outcome
 from blast_env.reporting.threats import NamedCharge
+from blast_env.runner import Tell, share_of
 from blast_env.scenario import Scenario
 from blast_env.units import MODULE_SIDE_M, MS_PER_S
 
@@ -206,7 +207,7 @@ def film_stills(
     bare: GasBlast,
     walled: GasBlast,
     moments_s: Sequence[float],
-    progress: Callable[[float], None],
+    progress: Tell,
 ) -> tuple[Picture, ...]:
     """Return moments of two blasts side by side, in plan and in a section."""
     if not moments_s:
@@ -214,12 +215,8 @@ def film_stills(
     section = default_section(walled.site)
     shots = []
     for number, blast in enumerate((bare, walled)):
-
-        def tell(share: float, number: int = number) -> None:
-            progress(0.5 * (number + share))
-
         height_m = min(_STILL_HEIGHT_M, 0.5 * blast.site.air_height_m)
-        shots.append(record_planes(blast, height_m, section, tell))
+        shots.append(record_planes(blast, height_m, section, share_of(progress, number, 2)))
     painter = PressurePainter(shots, scale_end_kpa([each.result for each in shots]), _STILL_PX)
     pictures = []
     for moment_s in moments_s:

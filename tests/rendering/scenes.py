@@ -1,6 +1,10 @@
 from typing import Any
 
+import numpy as np
+
 from blast_env.engines import Blast
+from blast_env.physics.engine import BallStates
+from blast_env.physics.scene import Scene
 from blast_env.scenario import Scenario
 
 LAYOUT = tuple((row, 1) for row in range(2, 9))
@@ -48,3 +52,15 @@ def small_scenario(ball_count: int = 240, time_limit_s: float = 0.05) -> Scenari
 
 def small_blast(with_barrier: bool = False) -> Blast:
     return Blast(small_scenario(), LAYOUT if with_barrier else ())
+
+
+def balls_at_start(scene: Scene) -> BallStates:
+    balls = scene.balls
+    return BallStates(
+        index=np.arange(len(balls)),
+        kind=balls.kind,
+        position=balls.position,
+        velocity=balls.velocity,
+        mass=balls.mass,
+        radius=balls.radius,
+    )

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.collections import PatchCollection, PathCollection
+from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.figure import Figure
 
 from blast_env import Charge, load_scenario
@@ -83,7 +83,7 @@ def test_both_facades_have_their_mean_loads_on_one_scale(
 ) -> None:
     panels = figure.axes[2:4]
     modules = [
-        each for axes in panels for each in axes.collections if isinstance(each, PatchCollection)
+        each for axes in panels for each in axes.collections if isinstance(each, PolyCollection)
     ]
     for each, column in zip(modules, ("unprotected_impulse_sim", "impulse_sim"), strict=True):
         shown = each.get_array()
@@ -144,5 +144,5 @@ def test_the_parts_of_a_building_are_drawn_together() -> None:
         assert axes.get_title().startswith("hall with")
         assert f"{mean:,.0f} Pa·s" in axes.get_title()
         assert axes.get_ylim() == (bottom - 0.25, bottom + 2.25)
-        drawn = [each for each in axes.collections if isinstance(each, PatchCollection)]
+        drawn = [each for each in axes.collections if isinstance(each, PolyCollection)]
         assert sum(len(each.get_paths()) for each in drawn) >= 16

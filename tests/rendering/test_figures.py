@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.collections import PatchCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 from PIL import Image
@@ -21,9 +21,9 @@ from blast_env.rendering.figures import (
 from blast_env.rendering.style import short_number
 
 
-def modules_of(figure: Figure, panel: int) -> PatchCollection:
+def modules_of(figure: Figure, panel: int) -> PolyCollection:
     (modules,) = (
-        artist for artist in figure.axes[panel].collections if isinstance(artist, PatchCollection)
+        artist for artist in figure.axes[panel].collections if isinstance(artist, PolyCollection)
     )
     return modules
 

@@ -2,24 +2,25 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from blast_env.engines import Blast
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Rectangle
 from blast_env.physics.particles import CollisionType
 from blast_env.physics.structure import load_colour
 from blast_env.plan import BARRIER, BORDER, EXPLOSIVE, PROTECTED
 from blast_env.rendering.canvas import Frame
-from blast_env.rendering.frames import FramePainter, balls_at_start
+from blast_env.rendering.frames import FramePainter
 from blast_env.rendering.style import AIR
-from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
+from blast_env.units import UNITS_PER_M
+from tests.rendering.scenes import balls_at_start
 
 
 def pixel_at(painter: FramePainter, frame: Frame, x: float, y: float) -> tuple[int, ...]:
-    across, down = painter.view.pixel(x / UNITS_PER_M, y / UNITS_PER_M)
+    across, down = painter.sheet.pixel(x / UNITS_PER_M, y / UNITS_PER_M)
     return tuple(int(channel) for channel in frame[down, across])
 
 
@@ -76,25 +77,34 @@ def test_small_balls_stay_visible(blast: Blast) -> None:
 
 
 def test_y_points_up_and_scales_are_equal(blast: Blast) -> None:
-    view = FramePainter(blast).view
-    left, low = view.pixel(0.0, 0.0)
-    right, high = view.pixel(20.0, 20.0)
+    sheet = FramePainter(blast).sheet
+    left, low = sheet.pixel(0.0, 0.0)
+    right, high = sheet.pixel(20.0, 20.0)
     assert high < low
     assert right - left == pytest.approx(low - high, abs=1)
-    assert right - left == pytest.approx(20.0 * view.pixels_per_m, abs=1)
+    assert right - left == pytest.approx(20.0 * sheet.pixels_per_m, abs=1)
+    assert sheet.place_m(*sheet.pixel(3.0, 4.0)) == pytest.approx((3.0, 4.0), abs=0.1)
+
+
+def nearest(frame: Frame, colour: tuple[int, int, int], across: int, down: int) -> float:
+    """Return how far the colour is from that of the pixel around here that has it most."""
+    around = frame[down - 2 : down + 3, across - 2 : across + 3].astype(float)
+    return float(np.abs(around - colour).max(axis=2).min())
+
+
+def edge_of(painter: FramePainter, rectangle_m: Rectangle) -> list[tuple[int, int]]:
+    """Return pixels on the four sides of a rectangle."""
+    left, bottom, right, top = rectangle_m
+    x_m, y_m = rectangle_m.centre
+    sides = ((left, y_m), (right, y_m), (x_m, bottom), (x_m, top))
+    return [painter.sheet.pixel(*place) for place in sides]
 
 
 def test_the_border_is_red_all_around(blast: Blast) -> None:
     painter = FramePainter(blast)
     frame = start_frame(painter, blast)
-    ring = painter.view.rectangle(blast.scene.site_m).inflate(2, 2)
-    for edge in (
-        frame[ring.top, ring.left : ring.right],
-        frame[ring.bottom - 1, ring.left : ring.right],
-        frame[ring.top : ring.bottom, ring.left],
-        frame[ring.top : ring.bottom, ring.right - 1],
-    ):
-        assert (edge == BORDER).all()
+    for place in edge_of(painter, blast.scene.site_m):
+        assert nearest(frame, BORDER, *place) < 60.0
 
 
 def test_a_modules_colour_follows_its_load(blast: Blast) -> None:
@@ -102,38 +112,42 @@ def test_a_modules_colour_follows_its_load(blast: Blast) -> None:
     obstacles = blast.scene.obstacles()
     part = obstacles[0].parts[0]
     seen = []
-    for load in (0.0, 50.0, 100.0, 1000.0):
-        part.impulse = load
+    for load in (0.0, 0.1, 50.0, 100.0, 1000.0):
+        part.impulse, part.hits = load, int(load > 0.0)
         frame = painter.paint(balls_at_start(blast.scene), obstacles, 0.0)
         seen.append(pixel_at(painter, frame, part.x, part.y))
-    assert seen == [load_colour(0.0), load_colour(0.5), load_colour(1.0), load_colour(1.0)]
-    assert len(set(seen)) == 3
+    shares = (0.0, 0.5, 1.0, 1.0)
+    for colour, share in zip(seen[1:], shares, strict=True):
+        assert colour == pytest.approx(load_colour(share), abs=2)
+    assert seen[0] == (255, 255, 255)  # not hit
+    assert len(set(seen)) == 4
 
 
 def test_protected_structures_and_barrier_modules_have_their_outlines(barrier_blast: Blast) -> None:
     painter = FramePainter(barrier_blast)
     frame = start_frame(painter, barrier_blast)
     shelter, _, barrier = barrier_blast.scene.obstacles()
-    ring = painter.view.rectangle(shelter.rectangle_m).inflate(2, 2)
-    assert (frame[ring.top : ring.bottom, ring.left] == PROTECTED).all()
+    for place in edge_of(painter, shelter.rectangle_m):
+        assert nearest(frame, PROTECTED, *place) < 60.0
     for part in barrier.parts:
-        place = painter.view.rectangle(part.rectangle_m)
-        assert (frame[place.top, place.left : place.right] == BARRIER).all()
+        for place in edge_of(painter, part.rectangle_m):
+            assert nearest(frame, BARRIER, *place) < 60.0
 
 
 def test_a_destroyed_module_looks_different(blast: Blast) -> None:
     painter = FramePainter(blast)
     obstacles = blast.scene.obstacles()
-    whole = painter.paint(balls_at_start(blast.scene), obstacles, 0.0)
     part = obstacles[0].parts[0]
-    part.impulse, part.capacity = 1.0, 0.5
+    part.impulse, part.hits = 1.0, 1
+    whole = painter.paint(balls_at_start(blast.scene), obstacles, 0.0)
+    part.capacity = 0.5
     broken = painter.paint(balls_at_start(blast.scene), obstacles, 0.0)
     changed = np.argwhere((whole != broken).any(axis=2))
-    place = painter.view.rectangle(part.rectangle_m)
-    assert len(changed) > 0.5 * place.width * place.height
-    changed = changed[changed[:, 0] >= painter.view.top_px]  # above, the load so far changes
-    assert (changed.min(axis=0) >= (place.top, place.left)).all()
-    assert (changed.max(axis=0) < (place.bottom, place.right)).all()
+    left, bottom, right, top = part.rectangle_m
+    low, high = painter.sheet.pixel(left, top), painter.sheet.pixel(right, bottom)
+    assert len(changed) > 0.05 * (high[0] - low[0]) * (high[1] - low[1])
+    assert (changed.min(axis=0)[::-1] >= np.subtract(low, 2)).all()
+    assert (changed.max(axis=0)[::-1] <= np.add(high, 2)).all()
 
 
 def test_equal_states_give_equal_frames(barrier_blast: Blast) -> None:
@@ -153,25 +167,15 @@ def test_the_scale_of_all_layouts_of_a_scenario_is_the_same(
     assert one == other > 0.0
 
 
-def test_frames_survive_that_someone_else_quits_pygame(blast: Blast) -> None:
-    import pygame
-
-    painter = FramePainter(blast)
-    before = start_frame(painter, blast)
-    pygame.quit()
-    assert np.array_equal(before, start_frame(painter, blast))
-
-
 def test_frames_need_no_display() -> None:
-    # A module of its own, because pygame's display stays as it is once it has been opened.
     code = (
-        "import pygame\n"
-        "from blast_env.rendering.frames import FramePainter, balls_at_start\n"
-        "from tests.rendering.scenes import small_blast\n"
+        "import sys\n"
+        "from blast_env.rendering.frames import FramePainter\n"
+        "from tests.rendering.scenes import balls_at_start, small_blast\n"
         "blast = small_blast()\n"
         "painter = FramePainter(blast)\n"
         "frame = painter.paint(balls_at_start(blast.scene), blast.scene.obstacles(), 0.0)\n"
-        "assert not pygame.display.get_init()\n"
+        "assert 'pygame' not in sys.modules\n"
         "print(frame.shape)\n"
     )
     hidden = ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY")
@@ -186,7 +190,7 @@ def test_frames_need_no_display() -> None:
 def test_a_missing_package_is_named_with_the_command_that_installs_it() -> None:
     code = (
         "import sys\n"
-        "sys.modules['pygame'] = None\n"
+        "sys.modules['matplotlib'] = None\n"
         "from blast_env.errors import BlastEnvError\n"
         "try:\n"
         "    import blast_env.rendering.frames\n"
@@ -195,15 +199,4 @@ def test_a_missing_package_is_named_with_the_command_that_installs_it() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "pip install blast-env[render]" in done.stdout
-    assert "'pygame'" in done.stdout
-
-
-def test_module_squares_touch_without_a_gap(blast: Blast) -> None:
-    painter = FramePainter(blast, width_px=333)
-    parts = blast.scene.obstacles()[0].parts
-    for left, right in pairwise(parts[:6]):
-        assert right.x - left.x == MODULE_SIDE_UNITS
-        assert (
-            painter.view.rectangle(left.rectangle_m).right
-            == painter.view.rectangle(right.rectangle_m).left
-        )
+    assert "'matplotlib" in done.stdout

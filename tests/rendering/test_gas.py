@@ -328,7 +328,7 @@ def test_colours_are_those_of_the_scale(shots: list[PressureShot]) -> None:
     expected = colormaps["RdBu_r"](painter.scale(pressure), bytes=True).astype(int)
     assert np.abs(painter.colours(pressure).astype(int) - expected).max() <= 8  # of neighbours
     assert (painter.scale.vmin, painter.scale.vmax) == (-200.0, 200.0)
-    assert painter.figure.axes[-1].get_xlabel().startswith("overpressure (kPa)")
+    assert painter.sheet.figure.axes[-1].get_xlabel().startswith("overpressure (kPa)")
 
 
 def test_frames_show_front_wall_and_time(shots: list[PressureShot]) -> None:
@@ -338,15 +338,15 @@ def test_frames_show_front_wall_and_time(shots: list[PressureShot]) -> None:
     assert start.shape[1] == 960
     assert start.shape[0] % 2 == 0
     colours = []
-    for axes in (painter.figure.axes[0], painter.figure.axes[2]):  # the plans
+    for axes in (painter.sheet.figure.axes[0], painter.sheet.figure.axes[2]):  # the plans
         x, y = axes.transData.transform((4.25, 3.25))  # a module of the wall
         colours.append(later[start.shape[0] - 1 - round(y), round(x)])
         assert axes.get_title(loc="left") == "plan at z = 0.75 m"
     assert colours[1].max() < 40  # black
     assert colours[0].max() > 100
     assert np.abs(later - start)[:40, 700:].max() > 100  # the clock
-    assert painter.figure.texts[-2].get_text() == "6.0 ms"
-    assert_all_is_on_the_page(painter.figure)
+    assert painter.sheet.figure.texts[-3].get_text() == "6.0 ms"
+    assert_all_is_on_the_page(painter.sheet.figure)
 
 
 def test_the_blast_goes_out_from_the_charge(shots: list[PressureShot]) -> None:

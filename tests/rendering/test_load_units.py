@@ -87,7 +87,8 @@ def test_frames_say_what_has_come_so_far_and_what_one_seed_is(bare: BlastResult)
     balls = bare.final_balls
     begun = painter.paint(balls, bare.blast.scene.obstacles(), 0.0)
     ended = painter.paint(balls, bare.obstacles, 0.0)
-    top = painter.view.top_px - 4
+    site = bare.blast.scene.site_m
+    top = painter.sheet.pixel(site.left, site.top)[1] - 4
     changed = np.argwhere((begun[:top] != ended[:top]).any(axis=2))
     assert len(changed) > 0
     assert changed[:, 1].min() > painter.size_px[0] / 2  # on the right
