@@ -1,17 +1,24 @@
 """`blast-env advise`: what does a budget buy by each kind of measure, what does it cost to pass?"""
 
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from blast_agents.search import LayoutProblem
-from blast_agents.search.advice import Advice, MeasureKind, advise, kinds_for
+from blast_agents.search.advice import (
+    Advice,
+    MeasureKind,
+    Verdict,
+    advise_until,
+    best_of,
+    kinds_for,
+)
 
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import CELL_HELP, SCENARIO_HELP, ChargeOptions
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
 from blast_env.cli.targets import PICTURES
-from blast_env.engines.contract import JUDGE, Engine, find_engine
+from blast_env.engines.contract import JUDGE, find_engine
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
@@ -35,7 +42,8 @@ class AdviseCommand(ChargeOptions):
     Of each kind the cheapest layout that reaches the target is looked for, by gas dynamics; where
     none does, the one with the least shortfall. What was found is judged again with finer cells,
     and with peaks as sharp as Kingery and Bulmash's: cells clip peaks, and those of 0.5 m halve
-    them. Hardening needs no blasts of its own.
+    them. A layout that fails there is searched for again with a margin to the target. Hardening
+    needs no blasts of its own.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -44,7 +52,8 @@ class AdviseCommand(ChargeOptions):
         None, "Level of protection to reach, else the scenario's, else medium."
     )
     charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
-    budget: int = option(60, "Most blasts for each kind.", min=1)
+    budget: int = option(60, "Most blasts of a search.", min=1)
+    rounds: int = option(3, "Most searches for each kind.", min=1)
     seed: int = option(0, "Decides what is drawn.", min=0)
     processes: int = option(1, "Worker processes.", min=1)
     cell_m: float | None = option(None, CELL_HELP)
@@ -74,18 +83,25 @@ class AdviseCommand(ChargeOptions):
             )
         kinds = kinds_for(scenario)
         print_line(
-            f"{len(kinds)} kinds, at most {self.budget} blasts each, {engine.words}; then "
-            f"{len(kinds) * len(threats)} blasts of the judge, {judge.words}"
+            f"{len(kinds)} kinds, at most {self.rounds} searches of {self.budget} blasts each, "
+            f"{engine.words}; what each finds is judged with {len(threats)}, {judge.words}"
         )
+        charges = [threat.charge for threat in threats]
+        judged: dict[Layout, Consequences] = {}
+
+        def verdict(layout: Layout) -> Verdict:
+            if layout not in judged:
+                judged[layout] = consequences(scenario, layout, charges, judge)
+            return _verdict_of(judged[layout], target)
+
         found: list[Advice] = []
         for kind in kinds:
+            first = tuple(each.layout for each in found) if kind is MeasureKind.TOGETHER else ()
+            arguments = (verdict, problem, kind, self.budget, self.seed, first)
             with progress_bar(f"{kind}") as progress:
-                before = tuple(each.layout for each in found)
-                first = before if kind is MeasureKind.TOGETHER else ()
-                found.append(advise(problem, kind, self.budget, self.seed, first, progress))
-        judged = self._judged(scenario, problem, found, judge)
-        self._print(scenario, target, found, judged)
-        best = _best(found, judged, target)
+                found.append(advise_until(*arguments, progress, rounds=self.rounds))
+        best = best_of(found, verdict)
+        self._print(scenario, target, best, found, judged)
         if self.out is not None:
             made = {"method": "advise", "seed": self.seed, "versions": versions(engine.version)}
             print_line(f"wrote {write_layout(self.out, scenario, best.layout, made)}")
@@ -104,7 +120,9 @@ class AdviseCommand(ChargeOptions):
         from blast_env.rendering.cost_level import PricedDamage, cost_level_figure
         from blast_env.rendering.figures import save_figure
 
-        tried = {str(each.kind): [PricedDamage(*astuple(x)) for x in each.tried] for each in found}
+        tried = {
+            str(each.kind): [PricedDamage(x.cost, x.damage) for x in each.tried] for each in found
+        }
         points = [
             PricedDamage(Placement(scenario, layout).cost, seen.worst_damage)
             for layout, seen in judged.items()
@@ -131,27 +149,15 @@ class AdviseCommand(ChargeOptions):
             document["build_zone"] = {**scenario.zone.model_dump(), "budget": self.budget_cost}
         return Scenario.from_document(document, scenario.name)
 
-    def _judged(
-        self, scenario: Scenario, problem: LayoutProblem, found: list[Advice], judge: Engine
-    ) -> dict[Layout, Consequences]:
-        """Return what the layouts do by the judge; those that differ in measures are other ones."""
-        charges = [threat.charge for threat in problem.threats]
-        judged: dict[Layout, Consequences] = {}
-        layouts = list(dict.fromkeys(each.layout for each in found))
-        with progress_bar("the judge") as progress:
-            for number, layout in enumerate(layouts, start=1):
-                judged[layout] = consequences(scenario, layout, charges, judge)
-                progress(number / len(layouts))
-        return judged
-
     def _print(
         self,
         scenario: Scenario,
         target: LevelOfProtection,
+        best: Advice,
         found: list[Advice],
         judged: dict[Layout, Consequences],
     ) -> None:
-        print_line(_verdict(scenario, target, found, judged))
+        print_line(_answer(scenario, target, best, found, judged))
         title = (
             f"{scenario.name}: what {scenario.zone.budget:g} buys, level {target.label!r} wanted"
         )
@@ -167,7 +173,7 @@ class AdviseCommand(ChargeOptions):
                 min(levels).label,
                 "yes" if each.passes else "no",
                 "passes" if seen.passes(target) else "fails",
-                "fails" if not seen.passes(target) or seen.depends_on_cells(target) else "passes",
+                "passes" if seen.stands_up(target) else "fails",
             )
         result_console().print(table)
         print_line(
@@ -176,22 +182,21 @@ class AdviseCommand(ChargeOptions):
         )
 
 
-def _best(
-    found: list[Advice], judged: dict[Layout, Consequences], target: LevelOfProtection
-) -> Advice:
-    """Return the cheapest layout that passes before the judge, else that of least shortfall."""
-    passing = [each for each in found if judged[each.layout].passes(target)]
-    return min(passing or found, key=lambda each: each.worth)
+def _verdict_of(seen: Consequences, target: LevelOfProtection) -> Verdict:
+    if seen.stands_up(target):
+        return Verdict.PASSES
+    return Verdict.PASSES_BARELY if seen.passes(target) else Verdict.FAILS
 
 
-def _verdict(
+def _answer(
     scenario: Scenario,
     target: LevelOfProtection,
+    best: Advice,
     found: list[Advice],
     judged: dict[Layout, Consequences],
 ) -> str:
     """Return the answer in a line or two: what it costs to pass, and whether walls help."""
-    best, by_kind = _best(found, judged, target), {each.kind: each for each in found}
+    by_kind = {each.kind: each for each in found}
     cost = Placement(scenario, best.layout).cost
     if not judged[best.layout].passes(target):
         answer = f"{scenario.name}: nothing that was tried reaches {target.label!r}."

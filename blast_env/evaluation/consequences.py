@@ -146,6 +146,10 @@ class Consequences:
             each.sharpened.level_of_protection < target for each in self.responses
         )
 
+    def stands_up(self, target: LevelOfProtection) -> bool:
+        """Return whether all buildings reach a level, with sharper peaks as well."""
+        return self.passes(target) and not self.depends_on_cells(target)
+
     def doubt(self, target: LevelOfProtection) -> str:
         """Return with what a verdict that passes would fail, in words; empty if with nothing.
 

@@ -24,9 +24,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from functools import cached_property
-from typing import Final
+from math import ceil
+from typing import Annotated, Final
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
@@ -56,6 +58,10 @@ _NEAR_M: Final = 1.0
 _PANEL_M: Final = 3.0
 _PANEL_LOW_M: Final = 0.6
 _BELOW_1: Final = 1.0 - 1e-9
+_SLOWEST_M_S: Final = 1e-3
+_RISK_OF_DAMAGE: Final = WEIBULL_M / STATIC_FATIGUE
+"""B is Brown's integral to this power."""
+
 _STIFFENING: Final = 3
 """A pane bent to breaking is so much quicker than at rest: its steps are for that."""
 
@@ -89,8 +95,7 @@ class GlazingCondition(IntEnum):
         return ("1", "2", "3a", "3b", "4", "5")[self.value - 1]
 
 
-@dataclass(frozen=True)
-class Interlayer:
+class Interlayer(BaseModel):
     """What holds the fragments of laminated glass together.
 
     The values for blast are an assumption of this project, with no public table behind them: PVB of
@@ -101,8 +106,10 @@ class Interlayer:
         tear_share: Deflection at which it tears or leaves the frame, over the short side.
     """
 
-    tension_n_m: float = 16_000.0
-    tear_share: float = 0.15
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    tension_n_m: Annotated[float, Field(gt=0.0)] = 16_000.0
+    tear_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.15
 
 
 @dataclass(frozen=True)
@@ -177,6 +184,29 @@ class Pane:
         """Resistance and risk over the deflection of its middle."""
         return PaneCurve.of(self)
 
+    @cached_property
+    def system(self) -> System:
+        """The pane before it breaks, as a single-degree-of-freedom system."""
+        return System(self.mass_kg_m2, self.curve.load_mass_factor, self.curve.resistance)
+
+    @cached_property
+    def thrown_by(self) -> tuple[float, float, float, float, float]:
+        """What the flight of its fragments depends on, beside the load.
+
+        Load-mass factor, mass per area, height of its middle above the floor; stiffness of the
+        interlayer's membrane and deflection at which it tears, or -1 without one. A membrane of
+        tension N over sides a and b resists with N pi^2 (1/a^2 + 1/b^2) a unit of its deflection.
+        """
+        holds = self.interlayer
+        sides = 1.0 / self.width_m**2 + 1.0 / self.height_m**2
+        return (
+            self.system.load_mass_factor,
+            self.mass_kg_m2,
+            self.middle_m,
+            0.0 if holds is None else holds.tension_n_m * np.pi**2 * sides,
+            -1.0 if holds is None else holds.tear_share * self.short_m,
+        )
+
     def risk(self, pressure_pa: float, duration_s: float) -> float:
         """Return B of a constant pressure.
 
@@ -244,14 +274,24 @@ class PaneCurve:
         return Resistance(np.append(0.0, self.deflection_m), np.append(0.0, self.load_pa))
 
     @cached_property
-    def log_rate(self) -> FloatArray:
-        """Logarithm of the rate at which a damage that goes to B grows there (points,)."""
-        return np.log(self.risk_60) * (STATIC_FATIGUE / WEIBULL_M)
+    def bending(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Deflection, resistance, and its slope before each point (points + 1,)."""
+        found = self.resistance
+        return found.deflection_m, found.pressure_pa, _slopes(found.deflection_m, found.pressure_pa)
 
     @cached_property
-    def log_deflection(self) -> FloatArray:
-        """Logarithm of the deflection (points,)."""
-        return np.log(self.deflection_m)
+    def wear(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Logarithms of the deflection and of the rate of a damage, and the slope (points,).
+
+        Damage that grows at that rate becomes B.
+        """
+        log_m, log_rate = np.log(self.deflection_m), np.log(self.risk_60) / _RISK_OF_DAMAGE
+        return log_m, log_rate, _slopes(log_m, log_rate)
+
+
+def _slopes(points: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the slopes of a polyline's segments, each at its end; 0 at the first point."""
+    return np.append(0.0, np.diff(values) / np.diff(points))
 
 
 def _single(pane: Pane, thickness_m: float) -> PaneCurve:
@@ -322,117 +362,93 @@ def glazing_responses(
         raise BlastEnvError(
             f"pressure_pa has shape {pressure_pa.shape}, must be ({len(panes)}, {len(time_s)})"
         )
-    rows, impulse_pa_s = np.zeros((len(panes), 9)), impulses(time_s, pressure_pa)
-    for index, pane in enumerate(panes):
-        history = pressure_pa[index], impulse_pa_s[index]
-        rows[index] = _one(pane, time_s, *history, limit_probability)
-    return GlazingResponses(*rows.T)
-
-
-def _one(
-    pane: Pane,
-    time_s: FloatArray,
-    pressure_pa: FloatArray,
-    impulse_pa_s: FloatArray,
-    limit: float,
-) -> FloatArray:
     from blast_env.response.kernels import bend
 
-    curve = pane.curve
-    resistance = curve.resistance
-    system = System(pane.mass_kg_m2, curve.load_mass_factor, resistance)
-    lasts_s = float(time_s[-1] - time_s[0]) + system.period_s
-    step_s = system.period_s / (_STIFFENING * STEPS_PER_PERIOD)
-    found = np.zeros(5)
-    arguments = (
-        system.load_mass_factor * pane.mass_kg_m2,
-        resistance.deflection_m,
-        resistance.pressure_pa,
-        curve.log_deflection,
-        curve.log_rate,
-        time_s,
-        pressure_pa,
-        impulse_pa_s,
-        step_s,
-        int(np.ceil(lasts_s / step_s)),
-    )
-    bend(*arguments, np.inf, found)
-    peak_m, damage = found[0], found[1]
-    risk = damage ** (WEIBULL_M / STATIC_FATIGUE)
-    probability = float(-np.expm1(-risk))
-    # The median of those that break: half of them have broken by then.
-    median = -np.log1p(-0.5 * probability)
-    bend(*arguments, median ** (STATIC_FATIGUE / WEIBULL_M), found)
-    break_s, break_m, break_m_s = found[2], found[3], found[4]
+    rows, impulse_pa_s = np.zeros((len(panes), 6)), impulses(time_s, pressure_pa)
+    span_s = float(time_s[-1] - time_s[0])
+    for index, pane in enumerate(panes):
+        curve, system = pane.curve, pane.system
+        step_s = system.period_s / (_STIFFENING * STEPS_PER_PERIOD)
+        bend(
+            system.load_mass_factor * system.mass_kg_m2,
+            *curve.bending,
+            *curve.wear,
+            _RISK_OF_DAMAGE,
+            time_s,
+            pressure_pa[index],
+            impulse_pa_s[index],
+            step_s,
+            ceil((span_s + system.period_s) / step_s),
+            rows[index],
+        )
+    peak_m, probability, break_s, break_m, break_m_s, left_pa_s = rows.T
+    klm, mass, middle_m, stiffness, tear_m = np.array([each.thrown_by for each in panes]).T
     # The net impulse so far is K_LM m v: broken, the pane flies on with it and what is to come.
-    left = _impulse_after(time_s, pressure_pa, break_s)
-    thrown_m_s = max(system.load_mass_factor * break_m_s + left / pane.mass_kg_m2, 0.0)
-    stretched = _stretched_share(pane, thrown_m_s, break_m)
+    thrown_m_s = np.maximum(klm * break_m_s + left_pa_s / mass, 0.0)
+    stretched = _stretched_share(thrown_m_s, break_m, mass, stiffness, tear_m)
     retained = stretched <= 1.0
-    speed = 0.0 if retained else thrown_m_s
-    flight = speed * np.sqrt(2.0 * pane.middle_m / _GRAVITY_M_S2)
-    hit = _hit_height_m(pane, speed)
-    condition = (
-        GlazingCondition.NO_BREAK
-        if probability <= limit
-        else GlazingCondition.RETAINED
-        if retained
-        else flight_condition(flight, hit)
+    speed = np.where(retained, 0.0, thrown_m_s)
+    flight = speed * np.sqrt(2.0 * middle_m / _GRAVITY_M_S2)
+    hit = _hit_height_m(middle_m, speed)
+    condition = np.where(
+        probability <= limit_probability,
+        GlazingCondition.NO_BREAK,
+        np.where(retained, GlazingCondition.RETAINED, flight_condition(flight, hit)),
     )
     # In each condition: how far it is on the way to the next. Risk goes with the power m of a load.
-    shares = {
-        GlazingCondition.NO_BREAK: (probability / limit) ** (1.0 / WEIBULL_M),
-        GlazingCondition.RETAINED: stretched,
-        GlazingCondition.WITHIN_1_M: flight / _NEAR_M,
-        GlazingCondition.WITHIN_3_M: (flight - _NEAR_M) / (_PANEL_M - _NEAR_M),
-    }
-    hazard = min(shares.get(condition, 1.0 - _PANEL_M / max(flight, _PANEL_M)), _BELOW_1)
-    hazard += min(condition, GlazingCondition.LOW_ON_PANEL) - GlazingCondition.NO_BREAK
-    return np.array(
-        [peak_m, probability, break_s, speed, retained, flight, hit, condition, hazard],
-        dtype=np.float64,
+    shares = (
+        (probability / limit_probability) ** (1.0 / WEIBULL_M),
+        stretched,
+        flight / _NEAR_M,
+        (flight - _NEAR_M) / (_PANEL_M - _NEAR_M),
+        1.0 - _PANEL_M / np.maximum(flight, _PANEL_M),
+    )
+    level = np.minimum(condition, GlazingCondition.LOW_ON_PANEL) - GlazingCondition.NO_BREAK
+    hazard = level + np.minimum(np.choose(level, shares), _BELOW_1)
+    return GlazingResponses(
+        peak_m,
+        probability,
+        break_s,
+        speed,
+        retained.astype(np.float64),
+        flight,
+        hit,
+        condition.astype(np.float64),
+        hazard,
     )
 
 
-def flight_condition(flight_m: float, hit_height_m: float) -> GlazingCondition:
-    """Return the condition of a pane whose fragments fly so far, or hit the panel so high."""
-    if hit_height_m > _PANEL_LOW_M:
-        return GlazingCondition.HIGH_ON_PANEL
-    if hit_height_m > 0.0:
-        return GlazingCondition.LOW_ON_PANEL
-    return GlazingCondition.WITHIN_1_M if flight_m <= _NEAR_M else GlazingCondition.WITHIN_3_M
+def flight_condition(flight_m: FloatArray, hit_height_m: FloatArray) -> FloatArray:
+    """Return the conditions of panes whose fragments fly so far, or hit the panel so high."""
+    near = np.where(
+        np.asarray(flight_m) <= _NEAR_M, GlazingCondition.WITHIN_1_M, GlazingCondition.WITHIN_3_M
+    )
+    hit = np.asarray(hit_height_m)
+    low = np.where(hit > 0.0, GlazingCondition.LOW_ON_PANEL, near)
+    return np.where(hit > _PANEL_LOW_M, GlazingCondition.HIGH_ON_PANEL, low)
 
 
-def _hit_height_m(pane: Pane, speed_m_s: float) -> float:
+def _hit_height_m(middle_m: FloatArray, speed_m_s: FloatArray) -> FloatArray:
     """Return where the middle hits a panel 3 m behind; -1 if it is on the floor before."""
-    if speed_m_s <= 0.0:
-        return -1.0
-    height = pane.middle_m - 0.5 * _GRAVITY_M_S2 * (_PANEL_M / speed_m_s) ** 2
-    return height if height > 0.0 else -1.0
+    falls_s = _PANEL_M / np.maximum(speed_m_s, _SLOWEST_M_S)
+    height = middle_m - 0.5 * _GRAVITY_M_S2 * falls_s**2
+    return np.where(height > 0.0, height, -1.0)
 
 
-def _stretched_share(pane: Pane, thrown_m_s: float, break_m: float) -> float:
-    """Return the motion over what an interlayer takes up before it tears; infinite without one.
+def _stretched_share(
+    thrown_m_s: FloatArray,
+    break_m: FloatArray,
+    mass_kg_m2: FloatArray,
+    stiffness_pa_m: FloatArray,
+    tear_m: FloatArray,
+) -> FloatArray:
+    """Return the motion over what interlayers take up before they tear; infinite without one.
 
-    A membrane of tension N over sides a and b resists with N pi^2 (1/a^2 + 1/b^2) a unit of its
-    deflection, in a shape of half waves; what moves is all its glass.
+    They move in a shape of half waves, and what moves is all the glass.
     """
-    if pane.interlayer is None:
-        return np.inf
-    sides = 1.0 / pane.width_m**2 + 1.0 / pane.height_m**2
-    stiffness = pane.interlayer.tension_n_m * np.pi**2 * sides
-    tear_m = pane.interlayer.tear_share * pane.short_m
-    if break_m >= tear_m:
-        return np.inf
     # mean(phi) = 4 / pi^2 and mean(phi^2) = 1 / 4 of half waves
     middle_m_s = thrown_m_s * (4.0 / np.pi**2) / 0.25
-    moving = 0.25 * pane.mass_kg_m2 * middle_m_s**2
-    taken = 0.25 * stiffness * (tear_m**2 - break_m**2)
-    return float(moving / taken)
-
-
-def _impulse_after(time_s: FloatArray, pressure_pa: FloatArray, at_s: float) -> float:
-    """Return the positive impulse after a time, Pa s."""
-    times = np.append(at_s, time_s[time_s > at_s])
-    pressure = np.maximum(np.interp(times, time_s, pressure_pa), 0.0)
-    return float(np.trapezoid(pressure, times)) if len(times) > 1 else 0.0
+    moving = 0.25 * mass_kg_m2 * middle_m_s**2
+    holds = break_m < tear_m
+    taken = 0.25 * stiffness_pa_m * (tear_m**2 - break_m**2)
+    return np.where(holds, moving / np.where(holds, taken, 1.0), np.inf)

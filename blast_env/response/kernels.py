@@ -116,37 +116,62 @@ def bend(
     mass: float,
     points: FloatArray,
     values: FloatArray,
+    slopes: FloatArray,
     log_points: FloatArray,
     log_rate: FloatArray,
+    log_slopes: FloatArray,
+    exponent: float,
     time_s: FloatArray,
     pressure_pa: FloatArray,
     impulse_pa_s: FloatArray,
     step_s: float,
     steps: int,
-    until: float,
     out: FloatArray,
 ) -> None:
-    """Bend a pane until its damage reaches a bound; `out`: peak, damage, time, place, speed."""
-    x, damage, peak, at_s = 0.0, 0.0, 0.0, time_s[0]
-    pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, at_s + 0.5 * step_s)
+    """Bend a pane that does not break, and find where the median of those that break does.
+
+    `out` gets the largest deflection, the share that breaks; of the median the time, the place, the
+    speed, and the positive impulse that is still to come. Slopes are those of the segments before
+    the points; damage to the power of `exponent` is the risk B.
+    """
+    x, damage, peak = 0.0, 0.0, 0.0
+    pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
     v = pushed / mass
+    track, per_step = np.empty((3, steps)), step_s / 60.0
     bent, worn = 1, 1  # segments of the two polylines: from step to step they hardly move
-    for step in range(1, steps + 1):
+    for step in range(steps):
         x += step_s * v
-        at_s = time_s[0] + step * step_s
+        at_s = time_s[0] + (step + 1) * step_s
         now, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, at_s + 0.5 * step_s)
         bent = end_of_segment(points, abs(x), bent)
-        resistance = np.sign(x) * straight(points, values, abs(x), bent)
+        resistance = values[bent] + slopes[bent] * (abs(x) - points[bent])
+        if x < 0.0:
+            resistance = -resistance
         v += (now - pushed - step_s * resistance) / mass
         pushed = now
         peak = max(peak, x)
         if x != 0.0:
             log_x = np.log(abs(x))
             worn = end_of_segment(log_points, log_x, worn)
-            damage += step_s / 60.0 * np.exp(straight(log_points, log_rate, log_x, worn))
-        if damage >= until:
-            break
-    out[0], out[1], out[2], out[3], out[4] = peak, damage, at_s, x, v
+            rate = log_rate[worn] + log_slopes[worn] * (log_x - log_points[worn])
+            damage += per_step * np.exp(rate)
+        track[0, step], track[1, step], track[2, step] = damage, x, v
+    share = -np.expm1(-(damage**exponent))
+    median = (-np.log1p(-0.5 * share)) ** (1.0 / exponent)
+    broken = min(np.searchsorted(track[0], median), steps - 1)
+    break_s = time_s[0] + (broken + 1) * step_s
+    left = 0.0
+    if break_s < time_s[-1]:
+        after = np.searchsorted(time_s, break_s, side="right")
+        gone = (break_s - time_s[after - 1]) / (time_s[after] - time_s[after - 1])
+        there = pressure_pa[after - 1] + gone * (pressure_pa[after] - pressure_pa[after - 1])
+        rest = max(there, 0.0) + max(pressure_pa[after], 0.0)
+        left = 0.5 * rest * (time_s[after] - break_s)
+        for upper in range(after + 1, len(time_s)):
+            rest = max(pressure_pa[upper - 1], 0.0) + max(pressure_pa[upper], 0.0)
+            left += 0.5 * rest * (time_s[upper] - time_s[upper - 1])
+    out[0], out[1], out[2] = peak, share, break_s
+    out[3], out[4], out[5] = track[1, broken], track[2, broken], left
 
 
 @njit(cache=True)

@@ -95,7 +95,7 @@ class Parts:
         build_zone: The build zone, if there is one and it is sound.
         parameters: The parameters of the blast model, if they are sound.
         gauges: The sound gauges, by their index.
-        components: The sound components, by name.
+        components: The components, by name; `None` if one of them is unsound.
         objective: What counts, if it is sound.
     """
 
@@ -106,7 +106,7 @@ class Parts:
     build_zone: BuildZone | None
     parameters: SimulationParameters | None
     gauges: Mapping[int, GaugeSection]
-    components: Mapping[str, Glazing | Wall] = field(default_factory=dict)
+    components: Mapping[str, Glazing | Wall] | None = field(default_factory=dict)
     objective: ObjectiveSection | None = None
 
     @property
@@ -141,7 +141,7 @@ def sound_parts(document: Mapping[str, Any]) -> Parts:
         build_zone=_sound(_BUILD_ZONE, document.get("build_zone")),
         parameters=None if simulation is None else simulation.parameters,
         gauges=_sound_items(_GAUGE, document.get("gauges")),
-        components=_sound(_COMPONENTS, document.get("components", {})) or {},
+        components=_sound(_COMPONENTS, document.get("components", {})),
         objective=_sound(_OBJECTIVE, document.get("objective", {})),
     )
 
@@ -156,15 +156,18 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
         *_simulation_problems(parts),
         *_height_problems(parts),
         *_gauge_problems(parts),
-        *facade_problems(parts.structures, parts.components),
-        *_hardening_problems(parts),
+        *_facade_problems(parts),
         *_objective_problems(parts),
     )
 
 
-def _hardening_problems(parts: Parts) -> Iterator[Problem]:
-    """Check measures against the facades that they harden, as far as all structures are sound."""
-    if parts.build_zone is not None and parts.all_structures:
+def _facade_problems(parts: Parts) -> Iterator[Problem]:
+    """Check facades, and the measures that harden them, as far as what they rest on is sound."""
+    if parts.components is None:
+        return
+    problems = list(facade_problems(parts.structures, parts.components))
+    yield from problems
+    if parts.build_zone is not None and parts.all_structures and not problems:
         measures = parts.build_zone.hardening
         yield from hardening_problems(parts.structures, parts.components, measures)
 

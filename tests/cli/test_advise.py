@@ -4,13 +4,21 @@ from pathlib import Path
 
 import pytest
 from blast_agents.search import LayoutProblem
-from blast_agents.search.advice import MeasureKind, advise, against_each, kinds_for, only
+from blast_agents.search.advice import (
+    MeasureKind,
+    Verdict,
+    advise,
+    advise_until,
+    against_each,
+    kinds_for,
+    only,
+)
 from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
 from blast_env.evaluation import BlastEvaluator, Case
-from blast_env.geometry import Measure, standing
+from blast_env.geometry import Layout, Measure, standing
 from blast_env.physics.scene import Charge
 from blast_env.rendering.cost_level import PricedDamage, cheapest
 from blast_env.scenario import Placement, load_layout
@@ -68,7 +76,8 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     files = ("--out", out, "--picture", picture)
     text = run(site, *options, *files, "--target", "low", "--budget-cost", "15")
     first, verdict = text.splitlines()[:2]
-    assert first.startswith("4 kinds, at most 3 blasts each, gas, cells of 0.5 m; then 4 blasts")
+    assert first.startswith("4 kinds, at most 3 searches of 3 blasts each, gas, cells of 0.5 m; ")
+    assert first.endswith("what each finds is judged with 1, gas, cells of 0.5 m")
     assert "walled_yard" in verdict
     assert all(
         kind.value in text for kind in (MeasureKind.NOTHING, MeasureKind.SHIELD, MeasureKind.HARDEN)
@@ -87,6 +96,28 @@ def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:
     assert [each.damage for each in front] == sorted((each.damage for each in front), reverse=True)
     assert front[0].cost == 0.0
     assert front[-1].damage == min(each.damage for each in found.tried)
+
+
+def test_what_a_judge_fails_is_searched_for_again_with_a_margin(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The judge is stricter than the search: it wants more glass, or a wall, than would do."""
+    monkeypatch.setattr("blast_agents.search.advice._MARGIN", 0.05)
+    scenario = glazed_yard(target="medium")
+    problem = LayoutProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
+    once = advise(problem, MeasureKind.TOGETHER, 12)
+
+    def judge(layout: Layout) -> Verdict:
+        return Verdict.FAILS if layout == once.layout else Verdict.PASSES
+
+    found = advise_until(judge, problem, MeasureKind.TOGETHER, 12, rounds=3)
+    assert judge(found.layout) is Verdict.PASSES
+    assert found.passes
+    assert found.best.damage < once.best.damage - 0.05
+    assert found.best.cost > once.best.cost
+    assert once.blasts < found.blasts <= 24
+    alone = advise_until(judge, problem, MeasureKind.TOGETHER, 12)
+    assert alone.best == once.best
 
 
 def test_a_search_begins_with_rules_against_each_charge_for_a_share_of_the_budget() -> None:

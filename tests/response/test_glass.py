@@ -112,7 +112,8 @@ def test_double_glazing_is_stiffer_and_heavier_than_its_inner_pane() -> None:
     [(0.8, -1.0, "3a"), (2.5, -1.0, "3b"), (4.0, 0.5, "4"), (9.0, 1.2, "5")],
 )
 def test_conditions_of_gsa(flight_m: float, hit_m: float, label: str) -> None:
-    assert flight_condition(flight_m, hit_m).label == label
+    (condition,) = flight_condition(np.array([flight_m]), np.array([hit_m])).tolist()
+    assert GlazingCondition(condition).label == label
 
 
 @pytest.mark.parametrize("sizes", [(0.0, 1.0, 0.006), (1.0, 1.0, -0.006), (6.0, 1.0, 0.006)])

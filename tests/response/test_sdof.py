@@ -83,8 +83,14 @@ def test_another_integrator_finds_the_same_ductility(resistance: float, share: f
         yields = (elastic >= yield_m and v > 0.0) or (elastic <= -yield_m and v < 0.0)
         return [v, (load - STIFFNESS * elastic) / MASS, 0.0 if yields else v]
 
-    ends = td + 5.0 * PERIOD
-    solved = solve_ivp(motion, (0.0, ends), [0.0] * 3, max_step=PERIOD / 2000.0, rtol=1e-8)
+    def comes_to_rest(t: float, state: np.ndarray) -> float:
+        return float(state[1]) if t > 0.0 else 1.0
+
+    comes_to_rest.terminal, comes_to_rest.direction = True, -1.0  # type: ignore[attr-defined]
+    ends, step = td + 5.0 * PERIOD, PERIOD / 2000.0
+    solved = solve_ivp(
+        motion, (0.0, ends), [0.0] * 3, max_step=step, rtol=1e-8, events=comes_to_rest
+    )
     system = System(MASS, 1.0, Resistance.elastic_plastic(STIFFNESS, cap))
     found = responses([system], *triangle(td)).peak_m[0]
     assert found == pytest.approx(solved.y[0].max(), rel=5e-3)

@@ -75,8 +75,31 @@ def test_a_facade_needs_a_height() -> None:
         Scenario.from_document(document, "test")
 
 
-def test_a_negative_thickness_is_refused_with_its_place() -> None:
-    own = {"thin": {"kind": "glazing", "title": "x", "source": "y", "width_m": 1.0}}
-    own["thin"] |= {"height_m": 1.0, "thickness_mm": -6.0}
-    with pytest.raises(ScenarioError, match=r"components.thin.*thickness_mm.*greater than 0"):
-        with_facade(FACADE, components=own)
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"thickness_mm": -6.0}, "thickness_mm: is -6.0, must be greater than 0"),
+        ({"interlayer": {"tension_n_m": -1.0}}, "interlayer.tension_n_m: is -1.0, must be greater"),
+        ({"interlayer": {"tear_shere": 0.1}}, "interlayer.tear_shere: unknown key"),
+        ({"kind": "door"}, "kind: is 'door', must be 'glazing' or 'wall'"),
+    ],
+)
+def test_a_wrong_component_is_all_that_is_wrong(wrong: dict[str, Any], message: str) -> None:
+    """No second message says that there is no such component, or that measures cover nothing."""
+    document = blast_env.load_scenario("clinic_front").model_dump(mode="json")
+    thin = {"kind": "glazing", "title": "x", "source": "y", "thickness_mm": 6.0}
+    thin |= {"width_m": 1.0, "height_m": 1.0, **wrong}
+    document["components"] = {"thin": thin}
+    document["structures"][0]["facade"]["glazing"] = "thin"
+    with pytest.raises(ScenarioError) as refused:
+        Scenario.from_document(document, "test")
+    assert str(refused.value).startswith(f"test: components.thin.{message}")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_site_without_a_height_is_not_told_that_its_measures_cover_nothing() -> None:
+    document = blast_env.load_scenario("clinic_front").model_dump(mode="json")
+    del document["structures"][0]["height_m"]
+    with pytest.raises(ScenarioError) as refused:
+        Scenario.from_document(document, "test")
+    assert "\n" not in str(refused.value)

@@ -1,9 +1,14 @@
-"""Sites whose facades count: the layouts found are theirs, and one where blasts are cheap."""
+"""Sites whose facades count: the layouts found are theirs, and one where blasts are cheap.
+
+And the test of a beam that the response is held against.
+"""
 
 import pytest
 
 from blast_env.engines import find_engine
+from blast_env.response.walls import DamageLevel
 from blast_env.scenario import Placement, load_layout, load_scenario
+from studies.response import BEAM_DEFLECTION_MM, BEAM_STEEL_DEPTHS_M, beam_response
 from studies.response_sites import FOUND, OLDER, SITES, glazed, reaches, site_charges
 
 
@@ -35,3 +40,12 @@ def test_an_older_site_gets_a_facade_and_a_charge_and_stays_as_it_is_otherwise(n
     assert [each.rectangle_m for each in changed.structures] == [
         each.rectangle_m for each in bare.structures
     ]
+
+
+@pytest.mark.parametrize("steel_depth_m", BEAM_STEEL_DEPTHS_M)
+def test_a_beam_bends_as_far_as_the_tested_one(steel_depth_m: float) -> None:
+    """Within a tenth of the test, from the measured load, wherever its steel lies exactly."""
+    found = beam_response(steel_depth_m, 1.17)
+    assert 1e3 * found.motion.peak_m[0] == pytest.approx(BEAM_DEFLECTION_MM, rel=0.1)
+    assert 1e3 * found.motion.peak_time_s[0] == pytest.approx(8.0, abs=1.0)
+    assert found.levels == [DamageLevel.MODERATE]

@@ -4,10 +4,11 @@ A layout needs blasts for what stands on the ground alone. So each barrier that 
 measures that suit it best, all choices of them looked at without a blast.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
-from enum import StrEnum
+from enum import IntEnum, StrEnum
 from itertools import combinations
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -30,8 +31,28 @@ _MOST_LOOKED_AT: Final = 10
 _KEPT: Final = 3
 """How many of the best barriers are changed."""
 
+_MARGIN: Final = 0.1
+"""By how much less damage is wanted than what failed before a judge: a tenth of a level."""
+
+_TOO_LITTLE: Final = 1e-9
+"""By how much at least a layout is worse than one that passes."""
+
 _FEWER_SHARE: Final = 0.4
 """Share of the changes that take a piece away: the cheapest layout that passes is wanted."""
+
+
+class Verdict(IntEnum):
+    """What a judge says of a layout, the better the larger.
+
+    Attributes:
+        FAILS: It misses the target.
+        PASSES_BARELY: It reaches the target, but not with peaks that cells do not clip.
+        PASSES: It reaches the target either way.
+    """
+
+    FAILS = 0
+    PASSES_BARELY = 1
+    PASSES = 2
 
 
 class MeasureKind(StrEnum):
@@ -44,18 +65,23 @@ class MeasureKind(StrEnum):
     TOGETHER = "together"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, order=True)
 class Tried:
     """A layout that was looked at: a barrier that got a blast, with some of the measures.
 
     Attributes:
+        worth: By the objective with its target: at most 1 if it passes; see
+            `ObjectiveSection.counted`.
         cost: What it costs.
         damage: The worst damage of all components under every charge, from 0 to 5; see
             `blast_env.response.damage`.
+        layout: The layout.
     """
 
+    worth: float
     cost: float
     damage: float
+    layout: Layout
 
 
 @dataclass(frozen=True)
@@ -64,18 +90,25 @@ class Advice:
 
     Attributes:
         kind: The kind.
-        layout: The layout: the cheapest that passes, else the one with the least shortfall.
-        worth: By the objective with its target: at most 1 if it passes; see
-            `ObjectiveSection.counted`.
+        best: The cheapest that passes, else the one with the least shortfall.
         blasts: Blasts that were asked for.
         tried: All that was looked at.
     """
 
     kind: MeasureKind
-    layout: Layout
-    worth: float
+    best: Tried
     blasts: int
     tried: tuple[Tried, ...] = ()
+
+    @property
+    def layout(self) -> Layout:
+        """The layout."""
+        return self.best.layout
+
+    @property
+    def worth(self) -> float:
+        """What it is worth."""
+        return self.best.worth
 
     @property
     def passes(self) -> bool:
@@ -128,6 +161,8 @@ def advise(
     seed: int = 0,
     begin_with: tuple[Layout, ...] = (),
     progress: Callable[[float], None] | None = None,
+    *,
+    damage_below: float = inf,
 ) -> Advice:
     """Return the best layout of a kind of measures.
 
@@ -141,11 +176,12 @@ def advise(
         seed: Decides what is drawn.
         begin_with: Layouts to begin with: those of kinds that were tried before.
         progress: Called with the share of the blasts that is spent.
+        damage_below: What the worst damage must be below as well, for a margin to the target.
     """
     scenario, rng = only(problem.scenario, kind), generator(seed)
     meter = BlastMeter(budget)
     metered = replace(problem, meter=meter)
-    best: dict[Layout, Advice] = {}
+    best: dict[Layout, Tried] = {}
     tried: list[Tried] = []
     moves = Moves(scenario)
 
@@ -162,7 +198,7 @@ def advise(
             for layout in ruled.values():
                 yield layout[: len(layout) // 2]
             while True:
-                ranked = sorted(best, key=lambda each: best[each].worth)[:_KEPT]
+                ranked = sorted(best, key=lambda each: best[each])[:_KEPT]
                 chosen = ranked[int(rng.integers(len(ranked)))]
                 yield standing(_changed(moves, chosen, rng))
 
@@ -175,14 +211,64 @@ def advise(
                 break
             if key in best:
                 continue
-            layout, worth = _hardened(metered, scenario, key, tried)
-            best[key] = Advice(kind, layout, worth, meter.blasts)
+            choices = _hardened(metered, scenario, key, damage_below)
+            tried += choices
+            best[key] = min(choices)
             if progress is not None:
                 progress(meter.blasts / budget)
     except BudgetError:
         pass
-    found = min(best.values(), key=lambda each: each.worth)
-    return replace(found, blasts=meter.blasts, tried=tuple(tried))
+    return Advice(kind, min(best.values()), meter.blasts, tuple(tried))
+
+
+def advise_until(
+    judge: Callable[[Layout], Verdict],
+    problem: LayoutProblem,
+    kind: MeasureKind,
+    budget: int,
+    seed: int = 0,
+    begin_with: tuple[Layout, ...] = (),
+    progress: Callable[[float], None] | None = None,
+    *,
+    rounds: int = 1,
+) -> Advice:
+    """Return the best of several searches, until a judge passes what one of them finds.
+
+    Each search after the first one wants a margin to what failed before the judge.
+
+    Args:
+        judge: What the judge says of a layout.
+        problem: As for `advise`.
+        kind: The kind.
+        budget: Most blasts of a search.
+        seed: Decides what is drawn.
+        begin_with: Layouts to begin with.
+        progress: Called with the share of the searches that is done.
+        rounds: Most searches.
+    """
+    every: list[Advice] = []
+    below = inf
+    for _ in range(rounds):
+        found = advise(problem, kind, budget, seed, begin_with, damage_below=below)
+        if every and not found.passes:
+            break
+        every.append(found)
+        if progress is not None:
+            progress(len(every) / rounds)
+        if not found.passes or judge(found.layout) is Verdict.PASSES:
+            break
+        below = found.best.damage - _MARGIN
+        begin_with = (*begin_with, found.layout)
+    return replace(
+        best_of(every, judge),
+        blasts=sum(each.blasts for each in every),
+        tried=tuple(tried for each in every for tried in each.tried),
+    )
+
+
+def best_of(found: Iterable[Advice], judge: Callable[[Layout], Verdict]) -> Advice:
+    """Return the cheapest of those that the judge says most for, or the one nearest to passing."""
+    return min(found, key=lambda each: (-judge(each.layout), each.best))
 
 
 def against_each(scenario: Scenario, charges: Collection[AnyCharge]) -> Iterator[Layout]:
@@ -208,13 +294,11 @@ def _changed(moves: Moves, layout: Layout, rng: np.random.Generator) -> Layout:
 
 
 def _hardened(
-    problem: LayoutProblem, scenario: Scenario, barrier: Layout, tried: list[Tried]
-) -> tuple[Layout, float]:
-    """Return a barrier with the measures that suit it best, and what that is worth.
+    problem: LayoutProblem, scenario: Scenario, barrier: Layout, damage_below: float
+) -> list[Tried]:
+    """Return a barrier with each choice of the measures that what is left of the budget pays for.
 
-    All that is looked at is added to `tried`. The blasts are those of the barrier alone. If none of
-    the measures pass with it for what is left of the budget, the one with the least shortfall is
-    returned.
+    The blasts are those of the barrier alone.
 
     Raises:
         BudgetError: If the blasts do not pay for it.
@@ -224,16 +308,17 @@ def _hardened(
     placement = Placement(scenario, barrier)
     left = placement.budget_left
     prices = {each.name: each.cost for each in scenario.zone.hardening}
-    found: list[tuple[float, float, Layout]] = []
+    found: list[Tried] = []
     for count in counts:
         for taken in combinations(names, count):
             cost = sum(prices[name] for name in taken)
             if left is None or cost <= left:
                 layout = (*barrier, *map(Measure.named, taken))
-                found.append((problem.load(layout), cost, layout))
-                tried.append(Tried(placement.cost + cost, _worst_damage(problem, layout)))
-    worth, _, layout = min(found)
-    return layout, worth
+                worth, damage = problem.load(layout), _worst_damage(problem, layout)
+                if worth <= 1.0 and damage >= damage_below:
+                    worth = 1.0 + damage - damage_below + _TOO_LITTLE
+                found.append(Tried(worth, placement.cost + cost, damage, layout))
+    return found
 
 
 def _worst_damage(problem: LayoutProblem, layout: Layout) -> float:
