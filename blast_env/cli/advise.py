@@ -15,11 +15,17 @@ from blast_agents.search.advice import (
 )
 
 from blast_env.cli.command import argument, option
-from blast_env.cli.options import CELL_HELP, SCENARIO_HELP, ChargeOptions
+from blast_env.cli.options import (
+    CELL_HELP,
+    SCENARIO_HELP,
+    TARGET_HELP,
+    ChargeOptions,
+    wanted_level,
+)
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
 from blast_env.cli.targets import PICTURES
 from blast_env.engines.contract import JUDGE, find_engine
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import Consequences, consequences
@@ -29,9 +35,6 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Placement, Scenario, load_scenario, write_layout
 from blast_env.scenario.versions import SCHEMA_VERSION
 
-_LEVELS: Final = {
-    level.label: level for level in LevelOfProtection if level > LevelOfProtection.BELOW_STANDARDS
-}
 _HEADERS: Final = ("kind", "layout", "cost", "blasts", "level", "passes", "judged", "sharp peaks")
 
 
@@ -48,9 +51,7 @@ class AdviseCommand(ChargeOptions):
 
     scenario: str = argument(SCENARIO_HELP)
     budget_cost: float | None = option(None, "What may be spent, else the zone's budget.")
-    target: str | None = option(
-        None, "Level of protection to reach, else the scenario's, else medium."
-    )
+    target: str | None = option(None, TARGET_HELP.format("medium"))
     charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
     budget: int = option(60, "Most blasts of a search.", min=1)
     rounds: int = option(3, "Most searches for each kind.", min=1)
@@ -135,9 +136,7 @@ class AdviseCommand(ChargeOptions):
 
     def _asked(self, scenario: Scenario) -> Scenario:
         """Return the scenario with the target and the budget that were asked for."""
-        target = self.target or scenario.objective.target or "medium"
-        if target not in _LEVELS:
-            raise UnknownNameError("level of protection", target, _LEVELS)
+        target = wanted_level(self.target, scenario, LevelOfProtection.MEDIUM).label
         kept = scenario.objective.model_dump(
             include={"charges", "cvar_level", "measure"}, exclude_none=True
         )

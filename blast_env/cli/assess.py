@@ -6,14 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from blast_env.cli.command import argument, option
-from blast_env.cli.options import CELL_HELP, SCENARIO_HELP, ChargeOptions
+from blast_env.cli.options import (
+    CELL_HELP,
+    SCENARIO_HELP,
+    TARGET_HELP,
+    ChargeOptions,
+    wanted_level,
+)
 from blast_env.cli.output import make_table, print_line, progress_bar, result_console
 from blast_env.cli.pieces import print_pieces
 from blast_env.cli.targets import PICTURES
 from blast_env.engines import JUDGE, find_engine
 from blast_env.engines.bays import LOADED_BAY_COLUMNS
 from blast_env.engines.pieces import PIECE_COLUMNS
-from blast_env.errors import UnknownNameError
 from blast_env.evaluation import draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import (
@@ -48,7 +53,6 @@ _NEIGHBOURS: Final = (
     *("layout", "building", "side-on peak (kPa)", "side-on impulse (Pa s)"),
     *(f"{damage} (%)" for damage in BuildingDamage),
 )
-_LEVELS: Final = {level.label: level for level in LevelOfProtection}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +67,7 @@ class AssessCommand(ChargeOptions):
 
     scenario: str = argument(SCENARIO_HELP)
     layout: Path | None = option(None, "Layout file; without it, the empty site.")
-    target: str = option("low", "Level of protection to reach: very low, low, medium or high.")
+    target: str | None = option(None, TARGET_HELP.format("low"))
     charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
     cell_m: float | None = option(None, CELL_HELP)
     without_fallen: bool = option(
@@ -84,9 +88,8 @@ class AssessCommand(ChargeOptions):
 
     def __call__(self) -> None:
         """Run the blasts, and print the verdict."""
-        if self.target not in _LEVELS:
-            raise UnknownNameError("level of protection", self.target, _LEVELS)
         scenario = load_scenario(self.scenario)
+        target = wanted_level(self.target, scenario, LevelOfProtection.LOW)
         layouts: dict[str, Layout] = {"no barrier": ()}
         if self.layout is not None:
             layout = tuple(load_layout(self.layout, scenario))
@@ -99,11 +102,11 @@ class AssessCommand(ChargeOptions):
                 found[name] = consequences(
                     scenario, layout, charges, engine, progress, without_fallen=self.without_fallen
                 )
-        self._print_verdict(scenario, found)
+        self._print_verdict(scenario, found, target)
         self._print(scenario, found)
         self._print_neighbours(found)
         self._print_barriers(found)
-        self._print_glazing(scenario, list(found.values())[-1])
+        self._print_glazing(scenario, list(found.values())[-1], target)
         print_line(engine.describe([scenario]))
         self._write(scenario, layouts, found)
 
@@ -112,8 +115,9 @@ class AssessCommand(ChargeOptions):
         fixed = [self.fixed(scenario, threat.charge) for threat in threats]
         return list(dict.fromkeys(fixed))
 
-    def _print_verdict(self, scenario: Scenario, found: dict[str, Consequences]) -> None:
-        target = _LEVELS[self.target]
+    def _print_verdict(
+        self, scenario: Scenario, found: dict[str, Consequences], target: LevelOfProtection
+    ) -> None:
         name, judged = list(found.items())[-1]
         count = len(judged.barriers)
         print_line(
@@ -157,13 +161,15 @@ class AssessCommand(ChargeOptions):
                     f"{_charge_text(each.charge)} was over, and were taken away for it"
                 )
 
-    def _print_glazing(self, scenario: Scenario, judged: Consequences) -> None:
+    def _print_glazing(
+        self, scenario: Scenario, judged: Consequences, target: LevelOfProtection
+    ) -> None:
         headers = ("glass in all windows", *_HEADERS[1:], "passes")
         table = make_table("the same loads, other glass", headers, text_columns=3)
         for name, glazing in other_glazing(scenario).items():
             other = judged.with_glazing(glazing)
             for building in other.buildings:
-                passes = "yes" if other.level(building) >= _LEVELS[self.target] else "no"
+                passes = "yes" if other.level(building) >= target else "no"
                 table.add_row(name, building, *_row(other, building), passes)
         result_console().print(table)
 

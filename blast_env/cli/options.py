@@ -9,6 +9,7 @@ from blast_env.cli.command import FOLDER, Command, option
 from blast_env.cli.output import check_json, resume_with_cache
 from blast_env.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.envs.arguments import ResetOptions
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 
 SCENARIO_HELP: Final = "Bundled name, or a scenario file."
@@ -25,7 +26,27 @@ UNTIL_HELP: Final = (
     "What a blast of gas dynamics waits for. structures: those protected; walls: all; "
     "gauges; or a number of seconds."
 )
+TARGET_HELP: Final = "Level of protection to reach, else the scenario's, else {}."
 CVAR_HELP: Final = "0.8: the mean of the worst 20 %, beside or instead of that of all."
+
+
+def wanted_level(
+    label: str | None, scenario: Scenario, otherwise: LevelOfProtection
+) -> LevelOfProtection:
+    """Return the level of protection that is asked for, else the scenario's target.
+
+    Args:
+        label: What the user asked for, if anything.
+        scenario: Its objective may have a target.
+        otherwise: The level where it has none.
+
+    Raises:
+        UnknownNameError: If there is no such level.
+    """
+    if label is not None:
+        return LevelOfProtection.named(label)
+    target = scenario.objective.level
+    return otherwise if target is None else target
 
 
 @dataclass(frozen=True, kw_only=True)

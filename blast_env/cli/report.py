@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from blast_env.app.cost import ReportCost, cost_words
 from blast_env.cli.command import argument, option
-from blast_env.cli.options import SCENARIO_HELP, CacheOptions, ProcessOptions
+from blast_env.cli.options import SCENARIO_HELP, TARGET_HELP, CacheOptions, ProcessOptions
 from blast_env.cli.output import message_console, print_line, progress_bar
 from blast_env.engines import JUDGE, find_engine
-from blast_env.errors import UnknownNameError
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import check_layout, load_layout, load_scenario
@@ -51,9 +50,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
         flag="--limit",
         metavar="NAME=IMPULSE,PEAK",
     )
-    target: str = option(
-        "low", "Level of protection that buildings with facades must reach: very low to high."
-    )
+    target: str | None = option(None, TARGET_HELP.format("low"))
     units: str = option("si", "si (Pa s, kPa) or psi (psi ms, psi).")
     front: Path | None = option(None, "front.csv of `blast-env search --method nsga2`.")
     places: int = option(5, "Other places of each charge source.")
@@ -100,8 +97,5 @@ class ReportCommand(ProcessOptions, CacheOptions):
         given["charges"] = tuple(Charge((x_m, y_m), tnt_kg) for x_m, y_m, tnt_kg in self.charges)
         given["limits"] = tuple(Limit.parsed(text, units) for text in self.limits)
         given["units"] = units
-        levels = {level.label: level for level in LevelOfProtection}
-        if self.target not in levels:
-            raise UnknownNameError("level of protection", self.target, levels)
-        given["target"] = levels[self.target]
+        given["target"] = None if self.target is None else LevelOfProtection.named(self.target)
         return StudyOptions(**given)

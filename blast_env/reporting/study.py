@@ -70,7 +70,8 @@ class StudyOptions:
         cells_m: Sides of cells, two of them, the coarser one first: loads with both say what the
             grid does. The same twice is one size, and nothing is said of that.
         limits: What buildings may take.
-        target: Level of protection that buildings with facades must reach.
+        target: Level of protection that buildings with facades must reach; `None` for that of the
+            scenario's objective, or low if it has none.
         units: Units of loads.
         front: CSV file of a search with the layouts of a front.
         places: How many places of each source the sensitivity looks at.
@@ -87,7 +88,7 @@ class StudyOptions:
     most_threats: int = 2
     cells_m: tuple[float, float] = (0.5, 0.25)
     limits: tuple[Limit, ...] = ()
-    target: LevelOfProtection = LevelOfProtection.LOW
+    target: LevelOfProtection | None = None
     units: UnitSystem = field(default_factory=lambda: UNITS["si"])
     front: Path | None = None
     places: int = 5
@@ -174,6 +175,12 @@ class Study:
     left_out: tuple[str, ...]
     digests: tuple[tuple[str, str], ...]
     stopped: str = ""
+
+    @property
+    def target(self) -> LevelOfProtection:
+        """Level of protection that buildings with facades must reach."""
+        asked = (self.options.target, self.scenario.objective.level, LevelOfProtection.LOW)
+        return next(each for each in asked if each is not None)
 
     def pair(self, target: ReportedBuilding, threat: NamedCharge, cell_m: float) -> LoadPair:
         """Return the loads on a building under a threat with one size of cells."""

@@ -107,7 +107,7 @@ def verdict_of(study: Study) -> ReportVerdict:
     that were given; both must be kept, on the finer cells and under every threat.
     """
     limits = tuple(_limits(study))
-    target = study.options.target
+    target = study.target
     kept, kept_bare = ([each.kept for each in limits], [each.kept_bare for each in limits])
     asked = [f"{len(limits)} limits of loads"] if limits else []
     doubt = ""
@@ -163,8 +163,7 @@ def _glazing(study: Study) -> Iterator[OtherGlass]:
         return
     for name, glazing in other_glazing(study.scenario).items():
         walled, bare = (
-            each.with_glazing(glazing).passes(study.options.target)
-            for each in (study.walled, study.bare)
+            each.with_glazing(glazing).passes(study.target) for each in (study.walled, study.bare)
         )
         yield OtherGlass(glazing.title, _price(study, name), walled, bare)
 

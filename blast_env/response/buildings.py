@@ -18,6 +18,7 @@ from enum import IntEnum, StrEnum
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.errors import UnknownNameError
 from blast_env.response.walls import DamageLevel
 
 
@@ -126,6 +127,18 @@ class LevelOfProtection(IntEnum):
     def label(self) -> str:
         """Its name in lower case."""
         return self.name.lower().replace("_", " ")
+
+    @classmethod
+    def named(cls, label: str) -> "LevelOfProtection":
+        """Return the level of a name; it has to be one that a building can be meant to reach.
+
+        Raises:
+            UnknownNameError: If there is none; the message has the nearest one.
+        """
+        levels = {each.label: each for each in cls if each is not cls.BELOW_STANDARDS}
+        if label not in levels:
+            raise UnknownNameError("level of protection", label, levels)
+        return levels[label]
 
 
 def level_of_protection(worst: DamageLevel) -> LevelOfProtection:

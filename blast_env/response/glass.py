@@ -382,7 +382,9 @@ def glazing_responses(
             rows[index],
         )
     peak_m, probability, break_s, break_m, break_m_s, left_pa_s = rows.T
-    klm, mass, middle_m, stiffness, tear_m = np.array([each.thrown_by for each in panes]).T
+    klm, mass, middle_m, stiffness, tear_m = np.reshape(
+        [each.thrown_by for each in panes], (len(panes), 5)
+    ).T
     # The net impulse so far is K_LM m v: broken, the pane flies on with it and what is to come.
     thrown_m_s = np.maximum(klm * break_m_s + left_pa_s / mass, 0.0)
     stretched = _stretched_share(thrown_m_s, break_m, mass, stiffness, tear_m)

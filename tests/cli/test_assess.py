@@ -8,6 +8,8 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
+from blast_env.cli.options import wanted_level
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Scenario
 
 
@@ -51,6 +53,21 @@ def test_the_verdict_comes_first_and_better_glass_may_turn_it(site: Path, tmp_pa
 def test_a_site_without_facades() -> None:
     output = run("control_room")
     assert "no structure has a facade with bays" in output
+
+
+@pytest.mark.parametrize(
+    ("asked", "site_name", "level"),
+    [
+        ("high", "clinic_front", LevelOfProtection.HIGH),
+        (None, "clinic_front", LevelOfProtection.MEDIUM),
+        (None, "control_room", LevelOfProtection.LOW),
+    ],
+)
+def test_a_site_s_own_target_counts_unless_another_one_is_asked_for(
+    asked: str | None, site_name: str, level: LevelOfProtection
+) -> None:
+    scenario = blast_env.load_scenario(site_name)
+    assert wanted_level(asked, scenario, LevelOfProtection.LOW) is level
 
 
 def test_a_level_that_does_not_exist(site: Path) -> None:

@@ -259,7 +259,7 @@ def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: s
     (line,) = verdict.buildings
     assert line.levels[0] <= line.levels[1]
     assert (line.panes, line.panels) == (8, 4)
-    assert verdict.passes == (study.walled.passes(study.options.target) and verdict.limits[0].kept)
+    assert verdict.passes == (study.walled.passes(study.target) and verdict.limits[0].kept)
     first = page[page.index("<h3>Verdict") : page.index("<h2>")]
     assert f">{verdict.word}<" in first
     assert f"<td>{line.broken[1]:.1f} of 8</td>" in first

@@ -151,7 +151,8 @@ class ReportDialog:
                 "font-weight: 600"
             )
             self._cells = ui.select(_CELLS, value=_TWO_SIZES, label="cells of gas dynamics")
-            self._target = ui.select(_LEVELS, value=ReportChoice().target, label="has to reach")
+            wanted = session.scenario.objective.level or ReportChoice().target
+            self._target = ui.select(_LEVELS, value=wanted, label="has to reach")
             self._target.visible = bool(session.scenario.bays)
             self._items = ui.switch("what each piece is worth, left out alone", value=True)
             for element in (self._cells, self._target):
