@@ -196,6 +196,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.response_sites criterion": "guard_post --cell 0.5",
     "python -m studies.response_sites compare --budget 30": "guard_post",
+    "python -m studies.response_sites pictures": "clinic_front",
     "python -m studies.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
     "python -m studies.gas corners": "--sizes 0.5",
     "python -m studies.gas handover": "--radii 3,6 --until 0.05",
