@@ -67,7 +67,6 @@ _HEADERS: Final = (
     "reduction",
 )
 
-
 _NO_BEST: Final = (
     "the run has no evaluation yet, so there are no best weights: the last ones propose"
 )

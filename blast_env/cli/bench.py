@@ -41,7 +41,6 @@ _ENVIRONMENT_HEADERS: Final = (
     "steps/s in processes",
 )
 
-
 _SITE_HEADERS: Final = (
     "length (m)",
     "cells",

@@ -22,10 +22,8 @@ from blast_env.units import MODULE_SIDE_M
 
 _DIGITS: Final = 9  # of a metre: what is beyond is rounding
 
-
 BULGE_OF_A_QUARTER: Final = tan(pi / 8.0)
 """Bulge of an arc over a right angle: the tangent of a quarter of it, counterclockwise."""
-
 
 CornerM = tuple[float, float, float]
 """x, y, and the bulge of the way to the next corner: 0 is straight."""
@@ -128,11 +126,7 @@ def _rounded_outline(rectangle: Rectangle, radius: float) -> tuple[CornerM, ...]
 
 
 _STEPS: Final = 12  # places that are tried along a line
-
-
 _SIGN_WIDTH: Final = 0.75  # in heights; of most typefaces that programs take for drawings
-
-
 _OFF_LINE: Final = 0.9  # from a line to the middle of a letter, in heights of the text
 
 
@@ -277,36 +271,20 @@ with import_extra("export", "DXF files"):
 
 VERSION: Final = "R2010"
 
-
 APPLICATION: Final = "BLAST_ENV"
 """Under this name the outline of a module has its identifier, as extended data."""
 
-
 CLEARANCE_LAYER: Final = "CLEARANCE"
-
-
 NOTES_LAYER: Final = "NOTES"
-
 
 ITEMS_LAYER: Final = "ITEMS"
 """What the pieces of a catalogue are, in words; they can be hidden."""
 
-
 _STRING: Final = 1000  # group code of a text in extended data
-
-
 _TEXT_HEIGHT_M: Final = 0.4
-
-
 _ROUNDING: Final = 1e-6  # of a count of signs
-
-
 _LINE_SPACING: Final = 5.0 / 3.0  # of lines of text, in heights of the text
-
-
 _POINT_SIZE_M: Final = 1.0
-
-
 _CROSS_IN_CIRCLE: Final = 35  # how points are drawn ($PDMODE)
 
 

@@ -159,7 +159,6 @@ _WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], None]]] = MappingProxy
     }
 )
 
-
 SUFFIXES: Final = tuple(_WRITERS)
 """The forms in which a layout can be written."""
 

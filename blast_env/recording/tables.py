@@ -63,7 +63,6 @@ COLLISION_COLUMNS: Final = (
     Column("first_contact", "", "whether this is the first hit on the module"),
 )
 
-
 MODULE_COLUMNS: Final = (
     Column("module_id", "", "name of the module, made from its centre in metres"),
     Column("structure", "", "structure that the module is part of"),
@@ -79,7 +78,6 @@ MODULE_COLUMNS: Final = (
     Column("piece", "", "piece of a barrier that it is part of; empty if it is of none"),
 )
 
-
 STRUCTURE_COLUMNS: Final = (
     Column("structure", "", "name of the structure"),
     Column("kind", "", "ConcreteSquare or ModularObstacle"),
@@ -92,7 +90,6 @@ STRUCTURE_COLUMNS: Final = (
     Column("first_hit_s", "s", "time of the first collision"),
     Column("modules_destroyed", "", "modules whose impulse passed their capacity"),
 )
-
 
 STRUCTURE_PA_S_COLUMNS: Final = (
     Column("impulse_pa_s", "Pa s", "impulse per area through the scenario's calibration"),

@@ -134,17 +134,9 @@ def _worst_ring(*position_m: float) -> Line2D:
 
 # Okabe and Ito's colours, which people with any colour vision can tell apart.
 _WITHOUT, _WITH = "#D55E00", "#0072B2"
-
-
 _HEIGHT_IN, _RIGHT_IN = 8.4, 7.2
-
-
 _PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 5.6, (4.8, 8.4)
-
-
 _MOST_NAMED_THREATS = 40
-
-
 _MOST_UPRIGHT_NAMES = 16
 
 
@@ -333,31 +325,14 @@ def _draw_structure(axes: Axes, obstacle: ModularObstacle, scale: Normalize) -> 
 MOST_SHOWN: Final = 12
 """How many cases a figure has at most: the first ones."""
 
-
 _COLUMNS: Final = 4
-
-
 _PANEL_IN: Final = 3.2
-
-
 _LEAST_WIDTH_IN: Final = 9.6  # the heading has to fit
-
-
 _PANEL_HEIGHTS_IN: Final = (2.0, 4.8)
-
-
 _THREAT_PT: Final = 29.0  # of the lines between title and panel
-
-
 _TITLE_IN: Final = 0.95  # of a panel, with the numbers along x
-
-
 _NUMBERS_IN: Final = 0.4  # along y
-
-
 _FRAME_IN: Final = 1.8  # heading and legend
-
-
 _OUT_OF_RANGE: Final = " ~"
 
 

@@ -59,11 +59,7 @@ with render_extra():
 
 
 _PLAN_HEIGHT_IN, _DETAIL_IN = 5.0, 4.4
-
-
 _ARROWS = 12
-
-
 _DETAIL_RADII = 4.5  # half the width of the detail, in radii of the charge
 
 
@@ -261,7 +257,6 @@ _FACADES = (
     ("bottom", "#CC79A7", (0, (1.2, 1.2))),
 )
 
-
 _MOST_PANELS = 6
 
 
@@ -352,17 +347,11 @@ __all__ = [
     "save_figure",
 ]
 
-
 FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of files that a figure can be saved as."""
 
-
 _DOTS_PER_IN = 150
-
-
 _MOST_ARROWS = 36
-
-
 _MOST_NAMED_ANGLES = 16
 
 

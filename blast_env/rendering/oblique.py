@@ -25,13 +25,10 @@ with render_extra():
 CORNERS: Final = ("southwest", "southeast", "northeast", "northwest")
 """Over which corner of a site one looks at it; south is towards smaller y, west smaller x."""
 
-
 _ACROSS, _UP = cos(radians(30.0)), sin(radians(30.0))
-
 
 _TOP, _RIGHT_SIDE, _LEFT_SIDE = 1.0, 0.82, 0.66
 """How bright the three faces are that one sees of a box."""
-
 
 Colour = tuple[float, float, float]
 

@@ -40,19 +40,10 @@ with render_extra():
 SITE_VIEWS: Final = ("both", "plan", "oblique")
 """What a picture of a site shows."""
 
-
 _PANEL_IN: Final = 5.4
-
-
 _WIDTHS_IN: Final = (4.6, 8.8)
-
-
 _HEADING_IN: Final = 0.9
-
-
 _LEGEND_ROW_IN: Final = 0.24
-
-
 _ARROW_PT: Final = 26.0
 
 

@@ -32,8 +32,6 @@ def render_extra() -> Iterator[None]:
 
 
 AIR: Final[Colour] = (30, 46, 122)
-
-
 _NICE_STEPS: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
