@@ -30,8 +30,9 @@ from blast_env.app.records import (
     read_record,
     write_kept,
 )
+from blast_env.app.threats import NamedThreat
 from blast_env.app.verdicts import keep_histories
-from blast_env.app.work import BlastTask, ThreatOf, scenario_of
+from blast_env.app.work import BlastTask
 from blast_env.calibration.model import CalibrationError
 from blast_env.documents import read_text
 from blast_env.engines import Blast
@@ -114,9 +115,9 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
     Raises:
         BlastEnvError: If they cannot be run.
     """
-    scenario = scenario_of(task.scenario)
+    scenario = task.site
     layout = standing(placing.layout_from(scenario, task.layout))
-    work: list[tuple[ThreatOf, Layout]] = []
+    work: list[tuple[NamedThreat, Layout]] = []
     for threat in task.threats:
         # Gas has its scale from the blast without a barrier; particles are looked at first.
         both = [(threat, ()), (threat, layout)]
@@ -128,7 +129,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
 
 
 def _run_one(
-    task: BlastTask, scenario: Scenario, threat: ThreatOf, layout: Layout, tell: Tell
+    task: BlastTask, scenario: Scenario, threat: NamedThreat, layout: Layout, tell: Tell
 ) -> None:
     charge = charge_against(scenario, layout, threat.charge)
     key = blast_key(scenario, layout, charge, task.engine)

@@ -35,7 +35,6 @@ from blast_env.app.work import (
     SearchTask,
     Status,
     Task,
-    ThreatOf,
 )
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Measure
@@ -190,11 +189,10 @@ class Session:
         folder = None
         for slot in chosen:
             task = BlastTask(
-                **self._what(self.design.layouts[slot]),
-                threats=self._threats_as_data(),
+                **self._on_site(),
+                layout=placing.plain(self.design.layouts[slot]),
                 engine=self.engine,
                 blasts=str(self.folder.blasts),
-                cache=str(self.work.cache),
             )
             folder = self._begin(task, f"blast of {SLOTS[slot]}, {self.engine.label}")
         if folder is None:
@@ -208,13 +206,7 @@ class Session:
             BlastEnvError: If there is no build zone.
         """
         _ = self.scenario.zone
-        task = ProposalTask(
-            scenario=self._document(),
-            threats=self._threats_as_data(),
-            proposer=proposer,
-            is_run=is_run,
-            cache=str(self.work.cache),
-        )
+        task = ProposalTask(**self._on_site(), proposer=proposer, is_run=is_run)
         return self._begin(task, f"proposal: {title_of(proposer)}")
 
     def search(self, method: str, budget: int, *, from_layout: bool = False) -> Path:
@@ -232,12 +224,10 @@ class Session:
         if budget < 1:
             raise BlastEnvError(f"budget is {budget} blasts, must be at least 1")
         task = SearchTask(
-            scenario=self._document(),
-            threats=self._threats_as_data(),
+            **self._on_site(),
             method=method,
             budget=budget,
             engine=self.engine,
-            cache=str(self.work.cache),
             begin_with=placing.plain(self.design.layout) if from_layout else (),
         )
         return self._begin(task, f"{method} search, {budget} blasts, {self.engine.label}")
@@ -249,8 +239,8 @@ class Session:
             BlastEnvError: If it cannot be begun.
         """
         task = FilmTask(
-            **self._what(self.design.layout),
-            threat=self._threats_as_data()[0],
+            **self._on_site(),
+            layout=placing.plain(self.design.layout),
             engine=self.engine,
             path=str(path),
         )
@@ -271,10 +261,9 @@ class Session:
         """
         self._check_for_report()
         task = ReportTask(
-            **self._what(self.design.layout),
-            threats=self._threats_as_data(),
+            **self._on_site(),
+            layout=placing.plain(self.design.layout),
             choice=choice or ReportChoice(),
-            cache=str(self.work.cache),
             path=str(page),
             pdf=None if pdf is None else str(pdf),
         )
@@ -304,14 +293,13 @@ class Session:
     def _begin(self, task: Task, title: str) -> Path:
         return self.workers.begin(task, self.folder.jobs, title)
 
-    def _what(self, layout: Layout) -> dict[str, Any]:
-        return {"scenario": self._document(), "layout": placing.plain(layout)}
-
-    def _document(self) -> dict[str, Any]:
-        return self.scenario.model_dump(mode="json", exclude_none=True)
-
-    def _threats_as_data(self) -> tuple[ThreatOf, ...]:
-        return tuple(ThreatOf.of(each.name, each.charge) for each in self.chosen_threats())
+    def _on_site(self) -> dict[str, Any]:
+        """Return what all work on the site is told."""
+        return {
+            "scenario": self.scenario.model_dump(mode="json", exclude_none=True),
+            "threats": self.chosen_threats(),
+            "cache": str(self.work.cache),
+        }
 
     def cost(self, slots: Iterable[int]) -> tuple[CostGuess, ...]:
         """Return what the blasts of layouts cost that are not there yet; nothing with particles."""

@@ -26,7 +26,6 @@ from blast_env.app.work import (
     Status,
     read_status,
     read_task,
-    scenario_of,
     write_status,
 )
 from blast_env.engines import JUDGE, find_engine
@@ -102,7 +101,7 @@ def run_task(folder: Path) -> None:
 
 
 def _propose(task: ProposalTask, teller: Teller) -> None:
-    scenario = scenario_of(task.scenario)
+    scenario = task.site
     layout = _proposed(task, scenario, teller)
     words = placing.counted(scenario, layout)
     text = f"{words}, proposed by {title_of(task.proposer)}"
@@ -119,13 +118,13 @@ def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> Layout:
     if task.proposer != PACKAGED:
         return proposed(task.proposer, scenario, known)
     case = Case(scenario, tuple(Threat(each, SeedRange.SEARCH.value.start) for each in known))
-    problem = LayoutProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache or None), case)
+    problem = LayoutProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache), case)
     report: Callable[[Progress], None] = lambda progress: teller.share(progress.share)  # noqa: E731
     return chosen_for(problem).propose(problem, report=report).layout
 
 
 def _search(task: SearchTask, teller: Teller) -> None:
-    scenario = scenario_of(task.scenario)
+    scenario = task.site
     begin_with = placing.layout_from(scenario, task.begin_with)
     method = find_proposer(task.method, (begin_with,) if begin_with else ())
     engine = find_engine(task.engine.name, task.engine.cell_m)
@@ -171,7 +170,7 @@ def practice_case(scenario: Scenario, task: SearchTask) -> Case:
 
 
 def _film(task: FilmTask, teller: Teller) -> None:
-    scenario, charge = scenario_of(task.scenario), task.threat.charge
+    scenario, charge = task.site, task.threats[0].charge
     layout, path = placing.layout_from(scenario, task.layout), Path(task.path)
     write: Callable[..., object]
     if not task.engine.is_first_look:
@@ -199,7 +198,7 @@ def _report(task: ReportTask, teller: Teller) -> None:
     # Reports need an extra, and most work is no report.
     from blast_env.reporting import run_study, write_report
 
-    scenario, page = scenario_of(task.scenario), Path(task.path)
+    scenario, page = task.site, Path(task.path)
     layout = placing.layout_from(scenario, task.layout)
     options = task.choice.options((each.charge for each in task.threats), Path(task.cache))
     cost = ReportCost.of(scenario, layout, options)

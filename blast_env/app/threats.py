@@ -1,9 +1,9 @@
 """Which charges a design is held against: by name, at places that can be pointed to."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final
 
+from blast_env.app.records import Kept
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
     AnyCharge,
@@ -18,8 +18,7 @@ from blast_env.scenario.sections import PointM
 _NEAREST: Final = ", as near as it comes"
 
 
-@dataclass(frozen=True)
-class NamedThreat:
+class NamedThreat(Kept):
     """A charge with what people call it, at its place or on its vehicle."""
 
     name: str
@@ -55,7 +54,10 @@ def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
         else:
             places = [("", source.position_m)]
         named += [
-            NamedThreat(f"charge {index + 1}{words}", Charge(at_m, source.tnt_kg, source.height_m))
+            NamedThreat(
+                name=f"charge {index + 1}{words}",
+                charge=Charge(at_m, source.tnt_kg, source.height_m),
+            )
             for words, at_m in places
         ]
     return tuple(named)
@@ -64,7 +66,7 @@ def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
 def _of_vehicle(name: str, source: VehicleSource) -> Iterator[NamedThreat]:
     for rank in range(source.places):
         words = _NEAREST if rank == 0 else f", place {rank + 1} by distance"
-        yield NamedThreat(f"{name}{words}", VehicleCharge(source, rank))
+        yield NamedThreat(name=f"{name}{words}", charge=VehicleCharge(source, rank))
 
 
 def usual_threats(scenario: Scenario) -> tuple[str, ...]:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from pydantic import Field, TypeAdapter
 
 from blast_env.app.records import MOST_BYTES, EngineRecord, Kept
+from blast_env.app.threats import NamedThreat
 from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.physics.scene import Charge
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import AnyCharge, Scenario, VehicleCharge, VehicleSource
+from blast_env.scenario import AnyCharge, Scenario
 
 if TYPE_CHECKING:
     from blast_env.reporting import StudyOptions
@@ -25,120 +25,91 @@ _LEAST_SHARE: Final = 0.05  # before that nobody knows
 State = Literal["waiting", "running", "done", "failed", "stopped"]
 
 
-class PlaceOf(Kept):
-    """A charge at a place, as data."""
-
-    position_m: tuple[float, float]
-    tnt_kg: float
-    height_m: float = 0.0
-
-
-class VehicleOf(Kept):
-    """The charge of a vehicle, as data; `rank` as for `VehicleCharge`."""
-
-    source: VehicleSource
-    rank: int = 0
-
-
-class ThreatOf(Kept):
-    """A threat, as data."""
-
-    name: str
-    charge_of: PlaceOf | VehicleOf
-
-    @classmethod
-    def of(cls, name: str, charge: AnyCharge) -> "ThreatOf":
-        """Return the threat of a charge."""
-        if isinstance(charge, VehicleCharge):
-            return cls(name=name, charge_of=VehicleOf(source=charge.source, rank=charge.rank))
-        return cls(name=name, charge_of=PlaceOf(**charge._asdict()))
-
-    @property
-    def charge(self) -> AnyCharge:
-        """The charge."""
-        if isinstance(self.charge_of, VehicleOf):
-            return VehicleCharge(self.charge_of.source, self.charge_of.rank)
-        return Charge(**self.charge_of.model_dump())
-
-
-class BlastTask(Kept):
-    """Blasts of one layout.
+class SiteTask(Kept):
+    """Work on a site.
 
     Attributes:
         scenario: The site as a document.
-        layout: The layout.
-        threats: A blast each.
-        engine: The engine.
-        blasts: Folder that the blasts are put into, each under its key.
+        threats: Those that layouts are held against: one is known, more are hidden.
         cache: Folder for the loads of blasts.
     """
 
-    kind: Literal["blast"] = "blast"
     scenario: dict[str, Any]
-    layout: tuple[tuple[Any, ...], ...]
-    threats: tuple[ThreatOf, ...]
-    engine: EngineRecord
-    blasts: str
+    threats: tuple[NamedThreat, ...]
     cache: str
 
+    @property
+    def site(self) -> Scenario:
+        """The site.
 
-class SearchTask(Kept):
+        Raises:
+            ScenarioError: If the document is none.
+        """
+        return Scenario.from_document(self.scenario, str(self.scenario.get("name", "the site")))
+
+
+class LayoutTask(SiteTask):
+    """Work on one layout.
+
+    Attributes:
+        layout: The layout.
+    """
+
+    layout: tuple[tuple[Any, ...], ...]
+
+
+class BlastTask(LayoutTask):
+    """Blasts of one layout, one a threat.
+
+    Attributes:
+        engine: The engine.
+        blasts: Folder that the blasts are put into, each under its key.
+    """
+
+    kind: Literal["blast"] = "blast"
+    engine: EngineRecord
+    blasts: str
+
+
+class SearchTask(SiteTask):
     """A search for a layout.
 
     Attributes:
-        scenario: The site as a document.
-        threats: Those that the layout is for: one is known, more are hidden.
         method: Name of the method.
         budget: Most blasts.
         engine: The engine.
-        cache: Folder for the loads of blasts.
         begin_with: A layout to begin with, for methods that can.
     """
 
     kind: Literal["search"] = "search"
-    scenario: dict[str, Any]
-    threats: tuple[ThreatOf, ...]
     method: str
     budget: int
     engine: EngineRecord
-    cache: str
     begin_with: tuple[tuple[Any, ...], ...] = ()
 
 
-class ProposalTask(Kept):
+class ProposalTask(SiteTask):
     """A layout that is proposed at once.
 
     Attributes:
-        scenario: The site as a document.
-        threats: As for `SearchTask`.
         proposer: Name of a rule, or the folder of a trained agent's run.
         is_run: Whether it is a folder.
-        cache: Folder for the loads of blasts, where some are needed.
     """
 
     kind: Literal["proposal"] = "proposal"
-    scenario: dict[str, Any]
-    threats: tuple[ThreatOf, ...]
     proposer: str
     is_run: bool = False
-    cache: str = ""
 
 
-class FilmTask(Kept):
-    """A film of one blast as a file to keep, without a barrier beside it.
+class FilmTask(LayoutTask):
+    """A film of the first threat as a file to keep, without a barrier beside it.
 
     Attributes:
-        scenario: The site as a document.
-        layout: The layout.
-        threat: The threat.
         engine: The engine.
         path: The file.
     """
 
     kind: Literal["film"] = "film"
-    scenario: dict[str, Any]
-    layout: tuple[tuple[Any, ...], ...]
-    threat: ThreatOf
     engine: EngineRecord
     path: str
 
@@ -167,25 +138,17 @@ class ReportChoice(Kept):
         )
 
 
-class ReportTask(Kept):
+class ReportTask(LayoutTask):
     """A report on one layout by gas dynamics.
 
     Attributes:
-        scenario: The site as a document.
-        layout: The layout.
-        threats: Those that it is held against.
         choice: What is to be in it.
-        cache: Folder for the loads of blasts.
         path: The page, .html.
         pdf: The same as PDF; `None` for none.
     """
 
     kind: Literal["report"] = "report"
-    scenario: dict[str, Any]
-    layout: tuple[tuple[Any, ...], ...]
-    threats: tuple[ThreatOf, ...]
     choice: ReportChoice = ReportChoice()
-    cache: str
     path: str
     pdf: str | None = None
 
@@ -267,12 +230,3 @@ def read_status(folder: Path) -> Status:
         return Status.model_validate_json(read_text(folder / STATUS, MOST_BYTES))
     except ValueError as error:
         return Status(state="failed", title=folder.name, text=f"cannot be read: {error}")
-
-
-def scenario_of(document: dict[str, Any]) -> Scenario:
-    """Return the scenario of a document.
-
-    Raises:
-        ScenarioError: If it is none.
-    """
-    return Scenario.from_document(document, str(document.get("name", "the site")))

@@ -25,9 +25,9 @@ from blast_env.app.records import (
     read_film,
 )
 from blast_env.app.session import Session, Sessions
-from blast_env.app.threats import threats_of
+from blast_env.app.threats import NamedThreat, threats_of
 from blast_env.app.verdicts import verdict_rows
-from blast_env.app.work import ReportChoice, Status, ThreatOf, read_status, write_status
+from blast_env.app.work import ReportChoice, Status, read_status, write_status
 from blast_env.engines import find_engine
 from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError
@@ -383,8 +383,7 @@ def test_a_vehicle_is_where_the_layout_lets_it_come(tmp_path: Path) -> None:
     assert bare.repeat["charge"][0] == [9.0, 4.0]
     assert posts.repeat["charge"][0][0] <= 3.0
     assert posts.loads[0].impulse_pa_s < 0.6 * bare.loads[0].impulse_pa_s
-    (task,) = [each for each in session._threats_as_data() if each.name == nearest.name]
-    again = ThreatOf.model_validate_json(task.model_dump_json())
+    again = NamedThreat.model_validate_json(nearest.model_dump_json())
     assert again.charge == nearest.charge != second.charge
 
 

@@ -25,7 +25,8 @@ from blast_agents.training.run_folder import (
 
 from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.folder import DesignFolder
-from blast_env.app.work import ReportTask, ThreatOf, read_task, write_task
+from blast_env.app.threats import NamedThreat
+from blast_env.app.work import ReportTask, read_task, write_task
 from blast_env.calibration.model import load_calibration, save_calibration
 from blast_env.cluster import address_of
 from blast_env.engines import simulate
@@ -320,7 +321,7 @@ def _design(folder: Path) -> Format:
 
 
 def _task(folder: Path) -> Format:
-    threat = ThreatOf.of("here", Charge((1.0, 2.0), 100.0))
+    threat = NamedThreat(name="here", charge=Charge((1.0, 2.0), 100.0))
     document = small_scenario().model_dump(mode="json", exclude_none=True)
     task = ReportTask(scenario=document, layout=((0, 0),), threats=(threat,), cache="c", path="p")
     write_task(task, folder, "report")
