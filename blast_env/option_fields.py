@@ -6,8 +6,7 @@ fields. Nothing here knows how they do that (`blast_env.cli.command`).
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import EllipsisType
-from typing import Any, Final, TypeVar, overload
+from typing import Any, Final
 
 FOLDER: Final[tuple[str, ...]] = ()
 """Says of an option that a folder is written there."""
@@ -37,29 +36,6 @@ class OptionText:
     settings: Mapping[str, Any] = field(default_factory=dict)
 
 
-_Value = TypeVar("_Value")
-
-
-@overload
-def option(
-    default: EllipsisType,
-    help: str,
-    *,
-    flag: str | None = None,
-    writes: tuple[str, ...] | None = None,
-    panel: str | None = None,
-    **settings: Any,
-) -> Any: ...
-@overload
-def option(
-    default: _Value,
-    help: str,
-    *,
-    flag: str | None = None,
-    writes: tuple[str, ...] | None = None,
-    panel: str | None = None,
-    **settings: Any,
-) -> _Value: ...
 def option(
     default: Any,
     help: str,  # noqa: A002  # the word for it on command lines

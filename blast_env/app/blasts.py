@@ -17,7 +17,6 @@ from blast_env.app import placing
 from blast_env.app.records import (
     FILM,
     FRAME,
-    MOST_BYTES,
     RECORD,
     BlastRecord,
     Film,
@@ -26,7 +25,7 @@ from blast_env.app.records import (
     Picture,
     Wave,
     blast_key,
-    read_film,
+    read_kept,
     read_record,
     write_kept,
 )
@@ -34,7 +33,6 @@ from blast_env.app.threats import NamedThreat
 from blast_env.app.verdicts import keep_histories
 from blast_env.app.work import BlastTask
 from blast_env.calibration.model import CalibrationError
-from blast_env.documents import read_text
 from blast_env.engines import Blast
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
@@ -251,21 +249,20 @@ def _gas(
 
 def _scale(shot: PressureShot, kept: Path) -> Scale:
     """Return the scale that was kept with the blast without a barrier; this one's without it."""
-    try:
-        return Scale.model_validate_json(read_text(kept, MOST_BYTES))
-    except ValueError:
-        result = shot.result
-        names = _facades_of(result)
-        film_kpa = scale_end_kpa([result])
-        return Scale(
-            film_kpa=film_kpa,
-            until_s=_last_seen_s(shot, film_kpa),
-            levels={each: map_levels(result, each) for each in _QUANTITIES},
-            walls={
-                name: {each: full_load(result, name, each) for each in _QUANTITIES}
-                for name in names
-            },
-        )
+    known = read_kept(Scale, kept)
+    if known is not None:
+        return known
+    result = shot.result
+    film_kpa = scale_end_kpa([result])
+    return Scale(
+        film_kpa=film_kpa,
+        until_s=_last_seen_s(shot, film_kpa),
+        levels={each: map_levels(result, each) for each in _QUANTITIES},
+        walls={
+            name: {each: full_load(result, name, each) for each in _QUANTITIES}
+            for name in _facades_of(result)
+        },
+    )
 
 
 def _last_seen_s(shot: PressureShot, film_kpa: float) -> float:
@@ -362,7 +359,7 @@ def _write_film(
     frames: Iterator[Frame], times_s: Sequence[float], folder: Path, tell: Tell
 ) -> None:
     """Write frames one by one; the film can be watched from the first few on."""
-    film = read_film(folder)
+    film = read_kept(Film, folder / FILM)
     if film is not None and film.count == len(film.time_ms):
         return
     times_ms = tuple(round(MS_PER_S * time_s, 3) for time_s in times_s)

@@ -4,7 +4,7 @@ Everything is put on the grid of the modules. No rule about what may stand where
 scenario goes through `Scenario.from_document`, which says all that is wrong with it.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import StrEnum
 from math import hypot
 from typing import Any, Final, NamedTuple
@@ -287,10 +287,7 @@ def removed(scenario: Scenario, thing: SiteThing) -> Scenario:
         raise BlastEnvError("the site itself cannot be taken away: open another one")
 
     def edit(document: Document) -> None:
-        *above, key = _PATHS[thing.kind]
-        table = document
-        for part in above:
-            table = table[part]
+        table, key = _place_of(document, thing.kind)
         if thing.kind in _SINGLE:
             del table[key]
         else:
@@ -343,10 +340,7 @@ def added(
     }[kind]()
 
     def edit(document: Document) -> None:
-        *above, key = _PATHS[kind]
-        table = document
-        for part in above:
-            table = table[part]
+        table, key = _place_of(document, kind)
         if kind is ThingKind.ZONE:
             table[key] = {**table.get(key, {}), **section}
         else:
@@ -393,21 +387,37 @@ def _fit_catalogue(document: Document, whole: int | None) -> None:
         zone.pop("stock", None)
 
 
+def _place_of(document: Document, kind: ThingKind) -> tuple[Document, str]:
+    """Return the table that a kind is in, and its key there."""
+    *above, key = _PATHS[kind]
+    table = document
+    for part in above:
+        table = table[part]
+    return table, key
+
+
+def section_of(scenario: Scenario, thing: SiteThing) -> Document:
+    """Return what the scenario's file says of a thing."""
+    return _own(document_of(scenario), thing)
+
+
 def _own(document: Document, thing: SiteThing) -> Document:
     """Return the part of a document that is a thing's."""
-    table: Any = document
-    for part in _PATHS[thing.kind]:
-        table = table[part]
-    own: Document = table if thing.kind in _SINGLE else table[thing.number]
+    table, key = _place_of(document, thing.kind)
+    own: Document = table[key] if thing.kind in _SINGLE else table[key][thing.number]
     return own
 
 
+def _free_name(word: str, things: Iterable[Any]) -> str:
+    """Return a name with a number that nothing has yet."""
+    names = {each.name for each in things}
+    return next(name for name in (f"{word}{n}" for n in range(1, 200)) if name not in names)
+
+
 def _structure(scenario: Scenario, area: Rectangle, height_m: float | None) -> Document:
-    names = {each.name for each in scenario.structures}
-    number = next(n for n in range(1, 200) if f"structure{n}" not in names)
     return {
         "kind": "ModularObstacle",
-        "name": f"structure{number}",
+        "name": _free_name("structure", scenario.structures),
         "corner_m": [area.left, area.bottom],
         "rows": max(round((area.top - area.bottom) / MODULE_SIDE_M), 1),
         "columns": max(round((area.right - area.left) / MODULE_SIDE_M), 1),
@@ -428,17 +438,13 @@ def _usual_tnt_kg(scenario: Scenario) -> float:
 
 
 def _gauge(scenario: Scenario, at_m: PointM) -> Document:
-    names = {each.name for each in scenario.gauges}
-    number = next(n for n in range(1, 200) if f"gauge{n}" not in names)
     place = [_plain(snapped(value - _HALF) + _HALF) for value in at_m]
-    return {"name": f"gauge{number}", "position_m": [*place, 1.25]}
+    return {"name": _free_name("gauge", scenario.gauges), "position_m": [*place, 1.25]}
 
 
 def _item(scenario: Scenario) -> Document:
-    names = {each.name for each in scenario.zone.items}
-    number = next(n for n in range(1, 200) if f"wall{n}" not in names)
     return {
-        "name": f"wall{number}",
+        "name": _free_name("wall", scenario.zone.items),
         "length_modules": 4,
         "thickness_modules": 1,
         "height_m": scenario.zone.height_m or 3.0,
@@ -448,9 +454,11 @@ def _item(scenario: Scenario) -> Document:
 
 
 def _measure(scenario: Scenario) -> Document:
-    names = {each.name for each in scenario.zone.hardening}
-    number = next(n for n in range(1, 200) if f"glass{n}" not in names)
-    return {"name": f"glass{number}", "glazing": _BETTER_GLASS, "cost": 1000.0}
+    return {
+        "name": _free_name("glass", scenario.zone.hardening),
+        "glazing": _BETTER_GLASS,
+        "cost": 1000.0,
+    }
 
 
 def _zone(scenario: Scenario, area: Rectangle) -> Document:

@@ -17,7 +17,15 @@ from typing import Annotated, Any, Final
 from pydantic import Field
 
 from blast_env.app.design import Design, DesignStep, History
-from blast_env.app.records import MOST_BYTES, RECORD, BlastRecord, Kept, check_key, read_record
+from blast_env.app.records import (
+    MOST_BYTES,
+    RECORD,
+    BlastRecord,
+    Kept,
+    check_key,
+    read_record,
+    write_kept,
+)
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
@@ -199,9 +207,7 @@ class WorkFolder:
                 f"{self.path} is open already at {other}: go there, or name another folder"
                 " (--folder)"
             )
-        with write_atomically(mark) as temporary:
-            holder = _Holder(process=os.getpid(), url=url, since_s=time())
-            temporary.write_text(holder.model_dump_json(), encoding="utf-8")
+        write_kept(_Holder(process=os.getpid(), url=url, since_s=time()), mark)
         try:
             yield
         finally:

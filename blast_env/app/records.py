@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from math import nan
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -38,6 +38,9 @@ class Kept(BaseModel):
     """Base of what is kept in files: frozen, numbers that do not exist are NaN."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
+
+
+AnyKept = TypeVar("AnyKept", bound=Kept)
 
 
 class EngineRecord(Kept):
@@ -183,25 +186,22 @@ def write_kept(record: Kept, path: Path) -> None:
         temporary.write_text(record.model_dump_json(), encoding="utf-8")
 
 
+def read_kept(kind: type[AnyKept], path: Path) -> AnyKept | None:
+    """Return a record of a file, or `None` if it is not there or damaged."""
+    try:
+        return kind.model_validate_json(read_text(path, MOST_BYTES))
+    except ValueError:
+        return None
+
+
 def read_record(folder: Path) -> BlastRecord | None:
     """Return the record of a blast, or `None` if it is not there or damaged."""
-    try:
-        return BlastRecord.model_validate_json(read_text(folder / RECORD, MOST_BYTES))
-    except ValueError:
-        return None
-
-
-def read_film(folder: Path) -> Film | None:
-    """Return what there is of the film of a blast, or `None` if nothing is."""
-    try:
-        return Film.model_validate_json(read_text(folder / FILM, MOST_BYTES))
-    except ValueError:
-        return None
+    return read_kept(BlastRecord, folder / RECORD)
 
 
 def frames_in(folder: Path) -> int:
     """Return how many frames of the film of a blast are there."""
-    film = read_film(folder)
+    film = read_kept(Film, folder / FILM)
     return 0 if film is None else film.count
 
 

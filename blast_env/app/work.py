@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field, TypeAdapter
 
-from blast_env.app.records import MOST_BYTES, EngineRecord, Kept
+from blast_env.app.records import MOST_BYTES, EngineRecord, Kept, write_kept
 from blast_env.app.threats import NamedThreat
 from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
-from blast_env.files import write_atomically
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import AnyCharge, Scenario
 
@@ -201,8 +200,7 @@ def write_task(task: Task, folder: Path, title: str) -> None:
     Raises:
         BlastEnvError: If it cannot be written.
     """
-    with write_atomically(folder / TASK) as temporary:
-        temporary.write_text(task.model_dump_json(), encoding="utf-8")
+    write_kept(task, folder / TASK)
     write_status(Status(title=title), folder)
 
 
@@ -220,8 +218,7 @@ def read_task(folder: Path) -> Task:
 
 def write_status(status: Status, folder: Path) -> None:
     """Say how far work has come."""
-    with write_atomically(folder / STATUS) as temporary:
-        temporary.write_text(status.model_dump_json(), encoding="utf-8")
+    write_kept(status, folder / STATUS)
 
 
 def read_status(folder: Path) -> Status:

@@ -11,13 +11,13 @@ from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from importlib import import_module
-from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Final, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Final, get_args, get_origin, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from blast_env.cli.targets import Target, checked_targets
 from blast_env.errors import BlastEnvError
 from blast_env.option_fields import FOLDER as FOLDER
 from blast_env.option_fields import TEXT, OptionText
@@ -52,7 +52,7 @@ class Command:
         """Return how to go on after Ctrl-C, where the command can."""
         return ""
 
-    def targets(self) -> "list[Target]":
+    def targets(self) -> list[Target]:
         """Return where the command is to write: the options with `Writes` that are given."""
         return [
             Target(each.flag, path, each.text.writes)
@@ -60,20 +60,6 @@ class Command:
             for path in [getattr(self, each.name)]
             if each.text.writes is not None and path is not None
         ]
-
-
-class Target(NamedTuple):
-    """A file or folder that a command is to write.
-
-    Attributes:
-        option: The option that says so.
-        path: Where.
-        suffixes: Those that the file may have; none for a folder.
-    """
-
-    option: str
-    path: Path
-    suffixes: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,17 +166,10 @@ def function_of(kind: type[Command]) -> Callable[..., None]:
 def _run(kind: type[Command], values: Mapping[OptionField, Any]) -> None:
     # Here, because the list of commands is shown without what they need.
     from blast_env.cli.output import user_errors
-    from blast_env.cli.targets import FileTarget, checked_targets
 
     with user_errors():
         command = kind(**{each.name: each.value(given) for each, given in values.items()})
-    files, folders = {}, {}
-    for flag, path, suffixes in command.targets():
-        if suffixes:
-            files[flag] = FileTarget(path, suffixes)
-        else:
-            folders[flag] = path
-    with user_errors(command.how_to_resume), checked_targets(files, folders):
+    with user_errors(command.how_to_resume), checked_targets(command.targets()):
         command()
 
 

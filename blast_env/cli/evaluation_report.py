@@ -6,7 +6,7 @@ from math import isnan
 from pathlib import Path
 from typing import Final
 
-from blast_env.cli.command import FOLDER, Target, option
+from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import (
     CELL_HELP,
     CELLS_HELP,
@@ -29,6 +29,7 @@ from blast_env.cli.output import (
     without,
 )
 from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
+from blast_env.cli.targets import Target
 from blast_env.engines import JUDGE, Engine
 from blast_env.evaluation import (
     BlastEvaluator,

@@ -1,7 +1,7 @@
 """Where a command is to write: looked at before its work begins, tidied up after it."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -12,47 +12,41 @@ PICTURES = (".png", ".svg", ".pdf")
 """Suffixes of pictures, as `rendering.figures.FIGURE_SUFFIXES`; known without that extra."""
 
 
-class FileTarget(NamedTuple):
-    """A file that a command is to write.
+class Target(NamedTuple):
+    """A file or folder that a command is to write.
 
     Attributes:
-        path: The file; None if the user does not want it.
-        suffixes: Those that it may have.
+        option: The option that says so.
+        path: Where.
+        suffixes: Those that the file may have; none for a folder.
     """
 
-    path: Path | None
-    suffixes: Sequence[str]
+    option: str
+    path: Path
+    suffixes: tuple[str, ...]
 
 
 @contextmanager
-def checked_targets(
-    files: Mapping[str, FileTarget] | None = None,
-    folders: Mapping[str, Path | None] | None = None,
-) -> Iterator[None]:
+def checked_targets(targets: Sequence[Target]) -> Iterator[None]:
     """Refuse targets of no use before the block, and leave no empty folders after it.
 
     So no result is lost for want of a place, and a command that fails or is interrupted leaves no
     folder behind that it has put nothing into.
 
-    Args:
-        files: The files, by the names of their options.
-        folders: The folders, likewise; they need not be there.
-
     Raises:
         BlastEnvError: If a file or folder cannot be written, or two options name one file.
     """
     known: dict[Path, str] = {}
-    for option, (path, suffixes) in (files or {}).items():
-        if path is None:
+    for option, path, suffixes in targets:
+        if not suffixes:
+            _check_folder(option, path)
             continue
         _check_file(option, path, suffixes)
         same = known.setdefault(path.resolve(), option)
         if same != option:
             raise BlastEnvError(f"{same} and {option} are the same file, {path}")
-    wanted = [(option, folder) for option, folder in (folders or {}).items() if folder is not None]
-    for option, folder in wanted:
-        _check_folder(option, folder)
-    before = {folder: _missing_above(folder) for _, folder in wanted}
+    folders = [each.path for each in targets if not each.suffixes]
+    before = {folder: _missing_above(folder) for folder in folders}
     present = {path for folder in before for path in _folders_in(folder)}
     try:
         yield

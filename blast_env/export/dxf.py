@@ -2,19 +2,17 @@
 
 import textwrap
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import floor, pi, tan
+from math import floor, inf, pi, tan
 from pathlib import Path
 from typing import Final, NamedTuple
-
-import numpy as np
 
 from blast_env.errors import import_extra
 from blast_env.export.bill import LayoutPlan
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
-from blast_env.labels import best_place
+from blast_env.labels import Label, settled_labels
 from blast_env.plan import SITE_KINDS, Feature, FeatureKind, Kinds
 from blast_env.scenario import BuildZone, Placement
 from blast_env.scenario.sections import PointM
@@ -125,9 +123,7 @@ def _rounded_outline(rectangle: Rectangle, radius: float) -> tuple[CornerM, ...]
     )
 
 
-_STEPS: Final = 12  # places that are tried along a line
 _SIGN_WIDTH: Final = 0.75  # in heights; of most typefaces that programs take for drawings
-_OFF_LINE: Final = 0.9  # from a line to the middle of a letter, in heights of the text
 
 
 @dataclass(frozen=True)
@@ -149,11 +145,15 @@ class Text:
     upright: bool = False
 
     @property
+    def size_m(self) -> tuple[float, float]:
+        """Width and height of what it takes."""
+        long, short = _SIGN_WIDTH * len(self.text) * self.height_m, self.height_m
+        return (short, long) if self.upright else (long, short)
+
+    @property
     def box_m(self) -> Rectangle:
         """The rectangle that it takes."""
-        long, short = _SIGN_WIDTH * len(self.text) * self.height_m, self.height_m
-        width, height = (short, long) if self.upright else (long, short)
-        x, y = self.centre_m
+        (width, height), (x, y) = self.size_m, self.centre_m
         return Rectangle(x - width / 2.0, y - height / 2.0, x + width / 2.0, y + height / 2.0)
 
 
@@ -171,17 +171,22 @@ def texts_of(plan: LayoutPlan, height_m: float) -> tuple[Text, ...]:
         height_m: Height of the letters; names inside things are smaller where they must.
     """
     inside = [_text_inside(each, height_m) for each in plan.features if _words_inside(each)]
-    modules = [each.bounds_m for each in plan.features if each.kind is Kinds.BARRIER]
-    taken = [text.box_m for text in inside] + modules
     key = key_of(plan)
-    letters = []
-    for feature in filter(_has_letter, plan.features):
-        words = key[_name(feature)]
-        tries = [Text(words, feature, place, height_m) for place in _places(feature, height_m)]
-        boxes = [each.box_m for each in tries]
-        chosen = best_place([(box, taken) for box in boxes], Rectangle.around(boxes))
-        taken.append(chosen)
-        letters.append(tries[boxes.index(chosen)])
+    labels = [Label(key[_name(each)], each) for each in plan.features if _has_letter(each)]
+    settled = settled_labels(
+        plan.features,
+        labels,
+        [Text(each.text, each.feature, (0.0, 0.0), height_m).size_m for each in labels],
+        lambda each: each.bounds_m.grown(MODULE_SIDE_M if len(each.places_m) == 1 else 0.0),
+        lambda each: each.bounds_m if len(each.places_m) > 2 else None,
+        plan.scenario.site.rectangle_m.grown(4.0 * height_m),
+        gap=0.4 * height_m,
+        far=inf,
+        others=[text.box_m for text in inside],
+    )
+    letters = [
+        Text(each.label.text, each.label.feature, each.place.centre, height_m) for each in settled
+    ]
     return (*inside, *letters)
 
 
@@ -218,42 +223,6 @@ def _text_inside(feature: Feature, height_m: float) -> Text:
     piece_m = MODULE_SIDE_M / 2.0 if feature.kind is Kinds.BARRIER else height_m
     fitting_m = min(height_m, piece_m, 0.6 * short_m, 0.95 * long_m / signs)
     return Text(text, feature, outline.centre, fitting_m, upright)
-
-
-def _places(feature: Feature, height_m: float) -> list[PointM]:
-    """Return where a letter may stand, the best place first."""
-    off_m = _OFF_LINE * height_m
-    if len(feature.places_m) > 2:
-        return list(_places_of_area(feature.bounds_m, off_m))
-    if len(feature.places_m) == 2:
-        return list(_places_along(feature.places_m[0], feature.places_m[1], off_m))
-    (x, y), gap_m = feature.places_m[0], off_m + MODULE_SIDE_M
-    around = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
-    return [(x + right * gap_m, y + up * gap_m) for right, up in around]
-
-
-def _places_of_area(outline: Rectangle, off_m: float) -> Iterator[PointM]:
-    """Yield places along the sides, inside first; from the lower left corner on."""
-    width_m, depth_m = outline.right - outline.left, outline.top - outline.bottom
-    inside = min(width_m, depth_m) > 2.0 * off_m
-    for ring in (outline.grown(-off_m),) * inside + (outline.grown(off_m),):
-        shares = np.linspace(0.0, 1.0, _STEPS)
-        for y in (ring.bottom, ring.top):
-            for share in shares:
-                yield ring.left + share * (ring.right - ring.left), y
-        for x in (ring.left, ring.right):
-            for share in shares:
-                yield x, ring.bottom + share * (ring.top - ring.bottom)
-
-
-def _places_along(start: PointM, end: PointM, off_m: float) -> Iterator[PointM]:
-    """Yield places on either side of a line."""
-    along = np.array(end) - np.array(start)
-    across = off_m * np.array((-along[1], along[0])) / np.hypot(*along)
-    for share in np.linspace(0.0, 1.0, _STEPS):
-        for side in (across, -across):
-            x, y = np.array(start) + share * along + side
-            yield float(x), float(y)
 
 
 def wrapped(lines: Sequence[str], characters: int) -> list[str]:

@@ -17,12 +17,14 @@ from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers, _Process, settle
 from blast_env.app.placing import plain
 from blast_env.app.records import (
+    FILM,
     BlastRecord,
     EngineRecord,
+    Film,
     Load,
     blast_key,
     comparison,
-    read_film,
+    read_kept,
 )
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import NamedThreat, threats_of
@@ -90,7 +92,7 @@ def test_a_particle_blast_has_a_film_and_the_loads_of_the_library(particles: Ses
     assert record.loads[0].low_pa_s < mean < record.loads[0].high_pa_s
     for key in (bare.key, own.key):
         folder = particles.folder.blast_of(key)
-        film = read_film(folder)
+        film = read_kept(Film, folder / FILM)
         assert film is not None
         assert film.count == blasts.FRAMES == len(list(folder.glob("*.jpg")))
 
@@ -187,7 +189,7 @@ def test_particles_show_a_film_and_say_that_peaks_need_gas(tmp_path: Path) -> No
     assert record is not None
     assert record.loads == ()
     assert "no loads: peak overpressure counts here; blast it with gas" in record.notes
-    film = read_film(session.folder.blast_of(record.key))
+    film = read_kept(Film, session.folder.blast_of(record.key) / FILM)
     assert film is not None
     assert film.count == blasts.FRAMES
 
@@ -210,7 +212,7 @@ def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Sessi
     assert load.impulse_pa_s == pytest.approx(result.impulse("hut").pa_s)
     assert load.peak_kpa == pytest.approx(float(result.structures["peak_pa"].iloc[0]) / 1e3)
     folder = gas.folder.blast_of(record.key)
-    films = [read_film(gas.folder.blast_of(each.key)) for each in gas.shown(threat)]
+    films = [read_kept(Film, gas.folder.blast_of(each.key) / FILM) for each in gas.shown(threat)]
     assert films[0] is not None
     assert films[0] == films[1]  # the same moments
     assert {each.label for each in record.pictures} == {

@@ -8,7 +8,8 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from blast_env.cli.command import Command, Target, function_of, options_of
+from blast_env.cli.command import Command, function_of, options_of
+from blast_env.cli.targets import Target
 from blast_env.option_fields import FOLDER, argument, option
 
 made: list[Any] = []

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
-from blast_env.app.edits import Document, SiteThing, ThingKind, document_of
+from blast_env.app.edits import Document, SiteThing, ThingKind, section_of
 from blast_env.physics.scene import WALLS
 from blast_env.scenario import Scenario
 
@@ -121,24 +121,6 @@ _LAST_OF_STRUCTURE: Final = (
     FormField("windows", "glazing", "glazing", optional=True, inside="facade"),
     FormField("wall panels", "wall", "wall", optional=True, inside="facade"),
 )
-
-
-def section_of(scenario: Scenario, thing: SiteThing) -> Document:
-    """Return what the scenario's file says of a thing."""
-    document = document_of(scenario)
-    tables: Mapping[ThingKind, Any] = {
-        ThingKind.SITE: [document["site"]],
-        ThingKind.ZONE: [document.get("build_zone", {})],
-        ThingKind.STRUCTURE: document["structures"],
-        ThingKind.CHARGE: document["charge"],
-        ThingKind.KEEP_OUT: document.get("build_zone", {}).get("keep_outs", []),
-        ThingKind.COST_AREA: document.get("build_zone", {}).get("cost_areas", []),
-        ThingKind.GAUGE: document.get("gauges", []),
-        ThingKind.ITEM: document.get("build_zone", {}).get("items", []),
-        ThingKind.MEASURE: document.get("build_zone", {}).get("hardening", []),
-    }
-    section: Document = tables[thing.kind][thing.number]
-    return section
 
 
 def fields_of(scenario: Scenario, thing: SiteThing) -> tuple[FormField, ...]:

@@ -9,7 +9,7 @@ from nicegui import ui
 from blast_env.app import edits
 from blast_env.app.editor import Editor
 from blast_env.app.edits import SiteThing, ThingKind
-from blast_env.app.page.fields import FormField, change_of, fields_of, section_of, value_of
+from blast_env.app.page.fields import FormField, change_of, fields_of, value_of
 from blast_env.physics.scene import WALLS
 from blast_env.response.components import catalogue
 from blast_env.scenario import Scenario
@@ -71,7 +71,7 @@ class SitePanel:
             self._form.clear()
             with self._form:
                 self._inputs = [self._input(each) for each in fields]
-        section = section_of(scenario, thing)
+        section = edits.section_of(scenario, thing)
         for field, element in zip(self._fields, self._inputs, strict=True):
             element.value = value_of(section, field)
         self._delete.set_enabled(thing != _SITE)
@@ -123,7 +123,7 @@ class SitePanel:
             return
         scenario = self._editor.session.scenario
         thing = self._editor.selected or _SITE
-        section = section_of(scenario, thing)
+        section = edits.section_of(scenario, thing)
         if value_of(section, field) == typed:
             return
         try:
