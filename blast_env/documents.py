@@ -140,7 +140,6 @@ def _check_toml_depth(text: str) -> None:
 
 
 def _toml_error(message: str, text: str) -> DocumentError:
-    """Return the error for a message of the TOML parser."""
     match = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.S)
     if match is None:
         # The only error without a place: an integer that Python refuses to read.

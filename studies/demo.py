@@ -32,8 +32,15 @@ from blast_agents.training.hyperparameters import SELF_LABELLING
 from blast_agents.training.run_folder import EvaluationRow, RunFolder, read_rows
 from blast_agents.training.train import TrainingResult
 
-from blast_env.cli.evaluation_report import interval, percent
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
+from blast_env.cli.evaluation_report import interval
+from blast_env.cli.output import (
+    make_table,
+    percent,
+    print_line,
+    progress_bar,
+    result_console,
+    user_errors,
+)
 from blast_env.engines import JUDGE
 from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError

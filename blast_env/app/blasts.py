@@ -310,7 +310,6 @@ def _gas_loads(result: GasResult) -> tuple[Load, ...]:
 
 
 def _load(name: str, row: Mapping[Hashable, Any]) -> Load:
-    """Return the load of a row of structures or of buildings."""
     return Load(
         structure=name,
         protected=bool(row["protected"]),
@@ -320,7 +319,6 @@ def _load(name: str, row: Mapping[Hashable, Any]) -> Load:
 
 
 def _buildings(result: GasResult) -> Iterator[Load]:
-    """Yield the loads of buildings of several parts."""
     sizes = Counter(each.building_name for each in result.blast.scenario.structures)
     for row in result.buildings.to_dict("records"):
         if sizes[row["building"]] > 1:

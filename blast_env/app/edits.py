@@ -402,7 +402,6 @@ def section_of(scenario: Scenario, thing: SiteThing) -> Document:
 
 
 def _own(document: Document, thing: SiteThing) -> Document:
-    """Return the part of a document that is a thing's."""
     table, key = _place_of(document, thing.kind)
     own: Document = table[key] if thing.kind in _SINGLE else table[key][thing.number]
     return own

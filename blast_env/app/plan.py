@@ -323,7 +323,6 @@ def _text(
 
 
 def _lines(view: PixelView, scenario: Scenario) -> Iterator[str]:
-    """Yield lines at round distances."""
     site = scenario.site.rectangle_m
     steps = (1.0, 5.0, 10.0, 50.0, 100.0)
     step = next((each for each in steps if each * view.pixels_per_m >= _LEAST_LINES_PX), 500.0)

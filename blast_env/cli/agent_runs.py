@@ -22,7 +22,6 @@ from blast_env.cli.evaluation_report import (
     EvaluateOptions,
     cache_record,
     cache_text,
-    percent,
     print_means,
     print_record,
     report_layout,
@@ -30,6 +29,7 @@ from blast_env.cli.evaluation_report import (
 )
 from blast_env.cli.output import (
     make_table,
+    percent,
     print_line,
     progress_bar,
     result_console,
@@ -165,7 +165,6 @@ def _engine(settings: TrainingSettings, options: EvaluateOptions) -> Engine:
 
 
 def _fixed(case: Case, options: EvaluateOptions) -> Case:
-    """Return a case with what the user has fixed of its charge."""
     threats = tuple(
         Threat(options.fixed(case.scenario, threat.charge), threat.seed) for threat in case.threats
     )
@@ -179,7 +178,6 @@ def _export(
     provenance: dict[str, Any],
     options: EvaluateOptions,
 ) -> list[Path]:
-    """Write the layouts for other tools, if that is asked for."""
     if options.export is None:
         return []
     plans = _plans(comparison, provenance)
@@ -253,7 +251,6 @@ def _place(settings: TrainingSettings, cases: Sequence[Case]) -> str:
 
 
 def _provenance(run: Path, settings: TrainingSettings, weights: str) -> dict[str, Any]:
-    """Return where the layouts come from."""
     return {
         "command": command(),
         "run": str(run),

@@ -20,15 +20,17 @@ from blast_env.cli.options import (
     ProcessOptions,
 )
 from blast_env.cli.output import (
+    LAYOUT_PICTURE,
     make_table,
+    percent,
     print_json,
     print_line,
     progress_bar,
     result_console,
+    save_layout_picture,
     save_pictures,
     without,
 )
-from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
 from blast_env.cli.targets import Target
 from blast_env.engines import JUDGE, Engine
 from blast_env.evaluation import (
@@ -48,8 +50,6 @@ from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.statistics import CVAR_LEVEL, Estimate
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
-
-_PERCENT = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,11 +136,6 @@ def cache_text(evaluator: BlastEvaluator | Evaluators) -> str:
         f"{record['blasts']:g} blasts run, {record['hits']:g} known already "
         f"(cache hit rate {percent(record['hit_rate'])})"
     )
-
-
-def percent(share: float) -> str:
-    """Return a share for people; a dash for one that does not exist."""
-    return "-" if isnan(share) else f"{_PERCENT * share:.1f} %"
 
 
 def interval(estimate: Estimate) -> str:

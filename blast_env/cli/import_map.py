@@ -94,7 +94,6 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
 
 
 def _record(imported: "ImportedSite", written: list[Path]) -> dict[str, Any]:
-    """Return the report as plain data."""
     georeference = imported.scenario.georeference
     return {
         "scenario": imported.scenario.name,

@@ -186,7 +186,6 @@ def _play(contest: "Contest", processes: int) -> "Standings":
 
 
 def _names(text: str) -> list[str]:
-    """Return the names of a list with commas."""
     return [name.strip() for name in text.split(",") if name.strip()]
 
 

@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from math import isnan
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Final
@@ -15,10 +16,15 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.tables import ResultTable
 from blast_env.errors import BlastEnvError, MissingExtraError
+from blast_env.geometry import Element
+from blast_env.scenario import Scenario
 from blast_env.values import STEERING
 
 _PIPE_COLUMNS = 120
 _LINE_EVERY_S: Final = 30.0
+
+LAYOUT_PICTURE: Final = "layout.png"
+"""File of the picture of a layout in the folder of `--out`."""
 
 
 def result_console() -> Console:
@@ -114,6 +120,20 @@ def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:
         return []
 
 
+def save_layout_picture(scenario: Scenario, layout: Sequence[Element], path: Path) -> Path:
+    """Draw a layout on its site, from above and obliquely; return the file.
+
+    Raises:
+        MissingExtraError: If the extra `render` is not installed.
+        BlastEnvError: If the file cannot be written.
+    """
+    # Here, because pictures need the extra `render`.
+    from blast_env.rendering.figures import save_figure
+    from blast_env.rendering.site_picture import site_picture
+
+    return save_figure(site_picture(scenario, layout), path)
+
+
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
     """Show a progress bar on standard error; it is gone when the work is done.
@@ -153,3 +173,8 @@ def _progress_lines(console: Console, label: str) -> Callable[[float], None]:
 def make_table(title: str, headers: Sequence[str], text_columns: int = 1) -> ResultTable:
     """Return an empty table; all columns but the first `text_columns` are set to the right."""
     return ResultTable(title, headers, text_columns)
+
+
+def percent(share: float) -> str:
+    """Return a share for people; a dash for one that does not exist."""
+    return "-" if isnan(share) else f"{100.0 * share:.1f} %"

@@ -17,9 +17,9 @@ from blast_env.cli.output import (
     print_line,
     progress_bar,
     result_console,
+    save_layout_picture,
     save_pictures,
 )
-from blast_env.cli.pictures import save_layout_picture
 from blast_env.cli.search import print_cost
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case

@@ -32,16 +32,18 @@ from blast_env.cli.options import (
     ProcessOptions,
 )
 from blast_env.cli.output import (
+    LAYOUT_PICTURE,
     make_table,
     message_console,
+    percent,
     print_line,
     progress_bar,
     result_console,
     resume_with_cache,
+    save_layout_picture,
     save_pictures,
     show_interruption,
 )
-from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
 from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.envs.strategies import HiddenThreat
@@ -332,7 +334,6 @@ def _save_figure(run: SearchRun, out: Path) -> list[Path]:
 def _provenance(
     run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation
 ) -> dict[str, Any]:
-    """Return what repeats the search, and what came out."""
     result, problem = run.result, run.problem
     low, high = (None if np.isnan(end) else float(end) for end in checked.ci95)
     return {
@@ -372,8 +373,3 @@ def _risk_text(problem: LayoutProblem) -> str:
     if isinstance(risk, ConditionalValueAtRisk):
         return f"{words}, mean of the worst {100.0 * (1.0 - risk.level):.3g} %"
     return f"mean {words}"
-
-
-def percent(share: float) -> str:
-    """Return a share for people."""
-    return f"{100.0 * share:.1f} %"

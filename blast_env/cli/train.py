@@ -9,8 +9,7 @@ import numpy as np
 from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option, options_of
 from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions
-from blast_env.cli.output import print_line, progress_bar
-from blast_env.cli.pictures import LAYOUT_PICTURE, save_layout_picture
+from blast_env.cli.output import LAYOUT_PICTURE, print_line, progress_bar, save_layout_picture
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario

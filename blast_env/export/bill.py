@@ -205,7 +205,6 @@ def bill_of_quantities(plan: LayoutPlan) -> "pd.DataFrame":
 
 
 def _lines(plan: LayoutPlan) -> Sequence[_Line]:
-    """Return a line for every item that there is."""
     zone, side_m = plan.scenario.build_zone, MODULE_SIDE_M
     if zone is None:
         return ()

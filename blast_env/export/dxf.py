@@ -47,14 +47,12 @@ def note_lines(plan: LayoutPlan) -> tuple[str, ...]:
 
 
 def _modules(plan: LayoutPlan, zone: BuildZone) -> str:
-    """Return how many modules there are, and how large they are."""
     side = f"{MODULE_SIDE_M:g}"
     high = "" if zone.height_m is None else f", {_number(zone.height_m)} m high"
     return f"Modules: {len(plan.layout)} of a stock of {zone.stock}, {side} m x {side} m each{high}"
 
 
 def _items(plan: LayoutPlan, zone: BuildZone) -> list[str]:
-    """Return a line for each item: how many there are, and how large they are."""
     counts = Counter(each.item for each in plan.layout if isinstance(each, Piece))
     sides = [(each.length_modules, each.thickness_modules) for each in zone.items]
     sizes_m = [[_number(MODULE_SIDE_M * modules) for modules in pair] for pair in sides]
@@ -78,7 +76,6 @@ def _conditions(zone: BuildZone) -> tuple[str, str]:
 
 
 def _charge(plan: LayoutPlan) -> str:
-    """Return the mass of the charge, and where it is or may be."""
     if plan.charge is not None:
         (x_m, y_m), tnt_kg = plan.charge.position_m, plan.charge.tnt_kg
         return f"{_number(tnt_kg)} kg TNT at ({x_m:.2f}, {y_m:.2f})"
@@ -360,7 +357,6 @@ def _write(space: Modelspace, text: Text) -> None:
 
 
 def _draw_clearance(space: Modelspace, plan: LayoutPlan) -> None:
-    """Draw how near modules may come to the structures, if there is a bound."""
     for outline in clearance_outlines(plan):
         attributes = {"layer": CLEARANCE_LAYER}
         space.add_lwpolyline(outline, format="xyb", close=True, dxfattribs=attributes)

@@ -70,7 +70,6 @@ def feature_collection(plan: LayoutPlan) -> dict[str, Any]:
 
 
 def _coordinate_words(georeference: AnyGeoreference | None) -> str:
-    """Return what the coordinates are, in words."""
     if georeference is None:
         return SITE_METRES
     if georeference.kind == "drawing":
@@ -124,7 +123,6 @@ def _on_map(places_m: Sequence[PointM], georeference: AnyGeoreference | None) ->
 
 
 def _geometry(places: list[list[float]]) -> dict[str, Any]:
-    """Return a point, a line or a polygon, its ring closed and counterclockwise."""
     if len(places) == 1:
         return {"type": "Point", "coordinates": places[0]}
     if len(places) == 2:

@@ -449,7 +449,6 @@ def _rankings(blast: RecordedBlast) -> Iterator[Ranking]:
 
 
 def _ranking(name: str, hit: pd.DataFrame, unit: LoadUnit) -> Ranking:
-    """Return the ranking of the modules that were hit in a group of structures."""
     # Stable, so that equal loads keep the order of the module table.
     ranked = hit.sort_values("impulse_sim", ascending=False, kind="stable")
     top = ranked.head(CHARTED_MODULES)
@@ -481,7 +480,6 @@ def _add_series(chart: Any, data: ChartData, rows: slice) -> None:
 
 
 def _add_labels(chart: Any, ranking: Ranking, label: str) -> None:
-    """Add the title, the titles of the axes and the legend, and set the size."""
     chart.set_title({"name": ranking.title, "name_font": {"size": 12}})
     chart.set_x_axis(
         {

@@ -120,7 +120,6 @@ def _read(path: Path) -> tuple[pd.DataFrame, dict[bytes, bytes]]:
 
 
 def _arrow_table(frame: pd.DataFrame, columns: Sequence[Column], record: RunRecord) -> pa.Table:
-    """Return a table with all its metadata."""
     table = pa.Table.from_pandas(frame, preserve_index=False)
     by_name = {column.name: column for column in columns}
     fields = [
@@ -135,7 +134,6 @@ def _arrow_table(frame: pd.DataFrame, columns: Sequence[Column], record: RunReco
 
 
 def _run_record(path: Path, metadata: dict[bytes, bytes]) -> dict[str, Any]:
-    """Return the run record in the metadata of a file."""
     if METADATA_KEY not in metadata:
         raise BlastEnvError(
             f"{path}: has no run record, so it is not a collision table that blast_env wrote"

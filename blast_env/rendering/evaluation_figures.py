@@ -28,6 +28,7 @@ from blast_env.plan import (
     without_counts,
 )
 from blast_env.rendering.site_plan import (
+    add_bar,
     draw_loads,
     draw_outline,
     draw_plan,
@@ -40,7 +41,6 @@ from blast_env.rendering.site_plan import (
 from blast_env.rendering.style import (
     count_of,
     nice_ceiling,
-    number_on_axis,
     render_extra,
     unit_interval,
 )
@@ -55,7 +55,6 @@ with render_extra():
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
-    from matplotlib.ticker import FuncFormatter
 
 
 _PERCENT = 100.0
@@ -96,7 +95,6 @@ def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
 
 
 def _charge_legend(evaluation: LayoutEvaluation) -> list[Artist]:
-    """Return the legend entries for the charges."""
     handles: list[Artist] = [_charge_handle("o", "charge")]
     if not evaluation.in_range:
         handles.append(_charge_handle("s", "charge outside the calibration's range"))
@@ -303,14 +301,8 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
         )
     figure = panels[0].get_figure(root=True)
     assert figure is not None
-    bar = figure.colorbar(
-        ScalarMappable(scale, load_colours()),
-        ax=list(panels),
-        shrink=0.9,
-        pad=0.03,
-        format=FuncFormatter(number_on_axis),
-    )
-    bar.set_label("mean impulse per module\n(simulation units); white: not hit")
+    label = "mean impulse per module\n(simulation units); white: not hit"
+    add_bar(figure, panels, ScalarMappable(scale, load_colours()), label, shrink=0.9, pad=0.03)
 
 
 def _draw_structure(axes: Axes, obstacle: ModularObstacle, scale: Normalize) -> None:
@@ -433,7 +425,6 @@ def _draw_case(axes: Axes, panel: _Panel, features: Sequence[Feature], name: str
 
 
 def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
-    """Write two quiet lines between title and panel."""
     (x_m, y_m), tnt_kg = panel.charge.position_m, panel.charge.tnt_kg
     charge = f"{tnt_kg:g} kg TNT at ({x_m:.1f}, {y_m:.1f}) m"
     axes.annotate(

@@ -17,13 +17,11 @@ from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.particles import CollisionType, explosion_fan
 from blast_env.physics.scene import Scene, StructureOutline
-from blast_env.physics.structure import Colour, ModularObstacle, load_colour
+from blast_env.physics.structure import Colour, ModularObstacle
 from blast_env.plan import (
-    BARRIER,
     EXPLOSIVE,
     INK,
     QUIET_INK,
-    STRUCTURE,
     Feature,
     Kinds,
     area_feature,
@@ -31,9 +29,9 @@ from blast_env.plan import (
 from blast_env.recording.tables import faces_hit
 from blast_env.rendering.heat_map import LoadScale, common_scale, heat_map
 from blast_env.rendering.site_plan import (
+    draw_loads,
     draw_outline,
     draw_site,
-    rectangle_patch,
     write_heading,
     write_names,
 )
@@ -52,7 +50,8 @@ from blast_env.values import path_of
 
 with render_extra():
     from matplotlib.axes import Axes
-    from matplotlib.collections import EllipseCollection, PatchCollection
+    from matplotlib.collections import EllipseCollection
+    from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
     from matplotlib.ticker import FuncFormatter
@@ -98,14 +97,7 @@ def _feature_of(outline: StructureOutline) -> Feature:
 
 def _draw_obstacles(axes: Axes, scene: Scene) -> None:
     for outline in scene.structures:
-        is_barrier = outline.cells is not None
-        modules = PatchCollection(
-            [rectangle_patch(part.rectangle_m) for part in outline.build().parts],
-            facecolor=unit_interval(load_colour(0.0)),
-            edgecolor=unit_interval(BARRIER if is_barrier else STRUCTURE),
-            linewidth=0.8 if is_barrier else 0.3,
-        )
-        axes.add_collection(modules)
+        draw_loads(axes, outline.build(), Normalize(0.0, 1.0), 0.3)
         draw_outline(axes, outline)
 
 
@@ -421,7 +413,6 @@ def initial_velocities(parameters: SimulationParameters, count: int = 12) -> Fig
 
 
 def _draw_arrows(axes: Axes, velocity: FloatArray, speed: float) -> None:
-    """Draw every velocity from the centre, with its index and angle at the tip."""
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     axes.plot(
         speed * np.cos(angle),

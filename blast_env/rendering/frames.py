@@ -196,7 +196,6 @@ def _ball(kind: CollisionType) -> Line2D:
 
 
 def _signs(scene: Scene) -> list[Artist]:
-    """Return the legend entries of balls and modules."""
     kinds = {"explosive ball": CollisionType.ExplosionBall}
     if scene.parameters.air.spacing_units > 0.0:
         kinds["air ball"] = CollisionType.AirBall

@@ -20,10 +20,11 @@ from blast_env.geometry import Rectangle, layout_counts
 from blast_env.physics.scene import WALLS, StructureOutline, WallName
 from blast_env.plan import FAINT, QUIET_INK
 from blast_env.rendering.site_plan import (
+    add_bar,
     load_colours,
     write_heading,
 )
-from blast_env.rendering.style import nice_ceiling, number_on_axis, render_extra, unit_interval
+from blast_env.rendering.style import nice_ceiling, render_extra, unit_interval
 from blast_env.units import MS_PER_S
 
 with render_extra():
@@ -31,7 +32,6 @@ with render_extra():
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Colormap, Normalize
     from matplotlib.figure import Figure
-    from matplotlib.ticker import FuncFormatter
 
 Quantity = Literal["impulse", "peak"]
 """What is drawn: the impulse of all positive phases, or the largest overpressure."""
@@ -227,14 +227,8 @@ def facades(
         panels[row][0].set_ylabel(f"{words}z (m)")
     for axes, wall in zip(panels[-1], _LEFT_TO_RIGHT, strict=True):
         axes.set_xlabel(f"{_LEFT_TO_RIGHT[wall][0]} (m)")
-    bar = figure.colorbar(
-        ScalarMappable(scale, load_colours()),
-        ax=panels.ravel().tolist(),
-        shrink=0.85,
-        pad=0.02,
-        format=FuncFormatter(number_on_axis),
-    )
-    bar.set_label(kind.label)
+    colours = ScalarMappable(scale, load_colours())
+    add_bar(figure, panels.ravel().tolist(), colours, kind.label, shrink=0.85, pad=0.02)
     title, subtitle = gas_heading(results, f"{kind.name} on the walls of {outline.name}")
     write_heading(figure, title, f"{subtitle}; walls seen from outside")
     return figure
@@ -256,7 +250,6 @@ def full_load(result: GasResult, structure: str, quantity: Quantity) -> float:
 
 
 def _full(walls: Sequence[Mapping[WallName, FloatArray]]) -> float:
-    """Return the largest load on walls, rounded up."""
     largest = max(float(np.nanmax(v, initial=0.0)) for row in walls for v in row.values())
     return nice_ceiling(largest) if largest > 0.0 else 1.0
 

@@ -25,6 +25,7 @@ from blast_env.rendering.gas import (
     loads_and_solids,
 )
 from blast_env.rendering.site_plan import (
+    add_bar,
     add_outline,
     draw_features,
     draw_plan,
@@ -33,7 +34,7 @@ from blast_env.rendering.site_plan import (
     write_legend,
     write_names,
 )
-from blast_env.rendering.style import number_on_axis, render_extra, short_number, unit_interval
+from blast_env.rendering.style import render_extra, short_number, unit_interval
 from blast_env.response.buildings import GroundThreshold, ground_thresholds
 from blast_env.units import PA_PER_KPA
 
@@ -47,7 +48,7 @@ with render_extra():
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle, Patch
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+    from matplotlib.ticker import FixedLocator, NullLocator
 
 _LEVELS: Final = {"few": (1.0, 2.0, 5.0), "many": (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)}
 _FEW_LEVELS: Final = 7
@@ -143,17 +144,10 @@ def ground_map(
     figure, plans = _plans(results)
     for axes, each, value in zip(plans, results, values, strict=True):
         _draw_ground(axes, each, value, levels, scale)
-    bar = figure.colorbar(
-        ScalarMappable(scale, loads_and_solids()),
-        ax=list(plans),
-        extend="both",
-        shrink=0.85,
-        pad=0.02,
-        format=FuncFormatter(number_on_axis),
-    )
+    colours = ScalarMappable(scale, loads_and_solids())
+    bar = add_bar(figure, plans, colours, kind.label, extend="both", shrink=0.85, pad=0.02)
     bar.ax.yaxis.set_major_locator(FixedLocator(levels))
     bar.ax.yaxis.set_minor_locator(NullLocator())
-    bar.set_label(kind.label)
     features = [feature for each in results for feature in _features(each)]
     handles = legend_of(without_counts(features) if len(results) > 1 else features)
     if result.run.charge.on_ground:
@@ -240,7 +234,6 @@ def _add_circle(axes: Axes, charge: Charge, radius_m: float, **style: Any) -> No
 def _write(
     figure: Figure, results: Sequence[GasResult], handles: Sequence[Artist], what: str, note: str
 ) -> None:
-    """Write legend, heading and names."""
     write_legend(figure, handles)
     title, subtitle = gas_heading(results, what)
     write_heading(figure, title, f"{subtitle}; {note}")

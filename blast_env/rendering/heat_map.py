@@ -19,6 +19,7 @@ from blast_env.plan import (
     without,
 )
 from blast_env.rendering.site_plan import (
+    add_bar,
     draw_loads,
     draw_outline,
     draw_plan,
@@ -32,7 +33,6 @@ from blast_env.rendering.style import (
     blast_title,
     count_of,
     nice_ceiling,
-    number_on_axis,
     render_extra,
     short_number,
     unit_interval,
@@ -46,7 +46,6 @@ with render_extra():
     from matplotlib.layout_engine import ConstrainedLayoutEngine
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
-    from matplotlib.ticker import FuncFormatter
 
 _HEIGHT_IN = 6.6
 _PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 4.6, (4.0, 8.0)
@@ -256,12 +255,9 @@ def _add_colour_bar(
         for obstacle in result.obstacles
         for part in obstacle.parts
     )
-    bar = figure.colorbar(
+    colours, label = (
         ScalarMappable(scale.norm, load_colours()),
-        ax=panels,
-        extend="max" if beyond else "neither",
-        shrink=0.85,
-        pad=0.03,
-        format=FuncFormatter(number_on_axis),
+        f"{scale.unit.label}; white: not hit",
     )
-    bar.set_label(f"{scale.unit.label}; white: not hit")
+    extend = "max" if beyond else "neither"
+    add_bar(figure, panels, colours, label, extend=extend, shrink=0.85, pad=0.03)

@@ -3,9 +3,10 @@
 import numpy as np
 
 from blast_env.importing import FittedBuilding, ImportedSite
-from blast_env.importing.plane import rotated
 from blast_env.plan import INK, PROTECTED, STRUCTURE, Kinds, site_features, without
+from blast_env.rendering.site_picture import draw_north
 from blast_env.rendering.site_plan import (
+    PLAN,
     draw_plan,
     legend_of,
     rectangle_patch,
@@ -27,7 +28,6 @@ with render_extra():
 _WIDTH_IN = 10.0
 _LEAST_IN, _MOST_IN = 5.0, 11.0
 _HEADING_IN = 1.7
-_ARROW_PT = 34.0
 _FAINT = 0.35
 
 
@@ -58,7 +58,7 @@ def imported_plan(imported: ImportedSite) -> Figure:
     draw_plan(axes, features)
     for building in imported.buildings:
         _draw_building(axes, building)
-    _draw_north(axes, imported)
+    draw_north(axes, scenario, PLAN)
     write_legend(figure, [*_legend(), *legend_of(features)])
     worst = max(imported.buildings, key=lambda each: each.deviation.outline_m)
     write_heading(
@@ -95,22 +95,3 @@ def _draw_building(axes: Axes, building: FittedBuilding) -> None:
         zorder=6,
     )
     text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])
-
-
-def _draw_north(axes: Axes, imported: ImportedSite) -> None:
-    """Draw an arrow to the north, or along a drawing's y axis, in the upper right corner."""
-    georeference = imported.scenario.georeference
-    assert georeference is not None
-    east, north = rotated(np.array([[0.0, 1.0]]), -georeference.rotation_deg)[0]
-    label = "N" if georeference.kind == "map" else "y"
-    axes.annotate(
-        label,
-        xy=(0.93, 0.87),
-        xycoords="axes fraction",
-        xytext=(_ARROW_PT * east, _ARROW_PT * north),
-        textcoords="offset points",
-        arrowprops={"arrowstyle": "<|-", "color": unit_interval(INK)},
-        ha="center",
-        va="center",
-        fontweight="bold",
-    )

@@ -474,7 +474,6 @@ def _signed(value: float, position: int | None) -> str:  # noqa: ARG001
 
 
 def _on_ground(shot: PressureShot) -> tuple[Feature, ...]:
-    """Return what lies on the ground."""
     blast = shot.result.blast
     features = blast_features(blast.scenario, (), shot.result.run.site.charge)
     return without(features, Kinds.SITE, *STANDING)

@@ -91,7 +91,7 @@ def site_picture(
         else:
             draw_plan(axes, features)
             _draw_plan_scale(axes, found)
-            _draw_north(axes, found, PLAN)
+            draw_north(axes, found, PLAN)
             shown.append((axes, features, PLAN))
     write_heading(figure, found.name, _subtitle(found, placement))
     for axes, of_view, seen in shown:
@@ -167,10 +167,10 @@ def _draw_directions(axes: Axes, scenario: Scenario, view: View) -> None:
     """Draw how the axes of the plan run in the oblique view, and north where it is known."""
     for label, x, y in (("x", 1.0, 0.0), ("y", 0.0, 1.0)):
         _draw_arrow(axes, view, label, (x, y), place=(0.09, 0.88))
-    _draw_north(axes, scenario, view)
+    draw_north(axes, scenario, view)
 
 
-def _draw_north(axes: Axes, scenario: Scenario, view: View) -> None:
+def draw_north(axes: Axes, scenario: Scenario, view: View) -> None:
     """Draw an arrow to the north, or along the y axis of the drawing that a site comes from."""
     georeference = scenario.georeference
     if georeference is not None:

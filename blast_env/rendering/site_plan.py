@@ -23,13 +23,15 @@ from blast_env.plan import (
     Look,
     area_feature,
 )
-from blast_env.rendering.style import render_extra, unit_interval
+from blast_env.rendering.style import number_on_axis, render_extra, unit_interval
 
 with render_extra():
     from matplotlib import patheffects
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.colorbar import Colorbar
     from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -37,6 +39,7 @@ with render_extra():
     from matplotlib.patches import Rectangle as RectanglePatch
     from matplotlib.path import Path
     from matplotlib.text import Text
+    from matplotlib.ticker import FuncFormatter
     from matplotlib.transforms import Bbox
 
 
@@ -69,6 +72,16 @@ def load_colours() -> Colormap:
     colours = [unit_interval(colour) for colour in LoadColours()]
     colour_map = LinearSegmentedColormap.from_list("load", colours)
     return colour_map.with_extremes(bad=unit_interval(PAGE))
+
+
+def add_bar(
+    figure: Figure, panels: Sequence[Axes], colours: ScalarMappable, label: str, **style: Any
+) -> Colorbar:
+    """Add a colour bar beside panels; `style` is matplotlib's."""
+    form = FuncFormatter(number_on_axis)
+    bar = figure.colorbar(colours, ax=list(panels), format=form, **style)
+    bar.set_label(label)
+    return bar
 
 
 def rectangle_patch(rectangle: Rectangle) -> RectanglePatch:
@@ -136,13 +149,11 @@ def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) ->
 
 
 def _places(feature: Feature, view: View) -> FloatArray:
-    """Return where the places of a feature are in the picture."""
     height_m = feature.above_ground_m if len(feature.places_m) == 1 else 0.0
     return view.places(np.array([(*place_m, height_m) for place_m in feature.places_m]))
 
 
 def _area_style(look: Look, fill: object) -> dict[str, Any]:
-    """Return matplotlib's style for an area."""
     line = QUIET_INK if look.line is None else look.line
     style: dict[str, Any] = {
         "facecolor": (*unit_interval(fill), look.opacity) if isinstance(fill, tuple) else "none",
@@ -167,7 +178,6 @@ def _line(feature: Feature, places: FloatArray) -> Artist:
 
 
 def _dashes(look: Look) -> tuple[float, Sequence[float]] | None:
-    """Return matplotlib's pattern of a line."""
     return (0.0, (3.0, 1.5)) if look.dashed else None
 
 
@@ -366,7 +376,6 @@ def _lay_out(figure: Figure) -> None:
 
 
 def _other_texts(axes: Axes, names: Sequence[Text]) -> list[Rectangle]:
-    """Return where texts other than the names are."""
     others = [text for text in axes.texts if text not in names and text.get_text()]
     boxes: list[Bbox] = [text.get_window_extent() for text in others]
     return [Rectangle(*box.extents) for box in boxes]

@@ -152,7 +152,6 @@ class WallHistories:
         return np.array(self._means)[:, keys.index((target, wall))]
 
     def _walls(self, solver: Gas) -> dict[tuple[str, WallName], NDArray[np.int64]]:
-        """Return the faces of each wall that counts."""
         faces = solver.faces
         behind_m = np.asarray(solver.grid.origin_m) + solver.grid.cell_m * (faces.solid + 0.5)
         number = 2 * faces.axis + (faces.side > 0)  # of `WALLS`; 4 and 5 look down and up
@@ -260,14 +259,12 @@ class MeasuredBlast:
         )
 
     def _is_complete(self, target: ReportedBuilding, wall: WallName) -> bool:
-        """Return whether the impulses on a building, and on a wall of it, are complete."""
         buildings, walls = self.result.buildings, self.result.walls
         on_building = buildings.loc[buildings["building"] == target.name, "complete"]
         on_wall = walls["structure"].isin(target.names) & (walls["face"] == wall) & walls["counts"]
         return bool(on_building.all() and walls.loc[on_wall, "complete"].all())
 
     def _duration_s(self, target: str, wall: WallName) -> float:
-        """Return how long the first positive phase on a wall lasts."""
         pressure = self.histories.of(target, wall)
         if pressure is None:
             return float("nan")

@@ -128,7 +128,6 @@ def report_html(study: Study, commands: list[str]) -> str:
 
 
 def _context(study: Study, commands: list[str]) -> dict[str, Any]:
-    """Return what the template shows."""
     scenario, options = study.scenario, study.options
     coarse, fine = options.cells_m
     protected = [each for each in study.targets if each.protected]
@@ -210,7 +209,6 @@ def _summary(study: Study) -> list[SummaryLine]:
 
 
 def _standing(verdict: ReportVerdict) -> str:
-    """Return what the pieces of the barrier do, in words."""
     if verdict.barrier is None:
         return ""
     counts = verdict.barrier.pieces["outcome"].value_counts()
@@ -218,7 +216,6 @@ def _standing(verdict: ReportVerdict) -> str:
 
 
 def _spread(study: Study) -> tuple[float, float] | None:
-    """Return the least and the largest reduction over other masses and places."""
     outcomes = [each for own in study.masses.values() for each in own]
     shares = [each.reduction for each in (*outcomes, *study.places)]
     found = [share for share in shares if isfinite(share)]

@@ -386,7 +386,6 @@ class Runs:
         return Consequences.together(self._found[cell_m, walled])
 
     def _damage_pictures(self, threat: str, cell_m: float) -> tuple[Picture, ...]:
-        """Return the damage of the buildings with facades under the last threat."""
         bare, walled = (self._found[cell_m, is_walled][-1] for is_walled in (False, True))
         return damage_pictures(self.scenario, self.layout, bare, walled, threat)
 

@@ -136,7 +136,6 @@ def _worst(scenario: Scenario, source: AnySource) -> AnyCharge:
 
 
 def _why(charge: AnyCharge, index: int, scaled: float) -> str:
-    """Return why a charge is among the chief threats."""
     if isinstance(charge, VehicleCharge):
         return (
             f"charge source {index + 1}, a vehicle {charge.source.width_m:g} m wide, as near to "
@@ -194,7 +193,6 @@ def _spread(source: Placed, count: int) -> Iterator[tuple[float, float]]:
 
 
 def _distance_m(scenario: Scenario, place: tuple[float, float]) -> float:
-    """Return the distance of a place from the nearest protected structure."""
     return min(each.distance_to(place) for each in _protected(scenario))
 
 

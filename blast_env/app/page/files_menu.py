@@ -33,7 +33,6 @@ _LEVELS: Final = {
 
 
 def _menu(words: str, icon: str) -> ui.menu:
-    """Return the menu of a button in the header."""
     with ui.button(words, icon=icon).props("flat dense no-caps color=white"):
         return ui.menu()
 

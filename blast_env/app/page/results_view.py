@@ -189,7 +189,6 @@ class ResultsView:
             yield _Found(each, record, frames, f"/blasts/{where}/", damage | others)
 
     def _offer(self, found: Sequence[_Found]) -> None:
-        """Offer what pictures there are."""
         labels = dict.fromkeys(label for each in found for label in each.pictures)
         gauges = [_GAUGES] if any(each.record and each.record.waves for each in found) else []
         options = [_FILM, *labels, *gauges]

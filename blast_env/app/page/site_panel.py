@@ -114,7 +114,6 @@ class SitePanel:
         return element
 
     def _components(self, kind: str) -> dict[str, str]:
-        """Return the components of a kind, with their titles."""
         known = {**catalogue(), **self._editor.session.scenario.components}
         return {name: each.title or name for name, each in known.items() if each.kind == kind}
 
