@@ -5,7 +5,6 @@ Whatever takes long tells how far it has come through a `Teller`, and may be int
 """
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from time import monotonic, time
 from typing import Final
@@ -172,25 +171,14 @@ def practice_case(scenario: Scenario, task: SearchTask) -> Case:
 def _film(task: FilmTask, teller: Teller) -> None:
     scenario, charge = task.site, task.threats[0].charge
     layout, path = placing.layout_from(scenario, task.layout), Path(task.path)
+    engine = find_engine(task.engine.name, task.engine.cell_m)
+    bare, own = (engine.blast(scenario, each, 0, charge) for each in ((), layout))
     write: Callable[..., object]
-    if not task.engine.is_first_look:
-        from blast_env.engines.gas import GasBlast
-        from blast_env.rendering.pressure_film import write_pressure_film
-
-        engine = find_engine(task.engine.name, task.engine.cell_m)
-        blasts = [GasBlast(scenario, each, 0, engine, charge) for each in ((), layout)]  # type: ignore[arg-type]
-        write = partial(write_pressure_film, blasts[-1], path, progress=teller.share)
-        write(beside=blasts[0] if layout else None)
+    if task.engine.is_first_look:
+        from blast_env.rendering.film import write_film as write
     else:
-        from blast_env.engines import Blast
-        from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
-
-        bare, own = (Blast(scenario, each, 0, "event", charge) for each in ((), layout))
-        if layout:
-            panels = [FilmPanel(bare, "no barrier"), FilmPanel(own, "with the layout")]
-            write_side_by_side(panels, path, progress=teller.share)
-        else:
-            write_film(own, path, progress=teller.share)
+        from blast_env.rendering.pressure_film import write_pressure_film as write
+    write(own, path, beside=bare if layout else None, progress=teller.share)
     teller.tell(state="done", share=1.0, text=f"wrote {path.name}", file=str(path))
 
 

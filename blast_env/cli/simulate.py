@@ -260,12 +260,6 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         *("transferred (sim)", "impulse (Pa s)", "first hit (ms)"),
     )
 
-    def check(self) -> None:
-        """Refuse a film that cannot be written."""
-        film = self.command.film
-        if self.command.side_by_side and film is not None and film.suffix.lower() != ".mp4":
-            raise BlastEnvError(f"--film {film}: of two blasts of particles it must be .mp4")
-
     def run_one(self, blast: Blast, progress: Tell) -> BlastResult:
         """Run one blast to its end."""
         return blast.run(progress)
@@ -275,14 +269,10 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
     ) -> tuple[BlastResult | None, BlastResult]:
         """Write the film of the blast, and of the other beside it; return their results."""
         # Here, because films need the extra `render`.
-        from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
+        from blast_env.rendering.film import write_film
 
-        if bare is None:
-            return None, write_film(self.blast, path, progress=progress)
-        words = f"barrier of {layout_counts(self.blast.layout)}"
-        panels = [FilmPanel(bare, "no barrier"), FilmPanel(self.blast, words)]
-        first, second = write_side_by_side(panels, path, progress=progress)
-        return first, second
+        results = write_film(self.blast, path, beside=bare, progress=progress)
+        return (None if bare is None else results[0]), results[-1]
 
     def write_pictures(self, result: BlastResult, bare: BlastResult | None) -> list[Path]:
         """Write the pictures; those of the empty site have files of their own."""

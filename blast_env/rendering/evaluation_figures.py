@@ -39,6 +39,7 @@ from blast_env.rendering.site_plan import (
     write_names,
 )
 from blast_env.rendering.style import (
+    charge_text,
     count_of,
     nice_ceiling,
     render_extra,
@@ -185,13 +186,11 @@ def _title(evaluation: LayoutEvaluation) -> str:
 
 
 def _subtitle(evaluation: LayoutEvaluation) -> str:
-    charge = evaluation.worst.charge
-    x_m, y_m = charge.position_m
     stand_off = stand_off_text(evaluation.scenario, evaluation.layout)
     range_note = "" if evaluation.in_range else "; partly outside the calibration's range"
     return (
-        f"{count_of('threat', len(evaluation.threats))}; worst: {charge.tnt_kg:g} kg TNT at "
-        f"({x_m:.1f} m, {y_m:.1f} m), {_load_text(evaluation, evaluation.worst.load)}; "
+        f"{count_of('threat', len(evaluation.threats))}; worst: "
+        f"{charge_text(evaluation.worst.charge)}, {_load_text(evaluation, evaluation.worst.load)}; "
         f"{stand_off and f'{stand_off}; '}"
         f"calibration {evaluation.calibration}, engine {evaluation.engine.name}{range_note}"
     )

@@ -21,7 +21,15 @@ from blast_env.physics.engine import BlastRun
 from blast_env.plan import PAGE
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.frames import FramePainter
-from blast_env.rendering.style import nice_load, nice_numbers, render_extra, shown_until_s
+from blast_env.rendering.style import (
+    barrier_text,
+    blast_title,
+    charge_text,
+    nice_load,
+    nice_numbers,
+    render_extra,
+    shown_until_s,
+)
 from blast_env.runner import Tell, share_of
 from blast_env.units import MS_PER_S
 from blast_env.values import path_of
@@ -114,62 +122,64 @@ def plan_until(
     return plan
 
 
-@dataclass(frozen=True, eq=False)
-class FilmPanel:
-    """One blast of a film.
-
-    Attributes:
-        blast: The blast.
-        title: Heading of its part of the frame; the usual one of a blast unless given.
-    """
-
-    blast: Blast
-    title: str | None = None
-
-    @property
-    def subtitle(self) -> str | None:
-        """The line under a heading of its own: short, because a part of a frame is narrow."""
-        if self.title is None:
-            return None
-        charge = self.blast.scene.charge
-        x_m, y_m = charge.position_m
-        return f"{charge.tnt_kg:g} kg TNT at ({x_m:.1f} m, {y_m:.1f} m), seed {self.blast.seed}"
-
-
 def write_film(
     blast: Blast,
     path: str | Path,
+    *,
+    beside: Blast | None = None,
     frames_per_s: float = 25.0,
     slow_motion: float | None = None,
-    width_px: int = 960,
+    width_px: int | None = None,
     progress: Tell = lambda _: None,
     full_impulse: float | None = None,
-) -> BlastResult:
-    """Write a film of a blast; return what happened in it.
+) -> tuple[BlastResult, ...]:
+    """Write a film of a blast, or of two side by side.
 
-    The blast is run twice: first to learn the loads and when they arrive, then to draw it.
-    Between the engine's steps balls are drawn where they fly without a collision.
+    Each blast is run twice: first to learn the loads and when they arrive, then to draw it.
+    Between the engine's steps balls are drawn where they fly without a collision. Two blasts are
+    shown at the same moments, and a colour means the same load in both; the film ends when that of
+    the blast which takes longer would end.
 
     Args:
         blast: The blast.
         path: The film, `.mp4` or `.gif`. A GIF is at most 640 pixels wide and has at most 12.5
             frames a second, or it would get too large to send.
+        beside: Another blast, shown to the left: without the barrier, or with another layout.
         frames_per_s: Frames in a second of the film.
         slow_motion: Seconds of the film for a second of the blast; see `plan_film`, which also
             gives the real-time factor from the result.
-        width_px: Width of the film; made even.
+        width_px: Width of the film; 960, or 1600 with two blasts. Each gets the same part, made
+            even.
         progress: Called from time to time with the share of the work that is done.
         full_impulse: Impulse of a module, simulation units, that has the last colour; give the
             same one to films that are to be compared. Without it it is the largest load of a
             protected module, rounded up.
 
+    Returns:
+        The results of the blasts, from left to right.
+
     Raises:
         BlastEnvError: If the suffix is another one, an argument is out of bounds or the file
             cannot be written; nothing is left behind then, nor after Ctrl-C.
     """
-    options = (frames_per_s, slow_motion, width_px, progress)
-    (result,) = _write((FilmPanel(blast),), path, *options, full_impulse)
-    return result
+    suffix = known_suffix(path)
+    blasts = [blast] if beside is None else [beside, blast]
+    width_px = width_px or (960 if beside is None else 1600)
+    with write_atomically(path) as temporary:
+        running = share_of(progress, 0, 10, _TENTHS_OF_FIRST_RUNS)
+        results = tuple(
+            each.run(share_of(running, number, len(blasts))) for number, each in enumerate(blasts)
+        )
+        plans = [plan_film(result, frames_per_s, slow_motion) for result in results]
+        plan = max(plans, key=lambda each: each.end_s)
+        if suffix == ".gif":
+            plan, width_px = for_gif(plan, width_px)
+        painters = _painters(results, width_px // len(blasts), full_impulse)
+        drawing = share_of(progress, _TENTHS_OF_FIRST_RUNS, 10, 10 - _TENTHS_OF_FIRST_RUNS)
+        frames = told_of(_frames(blasts, painters, plan), plan, drawing)
+        title = blast.scenario.name
+        save_frames(frames, temporary, suffix, plan, title, _comment(plan, blasts))
+    return results
 
 
 def known_suffix(path: str | Path) -> str:
@@ -316,8 +326,7 @@ def told_of(frames: Iterable[Frame], plan: FilmPlan, progress: Tell) -> Iterator
         progress(number / plan.frame_count)
 
 
-def _comment(plan: FilmPlan, panels: Sequence[FilmPanel]) -> str:
-    blasts = [panel.blast for panel in panels]
+def _comment(plan: FilmPlan, blasts: Sequence[Blast]) -> str:
     shown = dict.fromkeys(f"{blast.scenario.name}, seed {blast.seed}" for blast in blasts)
     return (
         f"{'; '.join(shown)}, {plan.real_time_factor}, {plan.end_s * MS_PER_S:.4g} ms of "
@@ -366,95 +375,35 @@ def _largest_load(result: BlastResult) -> float:
     return 0.0
 
 
-def write_side_by_side(
-    panels: Sequence[FilmPanel],
-    path: str | Path,
-    frames_per_s: float = 25.0,
-    slow_motion: float | None = None,
-    width_px: int = 1600,
-    progress: Tell = lambda _: None,
-) -> tuple[BlastResult, ...]:
-    """Write a film of blasts side by side; return what happened in each.
-
-    All show the same moment, and a colour means the same load in all. The film ends when that of
-    the blast which takes longest would end; see `plan_film`. Every blast is run twice: first to
-    learn its loads, then to draw it.
-
-    Args:
-        panels: The blasts, from left to right; at least two.
-        path: The film, `.mp4`.
-        frames_per_s: Frames in a second of the film.
-        slow_motion: Seconds of the film for a second of the blast; see `plan_film`.
-        width_px: Width of the film; every panel gets the same part, made even.
-        progress: Called from time to time with the share of the work that is done.
-
-    Raises:
-        BlastEnvError: If there are fewer than two panels, the suffix is another one, an argument
-            is out of bounds or the file cannot be written; nothing is left behind then.
-    """
-    if len(panels) < 2:
-        raise BlastEnvError(f"panels: there are {len(panels)}, must be at least 2")
-    if path_of(path).suffix.lower() != ".mp4":
-        raise BlastEnvError(f"{path}: suffix is {path_of(path).suffix!r}, must be '.mp4'")
-    return _write(panels, path, frames_per_s, slow_motion, width_px, progress)
-
-
-def _write(
-    panels: Sequence[FilmPanel],
-    path: str | Path,
-    frames_per_s: float,
-    slow_motion: float | None,
-    width_px: int,
-    progress: Tell,
-    full_impulse: float | None = None,
-) -> tuple[BlastResult, ...]:
-    """Write a film of blasts; see `write_film` and `write_side_by_side`."""
-    suffix = known_suffix(path)
-    with write_atomically(path) as temporary:
-        running = share_of(progress, 0, 10, _TENTHS_OF_FIRST_RUNS)
-        results = tuple(
-            panel.blast.run(share_of(running, number, len(panels)))
-            for number, panel in enumerate(panels)
-        )
-        plans = [plan_film(result, frames_per_s, slow_motion) for result in results]
-        plan = max(plans, key=lambda each: each.end_s)
-        if suffix == ".gif":
-            plan, width_px = for_gif(plan, width_px)
-        painters = _painters(panels, results, width_px // len(panels), full_impulse)
-        title = " | ".join(panel.title or panel.blast.scenario.name for panel in panels)
-        drawing = share_of(progress, _TENTHS_OF_FIRST_RUNS, 10, 10 - _TENTHS_OF_FIRST_RUNS)
-        frames = told_of(_frames(panels, painters, plan), plan, drawing)
-        save_frames(frames, temporary, suffix, plan, title, _comment(plan, panels))
-    return results
-
-
 def _painters(
-    panels: Sequence[FilmPanel],
-    results: Sequence[BlastResult],
-    width_px: int,
-    full_impulse: float | None,
+    results: Sequence[BlastResult], width_px: int, full_impulse: float | None
 ) -> list[FramePainter]:
-    """Return a painter a panel, all with the colours of the largest load on what is protected."""
+    """Return a painter a blast, all with the colours of the largest load on what is protected."""
     unit = max(results, key=_largest_load).load_unit  # one scale for all, so that they compare
     if full_impulse is None:
         full_impulse = scale_end(results, unit)
-    return [
-        FramePainter(
-            panel.blast,
-            title=panel.title,
-            subtitle=panel.subtitle,
+    painters = []
+    for result in results:
+        title, subtitle = blast_title(result.blast)
+        if len(results) > 1:  # short, because a part of a frame is narrow
+            title = barrier_text(result.blast.layout)
+            subtitle = f"{charge_text(result.blast.scene.charge)}, seed {result.blast.seed}"
+        painter = FramePainter(
+            result.blast,
+            title=title,
+            subtitle=subtitle,
             width_px=width_px - width_px % 2,
             full_impulse=full_impulse,
             unit=unit.with_loads_of(result.load_unit),
         )
-        for panel, result in zip(panels, results, strict=True)
-    ]
+        painters.append(painter)
+    return painters
 
 
 def _frames(
-    panels: Sequence[FilmPanel], painters: Sequence[FramePainter], plan: FilmPlan
+    blasts: Sequence[Blast], painters: Sequence[FramePainter], plan: FilmPlan
 ) -> Iterator[Frame]:
-    runs = [panel.blast.start() for panel in panels]
+    runs = [blast.start() for blast in blasts]
     height_px = max(painter.size_px[1] for painter in painters)
     for number in range(plan.frame_count):
         time_s = plan.time_s(number)
@@ -462,10 +411,10 @@ def _frames(
             paint_at(run, painter, time_s, plan.real_time_factor)
             for run, painter in zip(runs, painters, strict=True)
         )
-        yield np.concatenate([_made_higher(frame, height_px) for frame in frames], axis=1)
+        yield np.concatenate([made_higher(frame, height_px) for frame in frames], axis=1)
 
 
-def _made_higher(frame: Frame, height_px: int) -> Frame:
+def made_higher(frame: Frame, height_px: int) -> Frame:
     """Return a frame with empty page below; legends need not have as many lines."""
     below = np.full((height_px - frame.shape[0], frame.shape[1], 3), PAGE, dtype=np.uint8)
     return np.concatenate([frame, below])

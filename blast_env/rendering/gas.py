@@ -16,7 +16,7 @@ from blast_env.arrays import FloatArray
 from blast_env.calibration.references import Burst, Friedlander, kingery_bulmash
 from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.geometry import Rectangle, layout_counts
+from blast_env.geometry import Rectangle
 from blast_env.physics.scene import WALLS, StructureOutline, WallName
 from blast_env.plan import FAINT, QUIET_INK
 from blast_env.rendering.site_plan import (
@@ -24,7 +24,7 @@ from blast_env.rendering.site_plan import (
     load_colours,
     write_heading,
 )
-from blast_env.rendering.style import nice_ceiling, render_extra, unit_interval
+from blast_env.rendering.style import barrier_text, nice_ceiling, render_extra, unit_interval
 from blast_env.units import MS_PER_S
 
 with render_extra():
@@ -102,11 +102,6 @@ def kind_of(quantity: str | Kind) -> Kind:
     return KINDS[quantity]
 
 
-def layout_words(blast: GasBlast) -> str:
-    """Return what barrier a blast has, in words."""
-    return f"barrier of {layout_counts(blast.layout)}" if blast.layout else "no barrier"
-
-
 def gas_subtitle(blasts: Sequence[GasBlast]) -> str:
     """Return charge and cells of blasts in words; the seed has nothing to say beside them.
 
@@ -150,7 +145,7 @@ def gas_heading(results: Sequence[GasResult], what: str) -> tuple[str, str]:
     blast = results[-1].blast
     subtitle = gas_subtitle([each.blast for each in results])
     if len(results) == 1:
-        subtitle += f", {layout_words(blast)}"
+        subtitle += f", {barrier_text(blast.layout)}"
     return f"{blast.scenario.name}: {what}", subtitle
 
 
@@ -236,7 +231,7 @@ def facades(
 
 def _row_words(blast: GasBlast) -> str:
     """Return what barrier a blast has, in words as long as a wall is high."""
-    return "\n".join(wrap(layout_words(blast), _ROW_LETTERS))
+    return "\n".join(wrap(barrier_text(blast.layout), _ROW_LETTERS))
 
 
 def full_load(result: GasResult, structure: str, quantity: Quantity) -> float:
@@ -411,7 +406,7 @@ def gauge_history(
         # Still air before.
         time_s = np.concatenate(([0.0, 2.0 * time_s[0] - time_s[1]], time_s))
         overpressure = np.concatenate(([0.0, 0.0], overpressure))
-        words = layout_words(each.blast)
+        words = barrier_text(each.blast.layout)
         _draw_wave(
             (upper, lower),
             (time_s, overpressure, _positive_impulse(time_s, overpressure)),

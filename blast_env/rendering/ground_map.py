@@ -21,7 +21,6 @@ from blast_env.rendering.gas import (
     both_results,
     gas_heading,
     kind_of,
-    layout_words,
     loads_and_solids,
 )
 from blast_env.rendering.site_plan import (
@@ -34,7 +33,7 @@ from blast_env.rendering.site_plan import (
     write_legend,
     write_names,
 )
-from blast_env.rendering.style import render_extra, short_number, unit_interval
+from blast_env.rendering.style import barrier_text, render_extra, short_number, unit_interval
 from blast_env.response.buildings import GroundThreshold, ground_thresholds
 from blast_env.units import PA_PER_KPA
 
@@ -208,7 +207,7 @@ def _plans(results: Sequence[GasResult], more_in: float = 0.0) -> tuple[Figure, 
     for axes, each in zip(plans, results, strict=True):
         draw_plan(axes, [feature for feature in _features(each) if feature.kind is Kinds.SITE])
         if len(results) > 1:
-            axes.set_title(layout_words(each.blast), fontsize=11)
+            axes.set_title(barrier_text(each.blast.layout), fontsize=11)
     for axes in plans[1:]:
         axes.set_ylabel("")
         axes.tick_params(left=False, labelleft=False)

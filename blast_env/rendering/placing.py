@@ -32,7 +32,7 @@ from blast_env.rendering.canvas import Frame, SiteSheet
 from blast_env.rendering.film import paint_at, plan_film
 from blast_env.rendering.frames import FramePainter
 from blast_env.rendering.site_plan import add_outline, draw_features, legend_of, write_names
-from blast_env.rendering.style import nice_ceiling, render_extra, unit_interval
+from blast_env.rendering.style import charge_text, nice_ceiling, render_extra, unit_interval
 from blast_env.scenario import AnySource, BuildZone, Placement, PointSource, Scenario, VehicleSource
 from blast_env.scenario.build_scene import build_site
 from blast_env.units import MODULE_SIDE_M
@@ -145,17 +145,11 @@ def _is_in(zone: BuildZone, cell: Cell) -> bool:
     return 0 <= cell[0] < zone.rows and 0 <= cell[1] < zone.columns
 
 
-def charge_text(charge: Charge) -> str:
-    """Return mass and place of a charge, in words."""
-    x_m, y_m = charge.position_m
-    return f"charge {charge.tnt_kg:g} kg TNT at ({x_m:.1f} m, {y_m:.1f} m)"
-
-
 def sources_text(sources: Sequence[AnySource]) -> str:
     """Return what is known of a charge, in words."""
     first = sources[0]
     if len(sources) == 1 and isinstance(first, PointSource):
-        return charge_text(Charge(first.position_m, first.tnt_kg))
+        return f"charge {charge_text(Charge(first.position_m, first.tnt_kg))}"
     masses = sorted({source.tnt_kg for source in sources})
     bounds = dict.fromkeys((masses[0], masses[-1]))
     vehicles = all(isinstance(source, VehicleSource) for source in sources)
@@ -218,7 +212,7 @@ class BlastScreening:
         return FramePainter(
             self.blast,
             title=f"{self.blast.scenario.name}{self.remark}",
-            subtitle=charge_text(self.blast.scene.charge),
+            subtitle=f"charge {charge_text(self.blast.scene.charge)}",
             width_px=self.size_px[0],
             height_px=self.size_px[1],
             full_impulse=nice_ceiling(max(*loads, _LEAST_FULL_IMPULSE)),

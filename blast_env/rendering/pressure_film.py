@@ -18,12 +18,12 @@ from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import Snapshots
 from blast_env.physics.gas.solver import Recorder
 from blast_env.physics.scene import BlastSite
-from blast_env.plan import PAGE
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.film import (
     FilmPlan,
     for_gif,
     known_suffix,
+    made_higher,
     plan_until,
     save_frames,
     told_of,
@@ -32,7 +32,6 @@ from blast_env.rendering.gas import (
     PA_PER_KPA,
     check_comparable,
     gas_subtitle,
-    layout_words,
 )
 from blast_env.rendering.pressure_frames import (
     PlaneNow,
@@ -41,7 +40,7 @@ from blast_env.rendering.pressure_frames import (
     VerticalSection,
     default_section,
 )
-from blast_env.rendering.style import nice_ceiling
+from blast_env.rendering.style import barrier_text, nice_ceiling
 from blast_env.runner import Tell, share_of
 
 _EVERY_S: Final = 0.0002  # of 100 kg
@@ -151,8 +150,7 @@ class PressureScreening:
         painter = PressurePainter([shot], scale_end_kpa([shot.result]), width_px, height_px)
         for number in range(plan.frame_count):
             frame = painter.paint(plan.time_s(number), plan.real_time_factor)
-            below = np.full((height_px - len(frame), width_px, 3), PAGE, dtype=np.uint8)
-            yield np.concatenate([frame, below])
+            yield made_higher(frame, height_px)
 
 
 class PressureNow:
@@ -205,7 +203,10 @@ def _free_field_peak_kpa(site: BlastSite) -> float:
 
 def _comment(shots: Sequence["PressureShot"], plan: FilmPlan) -> str:
     blasts = [shot.result.blast for shot in shots]
-    scenario, layouts = blasts[-1].scenario, " | ".join(map(layout_words, blasts))
+    scenario, layouts = (
+        blasts[-1].scenario,
+        " | ".join(barrier_text(each.layout) for each in blasts),
+    )
     return (
         f"{scenario.name}, {gas_subtitle(blasts)}, {layouts}, {plan.real_time_factor}, "
         f"scenario {scenario.content_hash}"

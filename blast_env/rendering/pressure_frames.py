@@ -42,14 +42,13 @@ from blast_env.rendering.gas import (
     MINUS,
     PA_PER_KPA,
     gas_subtitle,
-    layout_words,
 )
 from blast_env.rendering.site_plan import (
     draw_features,
     legend_of,
     rectangle_patch,
 )
-from blast_env.rendering.style import render_extra, unit_interval
+from blast_env.rendering.style import barrier_text, render_extra, unit_interval
 from blast_env.units import MS_PER_S
 
 with render_extra():
@@ -291,7 +290,7 @@ class PressurePainter:
         self._draw_bar(bar_px)
         self.sheet.add_legend(handles, max(width_px // _LEGEND_ENTRY_PX, 2))
         blasts = [shot.result.blast for shot in shots]
-        barrier = "" if len(shots) > 1 else f", {layout_words(blasts[0])}"
+        barrier = "" if len(shots) > 1 else f", {barrier_text(blasts[0].layout)}"
         title = f"{blasts[-1].scenario.name}: overpressure{barrier}"
         self.sheet.write_heading((title, gas_subtitle(blasts)), _SHARE_OF_TITLES)
         self.sheet.add_clock(1.0 - _SHARE_OF_TITLES)
@@ -377,7 +376,7 @@ class PressurePainter:
         axes.set_title(f"plan at z = {height_m:g} m", fontsize=9, loc="left")
         if len(self.shots) > 1:
             axes.annotate(
-                layout_words(shot.result.blast),
+                barrier_text(shot.result.blast.layout),
                 (0.5, 1.0),
                 (0.0, 20.0),
                 xycoords="axes fraction",

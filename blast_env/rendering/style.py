@@ -1,7 +1,7 @@
 """Colours, fonts, and the extra that pictures need."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import ceil, floor, log10, pi
 from typing import Final
@@ -11,9 +11,9 @@ import numpy as np
 from blast_env.calibration import LoadUnit
 from blast_env.engines import Blast, BlastResult
 from blast_env.errors import import_extra
-from blast_env.geometry import layout_counts
+from blast_env.geometry import Element, layout_counts
 from blast_env.physics.particles import CollisionType, distance_to_rectangle
-from blast_env.physics.scene import Scene
+from blast_env.physics.scene import Charge, Scene
 from blast_env.physics.structure import Colour
 from blast_env.units import MODULE_SIDE_M
 
@@ -99,16 +99,21 @@ def count_of(noun: str, count: int) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+def barrier_text(layout: Sequence[Element]) -> str:
+    """Return what barrier there is, in words."""
+    return f"barrier of {layout_counts(layout)}" if layout else "no barrier"
+
+
+def charge_text(charge: Charge) -> str:
+    """Return mass and place of a charge, in words."""
+    x_m, y_m = charge.position_m
+    return f"{charge.tnt_kg:g} kg TNT at ({x_m:.1f} m, {y_m:.1f} m)"
+
+
 def blast_title(blast: Blast) -> tuple[str, str]:
     """Return the heading of a picture of a blast, and the line under it."""
-    charge = blast.scene.charge
-    x, y = charge.position_m
-    parts = [
-        f"charge {charge.tnt_kg:g} kg TNT at ({x:.1f} m, {y:.1f} m)",
-        f"barrier of {layout_counts(blast.layout)}" if blast.layout else "no barrier",
-        f"seed {blast.seed}",
-    ]
-    return blast.scenario.name, ", ".join(parts)
+    charge, barrier = charge_text(blast.scene.charge), barrier_text(blast.layout)
+    return blast.scenario.name, f"charge {charge}, {barrier}, seed {blast.seed}"
 
 
 def unit_interval(colour: Colour) -> tuple[float, float, float]:

@@ -18,7 +18,7 @@ from blast_env.evaluation import LayoutEvaluation, evaluate_layout
 from blast_env.export import LayoutPlan, export_layout
 from blast_env.files import scratch_folder
 from blast_env.rendering.figures import save_figure
-from blast_env.rendering.film import FilmPanel, write_film, write_side_by_side
+from blast_env.rendering.film import write_film
 from blast_env.reporting.page import write_report
 from blast_env.scenario import save_scenario, write_layout
 from blast_env.tables import write_csv
@@ -61,8 +61,8 @@ def _mp4(path: Path) -> None:
 
 
 def _pair(path: Path) -> None:
-    panels = [FilmPanel(_blast(), "left"), FilmPanel(_blast(), "right")]
-    write_side_by_side(panels, path, frames_per_s=5.0, slow_motion=40.0, width_px=640)
+    options: Any = {"frames_per_s": 5.0, "slow_motion": 40.0, "width_px": 640}
+    write_film(_blast(), path, beside=_blast(), **options)
 
 
 def _checkpoint(path: Path) -> None:

@@ -14,7 +14,7 @@ from blast_env.rendering.style import shown_until_s
 
 def test_an_mp4_has_the_planned_frames_and_even_sizes(blast: Blast, tmp_path: Path) -> None:
     path = tmp_path / "blast.mp4"
-    result = write_film(blast, path, frames_per_s=10.0, slow_motion=60.0, width_px=401)
+    (result,) = write_film(blast, path, frames_per_s=10.0, slow_motion=60.0, width_px=401)
     plan = plan_film(result, 10.0, 60.0)
     reader: Any = imageio.get_reader(path, format="FFMPEG")
     try:
@@ -34,7 +34,7 @@ def test_an_mp4_has_the_planned_frames_and_even_sizes(blast: Blast, tmp_path: Pa
 
 def test_a_gif_loops_and_states_the_real_time_factor(blast: Blast, tmp_path: Path) -> None:
     path = tmp_path / "blast.gif"
-    result = write_film(blast, path, frames_per_s=10.0, slow_motion=60.0, width_px=401)
+    (result,) = write_film(blast, path, frames_per_s=10.0, slow_motion=60.0, width_px=401)
     with Image.open(path) as film:
         assert film.format == "GIF"
         assert film.n_frames == plan_film(result, 10.0, 60.0).frame_count  # type: ignore[attr-defined]

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from imageio.plugins import ffmpeg
+from PIL import Image
 
 from blast_env.engines import Blast
 from blast_env.errors import BlastEnvError
-from blast_env.rendering.film import FilmPanel, plan_film, write_side_by_side
+from blast_env.rendering.film import plan_film, write_film
 from blast_env.rendering.frames import FramePainter
 
 WIDTH_PX = 640
@@ -29,13 +30,9 @@ def frames_of(path: Path) -> np.ndarray:
     return np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, height, width, 3)
 
 
-def panels(blast: Blast, barrier_blast: Blast) -> tuple[FilmPanel, ...]:
-    return FilmPanel(blast, "no barrier"), FilmPanel(barrier_blast, "with barrier")
-
-
-def write(shown: tuple[FilmPanel, ...], path: Path, **changes: Any) -> tuple[Any, ...]:
-    options = {"frames_per_s": 5.0, "slow_motion": 40.0, "width_px": WIDTH_PX, **changes}
-    return write_side_by_side(shown, path, **options)
+def write(left: Blast, right: Blast, path: Path, **changes: Any) -> tuple[Any, ...]:
+    options: dict[str, Any] = {"frames_per_s": 5.0, "slow_motion": 40.0, "width_px": WIDTH_PX}
+    return write_film(right, path, beside=left, **(options | changes))
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ class Written:
 def both(blast: Blast, barrier_blast: Blast, tmp_path_factory: pytest.TempPathFactory) -> Written:
     path = tmp_path_factory.mktemp("film") / "both.mp4"
     shares: list[float] = []
-    results = write(panels(blast, barrier_blast), path, progress=shares.append)
+    results = write(blast, barrier_blast, path, progress=shares.append)
     return Written(path, results, frames_of(path), shares)
 
 
@@ -71,7 +68,7 @@ def test_both_blasts_are_shown_to_the_end_of_the_longer_one(
 def test_the_same_blast_twice_gives_two_equal_halves(blast: Blast, tmp_path: Path) -> None:
     """Neither half may lag behind or be moved; the codec alone may differ."""
     path = tmp_path / "twins.mp4"
-    write((FilmPanel(blast, "one"), FilmPanel(blast, "one")), path)
+    write(blast, blast, path)
     frames = frames_of(path).astype(int)
     left, right = np.split(frames, 2, axis=2)
     assert np.abs(left - right).mean() < 1.0
@@ -93,7 +90,7 @@ def test_ctrl_c_leaves_nothing_behind(blast: Blast, barrier_blast: Blast, tmp_pa
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write(panels(blast, barrier_blast), tmp_path / "both.mp4", progress=stop)
+        write(blast, barrier_blast, tmp_path / "both.mp4", progress=stop)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -103,11 +100,13 @@ def test_progress_rises_to_one(both: Written) -> None:
 
 
 def test_what_is_no_film_of_two_is_refused(blast: Blast, tmp_path: Path) -> None:
-    pair = (FilmPanel(blast, "one"), FilmPanel(blast, "other"))
-    with pytest.raises(BlastEnvError, match="there are 1, must be at least 2"):
-        write(pair[:1], tmp_path / "film.mp4")
-    with pytest.raises(BlastEnvError, match=r"suffix is '.gif', must be '.mp4'"):
-        write(pair, tmp_path / "film.gif")
+    with pytest.raises(BlastEnvError, match=r"suffix '.avi', must be .mp4 or .gif"):
+        write(blast, blast, tmp_path / "film.avi")
     with pytest.raises(BlastEnvError, match="width_px is 300, must be 320"):
-        write(pair, tmp_path / "film.mp4", width_px=600)
+        write(blast, blast, tmp_path / "film.mp4", width_px=600)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_two_blasts_are_in_a_gif_too(blast: Blast, barrier_blast: Blast, tmp_path: Path) -> None:
+    write(blast, barrier_blast, tmp_path / "both.gif")
+    assert Image.open(tmp_path / "both.gif").size[0] == WIDTH_PX
