@@ -38,6 +38,7 @@ _DRAWN: Final = {
     Tool.ZONE: ThingKind.ZONE,
     Tool.KEEP_OUT: ThingKind.KEEP_OUT,
     Tool.CHARGE: ThingKind.CHARGE,
+    Tool.CHARGE_AREA: ThingKind.CHARGE,
     Tool.GAUGE: ThingKind.GAUGE,
 }
 
@@ -141,7 +142,7 @@ class Editor:
 
     def move(self, x_m: float, y_m: float, erase: bool = False) -> bool:
         """Follow the mouse; return whether anything looks different now."""
-        if self.tool is Tool.SELECT or self.tool in _DRAWN or self.tool is Tool.CHARGE_AREA:
+        if self.tool is Tool.SELECT or self.tool in _DRAWN:
             place: Cell | PointM | None = (edits.snapped(x_m), edits.snapped(y_m))
         else:
             place = placing.cell_at(self.session.scenario, x_m, y_m)
@@ -343,13 +344,14 @@ class Editor:
             return  # no area yet
         scenario = self.session.scenario
         try:
-            if self.tool is Tool.CHARGE_AREA:
-                stroke.made, stroke.thing = edits.with_charge_area(scenario, (x0, y0), (x1, y1))
-            else:
-                kind = _DRAWN[self.tool]
-                stroke.made, stroke.thing = edits.added(
-                    scenario, kind, (x0, y0), (x1, y1), self.new_height_m
-                )
+            stroke.made, stroke.thing = edits.added(
+                scenario,
+                _DRAWN[self.tool],
+                (x0, y0),
+                (x1, y1),
+                self.new_height_m,
+                self.tool is Tool.CHARGE_AREA,
+            )
         except BlastEnvError as error:
             stroke.made = None
             self.ghost = Ghost(box, reason_of(error), line)

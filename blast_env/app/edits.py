@@ -302,12 +302,14 @@ def added(
     start_m: PointM,
     end_m: PointM,
     height_m: float | None = STOREY_M,
+    is_area: bool = False,
 ) -> tuple[Scenario, SiteThing]:
     """Return the scenario with one thing more, drawn from one place to another, on the grid.
 
-    A charge is a point where both places are the same, else a line; see `with_charge_area` for an
-    area. A build zone takes the place of the one there is, and keeps what holds in it. A structure
-    is `height_m` high, a storey unless said otherwise; `None` for as high as the air.
+    A charge is a point where both places are the same, else a line; with `is_area` it may be
+    anywhere between them. A build zone takes the place of the one there is, and keeps what holds in
+    it. A structure is `height_m` high, a storey unless said otherwise; `None` for as high as the
+    air.
 
     Raises:
         ScenarioError: If it cannot be there.
@@ -322,7 +324,11 @@ def added(
     )
     section = {
         ThingKind.STRUCTURE: lambda: _structure(scenario, area, height_m),
-        ThingKind.CHARGE: lambda: _charge(scenario, start, end),
+        ThingKind.CHARGE: lambda: (
+            {"kind": "rectangle", "tnt_kg": _usual_tnt_kg(scenario), **_sized(area)}
+            if is_area
+            else _charge(scenario, start, end)
+        ),
         ThingKind.KEEP_OUT: lambda: {**_sized(area), "reason": "must stay free"},
         ThingKind.COST_AREA: lambda: {
             **_sized(area),
@@ -351,22 +357,6 @@ def added(
     after = changed(scenario, edit)
     last = max(each.number for each, _ in things(after) if each.kind is kind)
     return after, SiteThing(kind, last)
-
-
-def with_charge_area(
-    scenario: Scenario, start_m: PointM, end_m: PointM
-) -> tuple[Scenario, SiteThing]:
-    """Return the scenario with one more charge, anywhere in a rectangle.
-
-    Raises:
-        ScenarioError: If it cannot be there.
-    """
-    left, right = sorted((snapped(start_m[0]), snapped(end_m[0])))
-    bottom, top = sorted((snapped(start_m[1]), snapped(end_m[1])))
-    area = Rectangle(_plain(left), _plain(bottom), _plain(right), _plain(top))
-    section = {"kind": "rectangle", "tnt_kg": _usual_tnt_kg(scenario), **_sized(area)}
-    after = changed(scenario, lambda document: document["charge"].append(section))
-    return after, SiteThing(ThingKind.CHARGE, len(after.charge) - 1)
 
 
 def _fit_catalogue(document: Document, whole: int | None) -> None:

@@ -31,6 +31,7 @@ from blast_env.cli.output import (
     make_table,
     percent,
     print_line,
+    print_written,
     progress_bar,
     result_console,
 )
@@ -150,8 +151,7 @@ def _report_cases(
     _print_cases(comparison, evaluators.engine, f"{title}, {threats_text(len(cases), seeds)}")
     milliseconds = median(MS_PER_S * each.seconds for each in proposals)
     print_line(f"proposed in {milliseconds:.1f} ms each (median), no blast spent on any")
-    for path in written:
-        print_line(f"wrote {path}")
+    print_written(written)
     if exported:
         print_line(f"wrote {len(cases)} layouts to {options.export}, files: {len(exported)}")
     print_line(cache_text(evaluators))

@@ -13,7 +13,7 @@ from blast_env.cli.options import (
     ChargeOptions,
     wanted_level,
 )
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.cli.output import make_table, print_line, print_table, progress_bar, result_console
 from blast_env.cli.pieces import print_pieces
 from blast_env.cli.targets import PICTURES
 from blast_env.engines import JUDGE, find_engine
@@ -128,11 +128,12 @@ class AssessCommand(ChargeOptions):
             print_line(f"but it FAILS {doubt}")
 
     def _print(self, scenario: Scenario, found: dict[str, Consequences]) -> None:
-        table = make_table(f"{scenario.name}: the worst of all charges", _HEADERS, text_columns=3)
-        for name, each in found.items():
-            for building in each.buildings:
-                table.add_row(name, building, *_row(each, building))
-        result_console().print(table)
+        rows = [
+            (name, building, *_row(each, building))
+            for name, each in found.items()
+            for building in each.buildings
+        ]
+        print_table(f"{scenario.name}: the worst of all charges", _HEADERS, rows, text_columns=3)
         for name, each in found.items():
             for note in each.notes:
                 print_line(f"{name}: {note}")

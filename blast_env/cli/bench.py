@@ -13,7 +13,7 @@ from blast_env.benchmark import (
     site_cost,
 )
 from blast_env.cli.command import Command, option
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.cli.output import make_table, print_line, print_table, progress_bar, result_console
 from blast_env.engines import ENGINE_NAMES, find_engine
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.physics.gas.settings import CELLS, UNIFORM
@@ -159,12 +159,12 @@ class BenchCommand(Command):
         self, pairs: Sequence[tuple[Scenario, str]], costs: Sequence[BlastCost]
     ) -> None:
         title = f"blasts a second by the clock, in one process and in {self.processes}"
-        table = make_table(title, _CROWD_HEADERS, 2)
+        rows = []
         for (scenario, engine), cost in zip(pairs, costs, strict=True):
             found = crowd(scenario, engine, cost.cpu_s, self.processes)
             rates = (f"{each:.2f}" for each in (found.alone_per_s, found.together_per_s))
-            table.add_row(scenario.name, engine, *rates, f"{found.ratio:.2f}")
-        result_console().print(table)
+            rows.append((scenario.name, engine, *rates, f"{found.ratio:.2f}"))
+        print_table(title, _CROWD_HEADERS, rows, 2)
 
     def _print_environments(self, pairs: Sequence[tuple[Scenario, str]]) -> None:
         title = f"BlastBarrier-v0: random placements, medians of {self.repeats} episodes"

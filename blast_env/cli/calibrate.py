@@ -17,6 +17,7 @@ from blast_env.cli.options import ClusterOptions, ProcessOptions
 from blast_env.cli.output import (
     make_table,
     print_line,
+    print_written,
     progress_bar,
     result_console,
     save_pictures,
@@ -107,8 +108,7 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
         written = _write(report, stored, self.stem)
         _print(report, stored)
         print_line(engine.describe([study.scenario]))
-        for path in (*written, kept):
-            print_line(f"wrote {path}")
+        print_written([*written, kept])
 
     def _scenario(self) -> Scenario:
         scenario = load_scenario(self.scenario)

@@ -25,6 +25,7 @@ from blast_env.cli.output import (
     percent,
     print_json,
     print_line,
+    print_written,
     progress_bar,
     result_console,
     save_layout_picture,
@@ -201,8 +202,7 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
         print_record(record, options)
         return
     _print_evaluation(evaluation, options.seed_range, engine)
-    for path in written:
-        print_line(f"wrote {path}")
+    print_written(written)
     print_line(cache_text(evaluator))
 
 

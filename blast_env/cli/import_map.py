@@ -9,6 +9,7 @@ from blast_env.cli.output import (
     make_table,
     print_json,
     print_line,
+    print_written,
     result_console,
     save_pictures,
 )
@@ -89,8 +90,7 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
     )
     for note in imported.notes:
         print_line(f"note: {note}")
-    for path in written:
-        print_line(f"wrote {path}")
+    print_written(written)
 
 
 def _record(imported: "ImportedSite", written: list[Path]) -> dict[str, Any]:

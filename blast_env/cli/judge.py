@@ -9,7 +9,7 @@ from typing import Final
 
 from blast_env.cli.command import FOLDER, argument, option
 from blast_env.cli.options import CacheOptions, ProcessOptions
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.cli.output import print_line, print_table, progress_bar
 from blast_env.engines import JUDGE, find_engine
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator
@@ -182,9 +182,6 @@ def _submission(path: Path) -> Submission:
 def _print_standings(judged: Sequence[JudgedSubmission]) -> None:
     """Print a row a submission, the best first; those on other problems are other tables."""
     for each in standings_tables(judged):
-        table = make_table(each.title, each.headers)
-        for row in each.rows:
-            table.add_row(*row)
-        result_console().print(table)
+        print_table(each.title, each.headers, each.rows)
     if not judged:
         print_line("no submissions come with the package")

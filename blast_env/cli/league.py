@@ -12,7 +12,12 @@ from blast_agents.search import proposers
 from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions, ProcessOptions
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.cli.output import (
+    print_line,
+    print_table,
+    print_written,
+    progress_bar,
+)
 from blast_env.engines import Engine, find_engine
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.provenance import command
@@ -100,8 +105,7 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
             _print_outlook(contests)
             all_standings = [_play(contest, self.processes) for contest in contests]
             written = write_league(all_standings, self.out, shlex.join(command()))
-        for path in written:
-            print_line(f"wrote {path}")
+        print_written(written)
 
     def _contest(
         self,
@@ -176,10 +180,7 @@ def _play(contest: "Contest", processes: int) -> "Standings":
     two_lines = [
         "\n".join(header.rsplit(" ", 1)) for header in HEADERS
     ]  # so that a page holds them
-    table = make_table(contest.track.title, two_lines)
-    for row in table_rows(standings):
-        table.add_row(*row)
-    result_console().print(table)
+    print_table(contest.track.title, two_lines, table_rows(standings))
     for line in (f"{sample_text(standings)}.", *verdict_lines(standings)):
         print_line(line)
     return standings

@@ -3,7 +3,7 @@
 import json
 import os
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import isnan
 from pathlib import Path
@@ -173,6 +173,22 @@ def _progress_lines(console: Console, label: str) -> Callable[[float], None]:
 def make_table(title: str, headers: Sequence[str], text_columns: int = 1) -> ResultTable:
     """Return an empty table; all columns but the first `text_columns` are set to the right."""
     return ResultTable(title, headers, text_columns)
+
+
+def print_table(
+    title: str, headers: Sequence[str], rows: Iterable[Sequence[str]], text_columns: int = 1
+) -> None:
+    """Print a table to standard output; see `make_table`."""
+    table = make_table(title, headers, text_columns)
+    for row in rows:
+        table.add_row(*row)
+    result_console().print(table)
+
+
+def print_written(paths: Iterable[Path]) -> None:
+    """Say which files were written."""
+    for path in paths:
+        print_line(f"wrote {path}")
 
 
 def percent(share: float) -> str:

@@ -15,6 +15,7 @@ from blast_env.cli.options import SCENARIO_HELP, ChargeOptions, ProcessOptions
 from blast_env.cli.output import (
     make_table,
     print_line,
+    print_written,
     progress_bar,
     result_console,
     save_layout_picture,
@@ -152,8 +153,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         written = [LayoutFile.of(scenario, layout, provenance).save(out)]
         picture = out.with_suffix(".png")
         written += save_pictures(lambda: [save_layout_picture(scenario, layout, picture)])
-        for path in written:
-            print_line(f"wrote {path}")
+        print_written(written)
 
 
 def _print_verdict(loads: Mapping[str, float], case: Case) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from blast_env.app.cost import ReportCost, cost_words
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import SCENARIO_HELP, TARGET_HELP, CacheOptions, ProcessOptions
-from blast_env.cli.output import message_console, print_line, progress_bar
+from blast_env.cli.output import message_console, print_line, print_written, progress_bar
 from blast_env.engines import JUDGE, find_engine
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import LevelOfProtection
@@ -84,8 +84,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
             )
         coarse_m, fine_m = self.cells_m
         print_line(f"{find_engine(JUDGE, coarse_m).describe()} and of {fine_m:g} m")
-        for path in write_report(study, self.out, self.pdf):
-            print_line(f"wrote {path}")
+        print_written(write_report(study, self.out, self.pdf))
 
     def _study_options(self) -> "StudyOptions":
         from blast_env.reporting import Limit, StudyOptions, UnitSystem

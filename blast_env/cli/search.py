@@ -37,6 +37,7 @@ from blast_env.cli.output import (
     message_console,
     percent,
     print_line,
+    print_written,
     progress_bar,
     result_console,
     resume_with_cache,
@@ -318,8 +319,7 @@ def write_search(
         written += save_pictures(lambda: _save_figure(run, out))
     if result.front:
         written.append(write_csv(result.front_table(), out / "front.csv"))
-    for path in written:
-        print_line(f"wrote {path}")
+    print_written(written)
 
 
 def _save_figure(run: SearchRun, out: Path) -> list[Path]:

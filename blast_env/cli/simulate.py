@@ -22,6 +22,8 @@ from blast_env.cli.output import (
     make_table,
     print_json,
     print_line,
+    print_table,
+    print_written,
     progress_bar,
     result_console,
 )
@@ -146,8 +148,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
             print_json(_record(result, written, all_of_it=self.json_all))
         else:
             shown.print_loads(result)
-            for path in written:
-                print_line(f"wrote {path}")
+            print_written(written)
 
     def _check(self, engine: Engine, layout: Layout) -> None:
         """Refuse options of no use before anything is run."""
@@ -231,15 +232,13 @@ class ShownBlast(ABC, Generic[_AnyBlast, _AnyResult]):
             rows: The rows.
         """
         x_m, y_m = charge.position_m
-        table = make_table(
+        print_table(
             f"{self.blast.scenario.name}: {charge.tnt_kg:g} kg TNT at ({x_m:.2f}, {y_m:.2f}) m, "
             f"{more}, {layout_counts(self.blast.layout, 'barrier')}",
             self.headers,
+            rows,
             text_columns=2,
         )
-        for row in rows:
-            table.add_row(*row)
-        result_console().print(table)
 
     def print_end(self, result: _AnyResult, what: str, steps: str, notes: Sequence[str]) -> None:
         """Print which engine ran what, how it ended, and what there is to say of it."""

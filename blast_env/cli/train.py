@@ -9,7 +9,13 @@ import numpy as np
 from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option, options_of
 from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions
-from blast_env.cli.output import LAYOUT_PICTURE, print_line, progress_bar, save_layout_picture
+from blast_env.cli.output import (
+    LAYOUT_PICTURE,
+    print_line,
+    print_written,
+    progress_bar,
+    save_layout_picture,
+)
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
@@ -155,8 +161,7 @@ def _print_result(result: "TrainingResult") -> None:
                 f"best on held-out threats, after {row.steps:,} steps: reduction "
                 f"{row.reduction:.1%} (95 % interval {row.low:.1%} to {row.high:.1%})"
             )
-    for path in (folder.checkpoint, folder.evaluations, folder.learning_curve):
-        print_line(f"wrote {path}")
+    print_written((folder.checkpoint, folder.evaluations, folder.learning_curve))
     print_line(f"wrote {_draw_proposal(folder, scenario, settings.threat)}")
 
 

@@ -84,15 +84,15 @@ class ResultsView:
     def _build(self) -> None:
         with ui.row().classes("be-choices w-full items-center gap-2"):
             self._pictures = ui.select([_FILM], value=_FILM, label="picture")
-            self._pictures.on_value_change(lambda e: self._choose(e.value))
+            self._pictures.on_value_change(lambda e: self._set("_what", e.value))
             self._threats = ui.select([], label="threat")
-            self._threats.on_value_change(lambda e: self._against(e.value))
+            self._threats.on_value_change(lambda e: self._set("_threat", e.value))
             for element in (self._pictures, self._threats):
                 element.props("dense outlined options-dense").classes("w-52")
             bare = ui.switch("no barrier beside", value=True)
-            bare.on_value_change(lambda e: self._beside(e.value))
+            bare.on_value_change(lambda e: self._set("_with_bare", e.value))
             large = ui.switch("large", value=False)
-            large.on_value_change(lambda e: self._enlarge(e.value))
+            large.on_value_change(lambda e: self._set("_large", e.value))
         with ui.element("div").classes("be-results"):
             self._empty = ui.label().classes("be-quiet")
             verdict_columns = [
@@ -116,23 +116,11 @@ class ResultsView:
             self._table.props("dense flat bordered")
             self._notes = ui.column().classes("gap-0 mt-1")
 
-    def _choose(self, what: str) -> None:
-        if what and what != self._what:
-            self._what = what
+    def _set(self, name: str, value: Any) -> None:
+        """Take another choice, unless a list is empty for a moment."""
+        if value not in (None, "", getattr(self, name)):
+            setattr(self, name, value)
             self.refresh()
-
-    def _against(self, threat: str) -> None:
-        if threat and threat != self._threat:
-            self._threat = threat
-            self.refresh()
-
-    def _enlarge(self, large: bool) -> None:
-        self._large = large
-        self.refresh()
-
-    def _beside(self, beside: bool) -> None:
-        self._with_bare = beside
-        self.refresh()
 
     def refresh(self) -> None:
         """Show what there is, if it is not shown already."""

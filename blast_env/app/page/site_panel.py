@@ -91,22 +91,20 @@ class SitePanel:
         element: Any
         if field.form == "walls":
             element = ui.select([*WALLS], label=field.label, multiple=True)
-            element.on_value_change(lambda e: self._put(field, e.value))
         elif field.form == "side":
             element = ui.select(_SIDES, label=field.label, clearable=True)
-            element.on_value_change(lambda e: self._put(field, e.value))
         elif field.form in ("glazing", "wall"):
             element = ui.select(self._components(field.form), label=field.label, clearable=True)
-            element.on_value_change(lambda e: self._put(field, e.value))
         elif field.form == "text":
             element = ui.input(field.label)
         else:
-            step = 1 if field.form == "integer" else 0.5
-            element = ui.number(field.label, step=step)
+            element = ui.number(field.label, step=1 if field.form == "integer" else 0.5)
         if field.form in ("text", "number", "integer"):
             element.on("blur", lambda: self._put(field, element.value))
             element.on("keydown.enter", lambda: self._put(field, element.value))
             element.on("change", lambda: self._put(field, element.value))
+        else:
+            element.on_value_change(lambda e: self._put(field, e.value))
         if field.optional:
             empty = "none" if field.form in ("glazing", "wall") else "by rule"
             element.props(f'placeholder="{empty}" clearable stack-label')
