@@ -10,9 +10,8 @@ import numpy as np
 from blast_env.evaluation.cases import Case
 from blast_env.evaluation.comparison import Comparison
 from blast_env.evaluation.report import LayoutEvaluation
-from blast_env.geometry import Layout, Rectangle, layout_counts
+from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import BlastSite, Charge
-from blast_env.physics.structure import ModularObstacle
 from blast_env.plan import (
     EXPLOSIVE,
     INK,
@@ -29,8 +28,7 @@ from blast_env.plan import (
 )
 from blast_env.rendering.site_plan import (
     add_bar,
-    draw_loads,
-    draw_outline,
+    draw_enlarged,
     draw_plan,
     legend_of,
     load_colours,
@@ -197,7 +195,7 @@ def _subtitle(evaluation: LayoutEvaluation) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{_PERCENT * share:.0f} %"
+    return "-" if isnan(share) else f"{_PERCENT * share:.0f} %"
 
 
 def _interval(reduction: Estimate) -> str:
@@ -284,14 +282,12 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
     highest = float(own[list(columns)].to_numpy().max())
     scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
     for axes, column, words in zip(panels, columns, ("without", "with"), strict=True):
-        for outline in outlines:
-            obstacle = outline.build()
-            impulses = own[own.structure == outline.name][column]
+        obstacles = [outline.build() for outline in outlines]
+        for obstacle in obstacles:
+            impulses = own[own.structure == obstacle.name][column]
             for part, impulse in zip(obstacle.parts, impulses, strict=True):
                 part.impulse, part.hits = float(impulse), int(impulse > 0.0)
-            _draw_structure(axes, obstacle, scale)
-        left, bottom, right, top = Rectangle.around([each.rectangle_m for each in outlines])
-        axes.set(xlim=(left - 0.25, right + 0.25), ylim=(bottom - 0.25, top + 0.25))
+        draw_enlarged(axes, obstacles, scale, 0.4)
         pa_s = float(np.average(parts[column.replace("_sim", "_pa_s")], weights=parts.weight))
         axes.set_title(
             f"{name} {words} barrier\n{pa_s:,.0f} Pa·s",
@@ -302,15 +298,6 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
     assert figure is not None
     label = "mean impulse per module\n(simulation units); white: not hit"
     add_bar(figure, panels, ScalarMappable(scale, load_colours()), label, shrink=0.9, pad=0.03)
-
-
-def _draw_structure(axes: Axes, obstacle: ModularObstacle, scale: Normalize) -> None:
-    draw_loads(axes, obstacle, scale, linewidth=0.4)
-    draw_outline(axes, obstacle)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
-    axes.spines[:].set_visible(False)
 
 
 MOST_SHOWN: Final = 12
@@ -415,7 +402,7 @@ def _draw_case(axes: Axes, panel: _Panel, features: Sequence[Feature], name: str
     axes.tick_params(labelsize=7.5)
     mark = "" if panel.in_range else _OUT_OF_RANGE
     axes.set_title(
-        f"{name}: reduction {_percent_or_dash(panel.reduction)}{mark}",
+        f"{name}: reduction {_percent(panel.reduction)}{mark}",
         fontsize=10.5,
         fontweight="bold",
         color=unit_interval(INK),
@@ -441,11 +428,9 @@ def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
 
 def _headline(count: int, reduction: Estimate) -> str:
     if count == 1:
-        return f"reduction {_percent_or_dash(reduction.value)}"
-    text = f"a layout for each case, mean reduction {_percent_or_dash(reduction.value)}"
-    if isnan(reduction.low):
-        return text
-    return f"{text} (95 %: {_percent_or_dash(reduction.low)} to {_percent_or_dash(reduction.high)})"
+        return f"reduction {_percent(reduction.value)}"
+    mean = f"a layout for each case, mean reduction {_percent(reduction.value)}"
+    return f"{mean}{_interval(reduction)}"
 
 
 def _cases_subtitle(panels: Sequence[_Panel]) -> str:
@@ -461,7 +446,3 @@ def _cases_subtitle(panels: Sequence[_Panel]) -> str:
     if not all(panel.in_range for panel in panels):
         parts.append("~ outside the calibration's range")
     return "; ".join(parts)
-
-
-def _percent_or_dash(share: float) -> str:
-    return "-" if isnan(share) else f"{_PERCENT * share:.0f} %"

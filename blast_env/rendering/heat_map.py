@@ -20,6 +20,7 @@ from blast_env.plan import (
 )
 from blast_env.rendering.site_plan import (
     add_bar,
+    draw_enlarged,
     draw_loads,
     draw_outline,
     draw_plan,
@@ -189,16 +190,7 @@ def _draw_panel(
     scale: LoadScale,
     room_in: tuple[float, float],
 ) -> None:
-    rectangle = obstacle.rectangle_m
-    draw_loads(axes, obstacle, scale.norm, 0.6, scale.unit.factor)
-    draw_outline(axes, obstacle)
-    reach = 0.25
-    axes.set_xlim(rectangle.left - reach, rectangle.right + reach)
-    axes.set_ylim(rectangle.bottom - reach, rectangle.top + reach)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
-    axes.spines[:].set_visible(False)
+    draw_enlarged(axes, [obstacle], scale.norm, 0.6, scale.unit.factor)
     hits = sum(part.hits for part in obstacle.parts)
     axes.set_title(
         f"{obstacle.name}{' (protected)' if obstacle.protected else ''}\n"

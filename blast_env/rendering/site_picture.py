@@ -44,7 +44,7 @@ _PANEL_IN: Final = 5.4
 _WIDTHS_IN: Final = (4.6, 8.8)
 _HEADING_IN: Final = 0.9
 _LEGEND_ROW_IN: Final = 0.24
-_ARROW_PT: Final = 26.0
+_ARROW_PT: Final = 32.0
 
 
 def site_picture(
@@ -189,22 +189,14 @@ def _draw_arrow(
     """Draw an arrow that stands for a direction on the ground, with its label at the tip."""
     ends = view.places(np.array([(0.0, 0.0, 0.0), (*direction, 0.0)]))
     across, up = _ARROW_PT * (ends[1] - ends[0])
-    # Annotations draw their arrow from the text to the point, hence the tip twice.
-    arrow = {"arrowstyle": "<|-", "color": unit_interval(INK), "shrinkA": 0.0, "shrinkB": 0.0}
-    axes.annotate(
-        "",
-        xy=place,
-        xycoords="axes fraction",
-        xytext=(across, up),
-        textcoords="offset points",
-        arrowprops=arrow,
-    )
     axes.annotate(
         label,
         xy=place,
         xycoords="axes fraction",
-        xytext=(1.3 * across, 1.3 * up),
+        xytext=(across, up),
         textcoords="offset points",
+        # Annotations draw their arrow from the text to the point, hence the tip there.
+        arrowprops={"arrowstyle": "<|-", "color": unit_interval(INK), "shrinkB": 0.0},
         ha="center",
         va="center",
         fontsize=9,

@@ -71,6 +71,11 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
+def _page(height_in: float) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(_WIDTH_IN, height_in), layout="constrained")
+    return figure, figure.subplots()
+
+
 # The site.
 
 
@@ -79,8 +84,7 @@ def site_plan(scenario: Scenario, threats: Sequence[NamedCharge], layout: Layout
 
     Vehicles and their charges are where the layout lets them come.
     """
-    figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.9), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _page(_height_in(scenario) + 0.9)
     charges = [
         charge_feature(
             threat.against(scenario, layout),
@@ -146,8 +150,7 @@ def _history(
 ) -> Picture:
     """Return the mean overpressure on the most loaded wall over time, without and with."""
     wall = bare.loads[target.name].wall
-    figure = Figure(figsize=(_WIDTH_IN, 3.2), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _page(3.2)
     for measured, colour, words in ((bare, _BARE, "no barrier"), (walled, _WALLED, "layout")):
         pressure = measured.histories.of(target.name, wall)
         if pressure is not None:
@@ -231,8 +234,7 @@ def film_stills(
 
 def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
     """Return the layout with every module or piece in the colour of what it is worth."""
-    figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.3), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _page(_height_in(scenario) + 0.3)
     features = without(site_features(scenario), Kinds.CHARGE_PLACE)
     draw_plan(axes, features)
     worths = 100.0 * np.array([each.worth for each in items])
@@ -290,8 +292,7 @@ def place_figure(
         charges: Where they go off with the layout.
         outcomes: One a charge.
     """
-    figure = Figure(figsize=(_WIDTH_IN, _height_in(scenario) + 0.3), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _page(_height_in(scenario) + 0.3)
     features = without(_unlabelled(site_features(scenario)), *_ZONE)
     draw_plan(axes, features)
     places = np.array([each.position_m for each in charges])
@@ -317,8 +318,7 @@ def front_figure(
     points: Sequence[FrontPoint], own: tuple[float, float], threat_count: int
 ) -> bytes:
     """Return reduction against cost, with the layout of the report."""
-    figure = Figure(figsize=(_WIDTH_IN, 3.6), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = _page(3.6)
     axes.plot(
         [each.cost for each in points],
         [each.reduction for each in points],

@@ -167,12 +167,10 @@ def _candidates(scenario: Scenario, source: Placed) -> Iterator[tuple[float, flo
     if isinstance(source, RectangleSource):
         left, bottom, right, top = source.rectangle_m
         for target in _protected(scenario):
-            # The point of the area nearest to the building.
-            x_m = min(max(left, min(max(target.left, left), right)), right)
-            y_m = min(max(bottom, min(max(target.bottom, bottom), top)), top)
-            for x in {x_m, min(max(target.right, left), right)}:
-                for y in {y_m, min(max(target.top, bottom), top)}:
-                    yield x, y
+            # The points of the area nearest to the corners of the building.
+            xs_m = {min(max(each, left), right) for each in (target.left, target.right)}
+            ys_m = {min(max(each, bottom), top) for each in (target.bottom, target.top)}
+            yield from ((x_m, y_m) for x_m in xs_m for y_m in ys_m)
         return
     yield from _spread(source, _STEPS + 1)
 
