@@ -109,4 +109,5 @@ def test_what_is_no_film_of_two_is_refused(blast: Blast, tmp_path: Path) -> None
 
 def test_two_blasts_are_in_a_gif_too(blast: Blast, barrier_blast: Blast, tmp_path: Path) -> None:
     write(blast, barrier_blast, tmp_path / "both.gif")
-    assert Image.open(tmp_path / "both.gif").size[0] == WIDTH_PX
+    with Image.open(tmp_path / "both.gif") as film:
+        assert film.size[0] == WIDTH_PX
