@@ -1,7 +1,7 @@
 """Axis-parallel rectangles, the only plane figure that sites are made of; cells of a grid."""
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from math import hypot
 from typing import NamedTuple
 
@@ -30,7 +30,7 @@ class Piece(NamedTuple):
 
 
 class Measure(Piece):
-    """An item that hardens parts of facades: a piece that covers no cell.
+    """What hardens parts of facades, or takes a structure away: a piece that covers no cell.
 
     Its row and column are 0. It is equal to the plain tuple.
     """
@@ -41,6 +41,12 @@ class Measure(Piece):
     def named(cls, item: str) -> "Measure":
         """Return the measure of a name."""
         return cls(0, 0, item)
+
+
+class Removal(Measure):
+    """A measure that takes structures away: other than what hardens, it changes loads."""
+
+    __slots__ = ()
 
 
 Element = Cell | Piece
@@ -162,8 +168,17 @@ Layout = tuple[Element, ...]
 
 
 def standing(layout: "Iterable[Element]") -> "Layout":
-    """Return what of a layout stands on the ground: all but the measures that harden facades."""
+    """Return what of a layout stands on the ground: all but its measures."""
     return tuple(element for element in layout if not isinstance(element, Measure))
+
+
+def met_by_blasts(layout: "Iterable[Element]") -> "Layout":
+    """Return what of a layout its loads depend on: all but the measures that harden facades."""
+    return tuple(
+        element
+        for element in layout
+        if isinstance(element, Removal) or not isinstance(element, Measure)
+    )
 
 
 def layout_text(layout: Iterable[Element]) -> str:
@@ -171,27 +186,30 @@ def layout_text(layout: Iterable[Element]) -> str:
     return " ".join(map(_element_text, layout))
 
 
-def layout_counts(layout: Collection[Element], kind: str = "", of: int | None = None) -> str:
-    """Return what a layout consists of: `1 module`, `3 of 9 pieces (2 wall, 1 post)`.
+def layout_counts(layout: Iterable[Element], kind: str = "", of: int | None = None) -> str:
+    """Return what a layout consists of: `1 module`, `3 of 9 pieces (2 wall, 1 post), new glass`.
 
     Args:
-        layout: Modules or pieces.
+        layout: Modules or pieces, and measures.
         kind: What kind of them, before the word: `barrier`.
         of: How many there are in stock.
     """
-    items = Counter(str(element[2]) for element in layout if len(element) > 2)
+    elements = tuple(layout)
+    measures = [each.item for each in elements if isinstance(each, Measure)]
+    pieces = standing(elements)
+    if measures and not pieces and of is None:
+        return ", ".join(measures)
+    items = Counter(str(element[2]) for element in pieces if len(element) > 2)
     word = f"{kind} {'piece' if items else 'module'}".strip()
-    plural = "" if len(layout) == 1 and of is None else "s"
-    number = f"{len(layout)}" if of is None else f"{len(layout)} of {of}"
+    plural = "" if len(pieces) == 1 and of is None else "s"
+    number = f"{len(pieces)}" if of is None else f"{len(pieces)} of {of}"
     named = ", ".join(f"{count} {item}" for item, count in items.items())
-    return f"{number} {word}{plural}" + (f" ({named})" if named else "")
+    return ", ".join((f"{number} {word}{plural}" + (f" ({named})" if named else ""), *measures))
 
 
 def layout_words(layout: "Layout") -> str:
-    """Return what a layout has: its pieces by their items, then its measures."""
-    measures = [each.item for each in layout if isinstance(each, Measure)]
-    pieces = [layout_counts(standing(layout))] if standing(layout) else []
-    return ", ".join(pieces + measures) or "nothing"
+    """Return what a layout has, also if that is nothing."""
+    return layout_counts(layout) if layout else "nothing"
 
 
 def _element_text(element: Element) -> str:

@@ -162,6 +162,13 @@ class Kinds:
         2.2,
         Look(_WAY, 1.8, arrows=True, drawn_dashed=True, cad_colour=5),
     )
+    TAKEN_AWAY: Final = FeatureKind(
+        "taken_away",
+        "structure that is taken away",
+        2.9,
+        Look(STRUCTURE, 1.2, dashed=True, fill=FAINT, opacity=0.7, drawn_dashed=True, cad_colour=9),
+        named="inside",
+    )
     STRUCTURE: Final = FeatureKind(
         "structure",
         "other structure",
@@ -271,12 +278,17 @@ def site_features(
         layout: What stands on the build zone; it must fit there.
         charge: The charge, where it is known.
     """
-    zone = scenario.build_zone
+    zone, there = scenario.build_zone, scenario.structures_with(layout)
     found = [area_feature(Kinds.SITE, scenario.site.rectangle_m, scenario.name)]
     if zone is not None:
-        found += zone_features(zone, [each.rectangle_m for each in scenario.structures])
+        found += zone_features(zone, [each.rectangle_m for each in there])
         found += barrier_features(zone, layout)
-    found += structure_features(scenario.structures)
+    found += structure_features(there)
+    found += (
+        area_feature(Kinds.TAKEN_AWAY, each.rectangle_m, each.name, **_said_of(each))
+        for each in scenario.structures
+        if each not in there
+    )
     found += source_features(scenario.charge)
     if charge is not None:
         found.append(charge_feature(charge, f"charge of {charge.tnt_kg:g} kg TNT"))

@@ -37,7 +37,7 @@ from blast_env.engines import Blast
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.files import make_folder, write_atomically
-from blast_env.geometry import Layout, standing
+from blast_env.geometry import Layout, met_by_blasts
 from blast_env.provenance import versions
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.figures import save_figure
@@ -114,7 +114,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
         BlastEnvError: If they cannot be run.
     """
     scenario = task.site
-    layout = standing(placing.layout_from(scenario, task.layout))
+    layout = met_by_blasts(placing.layout_from(scenario, task.layout))
     work: list[tuple[NamedThreat, Layout]] = []
     for threat in task.threats:
         # Gas has its scale from the blast without a barrier; particles are looked at first.

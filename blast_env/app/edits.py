@@ -372,7 +372,8 @@ def _fit_catalogue(document: Document, whole: int | None) -> None:
     if not zone["items"]:
         del zone["items"]
         return
-    pieces = sum(item["stock"] for item in zone["items"]) + len(zone.get("hardening", ()))
+    pieces = sum(item["stock"] for item in zone["items"])
+    pieces += sum(len(zone.get(key, ())) for key in ("hardening", "removable"))
     if zone.get("stock", 0) > pieces or zone.get("stock") == whole:
         zone.pop("stock", None)
 

@@ -12,7 +12,7 @@ from blast_env.geometry import Cell, Element, Layout, Measure, Piece, Rectangle
 from blast_env.physics.scene import WALLS
 from blast_env.response.components import catalogue
 from blast_env.scenario import Placement, Scenario
-from blast_env.scenario.catalogue import Hardening
+from blast_env.scenario.catalogue import AnyMeasure, Removable
 from blast_env.scenario.facade import Components
 from blast_env.units import MODULE_SIDE_M
 
@@ -93,7 +93,7 @@ def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
 
 
 def measures(scenario: Scenario, layout: Layout) -> tuple[Measurable, ...]:
-    """Return the measures that may harden facades; none without a build zone that has some."""
+    """Return what may be taken or not; nothing without a build zone that has some."""
     zone = scenario.build_zone
     known = {**catalogue(), **scenario.components}
     return tuple(
@@ -103,12 +103,14 @@ def measures(scenario: Scenario, layout: Layout) -> tuple[Measurable, ...]:
             _words_of(each, known),
             Measure.named(each.name) in layout,
         )
-        for each in (() if zone is None else zone.hardening)
+        for each in (() if zone is None else zone.measures)
     )
 
 
-def _words_of(measure: Hardening, known: Components) -> str:
+def _words_of(measure: AnyMeasure, known: Components) -> str:
     """Return what a measure puts where: `window, 12 mm laminated on office, west, storey 1`."""
+    if isinstance(measure, Removable):
+        return f"takes away {', '.join(measure.structures)}: needs a blast of its own"
     names = [each for each in (measure.glazing, measure.wall) if each]
     what = " and ".join(known[name].title or name for name in names)
     where = [*(measure.structures or ("all structures",))]

@@ -15,7 +15,7 @@ from blast_env.documents import read_text
 from blast_env.engines.contract import CALIBRATED_ENGINES
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.geometry import Layout, standing
+from blast_env.geometry import Layout, met_by_blasts
 from blast_env.physics.scene import Charge
 from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.statistics import reductions
@@ -218,7 +218,7 @@ def blast_key(scenario: Scenario, layout: Layout, charge: Charge, engine: Engine
     depends = (
         scenario.content_hash,
         divided,
-        sorted(map(tuple, standing(layout))),
+        sorted(map(tuple, met_by_blasts(layout))),
         tuple(charge),
         engine.name,
         engine.cell_m or 0.5,

@@ -138,7 +138,7 @@ class Session:
         return notes
 
     def harden(self, measure: str, *, taken: bool) -> None:
-        """Take a measure that hardens facades into the layout that is edited, or out of it.
+        """Take a measure into the layout that is edited, or out of it.
 
         Raises:
             LayoutError: If there is no such measure, or the budget does not pay for it.

@@ -29,7 +29,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import Consequences, consequences
-from blast_env.geometry import Layout, layout_words, standing
+from blast_env.geometry import Layout, layout_words, met_by_blasts
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Placement, Scenario, load_scenario, write_layout
@@ -206,7 +206,7 @@ def _answer(
     shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
     if shield is None or judged[shield.layout].passes(target):
         return answer
-    barrier = set(standing(best.layout))
+    barrier = set(met_by_blasts(best.layout))
     gain = 1.0 - (shield.worth - 1.0) / (nothing.worth - 1.0) if nothing.worth > 1.0 else 0.0
     if best.passes and not barrier:
         return f"Walls are worth nothing here: better components alone are cheaper. {answer}"

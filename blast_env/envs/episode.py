@@ -34,7 +34,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, SeedRange, Threat
 from blast_env.evaluation.comparison import Assessment, Objective
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
-from blast_env.geometry import Layout, Measure
+from blast_env.geometry import Layout, met_by_blasts
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
@@ -140,8 +140,7 @@ class Episode:
         """
         placement, _, _, ended = self._after(action, illegal)
         case = self.objective.case
-        # Measures that harden facades need no blast of their own.
-        barrier = tuple(each for each in placement.layout if not isinstance(each, Measure))
+        barrier = met_by_blasts(placement.layout)
         layouts = (barrier, ()) if ended else ()
         return tuple(
             BlastAsked(case.scenario, layout, threat)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Threat
-from blast_env.geometry import Element, Layout, standing
+from blast_env.geometry import Element, Layout, met_by_blasts
 
 
 class BudgetError(BlastEnvError):
@@ -34,7 +34,7 @@ class BlastMeter:
         Raises:
             BudgetError: If the budget does not pay for all of them; none is counted then.
         """
-        asked = {(tuple(sorted(standing(layout))), threat) for layout, threat in pairs}
+        asked = {(tuple(sorted(met_by_blasts(layout))), threat) for layout, threat in pairs}
         asked |= self._asked
         if len(asked) > self.budget:
             raise BudgetError(

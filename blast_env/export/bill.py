@@ -222,7 +222,7 @@ def _lines(plan: LayoutPlan) -> Sequence[_Line]:
             item.cost,
         )
         for item in zone.items
-    ] + [_Line(each.name, each.description, 1, nan, nan, nan, each.cost) for each in zone.hardening]
+    ] + [_Line(each.name, each.description, 1, nan, nan, nan, each.cost) for each in zone.measures]
 
 
 def write_excel(plan: LayoutPlan, path: Path) -> None:

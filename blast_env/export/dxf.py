@@ -60,7 +60,7 @@ def _items(plan: LayoutPlan, zone: BuildZone) -> list[str]:
         f"{item.name}: {counts[item.name]} of a stock of {item.stock}, {length} m x {thickness} m,"
         f" {_number(item.height_m)} m high"
         for item, (length, thickness) in zip(zone.items, sizes_m, strict=True)
-    ] + [f"{each.name}: taken" for each in zone.hardening if counts[each.name]]
+    ] + [f"{each.name}: taken" for each in zone.measures if counts[each.name]]
 
 
 def _conditions(zone: BuildZone) -> tuple[str, str]:

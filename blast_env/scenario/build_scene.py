@@ -78,21 +78,21 @@ def worst_places(
         source: The vehicle.
         layout: (row, column) of the build-zone cells that hold a barrier module, or pieces.
     """
-    return scenario.vehicle_ground(source).worst_places(_obstacles(scenario, layout))
+    return scenario.vehicle_ground(source, layout).worst_places(_obstacles(scenario, layout))
 
 
 def vehicle_reach(
     scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
 ) -> Reach:
     """Return where a vehicle gets to; arguments as for `worst_places`."""
-    return scenario.vehicle_ground(source).reach(_obstacles(scenario, layout))
+    return scenario.vehicle_ground(source, layout).reach(_obstacles(scenario, layout))
 
 
 def vehicle_drive(
     scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
 ) -> Drive:
     """Return what stops a vehicle and what not; arguments as for `worst_places`."""
-    return scenario.vehicle_ground(source).drive(_obstacles(scenario, layout))
+    return scenario.vehicle_ground(source, layout).drive(_obstacles(scenario, layout))
 
 
 def charge_against(scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> Charge:
@@ -136,7 +136,7 @@ def build_site(
         _check_clear(scenario.with_charge(charge), placement)
     drawn = draw_threat(scenario, seed) if charge is None else charge
     charge = charge_against(scenario, placement.layout, drawn)
-    structures = tuple(_outline(section) for section in scenario.structures)
+    structures = tuple(map(_outline, scenario.structures_with(placement.layout)))
     barrier = standing(placement.layout)
     if barrier:
         structures += (barrier_outline(scenario.zone, barrier),)

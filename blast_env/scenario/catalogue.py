@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
-from blast_env.geometry import Cell, Element, Measure, Piece
+from blast_env.geometry import Cell, Element, Measure, Piece, Removal
 from blast_env.physics.scene import WALLS
 from blast_env.response.barriers import RigidPiece
 from blast_env.response.facade import Bay
@@ -192,6 +192,30 @@ class Hardening(Section):
         )
 
 
+class Removable(Section):
+    """Structures that may be taken away, at a price: a part of a layout as an item is.
+
+    What stood there is gone for blasts and vehicles. Its ground stays closed to pieces.
+
+    Attributes:
+        name: Name in layouts and tables.
+        description: What it is, for people.
+        structures: Names of the structures, none of them protected.
+        cost: What it costs.
+    """
+
+    name: Name
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE] = ""
+    structures: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
+    cost: Cost
+
+
+AnyMeasure = Hardening | Removable
+"""What is taken or not, and covers no cell."""
+
+_KINDS: Final[Mapping[type, type[Measure]]] = {Hardening: Measure, Removable: Removal}
+
+
 class Variant(NamedTuple):
     """One way to set an item down.
 
@@ -199,12 +223,13 @@ class Variant(NamedTuple):
         item: Index of the item in the catalogue.
         name: Its name; empty for the single module of a zone without a catalogue.
         turned: Whether its length runs upwards.
-        rows: Rows of cells that it covers; 0 of a measure that hardens facades.
+        rows: Rows of cells that it covers; 0 of a measure.
         columns: Columns of cells that it covers; likewise.
         height_m: Its height; `None` is as high as the air.
         cost: What a piece costs where no cost area says otherwise.
         stops_vehicles: Whether no vehicle gets past it.
         crash_rating: Which vehicles it stops; `None` is every one.
+        kind: What an element of it is.
     """
 
     item: int
@@ -216,10 +241,11 @@ class Variant(NamedTuple):
     cost: float
     stops_vehicles: bool
     crash_rating: CrashRating | None = None
+    kind: type[Piece] = Piece
 
     @property
     def is_measure(self) -> bool:
-        """Whether it hardens facades, and covers no cell; its only place is cell (0, 0)."""
+        """Whether it covers no cell; its only place is cell (0, 0)."""
         return self.rows == 0
 
     def cells_at(self, row: int, column: int) -> Iterator[Cell]:
@@ -252,7 +278,7 @@ class Catalogue:
     Without items the only thing to place is a single module, and the elements of a layout are
     cells; with items they are pieces. Action `variant * rows * columns + row * columns + column`
     sets a variant down with its lower left cell there; the action after the last one finishes. Of
-    a measure that hardens facades only the action of cell (0, 0) is ever legal.
+    a measure only the action of cell (0, 0) is ever legal.
 
     Attributes:
         variants: Every way to set an item down: item by item, not turned before turned.
@@ -268,7 +294,7 @@ class Catalogue:
 
     @classmethod
     def of_items(
-        cls, items: Sequence[Item], hardening: Sequence[Hardening], shape: tuple[int, int]
+        cls, items: Sequence[Item], measures: Sequence[AnyMeasure], shape: tuple[int, int]
     ) -> "Catalogue":
         """Return the catalogue of a zone with items, and with measures after them."""
         variants = tuple(
@@ -286,11 +312,11 @@ class Catalogue:
             for turned in item.orientations
         )
         variants += tuple(
-            Variant(number, each.name, False, 0, 0, 0.0, each.cost, False)
-            for number, each in enumerate(hardening, start=len(items))
+            Variant(number, each.name, False, 0, 0, 0.0, each.cost, False, kind=_KINDS[type(each)])
+            for number, each in enumerate(measures, start=len(items))
         )
-        names = (*(item.name for item in items), *(each.name for each in hardening))
-        stocks = (*(item.stock for item in items), *(1 for _ in hardening))
+        names = (*(item.name for item in items), *(each.name for each in measures))
+        stocks = (*(item.stock for item in items), *(1 for _ in measures))
         return cls(variants, names, stocks, shape)
 
     @classmethod
@@ -320,8 +346,7 @@ class Catalogue:
         if not self.has_items:
             return row, column
         chosen = self.variants[variant]
-        kind = Measure if chosen.is_measure else Piece
-        return kind(row, column, chosen.name, chosen.turned)
+        return chosen.kind(row, column, chosen.name, chosen.turned)
 
     def action(self, element: Element) -> int:
         """Return the number of the action that places an element.
@@ -369,7 +394,7 @@ class Catalogue:
             return f"is not in the catalogue{nearest}"
         item = self.variants[self._numbers[element.item, False]]
         if item.is_measure:
-            return "hardens facades: it is not turned"
+            return "covers no cell: it is not turned"
         if item.rows == item.columns:
             return "is as long as it is thick: it is not turned"
         return "may not be turned: it is not rotatable"
@@ -410,10 +435,10 @@ class Catalogue:
         return self._of_its_kind(Piece(index(row), index(column), str(item), bool(turned)))
 
     def _of_its_kind(self, piece: Piece) -> Piece:
-        """Return a piece, as a `Measure` if its item hardens facades."""
+        """Return a piece, as a `Measure` if its item is one."""
         number = self._numbers.get((piece.item, piece.turned))
-        is_measure = number is not None and self.variants[number].is_measure
-        return Measure(*piece) if is_measure else piece
+        kind = Piece if number is None else self.variants[number].kind
+        return piece if kind is Piece else kind(*piece)
 
     def layout_from(self, layout: Any) -> tuple[Element, ...]:
         """Return a layout as plain values, in its order; see `element_from`.

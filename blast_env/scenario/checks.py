@@ -18,7 +18,7 @@ from blast_env.physics.structure import BARRIER_NAME
 from blast_env.response.components import Component, Glazing, Wall
 from blast_env.scenario.facade import facade_problems, hardening_problems
 from blast_env.scenario.objective import ObjectiveSection
-from blast_env.scenario.problems import Problem, extent
+from blast_env.scenario.problems import Problem, extent, unknown_name
 from blast_env.scenario.reach import places_on
 from blast_env.scenario.sections import (
     AnySource,
@@ -157,6 +157,7 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
         *_height_problems(parts),
         *_gauge_problems(parts),
         *_facade_problems(parts),
+        *_removable_problems(parts),
         *_objective_problems(parts),
     )
 
@@ -170,6 +171,26 @@ def _facade_problems(parts: Parts) -> Iterator[Problem]:
     if parts.build_zone is not None and parts.all_structures and not problems:
         measures = parts.build_zone.hardening
         yield from hardening_problems(parts.structures, parts.components, measures)
+
+
+def _removable_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that what may be taken away is there, and is nothing that is to be protected."""
+    if parts.build_zone is None or not parts.all_structures:
+        return
+    structures = {each.name: each for each in parts.structures.values()}
+    first_use: dict[str, str] = {}
+    for number, removable in enumerate(parts.build_zone.removable):
+        for place, name in enumerate(removable.structures):
+            where = f"build_zone.removable[{number}].structures[{place}]"
+            used = first_use.setdefault(name, where)
+            if name not in structures:
+                yield Problem(where, unknown_name("structure", name, structures))
+            elif structures[name].protected:
+                yield Problem(where, f"is {name!r}, which is protected: it cannot be taken away")
+            elif structures[name].facade is not None:
+                yield Problem(where, f"is {name!r}, which has a facade: it cannot be taken away")
+            elif used != where:
+                yield Problem(where, f"is {name!r}, which {used} takes away already")
 
 
 def _objective_problems(parts: Parts) -> Iterator[Problem]:

@@ -11,7 +11,7 @@ from typing import Any, Final
 from blast_env.documents import MAX_BYTES, DocumentError, parse_json, read_text
 from blast_env.errors import LayoutError, key_path, suggestion, type_word, value_text
 from blast_env.files import write_atomically
-from blast_env.geometry import Element, Layout, Measure, Piece, standing
+from blast_env.geometry import Element, Layout, Measure, Piece, Removal, standing
 from blast_env.scenario.catalogue import cell_from
 from blast_env.scenario.files import AnyScenario, find_scenario
 from blast_env.scenario.models import Scenario
@@ -25,15 +25,17 @@ PIECES_VERSION: Final = 2
 """The version of a file whose layout consists of pieces."""
 
 MEASURES_VERSION: Final = 3
-"""The version of a file whose layout has measures that harden facades, beside pieces."""
+"""The version of a file whose layout has measures beside pieces."""
 
 _LISTS: Final[Mapping[int, str]] = MappingProxyType(
     {CELLS_VERSION: "cells", PIECES_VERSION: "pieces", MEASURES_VERSION: "pieces"}
 )
 """The key of the layout, by the version of the file."""
 
-_MEASURES: Final = "hardening"
-"""The key of the names of the measures, in the last version."""
+_MEASURES: Final[Mapping[str, type[Measure]]] = MappingProxyType(
+    {"hardening": Measure, "taken_away": Removal}
+)
+"""The keys of the names of the measures, in the last version."""
 
 _OTHER_KEYS: Final = ("scenario", "scenario_hash", "provenance", "version")
 _PIECE_KEYS: Final[Mapping[str, type]] = MappingProxyType(
@@ -148,13 +150,16 @@ class LayoutFile:
     def _text(self, path: str | Path) -> str:
         """Return the file as JSON, the cells on one line, or each piece on one."""
         pieces = [each for each in standing(self.layout) if isinstance(each, Piece)]
-        measures = [each.item for each in self.layout if isinstance(each, Measure)]
-        if pieces or measures:
-            version = MEASURES_VERSION if measures else PIECES_VERSION
+        measures = {
+            key: [each.item for each in self.layout if type(each) is kind]
+            for key, kind in _MEASURES.items()
+        }
+        if pieces or any(measures.values()):
+            version = MEASURES_VERSION if any(measures.values()) else PIECES_VERSION
             lines = ",\n".join(f"    {json.dumps(_piece_table(piece))}" for piece in pieces)
             layout = f'  "version": {version},\n  "pieces": [\n{lines}\n  ]'
-            if measures:
-                layout += f',\n  "{_MEASURES}": {json.dumps(measures)}'
+            for key in filter(measures.get, measures):
+                layout += f',\n  "{key}": {json.dumps(measures[key])}'
         else:
             layout = f'  "cells": {json.dumps([list(cell) for cell in self.layout])}'
         keys: dict[str, Any] = {"scenario": self.scenario, "scenario_hash": self.scenario_hash}
@@ -183,7 +188,7 @@ class LayoutFile:
 def load_layout(path: str | Path, scenario: AnyScenario | None = None) -> Layout:
     """Return the layout of a layout file.
 
-    The file is `[[row, column], ...]`, or a table with `cells`, or `pieces` and `hardening`, and,
+    The file is `[[row, column], ...]`, or a table with `cells`, or `pieces` and the measures, and,
     if it says so, the scenario that they are for and how they were made; see `LayoutFile`.
 
     Args:
@@ -237,7 +242,7 @@ def _parse(content: Any, source: str) -> LayoutFile:
         known = ", ".join(map(str, _LISTS))
         raise LayoutError(f"{source}: version: is {type_word(version)}, must be one of {known}")
     key = _LISTS[version]
-    measures = (_MEASURES,) if version == MEASURES_VERSION else ()
+    measures = _MEASURES if version == MEASURES_VERSION else ()
     _check_keys(content, (key, *measures, *_OTHER_KEYS), f"{source}: ")
     if key not in content:
         raise LayoutError(f"{source}: {key}: missing")
@@ -258,18 +263,19 @@ def _parse(content: Any, source: str) -> LayoutFile:
         raise LayoutError(f"{source}: provenance: is {type_word(provenance)}, must be a table")
     read = _cells if version == CELLS_VERSION else _pieces
     layout = read(content[key], source, key)
-    layout += _measures(content.get(_MEASURES, []), f"{source}: {_MEASURES}")
+    for name_key, kind in _MEASURES.items():
+        layout += _measures(content.get(name_key, []), f"{source}: {name_key}", kind)
     return LayoutFile(layout, name, scenario_hash, provenance)
 
 
-def _measures(listed: Any, where: str) -> Layout:
+def _measures(listed: Any, where: str, kind: type[Measure]) -> Layout:
     """Return the measures of a list of names; `where` it is begins the message of an error."""
     if not isinstance(listed, list):
         raise LayoutError(f"{where}: is {type_word(listed)}, must be a list of names")
     for index, name in enumerate(listed):
         if not isinstance(name, str):
             raise LayoutError(f"{where}[{index}]: is {type_word(name)}, must be a string")
-    return tuple(map(Measure.named, listed))
+    return tuple(map(kind.named, listed))
 
 
 def _check_keys(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:

@@ -6,6 +6,7 @@ heights are above the ground.
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from typing import Annotated, Any, Final, Self
 
@@ -109,7 +110,7 @@ __all__ = [
 
 _LATER_KEYS: Final = (
     *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
-    "hardening",
+    *("hardening", "removable"),
 )
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
@@ -393,9 +394,17 @@ class Scenario(Section):
         """The sources that are vehicles."""
         return tuple(source for source in self.charge if isinstance(source, VehicleSource))
 
-    def vehicle_ground(self, source: VehicleSource) -> VehicleGround:
-        """Return what a vehicle meets on the empty site."""
-        return vehicle_ground(self._parts((source,)), source)
+    def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
+        """Return the structures that are still there with a layout."""
+        away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
+        return tuple(each for each in self.structures if each.name not in away)
+
+    def vehicle_ground(
+        self, source: VehicleSource, layout: Iterable[Element] = ()
+    ) -> VehicleGround:
+        """Return what a vehicle meets on a site without barriers, as far as a layout lets it be."""
+        ground = vehicle_ground(self._parts((source,)), source)
+        return replace(ground, structures=self.structures_with(layout))
 
     def sample_charges(self, rng: np.random.Generator, count: int) -> tuple[AnyCharge, ...]:
         """Draw charges, independently of each other: a source by its weight, then a place in it.
@@ -465,7 +474,7 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
         for key in ("description", *RIGID_KEYS):
             item.pop(key, None)
         _without_test(item)
-    for measure in content["hardening"]:
+    for measure in (*content["hardening"], *content["removable"]):
         del measure["description"]
     if zone.access_way is not None and zone.access_way.gate is None:
         del content["access_way"]["gate"]

@@ -132,7 +132,7 @@ class Placement:
         """Return a sentence for each vehicle: how near it comes now, by which way, how fast."""
         obstacles = obstacles_of(self._zone, self.layout)
         return tuple(
-            self.scenario.vehicle_ground(source).explain(obstacles)
+            self.scenario.vehicle_ground(source, self.layout).explain(obstacles)
             for source in self.scenario.vehicles
         )
 

@@ -22,7 +22,7 @@ NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "charge": ("height_m",),
     "structures": ("height_m", "base_m", "faces", "building", "peak_weight", "facade"),
     "objective": ("kind", "measure", "target"),
-    "build_zone": ("height_m", "items", "hardening"),
+    "build_zone": ("height_m", "items", "hardening", "removable"),
     "build_zone.access_way": ("gate",),
 }
 """What version 2 added, by section; all of it has a default, which is what version 1 means."""

@@ -21,17 +21,19 @@ from pydantic import (
 )
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Cell, Element, Piece, Rectangle
+from blast_env.geometry import Cell, Element, Piece, Rectangle, Removal
 from blast_env.physics.scene import WALLS
 from blast_env.response.barriers import RigidPiece
 from blast_env.scenario.access_way import AccessWay, any_in_windows, counts_before
 from blast_env.scenario.catalogue import (
     MOST_ITEMS,
+    AnyMeasure,
     Catalogue,
     Cost,
     Hardening,
     Item,
     PlacedModule,
+    Removable,
     Variant,
 )
 from blast_env.scenario.sections import (
@@ -87,12 +89,14 @@ class _SameItems:
 
     items: tuple[Item, ...]
     hardening: tuple[Hardening, ...]
+    removable: tuple[Removable, ...]
 
     def __eq__(self, other: object) -> bool:
         return (
             isinstance(other, _SameItems)
             and other.items is self.items
             and other.hardening is self.hardening
+            and other.removable is self.removable
         )
 
     def __hash__(self) -> int:
@@ -101,7 +105,7 @@ class _SameItems:
 
 @lru_cache(maxsize=64)
 def _catalogue_of(same: _SameItems, shape: tuple[int, int]) -> Catalogue:
-    return Catalogue.of_items(same.items, same.hardening, shape)
+    return Catalogue.of_items(same.items, (*same.hardening, *same.removable), shape)
 
 
 class BuildZone(Section):
@@ -116,6 +120,7 @@ class BuildZone(Section):
         items: The catalogue; without one, single modules are placed.
         hardening: Measures that harden facades, beside the items; of two that change the same
             component of a bay, the one that stands later here counts.
+        removable: Structures that may be taken away, beside the items.
         stock: How many modules there are to place; with a catalogue, the most pieces that may be
             placed in all, which are all that there are unless it is given.
         keep_outs: Areas in which no cell may be used.
@@ -134,6 +139,7 @@ class BuildZone(Section):
     columns: Count
     items: Annotated[tuple[Item, ...], Field(max_length=MOST_ITEMS)] = ()
     hardening: Annotated[tuple[Hardening, ...], Field(max_length=MOST_ITEMS)] = ()
+    removable: Annotated[tuple[Removable, ...], Field(max_length=MOST_ITEMS)] = ()
     stock: Annotated[StrictInt, Field(ge=1, le=MOST_STOCK)]
     keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=100)] = ()
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
@@ -153,9 +159,9 @@ class BuildZone(Section):
         items = given.get("items")
         if not isinstance(items, list | tuple) or not items:
             return given
-        measures = given.get("hardening")
         pieces = sum(map(_pieces_of, items))
-        pieces += len(measures) if isinstance(measures, list | tuple) else 0
+        for measures in (given.get("hardening"), given.get("removable")):
+            pieces += len(measures) if isinstance(measures, list | tuple) else 0
         # An empty catalogue is an error of its own, `build_zone_problems`.
         return {**given, "stock": min(max(pieces, 1), MOST_STOCK)}
 
@@ -163,8 +169,20 @@ class BuildZone(Section):
     def catalogue(self) -> Catalogue:
         """What can be placed."""
         if self.items:
-            return _catalogue_of(_SameItems(self.items, self.hardening), self.shape)
+            same = _SameItems(self.items, self.hardening, self.removable)
+            return _catalogue_of(same, self.shape)
         return Catalogue.of_modules(self.stock, self.height_m, self.module_cost, self.shape)
+
+    @property
+    def measures(self) -> tuple[AnyMeasure, ...]:
+        """What is taken or not: what hardens facades, then what takes structures away."""
+        return (*self.hardening, *self.removable)
+
+    def taken_away(self, layout: Iterable[Element]) -> frozenset[str]:
+        """Return the names of the structures that a layout takes away."""
+        taken = {each.item for each in layout if isinstance(each, Removal)}
+        own = (each.structures for each in self.removable if each.name in taken)
+        return frozenset(name for names in own for name in names)
 
     @property
     def highest_m(self) -> float | None:

@@ -80,8 +80,10 @@ def _key_problems(zone: BuildZone) -> Iterator[Problem]:
             instead = "with a catalogue" if zone.items else "without a catalogue"
             yield Problem(f"{here}.{other}", f"must be left out: {instead} there is {needed}")
     if not zone.items:
-        if zone.hardening:
-            yield Problem("build_zone.hardening", "must be left out: there are no build_zone.items")
+        for key in ("hardening", "removable"):
+            if getattr(zone, key):
+                message = "must be left out: there are no build_zone.items"
+                yield Problem(f"build_zone.{key}", message)
         return
     for key in ("module_cost", "height_m"):
         if getattr(zone, key) != BuildZone.model_fields[key].default:
@@ -97,13 +99,14 @@ def _item_problems(zone: BuildZone, cells: EmptyZone) -> Iterator[Problem]:
     """Check the names of the items, that they are in stock, and that each fits somewhere."""
     places = [f"build_zone.items[{index}]" for index in range(len(zone.items))]
     places += [f"build_zone.hardening[{index}]" for index in range(len(zone.hardening))]
-    names = [*(item.name for item in zone.items), *(each.name for each in zone.hardening)]
+    places += [f"build_zone.removable[{index}]" for index in range(len(zone.removable))]
+    names = [each.name for each in (*zone.items, *zone.measures)]
     for index, name in enumerate(names):
         first = names.index(name)
         if first != index:
             message = f"is {name!r}, already the name of {places[first]}"
             yield Problem(f"{places[index]}.name", message)
-    pieces = sum(item.stock for item in zone.items) + len(zone.hardening)
+    pieces = sum(item.stock for item in zone.items) + len(zone.measures)
     if pieces == 0:
         yield Problem("build_zone.items", "none is in stock, at least one must have stock above 0")
     elif zone.stock > pieces:

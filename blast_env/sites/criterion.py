@@ -307,7 +307,7 @@ def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
         own[...] = by_height[variant.height_m]
         for cells, length in ((own.transpose(1, 0, 2), variant.rows), (own.T, variant.columns)):
             _take_next(cells, length)
-    return cut.reshape(len(lines.weight), -1)
+    return cut.reshape(len(lines.weight), catalogue.finish)
 
 
 def _take_next(cells: BoolArray, length: int) -> None:
@@ -321,6 +321,8 @@ def _take_next(cells: BoolArray, length: int) -> None:
 
 def _wall_share(scenario: Scenario, lines: Visibility) -> float:
     """Return the share of the lines that the best straight run of modules cuts."""
+    if not len(lines.weight):
+        return 0.0
     usable = usable_cells(scenario)
     best = 0.0
     for height_m, longest in _longest_runs(scenario.zone):
@@ -329,7 +331,7 @@ def _wall_share(scenario: Scenario, lines: Visibility) -> float:
             run = min(longest, along_rows.shape[1])
             cut_by_run = _any_in_runs(along_rows, run).reshape(len(lines.weight), -1)
             best = max(best, float((lines.weight @ cut_by_run).max(initial=0.0)))
-    return min(float(best / lines.weight.sum()), 1.0) if len(lines.weight) else 0.0
+    return min(float(best / lines.weight.sum()), 1.0)
 
 
 def _longest_runs(zone: BuildZone) -> Iterator[tuple[float | None, int]]:

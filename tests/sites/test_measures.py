@@ -7,6 +7,7 @@ import pytest
 
 from blast_env.scenario import Placement, Scenario, usable_cells
 from blast_env.sites import SiteMeasures, Visibility, visibility_layout
+from tests.scenario.test_removable import fenced
 from tests.sites.cases import yard
 
 SMALL = {"corner_m": (9.0, 9.0), "rows": 3, "columns": 2}
@@ -82,3 +83,12 @@ def test_dear_cells_are_used_last() -> None:
     scenario = yard(stock=2, cost_areas=[dear], budget=100.0)
     layout = visibility_layout(scenario, Visibility.of(scenario))
     assert all(each[0] >= 4 for each in layout)
+
+
+def test_where_nothing_is_seen_the_rule_of_sight_lines_builds_nothing() -> None:
+    """A wall that stands there already hides the building, before the lower walls on offer."""
+    scenario = fenced()
+    lines = Visibility.of(scenario)
+    assert not len(lines.weight)
+    assert visibility_layout(scenario, lines) == ()
+    assert SiteMeasures.of(scenario).wall_share == 0.0

@@ -17,7 +17,7 @@ from blast_agents.search.moves import Moves, legal_part
 from blast_agents.search.problem import LayoutProblem
 from blast_agents.search.registry import layouts_by_rule
 from blast_env.evaluation import BlastMeter, BudgetError
-from blast_env.geometry import Layout, Measure, standing
+from blast_env.geometry import Layout, Measure, met_by_blasts
 from blast_env.response.damage import worst
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from blast_env.values import generator
@@ -134,7 +134,9 @@ def only(scenario: Scenario, kind: MeasureKind) -> Scenario:
         each if each.name in names else each.model_copy(update={"stock": 0}) for each in zone.items
     )
     hardening = zone.hardening if kind in (MeasureKind.HARDEN, MeasureKind.TOGETHER) else ()
-    changed = zone.model_copy(update={"items": items, "hardening": hardening})
+    removable = zone.removable if kind in (MeasureKind.SHIELD, MeasureKind.TOGETHER) else ()
+    update = {"items": items, "hardening": hardening, "removable": removable}
+    changed = zone.model_copy(update=update)
     return scenario.model_copy(update={"build_zone": changed})
 
 
@@ -188,7 +190,7 @@ def advise(
     def drawn() -> Iterator[Layout]:
         yield ()
         for layout in begin_with:
-            yield standing(layout)
+            yield met_by_blasts(layout)
         if _items_of(scenario, kind):
             bare = scenario.zone.model_copy(update={"hardening": ()})
             unhardened = scenario.model_copy(update={"build_zone": bare})
@@ -200,7 +202,7 @@ def advise(
             while True:
                 ranked = sorted(best, key=lambda each: best[each])[:_KEPT]
                 chosen = ranked[int(rng.integers(len(ranked)))]
-                yield standing(_changed(moves, chosen, rng))
+                yield met_by_blasts(_changed(moves, chosen, rng))
 
     tries = 0
     try:

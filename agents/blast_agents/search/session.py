@@ -11,7 +11,7 @@ import numpy as np
 from blast_agents.search.problem import Candidate, LayoutProblem, Progress, Report, SearchResult
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Layout, standing
+from blast_env.geometry import Layout, met_by_blasts
 from blast_env.values import generator
 
 LAYOUTS_PER_REALISATION: Final = 500
@@ -275,7 +275,7 @@ class SearchSession:
         Measures that harden facades need none of their own.
         """
         return {
-            (standing(key), number)
+            (met_by_blasts(key), number)
             for key in layouts
             for number in range(len(self._known.get(key, ())), threats)
         } - self._met

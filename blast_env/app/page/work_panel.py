@@ -325,7 +325,7 @@ class WorkPanel:
             self._search_cost.text = cost_words(costs)
 
     def _offer_measures(self, scenario: Scenario, layout: Layout) -> None:
-        """Offer what may harden facades; a switch each, since it is taken or not."""
+        """Offer the measures; a switch each, since one is taken or not."""
         offers = placing.measures(scenario, layout)
         if offers == self._measures_shown:
             return
@@ -333,7 +333,7 @@ class WorkPanel:
         self._measures.clear()
         with self._measures:
             if offers:
-                ui.label("harden: no new blast is needed").classes("be-quiet")
+                ui.label("measures: what hardens needs no new blast").classes("be-quiet")
             for each in offers:
                 act = partial(self._harden, each.name)
                 switch = ui.switch(each.label, value=each.is_taken)
