@@ -213,6 +213,13 @@ SITE_KINDS: Final = tuple(each for each in vars(Kinds).values() if isinstance(ea
 """All kinds, the lowest first."""
 
 
+FREE_CELL: Final = FeatureKind("free_cell", "free cell", 1.12, Look(fill=(214, 238, 219)))
+NO_CELL: Final = FeatureKind(
+    "no_cell", "cell not available", 1.1, Look(fill=(226, 228, 232), hatched=True)
+)
+"""What pictures show while a layout is made; maps and drawings know nothing of cells."""
+
+
 @dataclass(frozen=True)
 class Feature:
     """One thing on the site.
@@ -388,6 +395,18 @@ def _way_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> Iterato
     free = (ends for ends in arrows if not any(each.meets_segment(*ends) for each in structures_m))
     ends = next(free, arrows[0])
     yield Feature(Kinds.ACCESS_WAY, tuple(rounded_m(*end) for end in ends), way.description)
+
+
+def cell_features(zone: BuildZone, cells: BoolArray) -> Iterator[Feature]:
+    """Yield where something may be placed and where not.
+
+    Args:
+        zone: The build zone.
+        cells: Which cells may take something (rows, columns).
+    """
+    for kind, chosen in ((NO_CELL, ~cells), (FREE_CELL, cells)):
+        for each in rectangles_of(chosen, zone.corner_m):
+            yield area_feature(kind, each, kind.words)
 
 
 def item_colours(zone: BuildZone | None) -> Mapping[str, Colour]:

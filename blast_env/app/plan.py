@@ -17,15 +17,17 @@ from blast_env.labels import labels_of, settled_labels
 from blast_env.physics.structure import Colour
 from blast_env.plan import (
     FAINT,
+    FREE_CELL,
     INK,
+    NO_CELL,
     QUIET_INK,
     STANDING,
     Feature,
     FeatureKind,
     Kinds,
     Look,
+    cell_features,
     in_order,
-    rectangles_of,
     site_features,
     vehicle_features,
     without,
@@ -120,14 +122,15 @@ def plan_svg(
     view: PixelView, scenario: Scenario, layout: Layout, selected: SiteThing | None
 ) -> str:
     """Return what stands on a site; `overlay_svg` goes on top of it."""
-    features = in_order((*site_features(scenario, layout), *vehicle_features(scenario, layout)))
+    features = _features(scenario, layout)
+    cells = [each for each in features if each.kind in (NO_CELL, FREE_CELL)]
     return "".join(
         (
-            _BLOCKED,
             *draw_features(view, [each for each in features if each.kind is Kinds.SITE]),
             *_lines(view, scenario),
-            *_cells(view, scenario, layout),
-            *draw_features(view, without(features, Kinds.SITE)),
+            *draw_features(view, cells),
+            *_cell_lines(view, scenario),
+            *draw_features(view, without(features, Kinds.SITE, NO_CELL, FREE_CELL)),
             *_names(view, [_named(each) for each in features]),
             *_selection(view, scenario, selected),
             *_scale_bar(view),
@@ -137,20 +140,21 @@ def plan_svg(
 
 def plan_legend(scenario: Scenario, layout: Layout) -> str:
     """Return what the colours and lines of the plan stand for, as HTML; what is on top first."""
-    features = [*site_features(scenario, layout), *vehicle_features(scenario, layout)]
-    shown = {each.title: each for each in features if each.kind is not Kinds.SITE}
-    entries = [
-        (title, "".join(_swatch(each)))
-        for title, each in sorted(shown.items(), key=lambda pair: -pair[1].kind.level)
-    ]
-    zone = scenario.build_zone
-    if zone is not None and not Placement.of(scenario, layout).usable.all():
-        blocked = '<rect x="1" y="1" width="22" height="12" fill="url(#blocked)"></rect>'
-        entries.append(("nothing may stand there", _BLOCKED + blocked))
+    shown = {each.title: each for each in without(_features(scenario, layout), Kinds.SITE)}
     return "".join(
-        f'<span><svg width="24" height="14" aria-hidden="true">{drawn}</svg>{escape(title)}</span>'
-        for title, drawn in entries
+        f'<span><svg width="24" height="14" aria-hidden="true">{"".join(_swatch(each))}</svg>'
+        f"{escape(title)}</span>"
+        for title, each in sorted(shown.items(), key=lambda pair: -pair[1].kind.level)
     )
+
+
+def _features(scenario: Scenario, layout: Layout) -> tuple[Feature, ...]:
+    """Return everything that the plan shows, the lowest first."""
+    found = [*site_features(scenario, layout), *vehicle_features(scenario, layout)]
+    if scenario.build_zone is not None:
+        usable = Placement.of(scenario, layout).usable
+        found += cell_features(scenario.build_zone, usable)
+    return in_order(found)
 
 
 def _swatch(feature: Feature) -> Iterator[str]:
@@ -183,13 +187,6 @@ def overlay_svg(
     return "".join(parts)
 
 
-_BLOCKED: Final = (
-    '<pattern id="blocked" width="7" height="7" patternUnits="userSpaceOnUse"'
-    ' patternTransform="rotate(45)"><rect width="7" height="7" fill="#e2e4e8"></rect>'
-    '<line x1="0" y1="0" x2="0" y2="7" stroke="#9ea4ae" stroke-width="1.6"></line></pattern>'
-)
-
-
 # Features.
 
 
@@ -213,11 +210,12 @@ def _areas(
     path = "".join(f"M{'L'.join(f'{x:g} {y:g}' for x, y in outline)}Z" for outline in outlines)
     fill = "none" if colour is None else _hex(colour)
     if look.hatched:
-        ink, fill = _hex(look.line or QUIET_INK), f"url(#{kind.name})"
+        ground, fill = fill, f"url(#{kind.name})"
         yield (
             f'<pattern id="{kind.name}" width="9" height="9" patternUnits="userSpaceOnUse"'
-            f' patternTransform="rotate(-45)"><line x1="0" y1="0" x2="0" y2="9" stroke="{ink}"'
-            ' stroke-width="2"></line></pattern>'
+            f' patternTransform="rotate(-45)"><rect width="9" height="9" fill="{ground}"></rect>'
+            f'<line x1="0" y1="0" x2="0" y2="9" stroke="{_hex(look.line or QUIET_INK)}"'
+            ' stroke-width="2" stroke-opacity="0.5"></line></pattern>'
         )
     stroke = "none" if look.line is None else _hex(look.line)
     dashed = ' stroke-dasharray="7 4"' if look.dashed else ""
@@ -337,22 +335,11 @@ def _lines(view: PixelView, scenario: Scenario) -> Iterator[str]:
     yield f'<path d="{path}" stroke="#e3e7ec" stroke-width="1" fill="none"></path>'
 
 
-def _cells(view: PixelView, scenario: Scenario, layout: Layout) -> Iterator[str]:
-    """Yield which cells of the build zone may take something."""
-    zone = scenario.build_zone
-    if zone is None:
+def _cell_lines(view: PixelView, scenario: Scenario) -> Iterator[str]:
+    zone, pitch = scenario.build_zone, MODULE_SIDE_M * view.pixels_per_m
+    if zone is None or pitch < _LEAST_CELL_PX:
         return
-    yield _rectangle(view, zone.rectangle_m, "#e9f3ec")
-    usable = Placement.of(scenario, layout).usable
-    for box in rectangles_of(~usable, zone.corner_m):
-        yield _rectangle(view, box, "url(#blocked)")
-    if MODULE_SIDE_M * view.pixels_per_m >= _LEAST_CELL_PX:
-        yield from _cell_lines(view, zone.rectangle_m)
-
-
-def _cell_lines(view: PixelView, zone_m: Rectangle) -> Iterator[str]:
-    left, top, across, down = view.box(zone_m)
-    pitch = MODULE_SIDE_M * view.pixels_per_m
+    left, top, across, down = view.box(zone.rectangle_m)
     lines = [f"M{left + k * pitch:.2f} {top}v{down}" for k in range(1, round(across / pitch))]
     lines += [f"M{left} {top + k * pitch:.2f}h{across}" for k in range(1, round(down / pitch))]
     path = "".join(lines)

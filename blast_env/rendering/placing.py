@@ -10,18 +10,14 @@ import numpy as np
 from blast_env.engines import Blast, BlastResult
 from blast_env.geometry import Cell, Element, Rectangle
 from blast_env.physics.scene import Charge
-from blast_env.physics.structure import Colour
 from blast_env.plan import (
     EXPLOSIVE,
     PROTECTED,
     Feature,
-    FeatureKind,
     Kinds,
-    Look,
-    area_feature,
     barrier_features,
+    cell_features,
     in_order,
-    rectangles_of,
     site_features,
     source_features,
     vehicle_features,
@@ -39,12 +35,6 @@ from blast_env.units import MODULE_SIDE_M
 
 with render_extra():
     from matplotlib.artist import Artist
-
-FREE: Final[Colour] = (214, 238, 219)
-_FREE_CELL: Final = FeatureKind("free_cell", "free cell", 1.12, Look(fill=FREE))
-_NO_CELL: Final = FeatureKind(
-    "no_cell", "cell not available", 1.1, Look(fill=(226, 228, 232), hatched=True)
-)
 
 
 class PlacingPainter:
@@ -105,9 +95,7 @@ class PlacingPainter:
             found += vehicle_features(scenario, layout)
         zone = scenario.build_zone
         if zone is not None:
-            found.append(area_feature(_NO_CELL, zone.rectangle_m, ""))
-            free_m = rectangles_of(placement.open_ground, zone.corner_m)
-            found += [area_feature(_FREE_CELL, each, "") for each in free_m]
+            found += cell_features(zone, placement.open_ground)
             found += barrier_features(zone, layout)
         return in_order(found)
 
@@ -137,8 +125,10 @@ class PlacingPainter:
         catalogue = placement.catalogue
         numbers = {each.name: number for number, each in enumerate(catalogue.variants)}
         one_each = [catalogue.element_at(number, 0, 0) for number in numbers.values()]
-        barrier = barrier_features(self._scenario.zone, one_each)
-        return legend_of(without_counts((*self._of(placement), *barrier)))
+        zone = self._scenario.zone
+        full = cell_features(zone, np.zeros(zone.shape, dtype=bool))
+        barrier = barrier_features(zone, one_each)
+        return legend_of(without_counts((*self._of(placement), *full, *barrier)))
 
 
 def _is_in(zone: BuildZone, cell: Cell) -> bool:

@@ -1,7 +1,9 @@
 """A window that shows frames, for `render_mode="human"`."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 from blast_env.errors import BlastEnvError
@@ -14,21 +16,12 @@ with render_extra():
 _SHARE_OF_SCREEN = 0.9
 _KEYS_HELD_MS = (300, 60)  # until a key that is held counts again, and then each time
 
-KEY_NUMBERS: Final = {
-    "up": pygame.K_UP,
-    "down": pygame.K_DOWN,
-    "left": pygame.K_LEFT,
-    "right": pygame.K_RIGHT,
-    "w": pygame.K_w,
-    "a": pygame.K_a,
-    "s": pygame.K_s,
-    "d": pygame.K_d,
-    "space": pygame.K_SPACE,
-    "tab": pygame.K_TAB,
-    "return": pygame.K_RETURN,
-    "backspace": pygame.K_BACKSPACE,
-    "escape": pygame.K_ESCAPE,
-}
+_LETTERS: Final = ("w", "a", "s", "d")
+_NAMED: Final = ("up", "down", "left", "right", "space", "tab", "return", "backspace", "escape")
+KEY_NUMBERS: Final[Mapping[str, int]] = MappingProxyType(
+    {name: getattr(pygame, f"K_{name}") for name in _LETTERS}
+    | {name: getattr(pygame, f"K_{name.upper()}") for name in _NAMED}
+)
 """The keys that mean anything, with pygame's numbers."""
 
 _KEY_NAMES: Final = {number: name for name, number in KEY_NUMBERS.items()}

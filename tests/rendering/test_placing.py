@@ -5,14 +5,15 @@ import pytest
 
 from blast_env.engines import Blast
 from blast_env.errors import BlastEnvError
-from blast_env.plan import EXPLOSIVE
+from blast_env.plan import EXPLOSIVE, FREE_CELL
 from blast_env.rendering.frames import FramePainter
-from blast_env.rendering.placing import FREE, PlacingPainter, sources_text
+from blast_env.rendering.placing import PlacingPainter, sources_text
 from blast_env.scenario import Placement, RectangleSource, SegmentSource
 from tests.rendering.scenes import LAYOUT, small_scenario
 
 SCENARIO = small_scenario()
 ROAD = SegmentSource(kind="segment", start_m=(2.0, 5.0), end_m=(2.0, 15.0), tnt_kg=50.0)
+FREE = FREE_CELL.look.fill or EXPLOSIVE
 PARK = RectangleSource(kind="rectangle", corner_m=(2.0, 2.0), size_m=(4.0, 3.0), tnt_kg=5.0)
 
 
