@@ -34,7 +34,7 @@ from blast_agents.training.train import TrainingResult
 
 from blast_env.cli.evaluation_report import interval
 from blast_env.cli.output import (
-    make_table,
+    ResultTable,
     percent,
     print_line,
     progress_bar,
@@ -310,7 +310,7 @@ def compare_methods(settings: DemoSettings, trained: TrainingResult) -> AgentCom
 def print_comparison(comparison: AgentComparison) -> None:
     """Print a row a method: mean impulse, reduction, time to propose a layout."""
     cases = comparison.standings.track.cases
-    table = make_table(
+    table = ResultTable(
         f"{cases[0].scenario.name}: {len(cases)} threats that the training has not met, the same "
         f"for all; judged by the engine {comparison.standings.engine}\n(Pa s: mean impulse on the "
         "protected structures; ahead: in percentage points, paired; ms: time to propose a layout)",

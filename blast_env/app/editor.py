@@ -72,7 +72,6 @@ class _Stroke:
     lifted: Element | None = None
     made: Scenario | None = None
     thing: SiteThing | None = None
-    changed: int = 0
 
 
 @dataclass

@@ -91,9 +91,9 @@ class PixelView:
         up_px = self.height_px - y_px
         return self.left_m + x_px / self.pixels_per_m, self.bottom_m + up_px / self.pixels_per_m
 
-    def zoomed(self, factor: float, at_m: PointM | None = None) -> "PixelView":
-        """Return the view nearer by a factor, with a place, the middle unless given, kept."""
-        x_m, y_m = at_m or self.metres(self.width_px / 2.0, self.height_px / 2.0)
+    def zoomed(self, factor: float) -> "PixelView":
+        """Return the view nearer by a factor, its middle kept."""
+        x_m, y_m = self.metres(self.width_px / 2.0, self.height_px / 2.0)
         scale = min(max(self.pixels_per_m * factor, 0.1), _MOST_ZOOM)
         share = self.pixels_per_m / scale
         return replace(
@@ -310,12 +310,10 @@ def _rectangle(
     )
 
 
-def _text(
-    x_px: float, y_px: float, text: str, colour: str, size_px: int = 13, anchor: str = "middle"
-) -> str:
+def _text(x_px: float, y_px: float, text: str, colour: str, size_px: int = 13) -> str:
     return (
         f'<text x="{x_px:g}" y="{y_px:g}" font-size="{size_px}" font-family="sans-serif"'
-        f' text-anchor="{anchor}" fill="{colour}" stroke="white" stroke-width="3"'
+        f' text-anchor="middle" fill="{colour}" stroke="white" stroke-width="3"'
         f' paint-order="stroke" stroke-linejoin="round">{escape(text)}</text>'
     )
 

@@ -22,7 +22,7 @@ from blast_env.cli.options import (
     ChargeOptions,
     wanted_level,
 )
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console
+from blast_env.cli.output import ResultTable, print_line, progress_bar, result_console
 from blast_env.cli.targets import PICTURES
 from blast_env.engines.contract import JUDGE, find_engine
 from blast_env.errors import BlastEnvError
@@ -160,7 +160,7 @@ class AdviseCommand(ChargeOptions):
         title = (
             f"{scenario.name}: what {scenario.zone.budget:g} buys, level {target.label!r} wanted"
         )
-        table = make_table(title, _HEADERS, text_columns=2)
+        table = ResultTable(title, _HEADERS, text_columns=2)
         for each in found:
             seen = judged[each.layout]
             levels = [seen.level(building) for building in seen.buildings]

@@ -28,7 +28,7 @@ from blast_env.cli.evaluation_report import (
     threats_text,
 )
 from blast_env.cli.output import (
-    make_table,
+    ResultTable,
     percent,
     print_line,
     print_written,
@@ -186,7 +186,7 @@ def _export(
 
 
 def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
-    table, cases = make_table(title, _HEADERS), case_table(comparison)
+    table, cases = ResultTable(title, _HEADERS), case_table(comparison)
     objective = comparison.cases[0].scenario.objective
     for row in cases.to_dict("records"):
         table.add_row(

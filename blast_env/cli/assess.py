@@ -13,7 +13,7 @@ from blast_env.cli.options import (
     ChargeOptions,
     wanted_level,
 )
-from blast_env.cli.output import make_table, print_line, print_table, progress_bar, result_console
+from blast_env.cli.output import ResultTable, print_line, print_table, progress_bar, result_console
 from blast_env.cli.pieces import print_pieces
 from blast_env.cli.targets import PICTURES
 from blast_env.engines import JUDGE, find_engine
@@ -142,7 +142,7 @@ class AssessCommand(ChargeOptions):
         if not any(each.neighbours for each in found.values()):
             return
         title = "without a facade: how likely an ordinary house there is damaged, worst charge"
-        table = make_table(title, _NEIGHBOURS, text_columns=2)
+        table = ResultTable(title, _NEIGHBOURS, text_columns=2)
         for name, each in found.items():
             for worst in each.worst_neighbours:
                 shares = (f"{100.0 * worst.probability[damage]:.0f}" for damage in BuildingDamage)
@@ -166,7 +166,7 @@ class AssessCommand(ChargeOptions):
         self, scenario: Scenario, judged: Consequences, target: LevelOfProtection
     ) -> None:
         headers = ("glass in all windows", *_HEADERS[1:], "passes")
-        table = make_table("the same loads, other glass", headers, text_columns=3)
+        table = ResultTable("the same loads, other glass", headers, text_columns=3)
         for name, glazing in other_glazing(scenario).items():
             other = judged.with_glazing(glazing)
             for building in other.buildings:

@@ -13,7 +13,7 @@ from blast_env.benchmark import (
     site_cost,
 )
 from blast_env.cli.command import Command, option
-from blast_env.cli.output import make_table, print_line, print_table, progress_bar, result_console
+from blast_env.cli.output import ResultTable, print_line, print_table, progress_bar, result_console
 from blast_env.engines import ENGINE_NAMES, find_engine
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.physics.gas.settings import CELLS, UNIFORM
@@ -121,7 +121,7 @@ class BenchCommand(Command):
             for cells in CELLS
             if cells != UNIFORM or length_m <= _LONGEST_UNIFORM_M
         ]
-        table = make_table("a blast on a street, by its length", _SITE_HEADERS, 2)
+        table = ResultTable("a blast on a street, by its length", _SITE_HEADERS, 2)
         with progress_bar("blasts") as progress:
             for done, (length_m, engine) in enumerate(pairs):
                 each = site_cost(length_m, engine)
@@ -140,7 +140,7 @@ class BenchCommand(Command):
         print_line(_ELSEWHERE)
 
     def _print_blasts(self, costs: Sequence[BlastCost]) -> None:
-        table = make_table(f"a blast: medians of {self.repeats} seeds", _BLAST_HEADERS, 2)
+        table = ResultTable(f"a blast: medians of {self.repeats} seeds", _BLAST_HEADERS, 2)
         for each in costs:
             updates = each.cell_updates
             table.add_row(
@@ -168,7 +168,7 @@ class BenchCommand(Command):
 
     def _print_environments(self, pairs: Sequence[tuple[Scenario, str]]) -> None:
         title = f"BlastBarrier-v0: random placements, medians of {self.repeats} episodes"
-        table, left_out = make_table(title, _ENVIRONMENT_HEADERS, 2), []
+        table, left_out = ResultTable(title, _ENVIRONMENT_HEADERS, 2), []
         for scenario, engine in pairs:
             try:
                 cost = environment_cost(scenario, engine, self.repeats, self.processes)

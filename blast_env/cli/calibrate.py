@@ -15,7 +15,7 @@ from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import ClusterOptions, ProcessOptions
 from blast_env.cli.output import (
-    make_table,
+    ResultTable,
     print_line,
     print_written,
     progress_bar,
@@ -165,7 +165,7 @@ def _save_figure(report: "CalibrationReport", stored: Calibration, path: Path) -
 
 
 def _print(report: "CalibrationReport", stored: Calibration) -> None:
-    table = make_table(
+    table = ResultTable(
         f"{stored.name}: {len(stored.seeds)} seeds at each distance, reference "
         f"{stored.reference.source}, {stored.reference.quantity.replace('_', ' ')}",
         ("R (m)", "i_sim", "95 % +-", "reference (psi s)", *report.laws, "error of stored law"),

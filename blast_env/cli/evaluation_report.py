@@ -21,7 +21,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
-    make_table,
+    ResultTable,
     percent,
     print_json,
     print_line,
@@ -231,7 +231,7 @@ def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
 def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine) -> None:
     """Print the buildings' mean loads, and what the layout does over all threats."""
     count = len(evaluation.threats)
-    table = make_table(
+    table = ResultTable(
         f"{evaluation.scenario.name}: {layout_counts(evaluation.layout, 'barrier')} against none, "
         f"{threats_text(count, seeds)}",
         _HEADERS,

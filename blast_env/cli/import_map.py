@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from blast_env.cli.command import Command, argument, option
 from blast_env.cli.output import (
-    make_table,
+    ResultTable,
     print_json,
     print_line,
     print_written,
@@ -66,7 +66,7 @@ def _pictures(imported: "ImportedSite", path: Path | None) -> list[Path]:
 
 def _print(imported: "ImportedSite", written: list[Path]) -> None:
     width_m, height_m = imported.site.size_m
-    table = make_table(
+    table = ResultTable(
         f"{imported.scenario.name}: {width_m:g} x {height_m:g} m, turned by "
         f"{imported.site.rotation_deg:.2f} degrees",
         _HEADERS,

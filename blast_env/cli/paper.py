@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from blast_env.cli.command import FOLDER, Command, option
-from blast_env.cli.output import make_table, result_console, save_pictures
+from blast_env.cli.output import ResultTable, result_console, save_pictures
 from blast_env.files import make_folder
 from blast_env.tables import write_csv
 
@@ -71,7 +71,7 @@ def rich_table(
     title: str, headers: tuple[str, ...], table: "pd.DataFrame", formats: tuple[str, ...]
 ) -> Table:
     """Return the first columns of a table, rounded, one for each format."""
-    shown = make_table(title, headers)
+    shown = ResultTable(title, headers)
     for row in table.itertuples(index=False):
         cells = zip(row, formats, strict=False)
         shown.add_row(*(format(value, wanted) for value, wanted in cells))
@@ -94,7 +94,7 @@ def coefficient_table() -> Table:
     from blast_env.fitting.paper import PAPER_LAWS, TABLE_4_DECIMALS, metrics_row
 
     headers = ("law", "from", "coefficients", "MAPE (%)", "RMSE (psi s)", "integral error (%)")
-    table = make_table("Coefficients, and the row of Table 4 that they give", headers, 3)
+    table = ResultTable("Coefficients, and the row of Table 4 that they give", headers, 3)
     for law in PAPER_LAWS:
         for source, coefficients in (("text", law.in_text), ("columns", law.fitted)):
             named = (f"{name} = {value:.5g}" for name, value in coefficients.coefficients.items())

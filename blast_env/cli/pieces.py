@@ -3,7 +3,7 @@
 from math import isnan
 from typing import TYPE_CHECKING, Final
 
-from blast_env.cli.output import make_table, print_line, result_console
+from blast_env.cli.output import ResultTable, print_line, result_console
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 if TYPE_CHECKING:  # a third of a second to import
@@ -26,7 +26,7 @@ def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
     if not len(pieces):
         return
     counts = ", ".join(f"{count} {word}" for word, count in outcome_counts(pieces).items())
-    table = make_table(f"{title}: {counts}", _HEADERS, text_columns=2)
+    table = ResultTable(f"{title}: {counts}", _HEADERS, text_columns=2)
     ordered = pieces.sort_values(["tilt", "slide_m"], ascending=False, kind="stable")
     for row in ordered.head(_MOST_ROWS).to_dict("records"):
         overturn_s = row["overturn_s"]

@@ -13,7 +13,7 @@ from blast_agents.search import LayoutProblem, Progress, SearchResult, layouts_b
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import SCENARIO_HELP, ChargeOptions, ProcessOptions
 from blast_env.cli.output import (
-    make_table,
+    ResultTable,
     print_line,
     print_written,
     progress_bar,
@@ -161,7 +161,7 @@ def _print_verdict(loads: Mapping[str, float], case: Case) -> None:
     charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
     objective = case.scenario.objective
     headers = ("layout", f"load ({objective.unit})", "reduction")
-    table = make_table(f"{case.scenario.name}: judged by gas dynamics on {charges}", headers)
+    table = ResultTable(f"{case.scenario.name}: judged by gas dynamics on {charges}", headers)
     rules = sorted(loads.keys() - {_NOTHING, _PROPOSAL}, key=lambda name: -loads[name])
     for name in (_NOTHING, *rules, _PROPOSAL):
         share = reductions(loads[name], loads[_NOTHING]).item()

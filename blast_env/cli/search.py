@@ -33,7 +33,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
-    make_table,
+    ResultTable,
     message_console,
     percent,
     print_line,
@@ -271,7 +271,7 @@ def print_cost(evaluator: BlastEvaluator, case: Case, blasts: int) -> None:
 def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
     """Print what the layout does against the search's threats and against others, and the cost."""
     result, problem = run.result, run.problem
-    table = make_table(
+    table = ResultTable(
         f"{problem.scenario.name}: {result.method} search, {_risk_text(problem)}",
         ("threats", "number", "without", "with", "reduction", "95 % interval"),
     )

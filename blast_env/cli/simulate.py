@@ -19,7 +19,7 @@ from blast_env.cli.options import (
     JsonOptions,
 )
 from blast_env.cli.output import (
-    make_table,
+    ResultTable,
     print_json,
     print_line,
     print_table,
@@ -504,7 +504,7 @@ def _section(text: str | None) -> "VerticalSection | None":
 def _print_gauges(gauges: "pd.DataFrame") -> None:
     if not len(gauges):
         return
-    table = make_table(
+    table = ResultTable(
         "gauges",
         ("gauge", "x (m)", "y (m)", "z (m)", "peak (kPa)", "impulse (Pa s)", "to come (Pa s)"),
         1,

@@ -131,7 +131,6 @@ def write_film(
     slow_motion: float | None = None,
     width_px: int | None = None,
     progress: Tell = lambda _: None,
-    full_impulse: float | None = None,
 ) -> tuple[BlastResult, ...]:
     """Write a film of a blast, or of two side by side.
 
@@ -151,9 +150,6 @@ def write_film(
         width_px: Width of the film; 960, or 1600 with two blasts. Each gets the same part, made
             even.
         progress: Called from time to time with the share of the work that is done.
-        full_impulse: Impulse of a module, simulation units, that has the last colour; give the
-            same one to films that are to be compared. Without it it is the largest load of a
-            protected module, rounded up.
 
     Returns:
         The results of the blasts, from left to right.
@@ -174,7 +170,7 @@ def write_film(
         plan = max(plans, key=lambda each: each.end_s)
         if suffix == ".gif":
             plan, width_px = for_gif(plan, width_px)
-        painters = _painters(results, width_px // len(blasts), full_impulse)
+        painters = _painters(results, width_px // len(blasts))
         drawing = share_of(progress, _TENTHS_OF_FIRST_RUNS, 10, 10 - _TENTHS_OF_FIRST_RUNS)
         frames = told_of(_frames(blasts, painters, plan), plan, drawing)
         title = blast.scenario.name
@@ -375,13 +371,9 @@ def _largest_load(result: BlastResult) -> float:
     return 0.0
 
 
-def _painters(
-    results: Sequence[BlastResult], width_px: int, full_impulse: float | None
-) -> list[FramePainter]:
+def _painters(results: Sequence[BlastResult], width_px: int) -> list[FramePainter]:
     """Return a painter a blast, all with the colours of the largest load on what is protected."""
     unit = max(results, key=_largest_load).load_unit  # one scale for all, so that they compare
-    if full_impulse is None:
-        full_impulse = scale_end(results, unit)
     painters = []
     for result in results:
         title, subtitle = blast_title(result.blast)
@@ -393,7 +385,7 @@ def _painters(
             title=title,
             subtitle=subtitle,
             width_px=width_px - width_px % 2,
-            full_impulse=full_impulse,
+            full_impulse=scale_end(results, unit),
             unit=unit.with_loads_of(result.load_unit),
         )
         painters.append(painter)

@@ -252,8 +252,8 @@ def scale_length_m(site_m: Rectangle) -> float:
     return nice_floor((site_m.right - site_m.left) / 3.0)
 
 
-def _lighter(colour: Colour, share: float = 0.45) -> Colour:
-    red, green, blue = (each + share * (1.0 - each) for each in colour)
+def _lighter(colour: Colour) -> Colour:
+    red, green, blue = (each + 0.45 * (1.0 - each) for each in colour)
     return red, green, blue
 
 

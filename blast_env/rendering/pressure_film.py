@@ -59,7 +59,6 @@ def write_pressure_film(
     beside: GasBlast | None = None,
     height_m: float = PLAN_HEIGHT_M,
     section: VerticalSection | None = None,
-    full_kpa: float | None = None,
     frames_per_s: float = 25.0,
     slow_motion: float | None = None,
     width_px: int | None = None,
@@ -75,8 +74,6 @@ def write_pressure_film(
             and on the same scale: without the barrier, or with another layout.
         height_m: Height of the plan; the layer of cells that holds it is drawn.
         section: The section; without it `default_section`.
-        full_kpa: Overpressure at the end of the scale; without it the largest peak on the walls
-            that count, rounded up.
         frames_per_s: Frames in a second of the film.
         slow_motion: Seconds of the film for a second of the blast; by default it lasts about 10 s.
         width_px: Width of the film; 960, or 1600 with two blasts.
@@ -93,8 +90,6 @@ def write_pressure_film(
     suffix = known_suffix(path)
     blasts = [blast] if beside is None else [beside, blast]
     check_comparable(blasts)
-    if full_kpa is not None and not full_kpa > 0.0:
-        raise BlastEnvError(f"full_kpa is {full_kpa:g}, must be above 0")
     width_px = width_px or (960 if beside is None else 1600)
     if not _NARROWEST_PX <= width_px <= _WIDEST_PX:
         raise BlastEnvError(f"width_px is {width_px}, must be {_NARROWEST_PX} to {_WIDEST_PX}")
@@ -109,7 +104,7 @@ def write_pressure_film(
         plan = plan_until(end_s, frames_per_s, slow_motion)
         if suffix == ".gif":
             plan, width_px = for_gif(plan, width_px)
-        full_kpa = scale_end_kpa([shot.result for shot in shots]) if full_kpa is None else full_kpa
+        full_kpa = scale_end_kpa([shot.result for shot in shots])
         painter = PressurePainter(shots, full_kpa, width_px - width_px % 2)
         times_s = map(plan.time_s, range(plan.frame_count))
         frames = (painter.paint(time_s, plan.real_time_factor) for time_s in times_s)

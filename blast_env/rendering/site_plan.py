@@ -193,12 +193,12 @@ def _sign(feature: Feature, places: FloatArray, view: View) -> list[Artist]:
     return [stem, sign]
 
 
-def _sign_style(kind: FeatureKind, size_pt: float = 13.0) -> dict[str, Any]:
+def _sign_style(kind: FeatureKind) -> dict[str, Any]:
     colour = unit_interval(kind.look.line or INK)
     if kind.look.sign == "ring":
-        style: dict[str, Any] = {"marker": "o", "markersize": 0.55 * size_pt}
+        style: dict[str, Any] = {"marker": "o", "markersize": 0.55 * _SIGN_PT}
         return style | {"color": "white", "markeredgecolor": colour, "linestyle": "none"}
-    style = {"marker": "*", "markersize": size_pt, "color": colour, "linestyle": "none"}
+    style = {"marker": "*", "markersize": _SIGN_PT, "color": colour, "linestyle": "none"}
     return style | {"markeredgecolor": unit_interval(INK), "markeredgewidth": 0.6}
 
 
@@ -240,12 +240,12 @@ def write_legend(figure: Figure, handles: Sequence[Artist]) -> int:
     return lines
 
 
-def draw_outline(axes: Axes, obstacle: Obstacle, linewidth: float = 1.6) -> list[Artist]:
+def draw_outline(axes: Axes, obstacle: Obstacle) -> list[Artist]:
     """Draw the outline of a structure in the colour of its role; a barrier has none."""
     if obstacle.cells is not None:
         return []
     colour = PROTECTED if obstacle.protected else STRUCTURE
-    width = 1.5 * linewidth if obstacle.protected else linewidth
+    width = 2.4 if obstacle.protected else 1.6
     style = {"edgecolor": unit_interval(colour), "linewidth": width, "zorder": 3}
     return [add_outline(axes, obstacle.rectangle_m, **style)]
 
@@ -322,6 +322,7 @@ def show_loads(
 
 
 _GAP_PT: Final = 4.0
+_SIGN_PT: Final = 13.0
 _STAR_PT: Final = 15.0
 _FAR_PT: Final = 7.0  # from where on a name is joined to its own by a line
 

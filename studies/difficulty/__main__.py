@@ -18,7 +18,7 @@ import typer
 
 from blast_env import load_scenario
 from blast_env.cli.cluster import ClusterAddress, running_on
-from blast_env.cli.output import make_table, print_line, progress_bar, result_console, user_errors
+from blast_env.cli.output import ResultTable, print_line, progress_bar, result_console, user_errors
 from blast_env.evaluation import evaluate_against
 from blast_env.files import make_folder, write_atomically
 from blast_env.rendering.figures import save_figure
@@ -293,7 +293,7 @@ def print_result(title: str, result: TaskResult) -> None:
 
 def print_table(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table."""
-    table = make_table(title, headers)
+    table = ResultTable(title, headers)
     for cells in rows:
         table.add_row(*cells)
     result_console().print(table)

@@ -17,7 +17,7 @@ from typer.testing import CliRunner, Result
 from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
 from blast_env.cli.command import LazyCommand
-from blast_env.cli.tables import ResultTable
+from blast_env.cli.output import ResultTable
 from blast_env.engines import ENGINE_NAMES, find_engine
 from blast_env.physics.event.engine import EventRun
 from blast_env.physics.pymunk.engine import PymunkRun

@@ -405,7 +405,6 @@ def test_a_film_has_the_planned_frames(
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"full_kpa": -1.0}, "full_kpa is -1, must be above 0"),
         ({"width_px": 100}, "width_px is 100, must be 480"),
         ({"height_m": 9.0}, "z = 9.0 m is outside the grid"),
         ({"section": VerticalSection("y", 90.0)}, "y = 90.0 m is outside the grid"),
