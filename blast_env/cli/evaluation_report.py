@@ -30,7 +30,6 @@ from blast_env.cli.output import (
     result_console,
     save_layout_picture,
     save_pictures,
-    without,
 )
 from blast_env.cli.targets import Target
 from blast_env.engines import JUDGE, Engine
@@ -159,7 +158,8 @@ _NOT_IN_SHORT: Final = ("scenario", "threats", "modules", "cases")
 
 def print_record(record: Mapping[str, object], options: EvaluateOptions) -> None:
     """Print a record as JSON, in short or all of it."""
-    print_json(record if options.json_all else without(record, _NOT_IN_SHORT))
+    shown = {key: each for key, each in record.items() if key not in _NOT_IN_SHORT}
+    print_json(record if options.json_all else shown)
 
 
 _HEADERS: Final = (

@@ -6,9 +6,9 @@ from typing import Final
 
 from blast_env.cli.cluster import CLUSTER_HELP
 from blast_env.cli.command import FOLDER, Command, option
-from blast_env.cli.output import check_json, resume_with_cache
 from blast_env.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.envs.arguments import ResetOptions
+from blast_env.errors import BlastEnvError
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 
@@ -61,8 +61,22 @@ class ChargeOptions(Command):
     )
 
     def fixed(self, scenario: Scenario, drawn: AnyCharge) -> AnyCharge:
-        """Return a charge with the place and the mass that the user gives; see `fixed_charge`."""
-        return fixed_charge(scenario, drawn, self.charge_m, self.tnt_kg)
+        """Return a charge with the place and the mass that the user gives, if any.
+
+        Args:
+            scenario: The scenario.
+            drawn: The charge that is drawn otherwise; with a place it is in no vehicle.
+
+        Raises:
+            ScenarioError: If it is out of bounds, or not clear of a structure or the border.
+        """
+        if self.charge_m is None and self.tnt_kg is None:
+            return drawn
+        options = ResetOptions(charge_position_m=self.charge_m, tnt_kg=self.tnt_kg)
+        charge = options.charge(drawn)
+        if not isinstance(charge, VehicleCharge):
+            scenario.with_charge(charge)  # refuses a place that is not clear
+        return charge
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +103,9 @@ class CacheOptions(Command):
 
     def how_to_resume(self) -> str:
         """Return how to go on after Ctrl-C: with the blasts that are kept, if they are."""
-        return resume_with_cache(self.cache)
+        if self.cache is None:
+            return "with --cache FOLDER the blasts would have been kept for the next call"
+        return f"the same command goes on with the blasts that are kept in {self.cache}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,34 +121,10 @@ class JsonOptions(Command):
         Raises:
             BlastEnvError: If both are asked for.
         """
-        check_json(self.as_json, self.json_all)
+        if self.as_json and self.json_all:
+            raise BlastEnvError("--json and --json-all exclude each other: one of them is printed")
 
     @property
     def any_json(self) -> bool:
         """Whether the result is printed as JSON."""
         return self.as_json or self.json_all
-
-
-def fixed_charge(
-    scenario: Scenario,
-    drawn: AnyCharge,
-    position_m: tuple[float, float] | None,
-    tnt_kg: float | None,
-) -> AnyCharge:
-    """Return a charge with the place and the mass that `--charge` and `--tnt-kg` give, if any.
-
-    Args:
-        scenario: The scenario.
-        drawn: The charge that is drawn otherwise.
-        position_m: Where it is to be; one in a vehicle is in none then.
-        tnt_kg: Its mass.
-
-    Raises:
-        ScenarioError: If it is out of bounds, or not clear of a structure or the border.
-    """
-    if position_m is None and tnt_kg is None:
-        return drawn
-    charge = ResetOptions(charge_position_m=position_m, tnt_kg=tnt_kg).charge(drawn)
-    if not isinstance(charge, VehicleCharge):
-        scenario.with_charge(charge)  # refuses a place that is not clear
-    return charge

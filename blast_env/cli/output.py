@@ -3,7 +3,7 @@
 import json
 import os
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import isnan
 from pathlib import Path
@@ -84,31 +84,9 @@ def show_interruption(*parts: str) -> None:
     message_console().print(printable(f"interrupted: {text}"), style="yellow")
 
 
-def resume_with_cache(cache: Path | None) -> str:
-    """Return how a command goes on whose blasts are kept in a folder, if they are."""
-    if cache is None:
-        return "with --cache FOLDER the blasts would have been kept for the next call"
-    return f"the same command goes on with the blasts that are kept in {cache}"
-
-
 def print_json(content: Mapping[str, object]) -> None:
     """Print plain data as JSON to standard output."""
     print_line(json.dumps(content, indent=2, allow_nan=False))
-
-
-def check_json(as_json: bool, json_all: bool) -> None:
-    """Refuse both forms of JSON at once.
-
-    Raises:
-        BlastEnvError: If both are asked for.
-    """
-    if as_json and json_all:
-        raise BlastEnvError("--json and --json-all exclude each other: one of them is printed")
-
-
-def without(content: Mapping[str, object], names: Collection[str]) -> dict[str, object]:
-    """Return what `--json` prints of a record: all but the long parts."""
-    return {name: value for name, value in content.items() if name not in names}
 
 
 def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:

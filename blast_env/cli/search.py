@@ -40,7 +40,6 @@ from blast_env.cli.output import (
     print_written,
     progress_bar,
     result_console,
-    resume_with_cache,
     save_layout_picture,
     save_pictures,
     show_interruption,
@@ -140,7 +139,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
             show_interruption(
                 "the best layout so far was kept",
                 "" if layout is None else f"--start-from {layout} begins with it",
-                resume_with_cache(self.cache),
+                self.how_to_resume(),
             )
             raise typer.Exit(130)
 

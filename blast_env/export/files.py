@@ -9,34 +9,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from blast_env import tables
 from blast_env.errors import BlastEnvError, suggestion
 from blast_env.export.bill import LayoutPlan, bill_of_quantities, element_table, write_excel
 from blast_env.files import make_folder, write_atomically
 from blast_env.plan import Feature
 from blast_env.scenario import write_layout
 from blast_env.scenario.sections import AnyGeoreference, PointM
+from blast_env.tables import write_csv
 from blast_env.values import path_of
 
 _DIGITS: Final = 9  # of a coordinate on a map: a tenth of a millimetre in degrees
-
-
-def write_csv(plan: LayoutPlan, path: Path) -> None:
-    """Write the modules or pieces.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
-    """
-    tables.write_csv(element_table(plan), path)
-
-
-def write_bill(plan: LayoutPlan, path: Path) -> None:
-    """Write the bill of quantities.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
-    """
-    tables.write_csv(bill_of_quantities(plan), path)
 
 
 SITE_METRES: Final = (
@@ -146,11 +128,11 @@ def _write_dxf(plan: LayoutPlan, path: Path) -> None:
     write_dxf(plan, path)
 
 
-_WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], None]]] = MappingProxyType(
+_WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], object]]] = MappingProxyType(
     {
         ".json": _write_json,
-        ".csv": write_csv,
-        ".bill.csv": write_bill,
+        ".csv": lambda plan, path: write_csv(element_table(plan), path),
+        ".bill.csv": lambda plan, path: write_csv(bill_of_quantities(plan), path),
         ".xlsx": write_excel,
         ".geojson": write_geojson,
         ".dxf": _write_dxf,
