@@ -17,7 +17,7 @@ from typing import Final, Literal
 import numpy as np
 
 from blast_env.arrays import BoolArray
-from blast_env.geometry import Element, Piece, Rectangle, standing
+from blast_env.geometry import Element, Piece, Rectangle, stacked_runs, standing
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import Colour
 from blast_env.scenario import (
@@ -398,12 +398,7 @@ def _way_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> Iterato
 
 
 def cell_features(zone: BuildZone, cells: BoolArray) -> Iterator[Feature]:
-    """Yield where something may be placed and where not.
-
-    Args:
-        zone: The build zone.
-        cells: Which cells may take something (rows, columns).
-    """
+    """Yield where something may be placed and where not; `cells` (rows, columns) are where."""
     for kind, chosen in ((NO_CELL, ~cells), (FREE_CELL, cells)):
         for each in rectangles_of(chosen, zone.corner_m):
             yield area_feature(kind, each, kind.words)
@@ -483,14 +478,13 @@ def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
 
 def _said_of(structure: AnyStructure) -> dict[str, str | float]:
     """Return what there is to say of a structure beside its name."""
-    said: dict[str, str | float] = {"weight": structure.weight}
-    if structure.height_m is not None:
-        said["height_m"] = structure.height_m
-    if structure.base_m > 0.0:
-        said["base_m"] = structure.base_m
-    if structure.building is not None:
-        said["building"] = structure.building
-    return said
+    said = {
+        "weight": structure.weight,
+        "height_m": structure.height_m,
+        "base_m": structure.base_m or None,
+        "building": structure.building,
+    }
+    return {key: each for key, each in said.items() if each is not None}
 
 
 def source_features(sources: Iterable[AnySource]) -> Iterator[Feature]:
@@ -602,24 +596,16 @@ def rectangles_of(
         corner_m: Lower left corner of the grid.
         side_m: Side of a square.
     """
-    found: list[Rectangle] = []
-    growing: dict[tuple[int, int], int] = {}
-    for row in range(len(squares) + 1):
-        runs = _runs(squares[row]) if row < len(squares) else []
-        for run, first in [*growing.items()]:
-            if run not in runs:
-                box = Rectangle(run[0], first, run[1], row).scaled(side_m)
-                x, y = corner_m
-                found.append(Rectangle(box[0] + x, box[1] + y, box[2] + x, box[3] + y))
-                del growing[run]
-        for run in runs:
-            growing.setdefault(run, row)
-    return found
-
-
-def _runs(row: BoolArray) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], row, [False])).astype(np.int8)))
-    return [(int(edges[k]), int(edges[k + 1])) for k in range(0, len(edges), 2)]
+    x_m, y_m = corner_m
+    return [
+        Rectangle(
+            side_m * column + x_m,
+            side_m * row + y_m,
+            side_m * (column + columns) + x_m,
+            side_m * (row + rows) + y_m,
+        )
+        for row, column, rows, columns in stacked_runs(squares).tolist()
+    ]
 
 
 def rounded_m(x_m: float, y_m: float) -> PointM:
