@@ -421,8 +421,7 @@ def item_words(zone: BuildZone, layout: Sequence[Element]) -> Mapping[str, str]:
     heights = {item.name: f"{item.height_m:g} m" for item in zone.items}
     stocks = {item.name: item.stock for item in zone.items}
     if not zone.items:
-        height_m = zone.height_m
-        heights[""] = "as high as the air" if height_m is None else f"{height_m:g} m"
+        heights[""] = "as high as the air" if zone.height_m is None else f"{zone.height_m:g} m"
         stocks[""] = zone.stock
     return {
         name: f"{name or 'barrier module'}, {height}: {placed[name]} of {stocks[name]}"
