@@ -21,6 +21,7 @@ from blast_agents.search.moves import Moves, random_walls
 from blast_agents.surrogate.fitting import Errors, Samples, errors, fit, folds
 from blast_agents.surrogate.network import Check, Fit, Surrogate, load_surrogate
 from blast_agents.surrogate.search import Guesses, LearntSearch, improved
+from blast_agents.surrogate.walls import ALL_FEATURES, FEATURES
 from blast_agents.training import load_agent
 
 from blast_env.cli.cluster import ClusterAddress, running_on
@@ -108,6 +109,9 @@ def fit_it(
         bool, typer.Option(help="First tell the errors, with a fifth held out in turn.")
     ] = True,
     epochs: Annotated[int, typer.Option(min=1)] = 20,
+    horizons: Annotated[
+        bool, typer.Option("--horizons", help="Give the networks horizons beside the ways.")
+    ] = False,
     seed: int = 0,
     out: Annotated[Path, typer.Option(help="The surrogate, .json.")] = Path("out/surrogate.json"),
 ) -> None:
@@ -115,12 +119,8 @@ def fit_it(
     torch.set_num_threads(1)  # more of them only wait for each other, for minutes on busy cores
     with user_errors():
         make_folder(out.parent)
-        names = [column.name for column in COLUMNS]
-        tables = [read_frame(path, names) for path in data or [DATA]]
-        table = pd.concat(tables, ignore_index=True)
-        named = table[~table["scenario"].isin(["", *(without or ())])]
-        scenarios = [scenario_of(name) for name in named["scenario"].unique()]
-        samples = Samples.of(named, {each.content_hash: each for each in scenarios})
+        named = named_rows(data or [DATA], without or ())
+        samples = samples_of(named)
         about = Fit(
             command=join(("python", "-m", "studies.surrogate", *command()[1:])),
             versions=versions(),
@@ -128,16 +128,31 @@ def fit_it(
             blasts=len(samples),
             sites=len(np.unique(samples.site)),
         )
+        features = ALL_FEATURES if horizons else FEATURES
         if check:
-            about = checked(samples, about, epochs, seed)
+            about = checked(samples, about, epochs, seed, features)
         began_s = perf_counter()
-        fitted = fit(samples, np.ones(len(samples), dtype=bool), epochs, seed, about)
+        every = np.ones(len(samples), dtype=bool)
+        fitted = fit(samples, every, epochs, seed, about, features)
         about = about.model_copy(update={"seconds": round(perf_counter() - began_s, 1)})
         surrogate = replace(fitted, fit=about)
         print_line(f"{len(samples):,} loads of {about.sites} sites; wrote {surrogate.save(out)}")
 
 
-def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
+def named_rows(paths: Sequence[Path], without: Sequence[str] = ()) -> pd.DataFrame:
+    """Return the rows of tables of blasts whose scenario has a name that is not left out."""
+    names = [column.name for column in COLUMNS]
+    table = pd.concat([read_frame(path, names) for path in paths], ignore_index=True)
+    return table[~table["scenario"].isin(["", *without])]
+
+
+def samples_of(rows: pd.DataFrame) -> Samples:
+    """Return what a surrogate is fitted to."""
+    scenarios = [scenario_of(name) for name in rows["scenario"].unique()]
+    return Samples.of(rows, {each.content_hash: each for each in scenarios})
+
+
+def checked(samples: Samples, about: Fit, epochs: int, seed: int, features: int = FEATURES) -> Fit:
     """Print how far the surrogate is off on what it was not fitted to; return it with that."""
     held_out = {"layouts": samples.layout, "sites": samples.site}
     found = {}
@@ -145,7 +160,7 @@ def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
         with progress_bar(f"held-out {name}") as progress:
             of_folds = []
             for out_of in folds(numbers, _FOLDS, seed):
-                surrogate = fit(samples, ~out_of, epochs, seed, about)
+                surrogate = fit(samples, ~out_of, epochs, seed, about, features)
                 of_folds.append(errors(surrogate, samples, out_of))
                 progress(len(of_folds) / _FOLDS)
         found[name] = of_folds

@@ -109,7 +109,7 @@ class JudgeCommand(ProcessOptions, CacheOptions):
             for each in definitions.values()
         ]
         asked = tuple(Asked(made, self.budget or BUDGETS[:2], range(self.seeds)))
-        journal = None if self.out is None else self.out / "runs.jsonl"
+        journal = None if self.out is None else self.out / self._journal(method)
         with progress_bar(f"{len(asked)} runs of {method}") as progress:
             done: list[Run] = []
 
@@ -122,6 +122,10 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         if self.out is not None:
             print_line(f"wrote {submission.save(self.out / 'submission.json')}")
         return submission
+
+    def _journal(self, method: str) -> str:
+        """Return a file name of the runs that a call may go on with: same method, same cells."""
+        return f"runs_{_file_name(method)}_{self.search_cell_m:g}.jsonl"
 
     def _references(self, definitions: Mapping[str, Definition]) -> Mapping[str, ScoreReference]:
         """Return the stored ones, or for secret sites what rules and the package's search find."""

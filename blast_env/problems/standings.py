@@ -80,7 +80,7 @@ def _scores(
 def _reductions(judged: Sequence[JudgedSubmission], problem: str, cell_m: float) -> StandingsTable:
     found = []
     for each in judged:
-        for budget in BUDGETS:
+        for budget in sorted({run.budget for run in each.runs}):
             runs = [run for run in each.runs if (run.problem, run.budget) == (problem, budget)]
             if runs:
                 off = 100.0 * (1.0 - np.array([run.share for run in runs]))

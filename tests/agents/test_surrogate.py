@@ -17,22 +17,31 @@ from blast_agents.search import LayoutProblem
 from blast_agents.search.registry import layouts_by_rule
 from blast_agents.surrogate import walls
 from blast_agents.surrogate.engine import SurrogateEngine
-from blast_agents.surrogate.fitting import MEMBERS, Samples, elements, errors, fit, folds
+from blast_agents.surrogate.fitting import (
+    MEMBERS,
+    Samples,
+    elements,
+    errors,
+    fit,
+    folds,
+    load_errors,
+)
+from blast_agents.surrogate.horizons import HORIZONS, horizons
 from blast_agents.surrogate.network import (
-    SHAPES,
     Check,
     Fit,
     Member,
     Surrogate,
     load_surrogate,
     packaged_surrogate,
+    shapes,
 )
 from blast_agents.surrogate.search import (
     Guesses,
     LearntSearch,
     improved,
 )
-from blast_agents.surrogate.walls import FEATURES, MOST_POINTS, WallPoints, site_of
+from blast_agents.surrogate.walls import ALL_FEATURES, FEATURES, MOST_POINTS, WallPoints, site_of
 from blast_agents.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -94,18 +103,18 @@ def shares(*solids: list[float], point_m: np.ndarray = POINT_M) -> np.ndarray:
     return ways.shares(np.array(solids).reshape(-1, 5))[0]
 
 
-def by_hand(seed: int = 0, members: int = 2) -> Surrogate:
+def by_hand(seed: int = 0, members: int = 2, given: int = FEATURES) -> Surrogate:
     """Return networks that nobody has fitted; what hides a wall lowers their guesses."""
     rng = np.random.default_rng(seed)
     networks = []
     for _ in range(2 * members):
-        arrays = [0.05 * rng.standard_normal(shape) for shape in SHAPES]
-        arrays[0][-SHARES:] += 0.2
+        arrays = [0.05 * rng.standard_normal(shape) for shape in shapes(given)]
+        arrays[0][FEATURES - SHARES : FEATURES] += 0.2
         arrays[2] += 0.02
         arrays[4] += 0.02
         networks.append(Member(*arrays))
     of_impulse, of_peak = tuple(networks[:members]), tuple(networks[members:])
-    return Surrogate(np.zeros(FEATURES), np.ones(FEATURES), of_impulse, of_peak, ABOUT)
+    return Surrogate(np.zeros(given), np.ones(given), of_impulse, of_peak, ABOUT)
 
 
 def test_all_is_open_where_nothing_stands_and_nothing_behind_an_endless_wall() -> None:
@@ -226,18 +235,47 @@ def test_a_guess_is_the_same_alone_and_among_others() -> None:
         assert alone.impulse_pa_s[0] == pytest.approx(together.impulse_pa_s[number], rel=1e-12)
 
 
-def test_points_that_a_barrier_does_not_hide_keep_what_was_said_of_them() -> None:
+def test_horizons_are_the_angles_of_the_highest_edges() -> None:
+    """Ahead of the charge, behind it, and before the point; a quarter of a turn changes nothing."""
+    assert (horizons(CHARGE_M, POINT_M, NOTHING) == 0.0).all()
+    ahead, behind = wall(5.0, -9.0, 9.0, 3.3), wall(-4.5, -0.5, 0.5, 2.3)
+    found = horizons(CHARGE_M, POINT_M, np.array([ahead, behind]))[0]
+    assert found.shape == (HORIZONS,)
+    assert found[0] == pytest.approx(np.arctan(3.0 / 5.0))  # straight on
+    assert found[1] == found[6] == pytest.approx(np.arctan(3.0 * np.cos(np.pi / 6.0) / 5.0))
+    assert found[3] == 0.0  # square to the way, beside the charge
+    assert found[11] == pytest.approx(np.arctan(2.0 / 4.0))  # the other way; 0.5 m thick
+    assert found[12] == pytest.approx(np.arctan(1.8 / 14.5))  # from the point to the charge
+    turned = [[-top, left, -bottom, right, h] for left, bottom, right, top, h in (ahead, behind)]
+    point_m = np.array([[0.0, 20.0, 1.5]])
+    assert horizons(CHARGE_M, point_m, np.array(turned))[0] == pytest.approx(found)
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(boxes=BOXES)
+def test_more_barrier_lowers_no_horizon_and_mirrors_change_none(
+    boxes: list[tuple[float, float, float]],
+) -> None:
+    solids = np.array([wall(x, y - 1.0, y + 1.0, height) for x, y, height in boxes])
+    found = horizons(CHARGE_M, POINT_M, solids)
+    assert (horizons(CHARGE_M, POINT_M, solids[1:]) <= found).all()
+    mirrored = solids * (1.0, -1.0, 1.0, -1.0, 1.0)
+    assert horizons(CHARGE_M, POINT_M, mirrored[:, [0, 3, 2, 1, 4]]) == pytest.approx(found)
+
+
+@pytest.mark.parametrize("given", [FEATURES, ALL_FEATURES])
+def test_points_to_which_a_barrier_makes_no_difference_keep_what_was_said(given: int) -> None:
     """Only the others are asked about again; the load is the same as of all features at once."""
-    site, surrogate, charge = site_of(PEAKS), by_hand(), Charge((1.5, 4.0), 5.0)
+    site, surrogate, charge = site_of(PEAKS), by_hand(given=given), Charge((1.5, 4.0), 5.0)
     (approach,) = site.approaches(charge)
     hidden = []
     for layout in [(), *(random_layout(YARD, np.random.default_rng(n)) for n in range(3))]:
         barrier = site.barrier(layout)
-        numbers, features = approach.behind(barrier)
-        whole = approach.features(barrier)
+        numbers, features = approach.behind(barrier, given)
+        whole = approach.features(barrier)[:, :given]
         assert (whole[numbers] == features).all()
         unchanged = np.setdiff1d(np.arange(len(whole)), numbers)
-        assert (whole[unchanged] == approach.on_empty[unchanged]).all()
+        assert (whole[unchanged] == approach.on_empty[unchanged, :given]).all()
         hidden.append(len(numbers))
         guess = surrogate.guess(site, [layout], [charge])
         logs = np.log(
@@ -277,10 +315,10 @@ def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
     [
         (lambda content: content["mean"].pop(), "mean"),
         (lambda content: content["scale"].__setitem__(3, 0.0), r"scale\[3\]"),
-        (lambda content: content["members"][1][2].pop(), "network 1 has arrays of .*2303"),
+        (lambda content: content["members"][1][2].pop(), "members: network 1 has .*2303"),
         (lambda content: content.update(members=[]), "members"),
         (lambda content: content.pop("peak_members"), "peak_members"),
-        (lambda content: content["peak_members"][0][1].pop(), "network 0 has arrays of .*47"),
+        (lambda content: content["peak_members"][0][1].pop(), "peak_members: network 0 has .*47"),
         (lambda content: content["fit"].update(format=1), "fit.format"),
         (lambda content: content["fit"].update(blasts=0), "fit.blasts"),
         (lambda content: content.update(more=1), "more"),
@@ -318,7 +356,7 @@ def test_peaks_are_guessed_where_they_count() -> None:
 
 def test_the_peak_on_a_structure_is_nearly_the_largest_on_its_walls() -> None:
     """Of Kingery and Bulmash's alone: networks of zeros change nothing of it."""
-    nothing = Member(*(np.zeros(shape) for shape in SHAPES))
+    nothing = Member(*(np.zeros(shape) for shape in shapes(FEATURES)))
     surrogate = Surrogate(np.zeros(FEATURES), np.ones(FEATURES), (nothing,), (nothing,), ABOUT)
     site, charge = site_of(PEAKS), Charge((1.5, 4.0), 5.0)
     (approach,) = site.approaches(charge)
@@ -425,6 +463,20 @@ def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
         assert found.rank > 0.9
         assert 0.0 <= found.lost < 0.02
     assert fit(samples, ~held[0], 20, 0, ABOUT).digest == learnt.digest
+
+
+def test_with_horizons_it_learns_what_stands_behind_the_charge(tmp_path: Path) -> None:
+    """Ways do not see it. The file tells how much the networks are given."""
+    truth = by_hand(7, members=1, given=ALL_FEATURES)
+    samples = Samples.of(table_of_guesses(truth, 80), {YARD.content_hash: YARD})
+    every = np.ones(len(samples), dtype=bool)
+    rms = [
+        load_errors(found, found.members, samples, samples.impulse, every).rms
+        for given in (FEATURES, ALL_FEATURES)
+        for found in [fit(samples, every, 30, 0, ABOUT, given, members=1, peaks=False)]
+    ]
+    assert rms[1] < 0.7 * rms[0]
+    assert len(load_surrogate(truth.save(tmp_path / "own.json")).mean) == ALL_FEATURES
 
 
 def test_rows_of_unknown_scenarios_are_left_out() -> None:

@@ -7,10 +7,12 @@ import pytest
 from typer.testing import CliRunner
 
 from blast_env.cli import app
-from blast_env.cli.judge import _submission
+from blast_env.cli.judge import JudgeCommand, _submission
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Piece
+from blast_env.geometry import Layout, Piece
 from blast_env.problems import (
+    DEFINITIONS,
+    BenchmarkProblem,
     JudgedSubmission,
     KnownLayout,
     Run,
@@ -143,3 +145,26 @@ def test_standings_that_come_with_the_package_are_of_its_problems() -> None:
     for each in shipped_standings():
         assert set(each.problems) <= set(known)
         assert all(0 <= made.blasts <= made.budget for made in each.runs)
+
+
+def near(_problem: BenchmarkProblem, _seed: int) -> Layout:
+    return wall(16)
+
+
+def far(_problem: BenchmarkProblem, _seed: int) -> Layout:
+    return wall(12)
+
+
+def test_a_folder_goes_on_with_runs_of_the_same_method_only(tmp_path: Path) -> None:
+    """Else a second method would enter the standings with the layouts of the first."""
+    command = JudgeCommand(out=tmp_path, budget=(0,))
+    found = [
+        command._played(f"{__name__}:{name}", {NAME: DEFINITIONS[NAME]}).runs[0].layout
+        for name in ("near", "far", "near")
+    ]
+    assert found == [wall(16), wall(12), wall(16)]
+
+
+def test_what_was_found_with_any_budget_is_shown() -> None:
+    _, table = standings_tables([judged(run(13, 7))])
+    assert [row[:2] for row in table.rows if row[0] == "own"] == [("own", "7")]

@@ -69,7 +69,7 @@ class Samples:
     """Loads of structures, with the features of the points on their walls.
 
     Attributes:
-        features: Of all points (points, FEATURES).
+        features: Of all points (points, ALL_FEATURES).
         area_m2: Of each point (points,).
         counts: Points of each sample (samples,).
         impulse: The impulses.
@@ -148,7 +148,16 @@ def elements(text: str) -> tuple[Element, ...]:
     return tuple(each if len(each) == 2 else Piece(*each) for each in found)
 
 
-def fit(samples: Samples, chosen: BoolArray, epochs: int, seed: int, about: Fit) -> Surrogate:
+def fit(
+    samples: Samples,
+    chosen: BoolArray,
+    epochs: int,
+    seed: int,
+    about: Fit,
+    features: int = FEATURES,
+    members: int = MEMBERS,
+    peaks: bool = True,
+) -> Surrogate:
     """Fit the networks to some of the samples.
 
     Args:
@@ -157,18 +166,22 @@ def fit(samples: Samples, chosen: BoolArray, epochs: int, seed: int, about: Fit)
         epochs: How often each is met.
         seed: Of starts and orders.
         about: What is said of it in its file.
+        features: How many the networks are given: `FEATURES` or `ALL_FEATURES`.
+        members: Networks for each load.
+        peaks: Whether to fit those for peaks, too.
     """
-    at_points = np.repeat(chosen, samples.counts)
-    mean = samples.features[at_points].mean(axis=0).astype(np.float64)
-    scale = samples.features[at_points].std(axis=0).astype(np.float64) + _LEAST_SCALE
+    at_points = samples.features[np.repeat(chosen, samples.counts), :features]
+    mean = at_points.mean(axis=0).astype(np.float64)
+    scale = at_points.std(axis=0).astype(np.float64) + _LEAST_SCALE
     cases = [np.flatnonzero(chosen & (samples.case == case)) for case in np.unique(samples.case)]
     own = [each for each in cases if len(each)]
 
-    def members(loads: Loads) -> tuple[Member, ...]:
+    def networks(loads: Loads) -> tuple[Member, ...]:
         data = _Tensors.of(samples, loads, mean, scale)
-        return tuple(_member(data, own, epochs, seed + each) for each in range(MEMBERS))
+        return tuple(_member(data, own, epochs, seed + each) for each in range(members))
 
-    return Surrogate(mean, scale, members(samples.impulse), members(samples.peak), about)
+    of_peaks = networks(samples.peak) if peaks else ()
+    return Surrogate(mean, scale, networks(samples.impulse), of_peaks, about)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +190,7 @@ class Errors:
 
     Attributes:
         rms: Root of the mean square error of the logarithm.
+        within: The same of what it is off beside the mean of its case, which ranks no layout.
         bias: Its mean.
         rank: Rank correlation among the layouts of a case, mean over the cases.
         lost: By how much the load behind the layout that is guessed to be the best is above that
@@ -185,6 +199,7 @@ class Errors:
     """
 
     rms: float
+    within: float
     bias: float
     rank: float
     lost: float
@@ -200,25 +215,36 @@ class ErrorsOfBoth(NamedTuple):
 
 def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> ErrorsOfBoth:
     """Compare guesses with gas dynamics on some samples."""
-    starts = np.cumsum([0, *samples.counts[:-1]])
-    scaled = (samples.features - surrogate.mean) / surrogate.scale
-
-    def of(members: Sequence[Member], loads: Loads) -> Errors:
-        differs = answers(members, scaled)
-        logs = log_loads(differs, loads.known, samples.area_m2, starts, loads.power)
-        return _errors(logs.mean(axis=0), loads.target, samples.case, chosen)
-
     return ErrorsOfBoth(
-        of(surrogate.members, samples.impulse), of(surrogate.peak_members, samples.peak)
+        load_errors(surrogate, surrogate.members, samples, samples.impulse, chosen),
+        load_errors(surrogate, surrogate.peak_members, samples, samples.peak, chosen),
     )
 
 
-def _errors(guess: FloatArray, target: FloatArray, cases: np.ndarray, chosen: BoolArray) -> Errors:
-    """Compare logarithms of loads."""
-    off = (guess - target)[chosen]
-    ranks, lost = [], []
-    for case in np.unique(cases[chosen]):
-        own = chosen & (cases == case)
+def load_errors(
+    surrogate: Surrogate,
+    members: Sequence[Member],
+    samples: Samples,
+    loads: Loads,
+    chosen: BoolArray,
+) -> Errors:
+    """Compare guesses of one load, by those of a surrogate's networks that know it."""
+    counts = samples.counts[chosen]
+    points = np.repeat(chosen, samples.counts)
+    starts = np.cumsum([0, *counts[:-1]])
+    differs = answers(members, surrogate.scaled(samples.features[points]))
+    known, area_m2 = loads.known[points], samples.area_m2[points]
+    logs = log_loads(differs, known, area_m2, starts, loads.power)
+    return _errors(logs.mean(axis=0), loads.target[chosen], samples.case[chosen])
+
+
+def _errors(guess: FloatArray, target: FloatArray, cases: np.ndarray) -> Errors:
+    """Compare logarithms of loads (samples,)."""
+    off = guess - target
+    ranks, lost, within = [], [], np.zeros_like(off)
+    for case in np.unique(cases):
+        own = cases == case
+        within[own] = off[own] - off[own].mean()
         true = target[own]
         if own.sum() >= _LEAST_CASE and np.ptp(true) > 0.0:
             ranks.append(float(spearmanr(guess[own], true).statistic))
@@ -226,6 +252,7 @@ def _errors(guess: FloatArray, target: FloatArray, cases: np.ndarray, chosen: Bo
             lost.append(float(shares[guess[own].argmin()] - shares.min()))
     return Errors(
         rms=float(np.sqrt(np.mean(off**2))),
+        within=float(np.sqrt(np.mean(within**2))),
         bias=float(off.mean()),
         rank=float(np.mean(ranks)) if ranks else float("nan"),
         lost=float(np.mean(lost)) if lost else float("nan"),
@@ -260,7 +287,9 @@ class _Tensors:
         # Single precision has no room for high powers of pascals.
         dtype = np.float32 if loads.power == 1.0 else np.float64
         return cls(
-            torch.from_numpy(((samples.features - mean) / scale).astype(np.float32)),
+            torch.from_numpy(
+                ((samples.features[:, : len(mean)] - mean) / scale).astype(np.float32)
+            ),
             torch.from_numpy(loads.known.astype(dtype)),
             torch.from_numpy(samples.area_m2.astype(dtype)),
             np.cumsum([0, *samples.counts[:-1]]),
@@ -300,7 +329,7 @@ def _member(data: _Tensors, cases: Sequence[np.ndarray], epochs: int, seed: int)
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     network = nn.Sequential(
-        nn.Linear(FEATURES, HIDDEN),
+        nn.Linear(data.features.shape[1], HIDDEN),
         nn.SiLU(),
         nn.Linear(HIDDEN, HIDDEN),
         nn.SiLU(),

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from hashlib import sha256
 from math import prod
 from pathlib import Path
-from typing import Annotated, Final, Literal, NamedTuple
+from typing import Annotated, Final, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from blast_agents.surrogate.walls import FEATURES, Approach, SurrogateSite
+from blast_agents.surrogate.walls import ALL_FEATURES, FEATURES, Approach, SurrogateSite
 from blast_env.arrays import FloatArray
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.engines.contract import structure_response
@@ -28,9 +28,6 @@ _PACKAGED: Final = Path(__file__).with_name("gas.json")
 HIDDEN: Final = 48
 """Width of the two hidden layers."""
 
-SHAPES: Final = ((FEATURES, HIDDEN), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (HIDDEN, 1), (1,))
-"""Of the arrays of a network, in the order of `Member`."""
-
 IMPULSE_POWER: Final = 1.0
 """The impulse on a structure is the mean over its walls."""
 
@@ -39,6 +36,11 @@ PEAK_POWER: Final = 16.0
 
 _AT_ONCE: Final = 512
 """Points of which a network is asked at a time: as many as stay in a processor's cache."""
+
+
+def shapes(features: int) -> tuple[tuple[int, ...], ...]:
+    """Return the shapes of the arrays of a network with so many inputs, as `Member` has them."""
+    return (features, HIDDEN), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (HIDDEN, 1), (1,)
 
 
 class Check(BaseModel):
@@ -173,7 +175,7 @@ class Member(NamedTuple):
         """Return by how much the logarithm of a load differs from Kingery and Bulmash's.
 
         Args:
-            features: Of points, less their mean, over their scale (points, FEATURES).
+            features: Of points, less their mean, over their scale (points, features).
 
         Returns:
             Shape (points,).
@@ -192,7 +194,8 @@ class Surrogate:
     """Some networks that were fitted to the same blasts, each from another start.
 
     Attributes:
-        mean: Of each feature (FEATURES,).
+        mean: Of each feature that the networks are given: (FEATURES,), or (ALL_FEATURES,) with
+            horizons.
         scale: Its spread, likewise.
         members: The networks that know impulses.
         peak_members: Those that know peak overpressures.
@@ -258,9 +261,10 @@ class Surrogate:
         """Return mean and spread of the impulse on one structure, then of its peak if asked."""
         starts: IntArray = np.cumsum([0, *(len(each.area_m2) for each in approaches[:-1])])
         area_m2 = np.concatenate([each.area_m2 for each in approaches])
-        behind = [each.behind(b) for each, b in zip(approaches, barriers, strict=True)]
+        given = len(self.mean)
+        behind = [each.behind(b, given) for each, b in zip(approaches, barriers, strict=True)]
         rows = np.concatenate([start + of for start, (of, _) in zip(starts, behind, strict=True)])
-        scaled = self._scaled(np.concatenate([features for _, features in behind]))
+        scaled = self.scaled(np.concatenate([features for _, features in behind]))
 
         def of(
             members: tuple[Member, ...], known: Sequence[FloatArray], power: float
@@ -279,12 +283,13 @@ class Surrogate:
         """Return what networks say of the points where no barrier stands (members, points)."""
         kept = approach.kept.get((self, members is self.members))
         if kept is None:
-            kept = answers(members, self._scaled(approach.on_empty))
+            kept = answers(members, self.scaled(approach.on_empty))
             approach.kept[self, members is self.members] = kept
         return kept
 
-    def _scaled(self, features: FloatArray) -> FloatArray:
-        scaled: FloatArray = (features - self.mean) / self.scale
+    def scaled(self, features: FloatArray) -> FloatArray:
+        """Return what the networks are given of points, from all features or from as many."""
+        scaled: FloatArray = (features[:, : len(self.mean)] - self.mean) / self.scale
         return scaled
 
 
@@ -336,8 +341,8 @@ def load_surrogate(path: str | Path) -> Surrogate:
     return Surrogate(
         np.array(content.mean),
         np.array(content.scale),
-        _members(content.members),
-        _members(content.peak_members),
+        _members(content.members, len(content.mean)),
+        _members(content.peak_members, len(content.mean)),
         content.fit,
     )
 
@@ -360,31 +365,35 @@ class _File(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     fit: Fit
-    mean: Annotated[list[float], Field(min_length=FEATURES, max_length=FEATURES)]
-    scale: Annotated[
-        list[Annotated[float, Field(gt=0.0)]], Field(min_length=FEATURES, max_length=FEATURES)
-    ]
+    mean: list[float]
+    scale: list[Annotated[float, Field(gt=0.0)]]
     members: _Networks
     peak_members: _Networks
 
-    @field_validator("members", "peak_members")
-    @classmethod
-    def _check_sizes(cls, members: list[list[list[float]]]) -> list[list[list[float]]]:
-        wanted = [prod(shape) for shape in SHAPES]
-        for number, member in enumerate(members):
-            sizes = [len(flat) for flat in member]
-            if sizes != wanted:
-                raise ValueError(f"network {number} has arrays of {sizes}, must be {wanted}")
-        return members
+    @model_validator(mode="after")
+    def _check_sizes(self) -> Self:
+        given = len(self.mean)
+        if given not in (FEATURES, ALL_FEATURES):
+            raise ValueError(f"mean has {given} numbers, must be {FEATURES} or {ALL_FEATURES}")
+        if len(self.scale) != given:
+            raise ValueError(f"scale has {len(self.scale)} numbers, must be {given}")
+        wanted = [prod(shape) for shape in shapes(given)]
+        for name, members in (("members", self.members), ("peak_members", self.peak_members)):
+            for number, member in enumerate(members):
+                sizes = [len(flat) for flat in member]
+                if sizes != wanted:
+                    raise ValueError(f"{name}: network {number} has {sizes}, must be {wanted}")
+        return self
 
 
 def _flat(members: Sequence[Member]) -> list[list[list[float]]]:
     return [[_numbers(array) for array in member] for member in members]
 
 
-def _members(networks: Sequence[Sequence[Sequence[float]]]) -> tuple[Member, ...]:
+def _members(networks: Sequence[Sequence[Sequence[float]]], features: int) -> tuple[Member, ...]:
+    wanted = shapes(features)
     return tuple(
-        Member(*(np.array(flat).reshape(shape) for flat, shape in zip(each, SHAPES, strict=True)))
+        Member(*(np.array(flat).reshape(shape) for flat, shape in zip(each, wanted, strict=True)))
         for each in networks
     )
 

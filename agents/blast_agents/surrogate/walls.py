@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from blast_agents.surrogate.horizons import HORIZONS, horizons
 from blast_agents.surrogate.ways import SHARES, Ways
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.calibration import kingery_bulmash
@@ -33,7 +34,10 @@ _LEAST_Z: Final = 0.2
 _OUTWARD: Final = {"west": (-1, 0), "east": (1, 0), "south": (0, -1), "north": (0, 1)}
 
 FEATURES: Final = 7 + 2 * SHARES
-"""Numbers that the network is given about a point."""
+"""Numbers that a network is given about a point: geometry and ways."""
+
+ALL_FEATURES: Final = FEATURES + 2 * HORIZONS
+"""The same for a network that is given horizons, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +94,8 @@ class Approach:
 
     Attributes:
         ways: From the charge to the points.
-        fixed: The first features of each point (points, FEATURES - SHARES).
-        on_empty: All of them where no barrier stands (points, FEATURES).
+        on_empty: Features of each point where no barrier stands (points, ALL_FEATURES): geometry,
+            open ways without and with the barrier, horizons without and with it.
         log_impulse: Logarithm of Kingery and Bulmash's reflected impulse there, Pa s (points,).
         log_peak: Of their reflected overpressure, Pa, likewise.
         area_m2: What each point stands for (points,).
@@ -99,7 +103,6 @@ class Approach:
     """
 
     ways: Ways
-    fixed: FloatArray
     on_empty: FloatArray
     log_impulse: FloatArray
     log_peak: FloatArray
@@ -107,19 +110,30 @@ class Approach:
     kept: dict[object, FloatArray] = field(default_factory=dict, repr=False)
 
     def features(self, barrier: FloatArray) -> FloatArray:
-        """Return the features of all points behind a barrier (points, FEATURES)."""
+        """Return the features of all points behind a barrier (points, ALL_FEATURES)."""
         features = self.on_empty.copy()
-        changed, features[changed] = self.behind(barrier)
+        changed, shares = self.ways.behind(barrier)
+        features[changed, FEATURES - SHARES : FEATURES] = shares
+        risen = horizons(self.ways.start_m, self.ways.points_m, barrier)
+        features[:, -HORIZONS:] = np.maximum(features[:, -HORIZONS:], risen)
         return features
 
-    def behind(self, barrier: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Return which points a barrier hides from the charge in part, and their features.
+    def behind(self, barrier: FloatArray, features: int = FEATURES) -> tuple[IntArray, FloatArray]:
+        """Return which points a barrier makes a difference to, and their features.
+
+        Args:
+            barrier: Left, bottom, right, top and height of each piece, m (pieces, 5).
+            features: How many a network is given: `FEATURES` or `ALL_FEATURES`.
 
         Returns:
-            Numbers of the points (behind,), and their features (behind, FEATURES).
+            Numbers of the points (behind,), and their features (behind, features).
         """
+        if features == ALL_FEATURES:
+            whole = self.features(barrier)
+            changed: IntArray = np.flatnonzero((whole != self.on_empty).any(axis=1))
+            return changed, whole[changed]
         numbers, shares = self.ways.behind(barrier)
-        return numbers, np.hstack((self.fixed[numbers], shares))
+        return numbers, np.hstack((self.on_empty[numbers, : FEATURES - SHARES], shares))
 
 
 class SurrogateSite:
@@ -199,10 +213,9 @@ class SurrogateSite:
         met_m = np.maximum(distance_m, _LEAST_Z * scale)
         impulse = kingery_bulmash("reflected_impulse", met_m, charge.tnt_kg)
         peak = kingery_bulmash("reflected_overpressure", met_m, charge.tnt_kg)
-        shares = ways.shares()
-        fixed = np.hstack((geometry, shares))
-        on_empty = np.hstack((fixed, shares))
-        return Approach(ways, fixed, on_empty, np.log(impulse), np.log(peak), points.area_m2)
+        shares, risen = ways.shares(), horizons(start_m, points.points_m, self._solids)
+        on_empty = np.hstack((geometry, shares, shares, risen, risen))
+        return Approach(ways, on_empty, np.log(impulse), np.log(peak), points.area_m2)
 
 
 def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> float:
