@@ -64,8 +64,6 @@ TRIALS: Final = (
     Trial(1.0, 0.0, ALL_FEATURES, 40),
     Trial(1.0, 1.0, ALL_FEATURES, 20),
     Trial(1.0, 1.0, ALL_FEATURES, 40),
-    Trial(1.0, 1.0, members=5),
-    Trial(1.0, 1.0, ALL_FEATURES, 40, members=5),
 )
 
 
