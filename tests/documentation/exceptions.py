@@ -224,6 +224,7 @@ SMALLER: Final[dict[str, str]] = {
         "--sites 1 --layouts 1 --cache blasts"
     ),
     "python -m studies.surrogate fit --out surrogate.json": "--epochs 1 --no-check",
+    "python -m studies.surrogate_limits": "--seeds 1 --sites 4",
     "blast-env league --engine gas --track item_sites --cases 48 --seeds 2 --methods best_rule"
     " --budgets 16 --surrogate surrogate.json --out out/league": (
         "--cases 1 --seeds 1 --budgets 2"
