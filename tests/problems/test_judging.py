@@ -147,6 +147,11 @@ def test_standings_that_come_with_the_package_are_of_its_problems() -> None:
         assert all(0 <= made.blasts <= made.budget for made in each.runs)
 
 
+def test_the_page_of_the_documentation_shows_them() -> None:
+    page = Path(__file__).parents[2] / "docs/researchers/standings.md"
+    assert page.read_text("utf-8") == standings_page(shipped_standings())
+
+
 def near(_problem: BenchmarkProblem, _seed: int) -> Layout:
     return wall(16)
 
