@@ -98,14 +98,7 @@ class _SchedulerFile:
 
 
 def address_of(scheduler: str) -> str:
-    """Return the address of a scheduler.
-
-    Args:
-        scheduler: The address, or the path of its scheduler file.
-
-    Raises:
-        BlastEnvError: If a scheduler file cannot be read.
-    """
+    """Return the address of a scheduler, from that or from the path of its scheduler file."""
     if not os.path.isfile(scheduler):
         return scheduler
     try:

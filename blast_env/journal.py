@@ -13,7 +13,6 @@ from blast_env.files import sync
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-
 MOST_BYTES: Final = 100_000_000
 """Most that a file may have: some hundred thousand results."""
 

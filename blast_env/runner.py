@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from functools import partial
 from typing import Any, Literal, TypeVar, overload
 
 import joblib
@@ -19,39 +20,6 @@ Workers = Literal["processes", "threads"]
 run; pymunk and plain Python want processes."""
 
 
-def in_order(
-    function: Callable[[Item], Result],
-    items: Sequence[Item],
-    workers: int = 1,
-    kind: Workers = "processes",
-) -> Iterator[Result]:
-    """Yield the results in the order of the items, each as soon as those before it are there.
-
-    The number of workers changes nothing but the time. When the consumer stops or an item raises,
-    what has not begun is left out. Where joblib has been told of another backend
-    (`joblib.parallel_config`, `on_cluster`), that one does what is for processes, with as many
-    workers as it was told.
-
-    Args:
-        function: Does one item; for processes, it and the items must pickle.
-        items: The work; a single item is done here.
-        workers: How many items are under way at the same time; a single one does them here.
-        kind: Processes or threads.
-
-    Raises:
-        BlastEnvError: If `workers` is not a whole number of at least 1, or a worker process was
-            killed.
-    """
-    check_workers("workers", workers)
-    if kind == "threads":
-        alone = min(workers, len(items)) <= 1
-        return map(function, items) if alone else _in_threads(function, items, workers)
-    count = _processes(workers, len(items))
-    if count == 1:
-        return map(function, items)
-    return _parallel(function, items, count, "generator")
-
-
 def run_all(
     function: Callable[[Item], Result],
     items: Sequence[Item],
@@ -61,11 +29,34 @@ def run_all(
 ) -> list[Result]:
     """Return the results of all items in their order.
 
-    Arguments and errors are those of `in_order`; `progress` is called with the share of the items
-    that is done.
+    The number of workers changes nothing but the time. When an item raises, what has not begun is
+    left out; of several errors the first in the order of the items counts. Where joblib has been
+    told of another backend (`joblib.parallel_config`, `on_cluster`), that one does what is for
+    processes, with as many workers as it was told.
+
+    Args:
+        function: Does one item; for processes, it and the items must pickle.
+        items: The work; a single item is done here.
+        workers: How many items are under way at the same time; a single one does them here.
+        progress: Called with the share of the items that is done.
+        kind: Processes or threads.
+
+    Raises:
+        BlastEnvError: If `workers` is not a whole number of at least 1, or a worker process was
+            killed.
     """
+    check_workers("workers", workers)
+    in_threads = kind == "threads"
+    count = min(workers, len(items)) if in_threads else _processes(workers, len(items))
+    found: Iterator[Result]
+    if count <= 1:
+        found = map(function, items)
+    elif in_threads:
+        found = _in_threads(function, items, workers)
+    else:
+        found = _parallel(function, items, count, "generator")
     results: list[Result] = []
-    for result in in_order(function, items, workers, kind):
+    for result in found:
         results.append(result)
         if progress is not None:
             progress(len(results) / len(items))
@@ -79,13 +70,13 @@ def as_completed(
 ) -> Iterator[tuple[int, Result]]:
     """Yield (index, result) of each item as soon as it is there, so that it can be kept at once.
 
-    Processes do it; arguments and errors are those of `in_order`.
+    Processes do it; arguments and errors are those of `run_all`.
     """
     check_workers("workers", workers)
     count = _processes(workers, len(items))
     if count == 1:
         return enumerate(map(function, items))
-    numbered = _Numbered(function)
+    numbered = partial(_numbered, function)
     return _parallel(numbered, list(enumerate(items)), count, "generator_unordered")
 
 
@@ -101,11 +92,7 @@ def share_of(progress: Tell | None, done: int, whole: int, part: int = 1) -> Tel
 def share_of(progress: Tell | None, done: int, whole: int, part: int = 1) -> Tell | None:
     """Return a function that reports the share of a part as a share of the whole.
 
-    Args:
-        progress: Takes the share of the whole.
-        done: How much of the whole comes before the part.
-        whole: How much there is in all.
-        part: How much the part is.
+    So much of the whole is done before the part.
     """
     if progress is None:
         return None
@@ -130,15 +117,9 @@ def _in_threads(
             pool.shutdown(cancel_futures=True)
 
 
-class _Numbered:
-    """A function whose results carry the index of their item."""
-
-    def __init__(self, function: Callable[[Any], Any]) -> None:
-        self._function = function
-
-    def __call__(self, numbered: tuple[int, Any]) -> tuple[int, Any]:
-        index, item = numbered
-        return index, self._function(item)
+def _numbered(function: Callable[[Any], Any], numbered: tuple[int, Any]) -> tuple[int, Any]:
+    index, item = numbered
+    return index, function(item)
 
 
 def _processes(workers: int, items: int) -> int:

@@ -52,12 +52,21 @@ def as_types(table: "pd.DataFrame", types: Mapping[str, str]) -> "pd.DataFrame":
     return converted
 
 
-def markdown_table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a Markdown table; bars in the cells are escaped."""
+def markdown_table(
+    headers: Sequence[str], rows: Iterable[Sequence[object]], *, numbers: bool = False
+) -> str:
+    """Return a Markdown table; bars in the cells are escaped, columns of numbers end alike.
+
+    Args:
+        headers: Of the columns.
+        rows: The cells.
+        numbers: Whether all columns but the first are of numbers.
+    """
     lines = [headers, *rows]
     cells = [[str(cell).replace("|", r"\|") for cell in line] for line in lines]
     text = [f"| {' | '.join(line)} |" for line in cells]
-    return "\n".join([text[0], "|---" * len(headers) + "|", *text[1:]])
+    rule = "|---" + ("|---:" if numbers else "|---") * (len(headers) - 1) + "|"
+    return "\n".join([text[0], rule, *text[1:]])
 
 
 def write_csv(table: "pd.DataFrame", path: str | Path, float_format: str | None = None) -> Path:

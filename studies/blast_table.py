@@ -11,11 +11,11 @@ from typing import Annotated, Final
 
 import typer
 from blast_agents.training.cases import training_cases
-from blast_agents.training.environments import training_source
 from blast_agents.training.run_folder import RunFolder
 
 from blast_env import load_scenario
 from blast_env.cli.output import print_line, user_errors
+from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastKey, DiskCache, StructureLoad
 from blast_env.files import make_folder
@@ -98,7 +98,7 @@ def _sites_of(folder: Path) -> dict[str, str]:
     settings = configuration.settings
     if settings.scenario != ITEM_SITES or settings.algorithm != "self_labelling":
         raise BlastEnvError(f"{folder}: is no run by self-labelling on {ITEM_SITES}")
-    source = training_source(settings.scenario)
+    source = scenario_source(settings.scenario)
     cases = training_cases(settings, source, configuration.self_labelling.cases)
     sites = [case.scenario for case in cases]
     return {each.content_hash: each.name.replace("site_", SITE_NAME) for each in sites}

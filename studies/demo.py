@@ -75,7 +75,7 @@ class AgentComparison:
     @property
     def agent(self) -> Result:
         """The trained agent."""
-        return next(each for each in self.standings.results if each.training is not None)
+        return next(each for each in self.standings.results if each.has_learnt)
 
     @property
     def random(self) -> Result:
@@ -95,7 +95,7 @@ class AgentComparison:
         chosen = [rules[number] for number in means.argmin(axis=0).tolist()]
         return replace(
             self.best_rule,
-            name="best rule for each case",
+            entry=replace(self.best_rule.entry, title="best rule for each case"),
             proposals=tuple(rule.proposals[case] for case, rule in enumerate(chosen)),
             loads=np.array([rule.loads[case] for case, rule in enumerate(chosen)]),
         )
@@ -286,7 +286,7 @@ def _evaluations(folder: RunFolder) -> list[EvaluationRow]:
 
 def clear(run: Path) -> None:
     """Remove the run of an earlier demonstration; anything else is left alone."""
-    if (run / "config.yaml").exists():
+    if (run / "config.json").exists():
         try:
             shutil.rmtree(run)
         except OSError as error:

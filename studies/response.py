@@ -17,7 +17,7 @@ from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.neighbours import side_on_impulse_pa_s, side_on_peak_pa
+from blast_env.evaluation.consequences import side_on_impulse_pa_s, side_on_peak_pa
 from blast_env.geometry import Layout, Piece
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import level_of

@@ -20,7 +20,7 @@ from blast_env.cluster import on_cluster
 from blast_env.engines.contract import BlastLoads
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, draw_threats
-from blast_env.runner import as_completed, in_order, run_all
+from blast_env.runner import as_completed, run_all
 from tests.pieces_of_work import Touch, process, refuse_three, square, workers_within
 from tests.scenarios import BALLISTIC_COURTYARD
 
@@ -76,7 +76,7 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Dask]:
 def test_all_that_the_runner_does_runs_on_the_workers(two: Dask) -> None:
     """Whatever number of processes is asked for, 1 too, and however many items there are."""
     with on_cluster(two.file):
-        assert set(in_order(process, range(40))) == {worker.pid for worker in two.workers}
+        assert set(run_all(process, range(40))) == {worker.pid for worker in two.workers}
         assert sorted(as_completed(square, range(9))) == [(i, i * i) for i in range(9)]
         assert run_all(square, range(60), workers=2) == [i * i for i in range(60)]
     assert set(run_all(process, range(2))) == {os.getpid()}

@@ -1,7 +1,7 @@
 """The package's own methods on the problems of the benchmark."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from functools import partial
 
 from blast_agents.search import LayoutProblem, Proposer, find_proposer, layouts_by_rule
 from blast_env.engines.contract import load_plugin
@@ -9,30 +9,16 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.geometry import Layout
 from blast_env.problems import BenchmarkProblem, Definition, KnownLayout, Method, ScoreReference
-from blast_env.problems.judging import shares_of
+from blast_env.problems.problem import shares_of
 
 
-@dataclass(frozen=True)
-class ProposerOnBenchmark:
-    """A proposer of the package as a method of the benchmark.
-
-    Attributes:
-        proposer: The proposer.
-    """
-
-    proposer: Proposer
-
-    def __call__(self, problem: BenchmarkProblem, seed: int) -> Layout:
-        """Return the layout that it proposes.
-
-        Raises:
-            BudgetError: If it asks for more blasts than the budget.
-        """
-        asked = LayoutProblem(problem.evaluator, problem.case, meter=problem.meter)
-        result = self.proposer.propose(asked, problem.budget, seed)
-        if result.interrupted:
-            raise KeyboardInterrupt
-        return result.layout
+def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layout:
+    """Return the layout that a proposer of the package proposes."""
+    asked = LayoutProblem(problem.evaluator, problem.case, meter=problem.meter)
+    result = proposer.propose(asked, problem.budget, seed)
+    if result.interrupted:
+        raise KeyboardInterrupt
+    return result.layout
 
 
 def find_method(name: str) -> Method:
@@ -43,7 +29,7 @@ def find_method(name: str) -> Method:
         BlastEnvError: If there is no such module or object, or it cannot be called.
     """
     if ":" not in name:
-        return ProposerOnBenchmark(find_proposer(name))
+        return partial(_proposed, find_proposer(name))
     try:
         found = load_plugin(name)
     except (ImportError, AttributeError, ValueError) as error:
@@ -69,7 +55,7 @@ def reference_of(
     rules = {name: tuple(sorted(layout)) for name, layout in rules.items()}
     names = [*rules, *more]
     layouts = [*rules.values(), *more.values()]
-    shares = dict(zip(names, shares_of(definition, layouts, evaluator), strict=True))
+    shares = dict(zip(names, shares_of(definition.case, layouts, evaluator), strict=True))
     rule, best = min(rules, key=shares.__getitem__), min(shares, key=shares.__getitem__)
     known = dict(zip(names, layouts, strict=True))
     return ScoreReference(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from blast_agents.search.by_rule import BestRuleSearch
+from blast_agents.search.methods import BestRuleSearch
 from blast_agents.search.problem import LayoutProblem, Proposer, Report, SearchResult
 from blast_agents.search.registry import find_proposer, layouts_by_rule, proposer_row
 from blast_env.engines import JUDGE, Engine

@@ -36,17 +36,13 @@ from blast_env.units import MODULE_SIDE_M
 NEAR_CHARGE: Final = 0.0
 """Share of the way through the build zone at which `wall_near_charge` stands."""
 
-
 NEAR_BUILDING: Final = 1.0
 """Share of the way through the build zone at which `wall_near_building` stands."""
-
 
 _LEAST_GAIN_M: Final = MODULE_SIDE_M / 2.0
 """A module that makes the wall wider by less than this would rather thicken it."""
 
-
 _TOLERANCE_M: Final = 1e-9
-
 
 WallKind = Literal["high", "long"]
 """What a wall of pieces is built of first: the highest items, or those that make most length."""
@@ -106,14 +102,13 @@ def wall_added_to(
 ) -> Placement:
     """Return a placement with a wall beside what stands already; see `line_of_sight_wall`.
 
+    Errors as for `line_of_sight_wall`.
+
     Args:
         placement: What stands already.
         charge_m: Where the charge is.
         share: As for `line_of_sight_wall`.
         kind: As for `line_of_sight_wall`.
-
-    Raises:
-        BlastEnvError: As for `line_of_sight_wall`.
     """
     if not 0.0 <= share <= 1.0:
         raise BlastEnvError(f"share is {share:g}, must be from 0 to 1")
@@ -185,8 +180,7 @@ def long_wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> 
 def ring_around_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return a wall that bends around the charge, as near to it as the build zone lets it stand.
 
-    Raises:
-        BlastEnvError: As for `line_of_sight_wall`.
+    Errors as for `line_of_sight_wall`.
     """
     placement = Placement.empty(scenario)
     (x_m, y_m), radius_m = _place_m(placement, charge), placement.scenario.charge_radius_m
@@ -199,8 +193,7 @@ def ring_around_building(scenario: AnyScenario, charge: AnyCharge | None) -> Lay
 
     It begins on the side of the charge and goes round both ways.
 
-    Raises:
-        BlastEnvError: As for `line_of_sight_wall`.
+    Errors as for `line_of_sight_wall`.
     """
     placement = Placement.empty(scenario)
     protected = [each.rectangle_m for each in placement.scenario.structures if each.protected]

@@ -2,41 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, dist
+from math import ceil
 from typing import TYPE_CHECKING, Final
 
+from blast_env.engines.gas import GasEngine
 from blast_env.geometry import Layout
 from blast_env.physics.gas.cost import CostGuess as CostGuess
-from blast_env.physics.gas.cost import cost_of_run
-from blast_env.physics.gas.settings import GasSettings
-from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
-from blast_env.scenario.zone import source_bounds_m
+from blast_env.scenario import Scenario
 
 if TYPE_CHECKING:
     from blast_env.reporting import StudyOptions
 
 _DRAWING_S: Final = 2.5
-
-
-def cost_of_blast(scenario: Scenario, charge: AnyCharge, cell_m: float) -> CostGuess:
-    """Return what a blast by gas dynamics costs, about; nothing is built for it."""
-    site = scenario.site
-    sides_m = (site.width_m, site.height_m, scenario.air_height_m)
-    if isinstance(charge, VehicleCharge):
-        tnt_kg, place_m = charge.source.tnt_kg, source_bounds_m(charge.source).centre
-    else:
-        tnt_kg, place_m = charge.tnt_kg, charge.position_m
-    protected = [each for each in scenario.structures if each.protected] or scenario.structures
-    far_m = max(
-        (
-            dist(place_m, (x_m, y_m))
-            for box in (each.rectangle_m for each in protected)
-            for x_m in (box.left, box.right)
-            for y_m in (box.bottom, box.top)
-        ),
-        default=dist((0.0, 0.0), sides_m[:2]),
-    )
-    return cost_of_run(GasSettings(cell_m=cell_m), sides_m, tnt_kg, far_m)
 
 
 @dataclass(frozen=True)
@@ -60,7 +37,8 @@ class ReportCost:
         from blast_env.reporting.study import blasts_of, threats_of
 
         threats = threats_of(scenario, options)
-        one = {size: cost_of_blast(scenario, threats[0].charge, size) for size in options.sizes_m}
+        charge = threats[0].charge
+        one = {size: GasEngine(cell_m=size).cost(scenario, charge) for size in options.sizes_m}
         parts = blasts_of(scenario, layout, options, threats)
         return cls(tuple((label, (one[cell_m],) * count) for label, count, cell_m in parts))
 

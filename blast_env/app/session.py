@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from blast_env.app import placing
-from blast_env.app.cost import CostGuess, ReportCost, cost_of_blast
+from blast_env.app.cost import CostGuess, ReportCost
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
@@ -36,6 +36,7 @@ from blast_env.app.work import (
     Status,
     Task,
 )
+from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Measure
 from blast_env.scenario import AnyCharge, Scenario
@@ -338,7 +339,7 @@ class Session:
         return tuple(costs[k % len(costs)] for k in range(max(budget, 0)))
 
     def _cost(self, charge: AnyCharge) -> CostGuess:
-        return cost_of_blast(self.scenario, charge, self.engine.cell_m or 0.5)
+        return GasEngine(cell_m=self.engine.cell_m or 0.5).cost(self.scenario, charge)
 
     # Results.
 

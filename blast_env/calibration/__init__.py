@@ -3,7 +3,6 @@
 from blast_env.calibration.laws import (
     FewDistancesWarning,
     FitMetrics,
-    Interval,
     LeaveOneOut,
     LinearLaw,
     PowerLaw,
@@ -46,7 +45,6 @@ __all__ = [
     "FewDistancesWarning",
     "FitMetrics",
     "Friedlander",
-    "Interval",
     "LeaveOneOut",
     "LinearLaw",
     "LoadUnit",

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
+from blast_env.statistics import Estimate
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
@@ -29,10 +30,8 @@ LawName = Literal["proportional", "linear", "power"]
 Numbers = Union[Sequence[float], NDArray[Any], "pd.Series"]
 """Several numbers; a lone one is a float."""
 
-
 LEAST_DISTANCES: Final = 4
 """A fit on fewer distances than this warns: two coefficients would pass through almost anything."""
-
 
 _CONSTANT: Final = 1e-12  # relative spread below which numbers count as equal
 
@@ -46,7 +45,6 @@ class ScalingLaw(ABC):
     """A law from simulated to reference impulse. Its fields are its coefficients."""
 
     def __post_init__(self) -> None:
-        """Refuse coefficients that are not finite numbers (`BlastEnvError`)."""
         for name, value in self.coefficients.items():
             if not np.isfinite(value):
                 raise BlastEnvError(
@@ -169,7 +167,6 @@ class PowerLaw(ScalingLaw):
     B: float
 
     def __post_init__(self) -> None:
-        """Refuse coefficients that are not finite numbers, and A of 0 or less."""
         super().__post_init__()
         if self.A <= 0.0:
             raise BlastEnvError(f"PowerLaw: A is {self.A}, must be above 0")
@@ -340,21 +337,6 @@ class LeaveOneOut:
     metrics: FitMetrics
 
 
-@dataclass(frozen=True)
-class Interval:
-    """A coefficient with a confidence interval.
-
-    Attributes:
-        estimate: The coefficient of the fit on all seeds.
-        low: Lower end.
-        high: Upper end.
-    """
-
-    estimate: float
-    low: float
-    high: float
-
-
 def fit_metrics(distance_m: Numbers, predicted: Numbers, reference: Numbers) -> FitMetrics:
     """Compare impulses with a reference (section 3.4).
 
@@ -436,7 +418,7 @@ def bootstrap_coefficients(
     resamples: int = 2000,
     confidence: float = 0.95,
     rng_seed: int = 0,
-) -> dict[str, Interval]:
+) -> dict[str, Estimate]:
     """Return percentile intervals of a law's coefficients from the scatter between seeds.
 
     Whole seeds are drawn with replacement, so that what the distances of a seed have in common
@@ -460,7 +442,12 @@ def bootstrap_coefficients(
     """
     simulated = checked_array("i_sim_by_seed", i_sim_by_seed, least=0.0, dimensions=2)
     seeds = len(simulated)
-    _check_bootstrap(seeds, resamples, confidence)
+    if seeds < 2:
+        raise BlastEnvError(f"i_sim_by_seed has {seeds} seeds, must have at least 2")
+    if resamples < 100:
+        raise BlastEnvError(f"resamples is {resamples}, must be at least 100")
+    if not 0.0 < confidence < 1.0:
+        raise BlastEnvError(f"confidence is {confidence:g}, must be between 0 and 1")
     reference = checked_array("i_reference", i_reference, above=0.0, dimensions=1)
     estimate = fit(simulated.mean(axis=0), reference).coefficients
     draws = np.random.default_rng(rng_seed).integers(seeds, size=(resamples, seeds))
@@ -468,19 +455,9 @@ def bootstrap_coefficients(
     tail = (1.0 - confidence) / 2.0
     low, high = np.quantile(drawn, (tail, 1.0 - tail), axis=0)
     return {
-        name: Interval(value, float(low[index]), float(high[index]))
+        name: Estimate(value, float(low[index]), float(high[index]))
         for index, (name, value) in enumerate(estimate.items())
     }
-
-
-def _check_bootstrap(seeds: int, resamples: int, confidence: float) -> None:
-    """Refuse what no interval can be made of."""
-    if seeds < 2:
-        raise BlastEnvError(f"i_sim_by_seed has {seeds} seeds, must have at least 2")
-    if resamples < 100:
-        raise BlastEnvError(f"resamples is {resamples}, must be at least 100")
-    if not 0.0 < confidence < 1.0:
-        raise BlastEnvError(f"confidence is {confidence:g}, must be between 0 and 1")
 
 
 def _coefficients(simulated: FloatArray, reference: FloatArray, fit: Fit) -> list[float]:

@@ -33,7 +33,6 @@ from blast_env.values import path_of
 SimulatedQuantity = Literal["impulse", "transferred_impulse"]
 """The paper's sum of m |v|, or the momentum really transferred along the normals."""
 
-
 LAWS: Final[Mapping[str, type[ScalingLaw]]] = MappingProxyType(
     {"proportional": ProportionalLaw, "linear": LinearLaw, "power": PowerLaw}
 )
@@ -295,24 +294,19 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
             )
         return _of_the_package(name, engine).model_copy(deep=True)
     try:
-        text = read_text(path)
+        return _parsed(read_text(path))
     except DocumentError as error:
         raise CalibrationError(f"{path}: {error}") from error
-    return _parse(text, str(path))
 
 
 @cache
 def _of_the_package(name: str, engine: str) -> Calibration:
     entry = files("blast_env.calibration") / "stored" / calibration_file(name, engine)
-    return _parse(entry.read_text(encoding="utf-8"), f"{name} for {engine}")
+    return _parsed(entry.read_text(encoding="utf-8"))
 
 
 def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:
     """Return the calibration that a scenario names, checked against its parameters.
-
-    Args:
-        scenario: The scenario.
-        engine: Name of the engine that runs its blasts.
 
     Raises:
         CalibrationError: If the scenario names no calibration, or one that was made with other
@@ -350,19 +344,16 @@ def _stored_files() -> tuple[tuple[str, str], ...]:
     return tuple((name, engine) for name, _, engine in pairs if name)
 
 
-def _parse(text: str, source: str) -> Calibration:
-    try:
-        document = parse_json(text)
-        if not isinstance(document, dict):
-            raise DocumentError("", f"is {type_word(document)}, must be a calibration, a table")
-        checksum = document.pop("checksum", None)
-        if checksum != _checksum(document):
-            raise DocumentError(
-                "", "the checksum does not match: the file was edited after it was made"
-            )
-        return checked_as(Calibration, document)
-    except DocumentError as error:
-        raise CalibrationError(f"{source}: {error}") from error
+def _parsed(text: str) -> Calibration:
+    document = parse_json(text)
+    if not isinstance(document, dict):
+        raise DocumentError("", f"is {type_word(document)}, must be a calibration, a table")
+    checksum = document.pop("checksum", None)
+    if checksum != _checksum(document):
+        raise DocumentError(
+            "", "the checksum does not match: the file was edited after it was made"
+        )
+    return checked_as(Calibration, document)
 
 
 def _checksum(content: dict[str, Any]) -> str:

@@ -31,14 +31,11 @@ Quantity = Literal[
 ]
 """A quantity of `kingery_bulmash`."""
 
-
 Burst = Literal["hemispherical", "spherical"]
 """Hemispherical: the charge lies on rigid ground. Spherical: far from any surface."""
 
-
 PAPER_UFC_LABEL: Final = "the paper's UFC column"
 """What its i_ufc must be called: it matches no curve of UFC 3-340-02 at all distances."""
-
 
 PAPER_COLUMNS: Final = (
     Column("r_m", "m", "distance R"),
@@ -56,7 +53,6 @@ PAPER_COLUMNS: Final = (
 )
 """The columns of `paper_table`."""
 
-
 # A unit of the data file: its factor to SI, and whether W^(1/3) scales the value.
 _TO_SI: Final[Mapping[str, tuple[float, bool]]] = MappingProxyType(
     {
@@ -67,11 +63,9 @@ _TO_SI: Final[Mapping[str, tuple[float, bool]]] = MappingProxyType(
     }
 )
 
-
 _BURST_KEYS: Final[Mapping[str, str]] = MappingProxyType(
     {"hemispherical": "hemispherical_surface_burst", "spherical": "spherical_free_air_burst"}
 )
-
 
 _ROUNDING: Final = 1e-9  # relative; R / W^(1/3) of a charge made for an end of the range
 
@@ -177,7 +171,11 @@ def kingery_bulmash(
         BlastEnvError: If a number is not above 0, if distance and mass cannot be broadcast, or if
             Z is outside the range of the curve; the message gives Z and the range.
     """
-    curve = _curve(quantity, burst)
+    if quantity not in get_args(Quantity):
+        raise UnknownNameError("quantity", quantity, get_args(Quantity))
+    if burst not in get_args(Burst):
+        raise UnknownNameError("burst", burst, get_args(Burst))
+    curve = _curves()[burst, quantity]
     charge = checked_array("charge_kg", charge_kg, above=0.0)
     z = scaled_distance(distance_m, charge_kg)
     low, high = curve.range
@@ -217,15 +215,6 @@ def scaled_distance(distance_m: float | Numbers, charge_kg: float | Numbers) -> 
     return np.asarray(distance / np.cbrt(charge))
 
 
-def _curve(quantity: str, burst: str) -> _Curve:
-    """Return a curve by the names that a user gave."""
-    if quantity not in get_args(Quantity):
-        raise UnknownNameError("quantity", quantity, get_args(Quantity))
-    if burst not in get_args(Burst):
-        raise UnknownNameError("burst", burst, get_args(Burst))
-    return _curves()[burst, quantity]
-
-
 @cache
 def _curves() -> Mapping[tuple[str, str], _Curve]:
     """Return all curves by burst and quantity."""
@@ -247,9 +236,7 @@ def _read(name: str) -> str:
 
 _SERIES_BELOW: Final = 0.5  # of b; the closed forms lose digits there
 
-
 _SERIES: Final = tuple((-1.0) ** order / factorial(order + 2) for order in range(16))
-
 
 _BISECTIONS: Final = 64
 

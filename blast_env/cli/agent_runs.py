@@ -14,7 +14,6 @@ from typing import Any, Final
 from blast_agents.search import timed_proposal
 from blast_agents.training import TrainedAgent, TrainingSettings, load_agent, newest_weights
 from blast_agents.training.cases import unseen_cases
-from blast_agents.training.environments import training_source
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import RunFolder
 
@@ -36,7 +35,7 @@ from blast_env.cli.output import (
     result_console,
 )
 from blast_env.engines import Engine, find_engine
-from blast_env.envs.strategies import ScenarioSource, SingleScenario
+from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.evaluation import (
     BlastEvaluator,
     Case,
@@ -87,7 +86,7 @@ def evaluate_run(run: Path, options: EvaluateOptions) -> None:
     seeds = options.seed_range
     source: ScenarioSource = SingleScenario(folder.scenario(configuration))
     if settings.scenario in FAMILIES:
-        source = training_source(settings.scenario)
+        source = scenario_source(settings.scenario)
     provenance = _provenance(run, settings, weights)
     notes = [_overlap(settings, seeds)] if weights == "best" else [_NO_BEST]
     for note in notes:

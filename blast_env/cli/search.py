@@ -249,22 +249,19 @@ class SearchRun:
 
 
 def print_cost(evaluator: BlastEvaluator, case: Case, blasts: int) -> None:
-    """Say what blasts of gas dynamics cost before they begin.
+    """Say what blasts cost before they begin, if the engine tells.
 
     Args:
         evaluator: Will run them.
         case: Its threats are what layouts meet.
         blasts: How many there will be at most.
     """
-    # Here, because they import Numba.
-    from blast_env.app.cost import cost_of_blast, cost_words
-    from blast_env.engines.gas import GasEngine
+    found = (evaluator.engine.cost(case.scenario, each.charge) for each in case.threats)
+    costs = [each for each in found if each is not None]
+    if costs and blasts:
+        from blast_env.app.cost import cost_words  # the page's words; takes long to import
 
-    engine = evaluator.engine
-    if not isinstance(engine, GasEngine) or not blasts:
-        return
-    costs = [cost_of_blast(case.scenario, each.charge, engine.cell_m) for each in case.threats]
-    print_line(f"up to {cost_words([costs[i % len(costs)] for i in range(blasts)])}")
+        print_line(f"up to {cost_words([costs[i % len(costs)] for i in range(blasts)])}")
 
 
 def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:

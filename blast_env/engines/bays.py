@@ -64,24 +64,14 @@ class BayTail(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BayLoads:
-    """The pressure histories of the bays of a blast.
-
-    Attributes:
-        bays: The bays with air before them.
-        recorder: Their histories, a patch each.
-    """
+    """The pressure histories of the bays of a blast."""
 
     bays: tuple[FilledBay, ...]
     recorder: "PatchHistories"
 
     @classmethod
     def begin(cls, run: "GasRun", bays: Sequence[FilledBay]) -> "BayLoads":
-        """Return the recorder of a run that has not begun; the run has to record it.
-
-        Args:
-            run: The run.
-            bays: The bays of its scenario.
-        """
+        """Return the recorder of a run that has not begun; the run has to record it."""
         from blast_env.physics.gas.probes import PatchHistories
 
         patch = _patches(run.table, [each.name for each in run.site.structures], bays)
@@ -112,11 +102,7 @@ class BayLoads:
         return bay_damages(own, self.recorder.time_s, histories, peak_factor) if own else ()
 
     def history(self, name: str) -> "pd.DataFrame":
-        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
-
-        Raises:
-            UnknownNameError: If there is no bay of that name with air before it.
-        """
+        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`."""
         import pandas as pd
 
         names = [each.bay.name for each in self.bays]
@@ -126,11 +112,7 @@ class BayLoads:
         return pd.DataFrame({"time_s": self.recorder.time_s, "overpressure_pa": history})
 
     def table(self, run: "GasRun") -> "pd.DataFrame":
-        """Return one row a bay; see `LOADED_BAY_COLUMNS`.
-
-        Args:
-            run: The run that has recorded them.
-        """
+        """Return one row a bay; see `LOADED_BAY_COLUMNS`."""
         if not self.bays:
             return table_of([], LOADED_BAY_COLUMNS)
         tails = self.tails(run)
@@ -138,11 +120,7 @@ class BayLoads:
         return table_of(rows, LOADED_BAY_COLUMNS)
 
     def tails(self, run: "GasRun") -> dict[str, BayTail]:
-        """Return how much of its impulse is still to come to each bay, by name.
-
-        Args:
-            run: The run that has recorded them.
-        """
+        """Return how much of its impulse is still to come to each bay, by name."""
         names = [each.name for each in run.site.structures]
         passed = {name: run.has_passed(index) for index, name in enumerate(names)}
         (middle_s, first_s), time_s = run.tail.since_s, self.response.time_s

@@ -10,8 +10,9 @@ An engine of one's own is a class with a name, a version and `loads`; everything
 It can be given wherever an engine's name can. A line in the table below gives it a name of its own.
 """
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from importlib import import_module
 from types import MappingProxyType
@@ -30,6 +31,8 @@ from blast_env.scenario.facade import NamedBay
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
+
+    from blast_env.physics.gas.cost import CostGuess
 
 
 @dataclass(frozen=True)
@@ -109,15 +112,15 @@ class BlastLoads:
 
     def are_for(self, scenario: AnyScenario) -> bool:
         """Return whether these can be loads of a scenario: finite, one a structure and module."""
-        structures = find_scenario(scenario).structures
-        names = [structure.name for structure in structures]
-        modules = sum(structure.rows * structure.columns for structure in structures)
+        found = find_scenario(scenario)
+        names = [structure.name for structure in found.structures]
+        modules = sum(structure.rows * structure.columns for structure in found.structures)
         impulses = np.array([load.impulse_pa_s for load in self.structures])
         return (
             [load.name for load in self.structures] == names
             and self.module_impulse_sim.shape == (modules,)
             and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse_sim).all())
-            and self._has_bays_of(find_scenario(scenario))
+            and self._has_bays_of(found)
         )
 
     def _has_bays_of(self, scenario: Scenario) -> bool:
@@ -220,6 +223,9 @@ class BlastOutcome(Protocol):
     def digest(self) -> str:
         """Hexadecimal digest of the whole outcome."""
 
+    def loads(self) -> BlastLoads:
+        """Return the loads on all structures."""
+
 
 class RunnableBlast(Protocol):
     """One blast that can be run to its end."""
@@ -267,11 +273,10 @@ class Engine(ABC):
     name: str
     version: str
 
-    @abstractmethod
     def loads(
         self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge, seed: int
     ) -> BlastLoads:
-        """Return the loads of one blast on all structures.
+        """Return the loads of one blast on all structures: those of `blast` if it runs any.
 
         Args:
             scenario: The scenario.
@@ -279,6 +284,7 @@ class Engine(ABC):
             charge: What goes off: where it does, or the vehicle that brings it.
             seed: Decides the noise; engines without any pay no heed to it.
         """
+        return self.blast(scenario, layout, seed, charge).run().loads()
 
     def blast(
         self,
@@ -304,19 +310,16 @@ class Engine(ABC):
         """
         if scenario.objective.needs_peaks and not self.has_peaks:
             counts = scenario.objective
-            key, value = (
-                ("kind", counts.kind)
-                if counts.is_response
-                else (
-                    "quantity",
-                    counts.quantity,
-                )
-            )
-            instead = "load" if counts.is_response else "impulse"
+            key, instead = ("kind", "load") if counts.is_response else ("quantity", "impulse")
             raise BlastEnvError(
-                f"scenario {scenario.name!r}: objective.{key} is {value!r}, but engine"
-                f" {self.name!r} knows no overpressure: must be {instead!r}, or the engine 'gas'"
+                f"scenario {scenario.name!r}: objective.{key} is {getattr(counts, key)!r}, but"
+                f" engine {self.name!r} knows no overpressure: must be {instead!r}, or the engine"
+                " 'gas'"
             )
+
+    def cost(self, scenario: Scenario, charge: AnyCharge) -> "CostGuess | None":  # noqa: ARG002
+        """Return what a blast costs, about; `None` where that is not worth telling before."""
+        return None
 
     def calibration(self, scenario: Scenario) -> Calibration | None:  # noqa: ARG002
         """Return the law that turns its impulses into Pa s; `None` where none is needed."""
@@ -422,13 +425,9 @@ def _made(name: str) -> Engine:
     if name not in _TABLE:
         raise UnknownNameError("engine", name, ENGINE_NAMES)
     row = _TABLE[name]
-    module, _, kind = row.place.partition(":")
-    if not row.extra:
-        made: Engine = getattr(import_module(module), kind)()
-        return made
-    with import_extra(row.extra, f"engine {name!r}"):
-        guessing: Engine = getattr(import_module(module), kind)()
-    return guessing
+    with import_extra(row.extra, f"engine {name!r}") if row.extra else nullcontext():
+        made: Engine = load_plugin(row.place)()
+    return made
 
 
 def load_plugin(place: str) -> Any:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
+from math import dist
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Final
 
@@ -38,6 +39,7 @@ from blast_env.engines.pieces import PIECE_COLUMNS, PieceLoads
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Element, layout_text
 from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.cost import CostGuess, cost_of_run
 from blast_env.physics.gas.settings import (
     CHECKED_SCALED_DISTANCE,
     FACE_NAMES,
@@ -47,9 +49,17 @@ from blast_env.physics.scene import WALLS, BlastSite
 from blast_env.provenance import versions
 from blast_env.response.damage import BayDamage
 from blast_env.response.facade import peak_factor
-from blast_env.scenario import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
+from blast_env.scenario import (
+    AnyCharge,
+    AnyScenario,
+    Scenario,
+    ScenarioField,
+    VehicleCharge,
+    find_scenario,
+)
 from blast_env.scenario.build_scene import build_site, draw_threat
 from blast_env.scenario.staircase import stepped_buildings
+from blast_env.scenario.zone import source_bounds_m
 from blast_env.tables import table_of
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
@@ -111,11 +121,25 @@ class GasEngine(GasSettings, Engine):
         """Return one blast, to be run and looked into."""
         return GasBlast(find_scenario(scenario), layout, seed, self, charge)
 
-    def loads(
-        self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge, seed: int
-    ) -> BlastLoads:
-        """Return the loads of one blast; the seed changes nothing."""
-        return self.blast(scenario, layout, seed, charge).run().loads()
+    def cost(self, scenario: Scenario, charge: AnyCharge) -> CostGuess:
+        """Return what a blast costs, about; nothing is built for it."""
+        site = scenario.site
+        sides_m = (site.width_m, site.height_m, scenario.air_height_m)
+        if isinstance(charge, VehicleCharge):
+            tnt_kg, place_m = charge.source.tnt_kg, source_bounds_m(charge.source).centre
+        else:
+            tnt_kg, place_m = charge.tnt_kg, charge.position_m
+        protected = [each for each in scenario.structures if each.protected] or scenario.structures
+        far_m = max(
+            (
+                dist(place_m, (x_m, y_m))
+                for box in (each.rectangle_m for each in protected)
+                for x_m in (box.left, box.right)
+                for y_m in (box.bottom, box.top)
+            ),
+            default=dist((0.0, 0.0), sides_m[:2]),
+        )
+        return cost_of_run(self, sides_m, tnt_kg, far_m)
 
     @property
     def words(self) -> str:
@@ -225,11 +249,7 @@ class GasResult:
 
     @property
     def collisions(self) -> "pd.DataFrame":
-        """There are none: a gas has no particles that collide.
-
-        Raises:
-            BlastEnvError: Always; the message says what there is instead.
-        """
+        """Refused (`BlastEnvError`): a gas has no particles that collide."""
         raise BlastEnvError(
             "engine 'gas' has no collisions: loads are in structures, modules, faces and gauges"
         )
@@ -349,33 +369,28 @@ class GasResult:
         peak_weights = {
             each.name: each.counted_peak_weight for each in self.blast.scenario.structures
         }
-        loads = []
-        for index, outline in enumerate(self.run.site.structures):
-            if outline.cells is None:
-                scaled = self._scaled(index)
-                loads.append(
-                    StructureLoad(
-                        name=outline.name,
-                        protected=outline.protected,
-                        weight=outline.weight,
-                        impulse_sim=np.nan,
-                        transferred_impulse_sim=np.nan,
-                        impulse_pa_s=scaled.pa_s,
-                        peak_pa=float(self.run.loads.peak_pa[self._walls(index)].max(initial=0.0)),
-                        peak_weight=peak_weights[outline.name],
-                        in_range=scaled.in_range,
-                        notes=scaled.notes,
-                    )
-                )
-        return BlastLoads(tuple(loads), self.module_impulse_n_s, self._bay_damages)
-
-    @property
-    def _bay_damages(self) -> tuple[BayDamage, ...]:
-        """What becomes of the bays, where that counts."""
-        if self.bay_loads is None or not self.blast.scenario.objective.is_response:
-            return ()
-        factor = peak_factor(self.run.grid.cell_m, self.run.site.charge.tnt_kg)
-        return self.bay_loads.damages(self.blast.scenario.alternatives, factor)
+        loads = tuple(
+            StructureLoad(
+                name=outline.name,
+                protected=outline.protected,
+                weight=outline.weight,
+                impulse_sim=np.nan,
+                transferred_impulse_sim=np.nan,
+                impulse_pa_s=scaled.pa_s,
+                peak_pa=float(self.run.loads.peak_pa[self._walls(index)].max(initial=0.0)),
+                peak_weight=peak_weights[outline.name],
+                in_range=scaled.in_range,
+                notes=scaled.notes,
+            )
+            for index, outline in enumerate(self.run.site.structures)
+            if outline.cells is None
+            for scaled in [self._scaled(index)]
+        )
+        bays: tuple[BayDamage, ...] = ()
+        if self.bay_loads is not None and self.blast.scenario.objective.is_response:
+            factor = peak_factor(self.run.grid.cell_m, self.run.site.charge.tnt_kg)
+            bays = self.bay_loads.damages(self.blast.scenario.alternatives, factor)
+        return BlastLoads(loads, self.module_impulse_n_s, bays)
 
     def _walls(self, index: int) -> NDArray[np.int64]:
         """Return the faces of the walls of a structure whose load counts (n,)."""
@@ -401,7 +416,7 @@ class GasResult:
             if outline.cells is None:
                 own = (table.structure == index) & (table.face < len(WALLS))
                 momentum = np.zeros((outline.rows, outline.columns))
-                values = self.run.loads.positive_impulse_pa_s[own] * self._cell_area_m2
+                values = self.run.loads.positive_impulse_pa_s[own] * self.run.grid.cell_m**2
                 np.add.at(momentum, (table.row[own], table.column[own]), values)
                 sums.append(momentum.ravel())
         return np.concatenate(sums) if sums else np.zeros(0)
@@ -450,9 +465,6 @@ class GasResult:
     def to_excel(self, path: str | Path) -> Path:
         """Write a workbook with structures, modules, gauges and the run record.
 
-        Returns:
-            The path.
-
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
@@ -475,9 +487,6 @@ class GasResult:
     def to_parquet(self, path: str | Path) -> Path:
         """Write the loads on all faces of cells as Parquet, the run record in its metadata.
 
-        Returns:
-            The path.
-
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
@@ -485,10 +494,6 @@ class GasResult:
 
         faces = self.faces[[column.name for column in FACE_COLUMNS]]
         return write_table(faces, FACE_COLUMNS, self.run_record, path)
-
-    @property
-    def _cell_area_m2(self) -> float:
-        return self.run.grid.cell_m**2
 
     def _notes(self, index: int) -> tuple[str, ...]:
         from blast_env.physics.gas.engine import scaled_distance  # the run has imported it
@@ -500,8 +505,7 @@ class GasResult:
             notes.append(
                 f"scaled distance {scaled:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
             )
-        walls = self._walls(index)
-        if not self.run.is_complete(walls, index):
+        if not self.run.is_complete(self._walls(index), index):
             notes.append(f"{NOT_COMPLETE}: the run ended because {self.end_reason}")
         if self.run.solver.lifted:
             notes.append(f"{self.run.solver.lifted} cells were raised to the floor of pressure")

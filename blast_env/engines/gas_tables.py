@@ -113,13 +113,8 @@ GAUGE_COLUMNS: Final = (
 
 def load_values(loads: "LoadTable") -> dict[str, FloatArray]:
     """Return the loads on the points of a table, by column."""
-    return {
-        "positive_impulse_pa_s": loads.positive_impulse_pa_s,
-        "first_impulse_pa_s": loads.first_impulse_pa_s,
-        "negative_impulse_pa_s": loads.negative_impulse_pa_s,
-        "peak_pa": loads.peak_pa,
-        "arrival_s": loads.arrival_s,
-    }
+    names = [column.name for column in _LOADS if column not in TAIL_COLUMNS]
+    return {name: getattr(loads, name) for name in names}
 
 
 def face_table(run: "GasRun") -> "pd.DataFrame":
@@ -135,7 +130,12 @@ def face_table(run: "GasRun") -> "pd.DataFrame":
         {
             "structure": names[table.structure],
             "face": np.array(FACE_NAMES, dtype=object)[table.face],
-            "module_id": _module_ids(run),
+            "module_id": [
+                run.site.structures[structure].module_name(row, column)
+                for structure, row, column in zip(
+                    table.structure, table.row, table.column, strict=True
+                )
+            ],
             "x_m": table.centre_m[:, 0],
             "y_m": table.centre_m[:, 1],
             "z_m": table.centre_m[:, 2],
@@ -158,37 +158,19 @@ def _add_tail(table: "pd.DataFrame") -> None:
     table["complete"] = is_complete(impulse, table["to_come_pa_s"].to_numpy())
 
 
-def _module_ids(run: "GasRun") -> list[str]:
-    table, outlines = run.table, run.site.structures
-    return [
-        outlines[structure].module_name(row, column)
-        for structure, row, column in zip(table.structure, table.row, table.column, strict=True)
-    ]
-
-
 def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataFrame":
     """Return impulses as means, peaks as the largest, arrivals as the first of each group."""
     groups: Any = faces.groupby(keys, sort=False, observed=True)
-    table: pd.DataFrame = groups.agg(
-        positive_impulse_pa_s=("positive_impulse_pa_s", "mean"),
-        first_impulse_pa_s=("first_impulse_pa_s", "mean"),
-        negative_impulse_pa_s=("negative_impulse_pa_s", "mean"),
-        peak_pa=("peak_pa", "max"),
-        arrival_s=("arrival_s", "min"),
-        last_pa_s=("last_pa_s", "mean"),  # a structure's are all there, or none
-        before_pa_s=("before_pa_s", "mean"),
-    )
+    means = [each for each in map(str, faces) if each.endswith("_pa_s")]
+    # Of what came last a structure's are all there, or none.
+    how: Any = dict.fromkeys(means, "mean") | {"peak_pa": "max", "arrival_s": "min"}
+    table: pd.DataFrame = groups.agg(how)
     _add_tail(table)
     return table.assign(area_m2=groups.size() * run.grid.cell_m**2).reset_index()
 
 
 def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
-    """Return one row a face of a module that touches air; see `MODULE_COLUMNS`.
-
-    Args:
-        run: The run.
-        faces: Its `face_table`.
-    """
+    """Return one row a face of a module that touches air; see `MODULE_COLUMNS`."""
     table = _grouped(run, faces, ["structure", "module_id", "row", "column", "face"])
     outlines = run.site.structures
     corners = {outline.name: outline.corner_m for outline in outlines}
@@ -221,13 +203,10 @@ def structure_table(
     buildings: Mapping[str, str] | None = None,
     stepped: Collection[str] = (),
 ) -> "pd.DataFrame":
-    """Return one row a structure, or one a building; see `STRUCTURE_COLUMNS`, `BUILDING_COLUMNS`.
+    """Return one row a structure; see `STRUCTURE_COLUMNS`.
 
-    Args:
-        run: The run.
-        faces: Its `face_table`.
-        buildings: The building that each structure is a part of, by name.
-        stepped: The buildings with a wall that is a staircase.
+    Or one a building, given the building that each structure is a part of, by name, and the
+    buildings with a wall that is a staircase; see `BUILDING_COLUMNS`.
     """
     together: dict[str, list[StructureOutline]] = {}
     for outline in run.site.structures:

@@ -76,17 +76,6 @@ class ParticleEngine(Engine):
         """Return one blast, to be run and looked into."""
         return Blast(find_scenario(scenario), layout, seed, self, charge)
 
-    def loads(
-        self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge, seed: int
-    ) -> BlastLoads:
-        """Return the loads of one blast, through the scenario's calibration.
-
-        Raises:
-            CalibrationError: If the scenario names no calibration, or one that was made with
-                other parameters or another engine.
-        """
-        return self.blast(scenario, layout, seed, charge).run().loads(self.calibration(scenario))
-
     def check(self, scenario: Scenario) -> None:
         """Refuse a scenario that particles cannot run, or that has no calibration for them."""
         super().check(scenario)
@@ -103,14 +92,10 @@ class ParticleEngine(Engine):
 
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
         """Return in a line which engine spoke, and with which presets."""
-        presets = dict.fromkeys(_preset_text(each) for each in scenarios)
+        sections = [each.simulation for each in scenarios]
+        presets = [each.preset + " with overrides" * bool(each.overrides) for each in sections]
         text = super().describe()
-        return f"{text}, preset {', '.join(presets)}" if presets else text
-
-
-def _preset_text(scenario: Scenario) -> str:
-    section = scenario.simulation
-    return section.preset + (" with overrides" if section.overrides else "")
+        return f"{text}, preset {', '.join(dict.fromkeys(presets))}" if presets else text
 
 
 @dataclass(frozen=True)
@@ -188,12 +173,7 @@ class Blast:
 
     @cached_property
     def particle_engine(self) -> ParticleEngine:
-        """The engine itself.
-
-        Raises:
-            UnknownNameError: If there is no such engine.
-            BlastEnvError: If it is no engine of particles.
-        """
+        """The engine itself; refused as by `find_particle_engine`."""
         return find_particle_engine(self.engine)
 
     def start(self) -> BlastRun:
@@ -290,35 +270,21 @@ class BlastResult:
 
     @property
     def bays(self) -> "pd.DataFrame":
-        """There are none: particles have no pressure that could load a pane or a panel.
-
-        Raises:
-            BlastEnvError: Always; the message says what does.
-        """
+        """Refused (`BlastEnvError`): particles have no pressure that could load a pane or panel."""
         raise BlastEnvError(
             f"engine {self.engine_name!r} knows no overpressure, so no response of bays: take 'gas'"
         )
 
     @property
     def pieces(self) -> "pd.DataFrame":
-        """There are none: particles have no pressure that could push a piece.
-
-        Raises:
-            BlastEnvError: Always; the message says what does.
-        """
+        """Refused (`BlastEnvError`): particles have no pressure that could push a piece."""
         raise BlastEnvError(
             f"engine {self.engine_name!r} knows no overpressure, so no push on pieces: take 'gas'"
         )
 
     @cached_property
     def calibration(self) -> Calibration:
-        """The scenario's calibration.
-
-        Raises:
-            UnknownNameError: If there is no calibration of that name.
-            CalibrationError: If the scenario names no calibration, or one that was made with
-                other parameters or another engine.
-        """
+        """The scenario's calibration; errors as for `scenario_calibration`."""
         return scenario_calibration(self.blast.scenario, self.engine_name)
 
     def obstacle(self, name: str) -> ModularObstacle:
@@ -335,11 +301,7 @@ class BlastResult:
     def impulse_sim(self, structure: str) -> float:
         """Return the sum of m |v| over the collisions with a structure, simulation units.
 
-        Args:
-            structure: Name of the structure.
-
-        Raises:
-            UnknownNameError: If there is no structure of that name.
+        Errors as for `obstacle`.
         """
         return self.obstacle(structure).impulse
 
@@ -381,23 +343,23 @@ class BlastResult:
         structures = [obstacle for obstacle in self.obstacles if obstacle.cells is None]
         impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
         return BlastLoads(
-            structures=tuple(self._structure_load(each, law) for each in structures),
+            structures=tuple(
+                StructureLoad(
+                    name=each.name,
+                    protected=each.protected,
+                    weight=each.weight,
+                    impulse_sim=each.impulse,
+                    transferred_impulse_sim=each.transferred_impulse,
+                    impulse_pa_s=scaled.pa_s,
+                    peak_pa=None,
+                    peak_weight=each.weight,
+                    in_range=scaled.in_range,
+                    notes=scaled.notes,
+                )
+                for each in structures
+                for scaled in [self.impulse(each.name, law)]
+            ),
             module_impulse_sim=np.array(impulse, dtype=np.float64),
-        )
-
-    def _structure_load(self, obstacle: ModularObstacle, calibration: Calibration) -> StructureLoad:
-        scaled = self.impulse(obstacle.name, calibration)
-        return StructureLoad(
-            name=obstacle.name,
-            protected=obstacle.protected,
-            weight=obstacle.weight,
-            impulse_sim=obstacle.impulse,
-            transferred_impulse_sim=obstacle.transferred_impulse,
-            impulse_pa_s=scaled.pa_s,
-            peak_pa=None,
-            peak_weight=obstacle.weight,
-            in_range=scaled.in_range,
-            notes=scaled.notes,
         )
 
     @cached_property
@@ -466,9 +428,6 @@ class BlastResult:
     def to_excel(self, path: str | Path) -> Path:
         """Write a workbook with collisions, modules, structures and the run record.
 
-        Returns:
-            The path.
-
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
@@ -478,9 +437,6 @@ class BlastResult:
 
     def to_parquet(self, path: str | Path) -> Path:
         """Write the collision table as Parquet, the run record in its metadata.
-
-        Returns:
-            The path.
 
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.

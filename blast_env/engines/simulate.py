@@ -7,7 +7,7 @@ from blast_env.engines.contract import BlastOutcome, Engine, find_engine
 from blast_env.engines.particles import Blast, BlastResult
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
-from blast_env.runner import check_workers, in_order
+from blast_env.runner import check_workers, run_all
 from blast_env.scenario import AnyCharge, AnyScenario
 
 if TYPE_CHECKING:  # Numba takes a third of a second to import
@@ -111,24 +111,13 @@ def simulate_many(
             left out then.
     """
     check_workers("threads", threads)
-    results: list[BlastResult] = []
-    for result in in_order(_run_numbered, list(enumerate(blasts)), threads, "threads"):
-        if isinstance(result, BlastEnvError):
-            raise result
-        results.append(result)
-        if progress is not None:
-            progress(len(results) / len(blasts))
-    return results
+    return run_all(_run_numbered, list(enumerate(blasts)), threads, progress, "threads")
 
 
-def _run_numbered(numbered: tuple[int, Blast]) -> BlastResult | BlastEnvError:
-    """Run a blast; an error of the user's says which one it was.
-
-    It is returned, not raised: the first one in the order of the blasts counts, whichever thread
-    comes to one first.
-    """
+def _run_numbered(numbered: tuple[int, Blast]) -> BlastResult:
+    """Run a blast; an error of the user's says which one it was."""
     number, blast = numbered
     try:
         return blast.run()
     except ValueError as error:  # what unusable arguments cause, `BlastEnvError` among it
-        return BlastEnvError(f"blasts[{number}]: {error}")
+        raise BlastEnvError(f"blasts[{number}]: {error}") from error

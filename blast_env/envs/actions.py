@@ -52,7 +52,6 @@ class ItemThenPlace:
     block_cells: int | None = None
 
     def __post_init__(self) -> None:
-        """Check the side of blocks."""
         if self.block_cells is not None:
             whole_number("block_cells", self.block_cells, 1, 1000)
 

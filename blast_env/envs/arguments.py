@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import wraps
+from functools import partial, wraps
 from inspect import signature
 from pathlib import Path
 from typing import Any, Final, ParamSpec, TypeVar
@@ -17,9 +17,7 @@ from blast_env.values import MOST_SEED, finite_number, number_pair, whole_number
 
 _Parameters = ParamSpec("_Parameters")
 
-
 _Returned = TypeVar("_Returned")
-
 
 _Strategy = TypeVar("_Strategy")
 
@@ -45,16 +43,7 @@ def checked_keywords(
 
 
 def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> None:
-    """Refuse a name that is not known.
-
-    Args:
-        kind: What is named, for the error.
-        names: The names given.
-        known: The names that exist.
-
-    Raises:
-        UnknownNameError: If there is one; the message names the nearest known one.
-    """
+    """Refuse a name that is not known."""
     known = list(known)
     for name in names:
         if name not in known:
@@ -94,10 +83,6 @@ def _common_methods(strategies: Iterable[object]) -> list[str]:
 
 def checked_options(options: Mapping[str, Any] | None, known: Iterable[str]) -> Mapping[str, Any]:
     """Return the options of a call of `reset`.
-
-    Args:
-        options: As given.
-        known: The names that exist.
 
     Raises:
         UnknownNameError: If there is no such option; the message names the nearest one.
@@ -140,23 +125,15 @@ class ResetOptions:
             BlastEnvError: If the value of an option is of no use.
         """
         options = checked_options(options, [field.name for field in fields(cls)])
-        seed = options.get("blast_seed")
-        tnt_kg = options.get("tnt_kg")
-        height_m = options.get("charge_height_m")
-        position_m = options.get("charge_position_m")
-        return cls(
-            charge_position_m=None
-            if position_m is None
-            else number_pair("charge_position_m", position_m),
-            tnt_kg=None if tnt_kg is None else finite_number("tnt_kg", tnt_kg),
-            charge_height_m=None
-            if height_m is None
-            else finite_number("charge_height_m", height_m),
-            layout=options.get("layout", ()),
-            blast_seed=None
-            if seed is None
-            else whole_number("blast_seed", seed, 0, _MOST_BLAST_SEED),
-        )
+        checks: dict[str, Callable[[str, Any], Any]] = {
+            "charge_position_m": number_pair,
+            "tnt_kg": finite_number,
+            "charge_height_m": finite_number,
+            "blast_seed": partial(whole_number, least=0, most=_MOST_BLAST_SEED),
+        }
+        given = {name: check for name, check in checks.items() if options.get(name) is not None}
+        fixed = {name: check(name, options[name]) for name, check in given.items()}
+        return cls(layout=options.get("layout", ()), **fixed)
 
     @property
     def fix_charge(self) -> bool:
@@ -197,12 +174,11 @@ class PlainSpec:
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         if spec is not None:
-            kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
+            kwargs = dict(spec.kwargs)
+            for name, value in spec.kwargs.items():
+                if isinstance(value, Scenario):
+                    kwargs[name] = value.model_dump(mode="json", exclude_none=True)
+                elif isinstance(value, Path):
+                    kwargs[name] = str(value)
             spec = replace(spec, kwargs=kwargs)
         self._spec = spec
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Scenario):
-        return value.model_dump(mode="json", exclude_none=True)
-    return str(value) if isinstance(value, Path) else value

@@ -81,9 +81,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     `charge_position_m`, `tnt_kg`, `charge_height_m`, `layout`, `blast_seed`.
 
     ## Episode end
-    Terminated when the agent finishes, when nothing more can be placed, or after
-    `illegal_action_limit` illegal actions. At the end `info` has the impulses with and without the
-    barrier, `reduction`, `layout`, and what repeats the blasts.
+    Terminated when the agent finishes, nothing more can be placed, or after `illegal_action_limit`
+    illegal actions. At the end `info` has the impulses with and without the barrier, `reduction`,
+    `layout`, and what repeats the blasts. Without an episode methods raise `ResetNeeded`.
 
     ## Arguments
     Those of `__init__`, below.
@@ -274,11 +274,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return self._episode.blasts_due(int(action), self.illegal)
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return which actions are legal now, (actions,).
-
-        Raises:
-            gymnasium.error.ResetNeeded: If `reset` has not been called.
-        """
+        """Return which actions are legal now, (actions,)."""
         return self._episode.action_mask()
 
     def explain(self, element: Element) -> str | None:
@@ -289,16 +285,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
         Raises:
             LayoutError: If it is neither.
-            gymnasium.error.ResetNeeded: If `reset` has not been called.
         """
         return self.placement.explain(element)
 
     def explain_vehicles(self) -> tuple[str, ...]:
-        """Return a sentence for each vehicle: how near it comes now, by which way, how fast.
-
-        Raises:
-            gymnasium.error.ResetNeeded: If `reset` has not been called.
-        """
+        """Return a sentence for each vehicle: how near it comes now, by which way, how fast."""
         return self.placement.explain_vehicles()
 
     @property
@@ -361,11 +352,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         self._display.marked = action
 
     def cell_at(self, place_px: tuple[int, int]) -> Cell | None:
-        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one.
-
-        Raises:
-            gymnasium.error.ResetNeeded: If `reset` has not been called.
-        """
+        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one."""
         return self._display.cell_at(self._episode, place_px)
 
     def close(self) -> None:

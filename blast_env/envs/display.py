@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.engines.contract import load_plugin
 from blast_env.envs.episode import Episode
 from blast_env.envs.observations import VehicleView
 from blast_env.evaluation.cases import Threat
-from blast_env.geometry import Cell, Layout, Rectangle
+from blast_env.geometry import Cell, Rectangle
 from blast_env.scenario import AnySource, Placement, PointSource, Scenario
 from blast_env.scenario.catalogue import element_text
 from blast_env.scenario.zone import distances_m
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from blast_env.rendering.placing import BlastScreening, PlacingPainter
     from blast_env.rendering.pressure_film import PressureScreening
     from blast_env.rendering.window import Window
-
 
 _LEGEND: Final = {
     "P": "protected structure",
@@ -61,7 +61,8 @@ def _map(
         ceil(length_m / MODULE_SIDE_M - 1e-9)
         for length_m in (scenario.site.height_m, scenario.site.width_m)
     )
-    y, x = _centres_m(rows)[:, np.newaxis], _centres_m(columns)[np.newaxis, :]
+    up, right = (np.arange(count, dtype=np.float64) for count in (rows, columns))
+    y, x = (up[:, np.newaxis] + 0.5) * MODULE_SIDE_M, (right + 0.5) * MODULE_SIDE_M
     characters = np.full((rows, columns), " ")
     zone, free, taken = scenario.zone, placement.open_ground, set(placement.cells)
     for cell in zone.cells():
@@ -77,22 +78,14 @@ def _map(
     return characters
 
 
-def _centres_m(count: int) -> NDArray[np.float64]:
-    """Return the centres of so many squares in a row."""
-    return np.asarray((np.arange(count) + 0.5) * MODULE_SIDE_M, dtype=np.float64)
-
-
-def _inside(
-    rectangle_m: Rectangle, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _inside(rectangle_m: Rectangle, x: FloatArray, y: FloatArray) -> BoolArray:
     """Return which squares have their centre in a rectangle."""
     left, bottom, right, top = rectangle_m
-    inside: NDArray[np.bool_] = (x >= left) & (x < right) & (y >= bottom) & (y < top)
+    inside: BoolArray = (x >= left) & (x < right) & (y >= bottom) & (y < top)
     return inside
 
 
 Frame = NDArray[np.uint8]
-
 
 _FRAMES_PER_PLACEMENT: Final = 5  # in the window: 0.2 s, so that a person can follow
 
@@ -101,10 +94,6 @@ class Display:
     """Shows an episode of placing, and the blast at its end.
 
     Drawing objects are made when they are needed and left out when this is pickled.
-
-    Args:
-        render_mode: `"human"`, `"rgb_array"`, `"ansi"`, or `None` for nothing.
-        frames_per_s: Frames a second of the window and of films.
 
     Attributes:
         marked: The action that is marked in the frames, before the charge goes off.
@@ -217,16 +206,15 @@ class Display:
 
 
 def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening | PressureScreening":
-    """Return the film of the blast that is shown.
-
-    Raises:
-        BlastEnvError: If the engine tells loads without a blast.
-    """
-    shown, engine = _shown_threat(episode), episode.objective.evaluator.engine
-    scenario, layout = episode.objective.evaluator.scenario, _sorted_layout(episode)
-    blast = engine.blast(scenario, layout, shown.seed, shown.charge)
-    made: BlastScreening | PressureScreening = load_plugin(engine.screening)(
-        blast, _outcome(episode), _remark(episode), size_px
+    """Return the film of the blast that is shown."""
+    shown, evaluator = _shown_threat(episode), episode.objective.evaluator
+    # Sorted as for the assessment: the order may change the last bits.
+    layout = tuple(sorted(episode.placement.layout))
+    blast = evaluator.engine.blast(evaluator.scenario, layout, shown.seed, shown.charge)
+    charges = len(episode.objective.case.charges)
+    remark = f": the worst of {charges} charges" if charges > 1 else ""
+    made: BlastScreening | PressureScreening = load_plugin(evaluator.engine.screening)(
+        blast, _outcome(episode), remark, size_px
     )
     return made
 
@@ -238,17 +226,6 @@ def _shown_threat(episode: Episode) -> Threat:
     loads = np.array(objective.counted_loads(episode.placement.layout))
     of_charges = loads.reshape(case.realisations, -1).mean(axis=0)
     return case.threats[int(of_charges.argmax())]
-
-
-def _sorted_layout(episode: Episode) -> Layout:
-    """Return the layout as for the assessment: its order may change the last bits."""
-    return tuple(sorted(episode.placement.layout))
-
-
-def _remark(episode: Episode) -> str:
-    """Return which of several charges is shown."""
-    charges = len(episode.objective.case.charges)
-    return f": the worst of {charges} charges" if charges > 1 else ""
 
 
 def _outcome(episode: Episode) -> str:

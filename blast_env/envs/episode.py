@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 
 from blast_env.engines import Engine
 from blast_env.envs.actions import ActionChoice, Actions, NumberedActions
-from blast_env.envs.arguments import (
-    ResetOptions,
-    strategy,
-)
+from blast_env.envs.arguments import ResetOptions, strategy
 from blast_env.envs.observations import (
     Array,
     EpisodeObservation,
@@ -58,20 +55,7 @@ class IllegalActions:
 
 @dataclass
 class Episode:
-    """The state of an episode.
-
-    Attributes:
-        observable: What may be observed before the end.
-        objective: Assesses layouts.
-        observation: Observes the episode.
-        initial: The layout at the start.
-        placement: The modules placed so far.
-        actions: What the actions are.
-        chosen: What has been chosen of the next module or piece.
-        illegal_actions: How many illegal actions there were.
-        begun: Whether there has been an action.
-        ended: Whether the charge has gone off.
-    """
+    """The state of an episode."""
 
     observable: Observable
     objective: Objective
@@ -85,7 +69,6 @@ class Episode:
     ended: bool = False
 
     def __post_init__(self) -> None:
-        """Begin with nothing chosen."""
         self.chosen = ActionChoice(self.placement.legal)
 
     def action_mask(self) -> NDArray[np.bool_]:
@@ -107,16 +90,7 @@ class Episode:
         return self.observation.observe(placement)
 
     def act(self, action: int, reward: Reward, illegal: IllegalActions) -> dict[str, float]:
-        """Place a module or a piece, choose a part of it, or finish; return the reward's terms.
-
-        Args:
-            action: One of `actions`.
-            reward: Pays for the action.
-            illegal: What an illegal action leads to.
-
-        Raises:
-            BlastEnvError: If the reward names a term that is taken.
-        """
+        """Place a module or a piece, choose a part of it, or finish; return the reward's terms."""
         before = self.placement
         self.placement, self.chosen, is_illegal, self.ended = self._after(action, illegal)
         self.illegal_actions += is_illegal
@@ -129,15 +103,15 @@ class Episode:
             objective=self.objective,
         )
         self.begun = True
-        return _with_illegal_term(reward(transition), -illegal.cost if is_illegal else 0.0)
+        terms = reward(transition)
+        if ILLEGAL_TERM in terms:
+            raise BlastEnvError(
+                f"the reward has a term {ILLEGAL_TERM!r}, which the environment adds itself"
+            )
+        return {**terms, ILLEGAL_TERM: -illegal.cost if is_illegal else 0.0}
 
     def blasts_due(self, action: int, illegal: IllegalActions) -> tuple[BlastAsked, ...]:
-        """Return the blasts that `final_information` asks for if the action ends the episode.
-
-        Args:
-            action: As for `act`, which is still to be called.
-            illegal: Likewise.
-        """
+        """Return the blasts that `final_information` asks for if the action ends the episode."""
         placement, _, _, ended = self._after(action, illegal)
         case = self.objective.case
         barrier = met_by_blasts(placement.layout)
@@ -174,11 +148,7 @@ class Episode:
         return {"action_mask": mask, "illegal_actions": self.illegal_actions}
 
     def final_information(self, evaluators: Evaluators) -> dict[str, Any]:
-        """Return what is told when the charge has gone off.
-
-        Args:
-            evaluators: They know how many blasts there were.
-        """
+        """Return what is told when the charge has gone off."""
         protected, unprotected = self.assess()
         case = self.objective.case
         seeds = [threat.seed for threat in case.threats]
@@ -219,14 +189,6 @@ def _where_known(protected: Assessment, unprotected: Assessment) -> dict[str, An
     }
 
 
-def _with_illegal_term(terms: Mapping[str, float], illegal: float) -> dict[str, float]:
-    if ILLEGAL_TERM in terms:
-        raise BlastEnvError(
-            f"the reward has a term {ILLEGAL_TERM!r}, which the environment adds itself"
-        )
-    return {**terms, ILLEGAL_TERM: illegal}
-
-
 def total(terms: Mapping[str, float]) -> float:
     """Return the sum of the terms of a reward."""
     return fsum(terms.values())
@@ -234,7 +196,6 @@ def total(terms: Mapping[str, float]) -> float:
 
 VISIBLE_REALISATIONS: Final = 2
 """Blasts for a visible charge unless an argument says otherwise (`studies.noise reward`)."""
-
 
 HIDDEN_THREATS: Final = 16
 """Charges for a hidden threat, one blast each, unless an argument says otherwise; likewise."""
@@ -244,14 +205,8 @@ HIDDEN_THREATS: Final = 16
 class Task:
     """What is placed where, against what, and what is seen of it.
 
-    Attributes:
-        source: Gives each episode its scenario.
-        threat_model: Draws the charges of an episode.
-        realisations: Blasts for each charge, with different fan and air.
-        risk: How the loads of several charges become one; as the scenario says if `None`.
-        observation: What is seen.
-        actions: What an action says.
-        evaluators: Run the blasts.
+    Each charge has `realisations` blasts, with different fan and air. Without a risk measure the
+    scenario says how the loads of several charges become one.
     """
 
     source: ScenarioSource

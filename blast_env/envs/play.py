@@ -86,11 +86,7 @@ class Cursor:
 
 
 def barrier_env(env: gym.Env[Any, Any]) -> BlastBarrierEnv:
-    """Return the barrier environment within wrappers.
-
-    Raises:
-        BlastEnvError: If it is another one, or does not give frames.
-    """
+    """Return the barrier environment within wrappers."""
     inner = env.unwrapped
     if not isinstance(inner, BlastBarrierEnv):
         raise BlastEnvError(f"env is {env}, must be a BlastBarrier environment: nothing is placed")
@@ -126,6 +122,7 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
         super().__init__(env)
         self._inner = barrier_env(env)
         self.action_space = spaces.Discrete(len(Key))
+        self.taken: list[int] = []
         self._last: tuple[Array, dict[str, Any]] | None = None
         self._cursor: Cursor | None = None
         self._held = (Key.NOTHING, 0)
@@ -148,8 +145,8 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
     ) -> tuple[Array, dict[str, Any]]:
         """Begin an episode, with the cursor in the middle of the zone."""
         self._last = self.env.reset(seed=seed, options=options)
-        self._held = (Key.NOTHING, 0)
-        self._point(Cursor.of(self._inner))
+        self._held, self.taken = (Key.NOTHING, 0), []
+        self.point(Cursor.of(self._inner))
         return self._last[0], self._information(self._last[1])
 
     def step(self, action: np.int64) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
@@ -161,19 +158,32 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
         """
         if not self.action_space.contains(action):
             raise gym.error.InvalidAction(f"action is {action!r}, must be in {self.action_space}")
-        if self._cursor is None or self._last is None:
+        film_is_on = self._last is not None and self._inner.charge_has_gone_off
+        return self.press(Key.FINISH if film_is_on else self._counted(Key(int(action))))
+
+    @property
+    def cursor(self) -> Cursor:
+        """What would be placed next, and where.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If `reset` has not been called.
+        """
+        if self._cursor is None:
             raise gym.error.ResetNeeded("there is no episode yet: call reset")
-        if self._inner.charge_has_gone_off:  # a film is on
-            return self._go(self._cursor.catalogue.finish)
-        key = self._counted(Key(int(action)))
+        return self._cursor
+
+    def press(self, key: Key) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
+        """Do what a key asks for, at once; as `step` otherwise."""
+        cursor = self.cursor
+        assert self._last is not None  # as there is a cursor
         if key == Key.FINISH:
-            return self._go(self._cursor.catalogue.finish)
-        if key == Key.PLACE and self._inner.action_masks()[self._cursor.action]:
-            return self._go(self._cursor.action)
+            return self.take(cursor.catalogue.finish)
+        if key == Key.PLACE and self._inner.action_masks()[cursor.action]:
+            return self.take(cursor.action)
         if key == Key.NEXT:
-            self._point(self._cursor.with_next())
+            self.point(cursor.with_next())
         elif key in _MOVES:
-            self._point(self._cursor.moved(*_MOVES[key]))
+            self.point(cursor.moved(*_MOVES[key]))
         return self._last[0], 0.0, False, False, self._information(self._last[1])
 
     def _counted(self, key: Key) -> Key:
@@ -184,12 +194,15 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
         again = steps >= _FIRST_REPEAT and steps % _REPEAT_EVERY == 0 and key in _MOVES
         return key if steps == 0 or again else Key.NOTHING
 
-    def _go(self, action: int) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
+    def take(self, action: int) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
+        """Take an action of the environment within; `taken` remembers those of the episode."""
+        self.taken.append(action)
         observation, reward, ended, truncated, info = self.env.step(np.int64(action))
         self._last = observation, info
         return observation, reward, ended, truncated, self._information(info)
 
-    def _point(self, cursor: Cursor) -> None:
+    def point(self, cursor: Cursor) -> None:
+        """Let the cursor be elsewhere."""
         self._cursor = cursor
         self._inner.mark(cursor.action)
 
@@ -211,6 +224,7 @@ _PLAY_KEYS: Final = {
     "space": Key.PLACE,
     "return": Key.FINISH,
 }
+_GAME_KEYS: Final = _PLAY_KEYS | {"left click": Key.PLACE, "right click": Key.NEXT}
 
 
 @dataclass(frozen=True)
@@ -249,7 +263,7 @@ def play(env: gym.Env[Any, Any], seed: int = 0) -> Iterator[Played]:
     window = Window("blast-env", inner.metadata["render_fps"])
     try:
         while not window.closed:
-            game = _Game(env, inner, window, seed)
+            game = _Game(CursorControl(env), inner, window, seed)
             for info in game.play():
                 yield Played(seed, info["layout"], info["reduction"], info["impulse_pa_s"])
             seed += 1
@@ -261,76 +275,58 @@ class _Game:
     """One episode in a window.
 
     Args:
-        env: The environment, with wrappers.
+        control: The environment, with wrappers.
         inner: The same without.
         window: Where it is shown, and what the person does.
         seed: Of the episode.
     """
 
     def __init__(
-        self, env: gym.Env[Any, Any], inner: BlastBarrierEnv, window: "Window", seed: int
+        self, control: CursorControl, inner: BlastBarrierEnv, window: "Window", seed: int
     ) -> None:
-        self._env = env
-        self._inner = inner
-        self._window = window
-        self._seed = seed
-        self._actions: list[int] = []
+        self._control, self._inner, self._window, self._seed = control, inner, window, seed
         self._ended = self._wants_next = False
         self._info: dict[str, Any] = {}
-        self._env.reset(seed=seed)
-        self._point(Cursor.of(inner))
+        control.reset(seed=seed)
 
     def play(self) -> Iterator[dict[str, Any]]:
         """Play until the person wants another episode; yield the final information once."""
         told = False
-        while not self._wants_next and self._window.show(self._env.render()):  # type: ignore[arg-type]
+        while not self._wants_next and self._window.show(self._control.render()):  # type: ignore[arg-type]
             if self._inner.charge_has_gone_off and not told:
                 told = True
                 yield self._info
             for done in self._window.inputs():
                 self._react(done)
             if self._inner.charge_has_gone_off and not self._ended:  # the film is on
-                self._step(self._cursor.catalogue.finish)
+                self._press(Key.FINISH)
 
     def _react(self, done: "Input") -> None:
-        """Do what a key or the mouse asks for."""
+        """Do what a key or the mouse asks for; the cursor follows the mouse."""
+        key = _GAME_KEYS.get(done.name)
         if done.name == "escape":
             self._window.close()
         elif self._inner.charge_has_gone_off:
             self._wants_next |= done.name == "return"
         elif done.name == "backspace":
             self._take_back()
-        elif done.name == "return":
-            self._step(self._cursor.catalogue.finish)
-        elif done.name in ("tab", "right click"):
-            self._point(self._cursor.with_next())
-        elif _PLAY_KEYS.get(done.name) in _MOVES:
-            self._point(self._cursor.moved(*_MOVES[_PLAY_KEYS[done.name]]))
+        elif key in (None, Key.PLACE):
+            cell = None if done.place_px is None else self._inner.cell_at(done.place_px)
+            if cell is not None:
+                self._control.point(replace(self._control.cursor, cell=cell))
+            if key == Key.PLACE and (cell is not None or done.name != "left click"):
+                self._press(key)
         else:
-            self._use_mouse(done)
-
-    def _use_mouse(self, done: "Input") -> None:
-        """Let the cursor follow the mouse; place with the left button, or the space bar."""
-        cell = None if done.place_px is None else self._inner.cell_at(done.place_px)
-        if cell is not None:
-            self._point(replace(self._cursor, cell=cell))
-        placing = done.name == "space" or (done.name == "left click" and cell is not None)
-        if placing and self._inner.action_masks()[self._cursor.action]:
-            self._step(self._cursor.action)
+            self._press(key)
 
     def _take_back(self) -> None:
         """Begin again, with all but the last one."""
-        actions = self._actions[:-1]
-        self._actions = []
-        self._env.reset(seed=self._seed)
+        cursor, actions = self._control.cursor, self._control.taken[:-1]
+        self._control.reset(seed=self._seed)
         for action in actions:
-            self._step(action)
+            self._control.take(action)
+        self._control.point(cursor)
 
-    def _step(self, action: int) -> None:
-        _, _, ended, truncated, self._info = self._env.step(np.int64(action))
-        self._actions.append(action)
+    def _press(self, key: Key) -> None:
+        _, _, ended, truncated, self._info = self._control.press(key)
         self._ended = ended or truncated
-
-    def _point(self, cursor: Cursor) -> None:
-        self._cursor = cursor
-        self._inner.mark(cursor.action)

@@ -22,8 +22,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
 from blast_env.physics.engine import BlastRun, EndReason
 from blast_env.physics.particles import CollisionType, lattice_capacity
-from blast_env.physics.scene import Charge
-from blast_env.physics.structure import BARRIER_NAME, ModularPart
+from blast_env.physics.scene import BlastSite
+from blast_env.physics.structure import BARRIER_NAME
 from blast_env.scenario import AnyScenario, Scenario, check_layout, find_scenario
 from blast_env.scenario.build_scene import draw_threat
 from blast_env.values import real_number
@@ -83,18 +83,24 @@ class Unfolding(ABC):
 
     @property
     @abstractmethod
-    def charge(self) -> Charge:
-        """The charge where it goes off."""
+    def site(self) -> BlastSite:
+        """What stands where."""
+
+    @property
+    def module_ids(self) -> tuple[str, ...]:
+        """Names of the modules of the structures, as they are observed."""
+        return tuple(
+            outline.module_name(row, column)
+            for outline in self.site.structures
+            if outline.cells is None
+            for row in range(outline.rows)
+            for column in range(outline.columns)
+        )
 
     @property
     @abstractmethod
     def impulse(self) -> float:
         """Impulse on the protected structures so far, by weight: simulation units, or Pa s."""
-
-    @property
-    @abstractmethod
-    def module_ids(self) -> tuple[str, ...]:
-        """Names of the modules of the structures, as they are observed."""
 
     @abstractmethod
     def advance(self, until_s: float) -> dict[str, Any]:
@@ -133,52 +139,40 @@ class UnfoldingParticles(Unfolding):
         self.run = blast.start()
 
     @property
-    def charge(self) -> Charge:
-        """The charge where it goes off."""
-        return self.blast.scene.charge
+    def site(self) -> BlastSite:
+        """What stands where."""
+        return self.blast.scene
 
     @property
     def impulse(self) -> float:
         """Impulse on the protected structures so far, by weight, simulation units."""
         return sum(o.weight * o.impulse for o in self.run.obstacles if o.protected)
 
-    @property
-    def module_ids(self) -> tuple[str, ...]:
-        """Names of the modules of the structures, as they are observed."""
-        return tuple(part.module_id for part in _structure_parts(self.run))
-
     def advance(self, until_s: float) -> dict[str, Any]:
-        """Go on to a time, or the end; return the collisions on the way."""
+        """Go on to a time, or the end; return the collisions on the way, a row each."""
         recorded = len(self.run.log)
         self.run.advance(until_s)
-        return {
-            "collisions": self._collisions(recorded) if len(self.run.log) > recorded else (),
-            "impulse_sim": self.impulse,
-        }
+        collisions: tuple[dict[Any, Any], ...] = ()
+        if len(self.run.log) > recorded:
+            from blast_env.recording.tables import collision_table  # pandas takes long to import
 
-    def _collisions(self, start: int) -> tuple[dict[Any, Any], ...]:
-        """Return the collisions from a number on, each as a row of `BlastResult.collisions`."""
-        from blast_env.recording.tables import collision_table  # pandas takes long to import
-
-        table = collision_table(self.run.log.to_array(start), self.run.obstacles)
-        return tuple(table.to_dict("records"))
+            table = collision_table(self.run.log.to_array(recorded), self.run.obstacles)
+            collisions = tuple(table.to_dict("records"))
+        return {"collisions": collisions, "impulse_sim": self.impulse}
 
     def observe(self) -> Observation:
         """Return impulses, counts of balls and the time."""
         kinds = self.run.balls().kind
         counts = [(kinds == kind).sum() for kind in _BALL_KINDS]
+        structures = [each for each in self.run.obstacles if each.name != BARRIER_NAME]
         return {
-            "module_impulses": np.array([part.impulse for part in _structure_parts(self.run)]),
+            "module_impulses": np.array([p.impulse for each in structures for p in each.parts]),
             "particle_counts": np.array(counts, dtype=np.int64),
             "time_s": np.array([self.run.time_s]),
         }
 
     def result(self) -> BlastResult:
-        """Return what happened, at the end.
-
-        Raises:
-            ValueError: If the run has not ended.
-        """
+        """Return what happened, at the end."""
         return self.blast.result(self.run)
 
     def frame(self) -> NDArray[np.uint8]:
@@ -234,9 +228,9 @@ class UnfoldingGas(Unfolding):
         self._layer = min(int(PLAN_HEIGHT_M / grid.cell_m), grid.shape[2] - 1)
 
     @property
-    def charge(self) -> Charge:
-        """The charge where it goes off."""
-        return self.run.site.charge
+    def site(self) -> BlastSite:
+        """What stands where."""
+        return self.run.site
 
     @property
     def impulse(self) -> float:
@@ -244,17 +238,6 @@ class UnfoldingGas(Unfolding):
         table = self._so_far().structures
         counts = table["protected"] * table["weight"]
         return float((counts * table["positive_impulse_pa_s"]).sum())
-
-    @property
-    def module_ids(self) -> tuple[str, ...]:
-        """Names of the modules of the structures, as they are observed."""
-        return tuple(
-            outline.module_name(row, column)
-            for outline in self.run.site.structures
-            if outline.cells is None
-            for row in range(outline.rows)
-            for column in range(outline.columns)
-        )
 
     def advance(self, until_s: float) -> dict[str, Any]:
         """Go on to a time, or the end; return the impulse so far."""
@@ -278,11 +261,7 @@ class UnfoldingGas(Unfolding):
         }
 
     def result(self) -> "GasResult":
-        """Return what happened, at the end.
-
-        Raises:
-            ValueError: If the run has not ended.
-        """
+        """Return what happened, at the end."""
         if self.run.end_reason is None:
             raise ValueError(f"the run is at {self.time_s} s and has not ended: advance it first")
         return self._so_far()
@@ -319,12 +298,6 @@ class UnfoldingGas(Unfolding):
         )
 
 
-def observation_space(scenario: Scenario, engine: Engine) -> spaces.Dict:
-    """Return the space of what `Unfolding.observe` gives with an engine."""
-    space: spaces.Dict = _unfolding_class(engine).space(scenario, engine)
-    return space
-
-
 def _unfolding_class(engine: Engine) -> Any:
     """Return what shows the blasts of an engine step by step.
 
@@ -347,16 +320,6 @@ def _plan_shape(scenario: Scenario, cell_m: float) -> tuple[int, int]:
 
 def _module_count(scenario: Scenario) -> int:
     return sum(section.rows * section.columns for section in scenario.structures)
-
-
-def _structure_parts(run: BlastRun) -> list[ModularPart]:
-    """Return the modules of all structures, without those of the barrier."""
-    return [
-        part
-        for obstacle in run.obstacles
-        if obstacle.name != BARRIER_NAME
-        for part in obstacle.parts
-    ]
 
 
 _OPTIONS: Final = ("layout", "charge_position_m")
@@ -464,7 +427,8 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         self.render_mode = render_mode
         self._engine = find_engine(engine, cell_m)
         self.action_space = spaces.Discrete(1)
-        self.observation_space = observation_space(self.scenario, self._engine)
+        unfolding = _unfolding_class(self._engine)
+        self.observation_space = unfolding.space(self.scenario, self._engine)
         self._blast: Unfolding | None = None
         self._target_s = 0.0
         self._window: Window | None = None
@@ -486,8 +450,8 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         info = {
             "seed": drawn_seed,
             "scenario_hash": self.scenario.content_hash,
-            "charge_position_m": blast.charge.position_m,
-            "charge_tnt_kg": blast.charge.tnt_kg,
+            "charge_position_m": blast.site.charge.position_m,
+            "charge_tnt_kg": blast.site.charge.tnt_kg,
             "layout": blast.layout,
             "module_ids": blast.module_ids,
         }

@@ -8,8 +8,7 @@ from blast_env.evaluation.comparison import (
     Objective,
     compare,
 )
-from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
-from blast_env.evaluation.meter import BlastMeter, BudgetError
+from blast_env.evaluation.evaluator import BlastEvaluator, BlastMeter, BudgetError, Evaluators
 from blast_env.evaluation.report import (
     LayoutEvaluation,
     ThreatOutcome,

@@ -173,7 +173,6 @@ class Case:
     practice: "Case | None" = None
 
     def __post_init__(self) -> None:
-        """Check the threats."""
         if not self.threats:
             raise BlastEnvError("threats: there are none, must be at least one")
         charges = self.charges
@@ -258,9 +257,6 @@ def practice_visible(
         realisations: How many fans and airs, at least one.
         seed: Decides the seeds of the blasts, and what the search draws.
         risk: As for `Case`.
-
-    Raises:
-        BlastEnvError: If there are to be none.
     """
     _at_least_one("realisations", realisations)
     drawn = SeedRange.SEARCH.draw_distinct(generator(seed), realisations)
@@ -284,9 +280,6 @@ def practice_hidden(
         A case whose first charge is the one in the middle of all, and each further one as far as
         possible from those before it, so that the first few stand for all. Those of vehicles come
         before them, the worst first.
-
-    Raises:
-        BlastEnvError: If there are to be none.
     """
     _at_least_one("charges", charges)
     _at_least_one("realisations", realisations)

@@ -8,6 +8,7 @@ comparison that is to say how good layouts are is refused for a case in which no
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby, islice
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from blast_env.evaluation.cases import Case, check_distinct
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
 from blast_env.geometry import Element, Layout
 from blast_env.response.buildings import LevelOfProtection
+from blast_env.runner import share_of
 from blast_env.scenario import check_layout
 from blast_env.statistics import (
     CVAR_LEVEL,
@@ -71,12 +73,10 @@ class Objective:
     Attributes:
         evaluator: Runs the blasts and remembers them; it has the scenario.
         case: The threats, and how they become one number.
-        processes: Worker processes; they change nothing but the time.
     """
 
     evaluator: BlastEvaluator
     case: Case
-    processes: int = 1
     _assessed: dict[Layout, Assessment] = field(default_factory=dict, init=False)
 
     def assess(self, layout: Sequence[Element]) -> Assessment:
@@ -113,7 +113,7 @@ class Objective:
             LayoutError: If the layout does not fit the build zone.
         """
         pairs = [(layout, threat) for threat in self.case.threats]
-        return self.evaluator.loads_of_many(pairs, self.processes)
+        return self.evaluator.loads_of_many(pairs)
 
     def counted_loads(self, layout: Sequence[Element]) -> tuple[float, ...]:
         """Return the load that counts with a layout, in the objective's unit, one a threat."""
@@ -152,7 +152,6 @@ class Comparison:
     cvar_level: float = CVAR_LEVEL
 
     def __post_init__(self) -> None:
-        """Check that there is something to reduce."""
         check_cvar_level(self.cvar_level)
         check_something_arrives(self.cases, self.unprotected)
 
@@ -290,8 +289,7 @@ def loads_of_both(
 ) -> tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]:
     """Return the loads with a layout and without a barrier, one a threat of the case each.
 
-    Raises:
-        BlastEnvError: As for `compare`.
+    Errors as for `compare`.
     """
     check_distinct(case.threats)
     pairs = [(each, threat) for threat in case.threats for each in (layout, ())]
@@ -305,9 +303,6 @@ def check_something_arrives(cases: Sequence[Case], unprotected: FloatArray) -> N
     Args:
         cases: The cases.
         unprotected: Load on the protected structures without a barrier (cases, threats).
-
-    Raises:
-        BlastEnvError: If it is 0 under every threat of a case; the message says of which.
     """
     for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
         if not mean > 0.0:
@@ -329,34 +324,22 @@ def _both(
     The blasts of cases that follow each other on one scenario are run together.
     """
     done = 0
-    for first, last in _runs_of_one_scenario(cases):
-        together = range(first, last)
+    for _, group in groupby(zip(cases, layouts, strict=True), lambda each: id(each[0].scenario)):
+        together = list(group)
         pairs = [
             (cells, threat)
-            for index in together
-            for threat in cases[index].threats
-            for cells in (layouts[index], ())
+            for case, layout in together
+            for threat in case.threats
+            for cells in (layout, ())
         ]
-
-        def tell(share: float, done: int = done, count: int = last - first) -> None:
-            if progress is not None:
-                progress((done + share * count) / len(cases))
-
-        loads = iter(evaluators.of(cases[first].scenario).loads_of_many(pairs, processes, tell))
-        for index in together:
-            check_distinct(cases[index].threats)
-            own = [next(loads) for _ in range(2 * len(cases[index].threats))]
+        tell = share_of(progress, done, len(cases), len(together))
+        evaluator = evaluators.of(together[0][0].scenario)
+        loads = iter(evaluator.loads_of_many(pairs, processes, tell))
+        for case, _ in together:
+            check_distinct(case.threats)
+            own = list(islice(loads, 2 * len(case.threats)))
             yield tuple(own[0::2]), tuple(own[1::2])
-        done = last
-
-
-def _runs_of_one_scenario(cases: Sequence[Case]) -> Iterator[tuple[int, int]]:
-    """Yield where runs of cases on one scenario begin and end."""
-    first = 0
-    for index in range(1, len(cases) + 1):
-        if index == len(cases) or cases[index].scenario is not cases[first].scenario:
-            yield first, index
-            first = index
+        done += len(together)
 
 
 def _counted(cases: Sequence[Case], loads: Sequence[Sequence[BlastLoads]]) -> FloatArray:

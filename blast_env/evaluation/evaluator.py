@@ -1,13 +1,14 @@
-"""The loads of layouts under threats, each blast simulated once."""
+"""The loads of layouts under threats, each blast simulated once, and counted against a budget."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from blast_env.calibration.model import Calibration
 from blast_env.engines import BlastLoads, Engine, find_engine
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.store import (
     BlastCache,
@@ -140,10 +141,9 @@ class BlastEvaluator:
             keys.append(self._key(layout, threat))
             asked.setdefault(keys[-1], threat.charge)
         found = {key: loads for key in asked if (loads := self._known(key)) is not None}
-        missing = [self._work(key, charge) for key, charge in asked.items() if key not in found]
-        for done, (index, loads) in enumerate(as_completed(_run_one, missing, processes), start=1):
-            found[missing[index].key] = loads
-            self._keep(missing[index].key, loads)
+        missing = {key: (self, charge) for key, charge in asked.items() if key not in found}
+        for done, (key, loads) in enumerate(_run(missing, processes), start=1):
+            found[key] = loads
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(keys))
         self.cache_hits += len(keys) - len(missing)
@@ -162,9 +162,6 @@ class BlastEvaluator:
         seed = threat.seed if self.engine.has_noise else 0
         charge = threat.charge_against(self.scenario, cells)
         return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
-
-    def _work(self, key: BlastKey, charge: AnyCharge) -> "_Work":
-        return _Work(self.scenario, self.engine, key, charge)
 
     def _known(self, key: BlastKey) -> BlastLoads | None:
         """Return loads that are remembered here or there."""
@@ -189,31 +186,28 @@ class BlastEvaluator:
         self._remembered.add(key, loads)
 
 
-@dataclass(frozen=True)
-class _Work:
-    """One blast to run, perhaps in a worker process.
+def _run(
+    missing: Mapping[BlastKey, tuple[BlastEvaluator, AnyCharge]], processes: int
+) -> Iterator[tuple[BlastKey, BlastLoads]]:
+    """Run blasts, let their evaluators keep the loads, and yield them as they come.
 
-    Its charge is that of the key, or the vehicle that brings it there.
+    The charges are those of the keys, or the vehicles that bring them there.
     """
+    keys = list(missing)
+    work = [(each.engine, each.scenario, key, charge) for key, (each, charge) in missing.items()]
+    for index, loads in as_completed(_run_one, work, processes):
+        missing[keys[index]][0]._keep(keys[index], loads)
+        yield keys[index], loads
 
-    scenario: Scenario
-    engine: Engine
-    key: BlastKey
-    charge: AnyCharge
 
-
-def _run_one(work: _Work) -> BlastLoads:
-    return work.engine.loads(work.scenario, work.key.layout, work.charge, work.key.seed)
+def _run_one(work: tuple[Engine, Scenario, BlastKey, AnyCharge]) -> BlastLoads:
+    """Run a blast, perhaps in a worker process."""
+    engine, scenario, key, charge = work
+    return engine.loads(scenario, key.layout, charge, key.seed)
 
 
 class BlastAsked(NamedTuple):
-    """A blast that somebody will ask for.
-
-    Attributes:
-        scenario: The scenario.
-        layout: What stands on the site.
-        threat: The charge and the seed.
-    """
+    """A blast that somebody will ask for."""
 
     scenario: Scenario
     layout: Layout
@@ -285,21 +279,16 @@ class Evaluators:
         Raises:
             BlastEnvError: As `BlastEvaluator.loads_of_many`.
         """
-        missing: dict[BlastKey, tuple[int, BlastEvaluator]] = {}
+        missing: dict[BlastKey, tuple[BlastEvaluator, AnyCharge]] = {}
+        numbers: dict[BlastKey, int] = {}
         for number, (scenario, layout, threat) in enumerate(asked):
             evaluator = self.of(scenario)
             key = evaluator._key(layout, threat)
             if key not in missing and evaluator._known(key) is None:
-                missing[key] = (number, evaluator)
-        blasts = [
-            evaluator._work(key, asked[number].threat.charge)
-            for key, (number, evaluator) in missing.items()
-        ]
+                missing[key], numbers[key] = (evaluator, threat.charge), number
         was_run = [False] * len(asked)
-        for index, loads in as_completed(_run_one, blasts, processes):
-            number, evaluator = missing[blasts[index].key]
-            evaluator._keep(blasts[index].key, loads)
-            was_run[number] = True
+        for key, _ in _run(missing, processes):
+            was_run[numbers[key]] = True
         return was_run
 
     def of(self, scenario: AnyScenario) -> BlastEvaluator:
@@ -326,3 +315,40 @@ class Evaluators:
             self._gone_blasts += gone.blasts
             self._gone_cache_hits += gone.cache_hits
         return self._kept[key]
+
+
+class BudgetError(BlastEnvError):
+    """A search asks for more blasts than its budget has."""
+
+
+@dataclass(eq=False)
+class BlastMeter:
+    """Counts distinct pairs of layout and threat, and refuses those beyond a budget.
+
+    What a search says of its own blasts counts nowhere.
+
+    Attributes:
+        budget: Most pairs.
+    """
+
+    budget: int
+    _asked: set[tuple[Layout, Threat]] = field(default_factory=set, init=False, repr=False)
+
+    @property
+    def blasts(self) -> int:
+        """Pairs that were asked for so far; one that comes again counts once."""
+        return len(self._asked)
+
+    def add(self, pairs: Iterable[tuple[Sequence[Element], Threat]]) -> None:
+        """Count pairs.
+
+        Raises:
+            BudgetError: If the budget does not pay for all of them; none is counted then.
+        """
+        asked = {(tuple(sorted(met_by_blasts(layout))), threat) for layout, threat in pairs}
+        asked |= self._asked
+        if len(asked) > self.budget:
+            raise BudgetError(
+                f"the search asks for {len(asked):,} blasts in all, the budget is {self.budget:,}"
+            )
+        self._asked = asked

@@ -61,7 +61,6 @@ STRUCTURE_COLUMNS: Final = (
     Column("threats_in_range", "", "threats that the calibration was made for"),
 )
 
-
 MODULE_COLUMNS: Final = (
     Column("module_id", "", "name of the module, made from its centre in metres"),
     Column("structure", "", "structure that the module is part of"),
@@ -72,13 +71,16 @@ MODULE_COLUMNS: Final = (
     Column("reduction", "", "of the sum of m |v|"),
 )
 
-
-THREAT_COLUMNS: Final = (
-    Column("seed", "", "seed of fan and air"),
+_CHARGE_COLUMNS: Final = (
     Column("charge_x_m", "m", "centre of the charge, from the left border"),
     Column("charge_y_m", "m", "centre of the charge, from the lower border"),
     Column("charge_height_m", "m", "height of its centre; 0: it lies on the ground"),
     Column("tnt_kg", "kg", "TNT-equivalent mass of the charge"),
+)
+
+THREAT_COLUMNS: Final = (
+    Column("seed", "", "seed of fan and air"),
+    *_CHARGE_COLUMNS,
     Column("impulse_pa_s", "Pa s", "protected structures, with the barrier"),
     Column("unprotected_impulse_pa_s", "Pa s", "protected structures, without it"),
     Column("peak_pa", "Pa", "largest overpressure on them, with the barrier"),
@@ -91,14 +93,10 @@ THREAT_COLUMNS: Final = (
     Column("unprotected_stand_off_m", "m", "the same without it: less only for a vehicle"),
 )
 
-
 CASE_COLUMNS: Final = (
     Column("scenario", "", "name of the scenario"),
-    Column("seed", "", "seed of the first threat's fan and air"),
-    Column("charge_x_m", "m", "centre of its charge, from the left border"),
-    Column("charge_y_m", "m", "centre of its charge, from the lower border"),
-    Column("charge_height_m", "m", "height of its centre; 0: it lies on the ground"),
-    Column("tnt_kg", "kg", "TNT-equivalent mass of its charge"),
+    Column("seed", "", "seed of the first threat's fan and air; the charge is that threat's"),
+    *_CHARGE_COLUMNS,
     Column("modules", "", "modules, or pieces, of the layout"),
     Column("load", "", "protected structures, with the layout, over the threats"),
     Column("unprotected_load", "", "the same without a barrier"),
@@ -106,26 +104,6 @@ CASE_COLUMNS: Final = (
     Column("reduction", "", "of that load"),
     Column("in_range", "", "whether the calibration was made for every threat"),
 )
-
-
-def structure_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
-    """Return one row a structure; see `STRUCTURE_COLUMNS`."""
-    pairs = zip(_by_structure(evaluation.loads), _by_structure(evaluation.unprotected), strict=True)
-    return table_of([_structure_row(loads, bare) for loads, bare in pairs], STRUCTURE_COLUMNS)
-
-
-def building_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
-    """Return one row a building, whose parts are one; see `STRUCTURE_COLUMNS`.
-
-    Impulses on parts are averaged by their weights, as rewards count them; the peak is the largest.
-    """
-    names = {each.name: each.building_name for each in evaluation.scenario.structures}
-    loads, bare = (
-        zip(*(_together(each.structures, names) for each in blasts), strict=True)
-        for blasts in (evaluation.loads, evaluation.unprotected)
-    )
-    rows = [_structure_row(*each) for each in zip(loads, bare, strict=True)]
-    return table_of(rows, STRUCTURE_COLUMNS)
 
 
 def _together(loads: Sequence[StructureLoad], names: Mapping[str, str]) -> list[StructureLoad]:
@@ -154,51 +132,10 @@ def _of_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
     )
 
 
-def module_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
-    """Return one row a module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
-    from blast_env.recording.tables import module_table
-
-    threat = evaluation.threats[0]
-    scene = build_site(evaluation.scenario, (), threat.seed, threat.charge)
-    impulse, bare = (
-        np.mean([load.module_impulse_sim for load in loads], axis=0)
-        for loads in (evaluation.loads, evaluation.unprotected)
-    )
-    table = module_table(scene.obstacles()).assign(
-        impulse_sim=impulse, unprotected_impulse_sim=bare, reduction=reductions(impulse, bare)
-    )
-    return table[[column.name for column in MODULE_COLUMNS]]
-
-
-def threat_reductions(evaluation: "LayoutEvaluation") -> "pd.DataFrame":
-    """Return one row a threat; see `THREAT_COLUMNS`."""
-    return table_of([_threat_row(outcome) for outcome in evaluation.outcomes], THREAT_COLUMNS)
-
-
-def _threat_row(outcome: "ThreatOutcome") -> dict[str, object]:
-    charge = outcome.charge
-    return {
-        "seed": outcome.threat.seed,
-        "charge_x_m": charge.position_m[0],
-        "charge_y_m": charge.position_m[1],
-        "charge_height_m": charge.height_m,
-        "tnt_kg": charge.tnt_kg,
-        "impulse_pa_s": outcome.impulse_pa_s,
-        "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
-        "peak_pa": outcome.peak_pa,
-        "unprotected_peak_pa": outcome.unprotected_peak_pa,
-        "load": outcome.load,
-        "unprotected_load": outcome.unprotected_load,
-        "reduction": outcome.reduction,
-        "in_range": outcome.in_range,
-        "stand_off_m": outcome.stand_off_m,
-        "unprotected_stand_off_m": outcome.unprotected_stand_off_m,
-    }
-
-
-def _by_structure(loads: Sequence[BlastLoads]) -> list[tuple[StructureLoad, ...]]:
-    """Return the loads of each structure, one a threat."""
-    return list(zip(*(load.structures for load in loads), strict=True))
+def _of_charge(charge: Charge) -> dict[str, object]:
+    """Return the values of `_CHARGE_COLUMNS`."""
+    values = (*charge.position_m, charge.height_m, charge.tnt_kg)
+    return {column.name: value for column, value in zip(_CHARGE_COLUMNS, values, strict=True)}
 
 
 def _structure_row(
@@ -231,39 +168,16 @@ SCHEMA_VERSION: Final = 1
 """The version of the file that `LayoutEvaluation.to_json` writes."""
 
 
-def evaluation_record(evaluation: "LayoutEvaluation") -> dict[str, Any]:
-    """Return everything about an evaluation as what JSON knows; NaN is `None`."""
-    scenario = evaluation.scenario
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "scenario": scenario.model_dump(mode="json", exclude_none=True),
-        "scenario_hash": scenario.content_hash,
-        "layout": [list(cell) for cell in evaluation.layout],
-        "engine": evaluation.engine.name,
-        "calibration": evaluation.calibration,
-        "versions": versions(evaluation.engine.version),
-        "result": _result(evaluation),
-        "notes": list(evaluation.notes),
-        "threats": _rows(evaluation.threat_table),
-        "structures": _rows(evaluation.table),
-        "modules": _rows(evaluation.module_table),
-    }
-
-
 def case_table(comparison: Comparison) -> "pd.DataFrame":
     """Return one row a case; see `CASE_COLUMNS`."""
     rows = []
     for index, (case, layout) in enumerate(zip(comparison.cases, comparison.layouts, strict=True)):
         threat = case.threats[0]
-        charge = threat.charge_against(case.scenario, layout)
         rows.append(
             {
                 "scenario": case.scenario.name,
                 "seed": threat.seed,
-                "charge_x_m": charge.position_m[0],
-                "charge_y_m": charge.position_m[1],
-                "charge_height_m": charge.height_m,
-                "tnt_kg": charge.tnt_kg,
+                **_of_charge(threat.charge_against(case.scenario, layout)),
                 "modules": len(layout),
                 "load": case.counted(comparison.loads[index], layout),
                 "unprotected_load": case.counted(comparison.unprotected[index]),
@@ -428,7 +342,6 @@ class LayoutEvaluation:
     cvar_level: float
 
     def __post_init__(self) -> None:
-        """Check that there is something to reduce, and the level."""
         self.comparison  # noqa: B018
 
     @property
@@ -530,23 +443,51 @@ class LayoutEvaluation:
 
     @cached_property
     def table(self) -> "pd.DataFrame":
-        """One row a structure; the columns are `tables.STRUCTURE_COLUMNS`."""
-        return structure_reductions(self)
+        """One row a structure; see `STRUCTURE_COLUMNS`."""
+        return self._by_name(lambda loads: loads.structures)
 
     @cached_property
     def building_table(self) -> "pd.DataFrame":
-        """One row a building, whose parts are one; the columns are those of `table`."""
-        return building_reductions(self)
+        """One row a building, whose parts are one; the columns are those of `table`.
+
+        Impulses on parts are averaged by their weights, as rewards count them; the peak is the
+        largest.
+        """
+        names = {each.name: each.building_name for each in self.scenario.structures}
+        return self._by_name(lambda loads: _together(loads.structures, names))
+
+    def _by_name(self, loads_of: Callable[[BlastLoads], Sequence[StructureLoad]]) -> "pd.DataFrame":
+        """Return a row for each of the loads that are made of those of a blast."""
+        loads, bare = (
+            zip(*map(loads_of, blasts), strict=True) for blasts in (self.loads, self.unprotected)
+        )
+        return table_of(list(map(_structure_row, loads, bare)), STRUCTURE_COLUMNS)
 
     @cached_property
     def module_table(self) -> "pd.DataFrame":
-        """One row a module of the structures; the columns are `tables.MODULE_COLUMNS`."""
-        return module_reductions(self)
+        """One row a module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
+        from blast_env.recording.tables import module_table
+
+        threat = self.threats[0]
+        scene = build_site(self.scenario, (), threat.seed, threat.charge)
+        impulse, bare = (
+            np.mean([load.module_impulse_sim for load in loads], axis=0)
+            for loads in (self.loads, self.unprotected)
+        )
+        table = module_table(scene.obstacles()).assign(
+            impulse_sim=impulse, unprotected_impulse_sim=bare, reduction=reductions(impulse, bare)
+        )
+        return table[[column.name for column in MODULE_COLUMNS]]
 
     @cached_property
     def threat_table(self) -> "pd.DataFrame":
-        """One row a threat; the columns are `tables.THREAT_COLUMNS`."""
-        return threat_reductions(self)
+        """One row a threat; see `THREAT_COLUMNS`."""
+        rows = [
+            {"seed": each.threat.seed, **_of_charge(each.charge), **vars(each)}
+            | {"reduction": each.reduction}
+            for each in self.outcomes
+        ]
+        return table_of(rows, THREAT_COLUMNS)
 
     @property
     def in_range(self) -> bool:
@@ -575,13 +516,24 @@ class LayoutEvaluation:
 
         The same arguments and versions give the same data; numbers that do not exist are `None`.
         """
-        return evaluation_record(self)
+        scenario = self.scenario
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "scenario": scenario.model_dump(mode="json", exclude_none=True),
+            "scenario_hash": scenario.content_hash,
+            "layout": [list(cell) for cell in self.layout],
+            "engine": self.engine.name,
+            "calibration": self.calibration,
+            "versions": versions(self.engine.version),
+            "result": _result(self),
+            "notes": list(self.notes),
+            "threats": _rows(self.threat_table),
+            "structures": _rows(self.table),
+            "modules": _rows(self.module_table),
+        }
 
     def to_json(self, path: str | Path) -> Path:
         """Write `to_dict` to a file.
-
-        Returns:
-            The path.
 
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
@@ -660,6 +612,8 @@ def evaluate_against(
 
     For several layouts on the same threats: the empty site is simulated only once.
 
+    Errors as for `evaluate_layout`.
+
     Args:
         evaluator: Runs the blasts.
         layout: As for `evaluate_layout`.
@@ -667,9 +621,6 @@ def evaluate_against(
         processes: As for `evaluate_layout`.
         cvar_level: As for `evaluate_layout`.
         progress: As for `evaluate_layout`.
-
-    Raises:
-        BlastEnvError: As for `evaluate_layout`.
     """
     check_cvar_level(cvar_level)
     scenario = evaluator.scenario

@@ -111,7 +111,6 @@ def calibration_digest(calibration: Calibration) -> str:
 SUFFIX: Final = ".loads"
 """Files with this suffix belong to the cache; it touches no others."""
 
-
 MOST_BYTES: Final = 256_000_000
 """Size of a cache unless an argument says otherwise; a blast in the courtyard takes 2 kB."""
 
@@ -146,12 +145,12 @@ class DiskCache:
 
     def get(self, key: BlastKey) -> BlastLoads | None:
         """Return the loads of a blast, or `None` if they are not there in one piece."""
-        return self._store.read(_key_text(key), _decoded)
+        return self._store.read(json.dumps(key), _decoded)
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast; the ones that were asked for longest ago may have to go."""
         try:
-            self._store.put(_key_text(key), _encoded(loads))
+            self._store.put(json.dumps(key), _encoded(loads))
         except BlastEnvError as error:
             warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=2)
 
@@ -159,7 +158,7 @@ class DiskCache:
         """Yield all blasts that are there in one piece, always in the same order."""
         for text, content in self._store.items():
             with suppress(ValueError):
-                yield _key_of(text), _decoded(content)
+                yield _KEY.validate_python(json.loads(text)), _decoded(content)
 
     def __len__(self) -> int:
         return len(self._store)
@@ -181,20 +180,7 @@ def find_cache(value: str | Path | BlastCache | None) -> BlastCache | None:
     return value
 
 
-def _key_text(key: BlastKey) -> str:
-    return json.dumps(key)
-
-
 _KEY: Final = TypeAdapter(BlastKey)
-
-
-def _key_of(text: str) -> BlastKey:
-    """Return the key of a text.
-
-    Raises:
-        ValueError: If it is that of no key.
-    """
-    return _KEY.validate_python(json.loads(text))
 
 
 def _encoded(loads: BlastLoads) -> bytes:
@@ -216,11 +202,7 @@ _HEADER: Final = TypeAdapter(_Header)
 
 
 def _decoded(content: bytes) -> BlastLoads:
-    """Return the loads.
-
-    Raises:
-        ValueError: If the content is anything else.
-    """
+    """Return the loads."""
     line, _, impulses = content.partition(b"\n")
     header = _HEADER.validate_json(line)
     modules = np.frombuffer(impulses, dtype="<f8").astype(np.float64)

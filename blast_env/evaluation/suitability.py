@@ -47,14 +47,7 @@ def suitability(scenario: AnyScenario) -> Suitability:
     if found.build_zone is not None:
         uses.append(f"placing barriers ({_PLACING}) with {', '.join(able)}")
         uses.append(f"report ({JUDGE})")
-    limits = (
-        *_placing_limits(found),
-        *_particle_limits(found, refusals),
-        *_height_limits(found),
-        *_charge_limits(found),
-        *_gauge_limits(found),
-    )
-    return Suitability(tuple(uses), limits)
+    return Suitability(tuple(uses), tuple(_limits(found, refusals)))
 
 
 def _refusal(scenario: Scenario, engine: str) -> str:
@@ -66,9 +59,14 @@ def _refusal(scenario: Scenario, engine: str) -> str:
     return ""
 
 
-def _placing_limits(scenario: Scenario) -> Iterator[str]:
+def _limits(scenario: Scenario, refusals: dict[str, str]) -> Iterator[str]:
     if scenario.build_zone is None:
         yield f"no build zone: nothing can be placed, report, {_PLACING} refuse it ([build_zone])"
+    yield from _particle_limits(scenario, refusals)
+    yield from _height_limits(scenario)
+    yield from _charge_limits(scenario)
+    if not scenario.gauges:
+        yield f"no gauges: simulate --engine {JUDGE} has no --history to draw ([[gauges]])"
 
 
 def _particle_limits(scenario: Scenario, refusals: dict[str, str]) -> Iterator[str]:
@@ -141,8 +139,3 @@ def _speed_limits(scenario: Scenario) -> Iterator[str]:
             f"no crash rating ({', '.join(unrated)}): stops a vehicle of any mass at any speed "
             "(crash_rating)"
         )
-
-
-def _gauge_limits(scenario: Scenario) -> Iterator[str]:
-    if not scenario.gauges:
-        yield f"no gauges: simulate --engine {JUDGE} has no --history to draw ([[gauges]])"

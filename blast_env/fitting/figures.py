@@ -26,7 +26,6 @@ with render_extra():
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, ScalarFormatter
 
-
 # Okabe and Ito's colours, which people with any colour vision can tell apart.
 _LAWS = {
     "proportional": ("#E69F00", "--", "s"),
@@ -49,12 +48,7 @@ _SIMULATED, _REFERENCE = "#0072B2", "#000000"
 
 
 def calibration_figure(report: CalibrationReport, name: str) -> Figure:
-    """Return the simulated impulse, the three laws beside the reference, and their residuals.
-
-    Args:
-        report: The report.
-        name: Name of the calibration, for the heading.
-    """
+    """Return the simulated impulse, the three laws beside the reference, and their residuals."""
     figure = Figure(figsize=(12.0, 8.6), layout="constrained")
     grid = figure.add_gridspec(2, 2, height_ratios=(3, 2))
     _draw_simulated(figure.add_subplot(grid[:, 0]), report)

@@ -42,7 +42,6 @@ from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
 RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")
 
-
 Amount = Annotated[float, Field(ge=0.0)]
 
 
@@ -124,8 +123,9 @@ class FreeFieldStudy:
         """
         journal = None if store is None else Journal(store, FreeFieldRun)
         finished = {} if journal is None else {each.key: each for each in journal.read()}
+        version = find_engine(self.engine).version
         wanted = {
-            self._key(scenario, seed): (scenario, distance_m, seed)
+            f"{scenario.content_hash} {seed} {self.engine} {version}": (scenario, distance_m, seed)
             for distance_m in self.distances_m
             for scenario in (self.scenario.at_stand_off(distance_m),)
             for seed in self.seeds
@@ -148,10 +148,6 @@ class FreeFieldStudy:
         rows = [asdict(finished[key]) for key in wanted]
         table = pd.DataFrame(rows)[list(RUN_COLUMNS)]
         return table.sort_values(["distance_m", "seed"], ignore_index=True)
-
-    def _key(self, scenario: Scenario, seed: int) -> str:
-        version = find_engine(self.engine).version
-        return f"{scenario.content_hash} {seed} {self.engine} {version}"
 
 
 def free_field(tnt_kg: float | None = None, side_modules: int | None = None) -> Scenario:
@@ -225,7 +221,6 @@ FITS: Final[Mapping[str, Fit]] = MappingProxyType(
     {"proportional": fit_proportional, "linear": fit_linear, "power": fit_power_law}
 )
 
-
 ImpulseQuantity = Literal["incident_impulse", "reflected_impulse"]
 
 
@@ -279,17 +274,7 @@ def kingery_bulmash_reference(
 
 @dataclass(frozen=True, eq=False)
 class CalibrationReport:
-    """A study with its three fits.
-
-    Attributes:
-        study: What was run.
-        runs: One row a blast.
-        summary: One row a distance; see `summarise`.
-        reference: What it was fitted to.
-        laws: The three laws by name.
-        metrics: How well each agrees.
-        simulated: Which sum over the collisions they convert.
-    """
+    """A study with its three fits."""
 
     study: FreeFieldStudy
     runs: pd.DataFrame
@@ -309,12 +294,7 @@ class CalibrationReport:
         return table
 
     def calibration(self, name: str, law: LawName = "power") -> Calibration:
-        """Return the calibration of one of the laws.
-
-        Args:
-            name: Its name.
-            law: Which of the laws.
-        """
+        """Return the calibration of one of the laws."""
         study, by_seed = self.study, impulse_by_seed(self.runs, self.simulated)
         reference = self.reference.impulse_psi_s
         left_out = leave_one_out(
@@ -323,7 +303,6 @@ class CalibrationReport:
         intervals = bootstrap_coefficients(by_seed, reference, FITS[law])
         (structure,) = study.scenario.structures
         (source,) = study.scenario.charge
-        metrics = self.metrics[law]
         return Calibration(
             name=name,
             law=law,
@@ -345,9 +324,7 @@ class CalibrationReport:
             i_sim_ci95=tuple(self.summary.ci95),
             i_reference_psi_s=tuple(reference.tolist()),
             metrics=MetricsSection(
-                mape_percent=metrics.mape_percent,
-                rmse=metrics.rmse,
-                integral_error_percent=metrics.integral_error_percent,
+                **asdict(self.metrics[law]),
                 leave_one_out_mape_percent=left_out.metrics.mape_percent,
             ),
         )
@@ -360,12 +337,6 @@ def calibrate(
     simulated: SimulatedQuantity = "impulse",
 ) -> CalibrationReport:
     """Fit the three laws to the runs of a study.
-
-    Args:
-        study: The study.
-        runs: Its runs.
-        reference: What to fit to.
-        simulated: Which sum over the collisions to convert.
 
     Raises:
         BlastEnvError: If the runs cannot be fitted, e.g. because nothing arrived at a distance.

@@ -14,10 +14,10 @@ from blast_env.documents import checked_as, parse_json, read_text
 from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastCache, BlastEvaluator
-from blast_env.geometry import Layout
 from blast_env.problems.definitions import BUDGETS, DEFINITIONS, Definition
+from blast_env.problems.problem import shares_of
 from blast_env.problems.references import ScoreReference, Share, cell_key, stored_references
-from blast_env.problems.submissions import MOST_BYTES, Count, Run, Submission, write_runs
+from blast_env.problems.submissions import MOST_BYTES, Run, Submission, write_runs
 from blast_env.statistics import Estimate, stratified_estimate
 from blast_env.values import path_of
 
@@ -31,27 +31,15 @@ _SAME: Final = 1e-9
 
 
 @dataclass(frozen=True)
-class JudgedRun:
-    """A run that was played again.
+class JudgedRun(Run):
+    """A run that was played again; further attributes as of `Run`.
 
     Attributes:
-        problem: Name of the problem.
-        budget: Blasts that it might have spent.
-        seed: Of what was drawn.
-        blasts: Blasts spent.
-        layout: The answer.
         share: Share of the load without a barrier that is left.
         rule: The same of the best rule: score 0.
         best: The same of the best layout known: score 1.
     """
 
-    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
-
-    problem: str
-    budget: Count
-    seed: Count
-    blasts: Count
-    layout: Layout
     share: Share
     rule: Share
     best: Share
@@ -121,32 +109,27 @@ class JudgedSubmission:
         """The problems that were entered."""
         return tuple(dict.fromkeys(run.problem for run in self.runs))
 
-    def score(self, budget: int, problems: Sequence[str] | None = None) -> Estimate:
+    def score(self, budget: int) -> Estimate:
         """Return the mean score with a budget, over the problems that were entered.
 
         What was found with fewer blasts counts for more blasts, too; without any it is 0. The 95 %
         interval says how the mean would change with other seeds of the same runs.
         """
-        chosen = problems or self.problems
-        weight = 1.0 / len(chosen)
-        return stratified_estimate(
-            [
-                (weight, scores or [0.0])
-                for name in chosen
-                for scores in [self._scores(name, budget)]
-            ]
-        )
+        return self._mean({budget: 1.0})
 
-    def area(self, problems: Sequence[str] | None = None) -> Estimate:
+    def area(self) -> Estimate:
         """Return the score over all budgets: the area under it over the logarithm of the blasts."""
-        chosen = problems or self.problems
+        return self._mean(BUDGET_WEIGHTS)
+
+    def _mean(self, of_budgets: Mapping[int, float]) -> Estimate:
+        """Return the mean score with budgets, each by its weight."""
         groups = []
-        for name in chosen:
+        for name in self.problems:
             weights: dict[int, float] = defaultdict(float)
-            for budget, weight in BUDGET_WEIGHTS.items():
+            for budget, weight in of_budgets.items():
                 weights[self._spent(name, budget)] += weight
             for budget, weight in weights.items():
-                groups.append((weight / len(chosen), self._scores(name, budget) or [0.0]))
+                groups.append((weight / len(self.problems), self._scores(name, budget) or [0.0]))
         return stratified_estimate(groups)
 
     def _spent(self, problem: str, budget: int) -> int:
@@ -224,27 +207,6 @@ def judge(
     )
 
 
-def shares_of(
-    definition: Definition,
-    layouts: Sequence[Layout],
-    evaluator: BlastEvaluator,
-    processes: int = 1,
-) -> list[float]:
-    """Return what layouts leave of what counts without a barrier, under the judge's threats."""
-    case, counts = definition.case, definition.scenario.objective
-    pairs = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
-    loads = [each.load(counts) for each in evaluator.loads_of_many(pairs, processes)]
-    of_layout = [
-        case.counted(loads[first : first + len(case.threats)], layout)
-        for layout, first in zip(
-            ((), *layouts), range(0, len(loads), len(case.threats)), strict=True
-        )
-    ]
-    if not of_layout[0] > 0.0:
-        raise BlastEnvError(f"{definition.name}: nothing arrives without a barrier")
-    return [load / of_layout[0] for load in of_layout[1:]]
-
-
 def _judged(
     definition: Definition,
     runs: Sequence[Run],
@@ -261,20 +223,11 @@ def _judged(
     }
     wanted = (reference.rule.layout, reference.best.layout, *(run.layout for run in runs))
     layouts = [each for each in dict.fromkeys(wanted) if each not in stored]
-    shares = dict(zip(layouts, shares_of(definition, layouts, evaluator, processes), strict=True))
-    shares |= stored
+    found = shares_of(definition.case, layouts, evaluator, processes)
+    shares = dict(zip(layouts, found, strict=True)) | stored
     rule, best = (shares[each.layout] for each in (reference.rule, reference.best))
     for run in runs:
-        yield JudgedRun(
-            run.problem,
-            run.budget,
-            run.seed,
-            run.blasts,
-            run.layout,
-            shares[run.layout],
-            rule,
-            best,
-        )
+        yield JudgedRun(**vars(run), share=shares[run.layout], rule=rule, best=best)
 
 
 def shipped_standings() -> tuple[JudgedSubmission, ...]:

@@ -1,9 +1,11 @@
 """A problem as an optimiser meets it: layouts are vectors or lists, blasts are counted."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+
+import numpy as np
 
 from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.errors import BlastEnvError
@@ -13,7 +15,6 @@ from blast_env.evaluation import (
     BlastMeter,
     BudgetError,
     Case,
-    Objective,
     Threat,
 )
 from blast_env.geometry import Element, Layout
@@ -64,7 +65,6 @@ class BenchmarkProblem:
     history: list[Evaluated] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
-        """Begin to count."""
         if self.budget < 0:
             raise BlastEnvError(f"budget is {self.budget} blasts, must be at least 0")
         self.meter = BlastMeter(self.budget)
@@ -175,12 +175,8 @@ class BenchmarkProblem:
                 f"{self.name}: {count} blasts asked for, {self.blasts_left} of the budget of "
                 f"{self.budget} are left"
             ) from None
-        bare: list[tuple[Layout, Threat]] = [((), pair[1]) for pair in pairs]
-        counted = [
-            each.load(self.scenario.objective)
-            for each in self.evaluator.loads_of_many(pairs + bare)
-        ]
-        share = self.case.counted(counted[:count], checked) / self.case.counted(counted[count:])
+        met = replace(self.case, threats=self.case.threats[:count])
+        (share,) = shares_of(met, [checked], self.evaluator)
         self.history.append(Evaluated(checked, share, count, self.blasts))
         return share
 
@@ -192,8 +188,28 @@ class BenchmarkProblem:
         Raises:
             LayoutError: If the layout is not legal.
         """
-        objective = Objective(self.evaluator, self.definition.case, processes)
-        return objective.assess(layout).load / objective.assess(()).load
+        checked = tuple(sorted(check_layout(self.scenario, layout)))
+        (share,) = shares_of(self.definition.case, [checked], self.evaluator, processes)
+        return share
+
+
+def shares_of(
+    case: Case, layouts: Sequence[Layout], evaluator: BlastEvaluator, processes: int = 1
+) -> list[float]:
+    """Return what layouts leave of what counts without a barrier, under the threats of a case."""
+    pairs = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
+    loads = [
+        each.load(case.scenario.objective) for each in evaluator.loads_of_many(pairs, processes)
+    ]
+    of_layout = [
+        case.counted(own, layout)
+        for layout, own in zip(
+            ((), *layouts), np.reshape(loads, (-1, len(case.threats))), strict=True
+        )
+    ]
+    if not of_layout[0] > 0.0:
+        raise BlastEnvError(f"{case.name or case.scenario.name}: nothing arrives without a barrier")
+    return [load / of_layout[0] for load in of_layout[1:]]
 
 
 def make(

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from blast_agents.league import Result, Standings, Track, Training, known_track
+from blast_agents.league.entries import NO_TRAINING, LeagueEntry, NoBarrier, Training
+from blast_agents.league.standings import Result, Standings
+from blast_agents.league.tracks import Track, known_track
 from blast_agents.rules import line_of_sight_wall
-from blast_agents.search import LayoutProblem, Proposal, Report, SearchResult
+from blast_agents.search import LayoutProblem, Proposal, ProposerKind, Report, SearchResult
 
 from blast_env.scenario import AnyCharge, Scenario, SegmentSource
 from tests.agents.search_cases import small_scenario
@@ -39,22 +41,20 @@ def result(
     impulse_pa_s: Sequence[Sequence[float]],
     blasts: int = 0,
     seconds: Sequence[float] | None = None,
-    training: Training | None = None,
+    training: Training = NO_TRAINING,
     is_rule: bool = False,
     has_learnt: bool = False,
 ) -> Result:
     """Return a result with a module in each layout, unless it is that of no barrier."""
     layout = () if name == "no barrier" else ((0, 0),)
     times = seconds or [0.01] * len(impulse_pa_s)
+    kind = ProposerKind.RULE if is_rule else ProposerKind.SEARCH
+    if has_learnt or training != NO_TRAINING:
+        kind = ProposerKind.LEARNT
     return Result(
-        name=name,
-        method=name.partition(",")[0],
-        budget=blasts,
-        training=training,
-        proposals=tuple(Proposal(layout, each, blasts) for each in times),
-        loads=np.array(impulse_pa_s, dtype=np.float64),
-        is_rule=is_rule,
-        has_learnt=has_learnt or training is not None,
+        LeagueEntry(NoBarrier(name.partition(",")[0]), blasts, kind=kind, training=training),
+        tuple(Proposal(layout, each, blasts) for each in times),
+        np.array(impulse_pa_s, dtype=np.float64),
     )
 
 

@@ -4,16 +4,17 @@ import inspect
 import sys
 from importlib import import_module
 from pathlib import Path
+from typing import get_args
 
 import gymnasium as gym
 import pytest
 import yaml
 from blast_agents.training import TrainedAgent, load_archive
-from blast_agents.training.environments import environment_id, training_source
+from blast_agents.training.environments import environment_id
 from blast_agents.training.hyperparameters import (
     PPO_ALGORITHMS,
-    WRAPPERS,
     Hyperparameters,
+    WrapperName,
     hyperparameter_file,
     hyperparameter_keys,
     load_hyperparameters,
@@ -25,6 +26,7 @@ from stable_baselines3 import PPO
 
 from blast_env import load_scenario
 from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE
+from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import bundled_scenarios
 
@@ -58,7 +60,7 @@ def sections(algorithm: str) -> dict[str, dict]:
 def test_every_scenario_has_a_section_for_its_zone(algorithm: str, scenario: str) -> None:
     """RL Zoo cannot fill in rows and columns, so the file must have the right ones."""
     section = sections(algorithm)[environment_id(scenario)]
-    zone = training_source(scenario).representative.zone
+    zone = scenario_source(scenario).representative.zone
     arguments = section["policy_kwargs"]
     assert (arguments["rows"], arguments["columns"]) == (zone.rows, zone.columns)
     load_hyperparameters(algorithm, environment_id(scenario))
@@ -71,7 +73,7 @@ def test_rl_zoo_can_use_every_section(algorithm: str) -> None:
     for env_id, section in sections(algorithm).items():
         assert env_id in gym.registry
         assert set(section) - OF_RL_ZOO <= accepted
-        for name in (section["policy"], *WRAPPERS):
+        for name in (section["policy"], *get_args(WrapperName)):
             module, _, attribute = name.rpartition(".")
             assert hasattr(import_module(module), attribute)
 
@@ -124,7 +126,7 @@ def test_an_archive_with_an_unknown_policy_is_refused_with_the_reason(
         load_archive(archive, "ppo", load_scenario("courtyard"), trust_archive=True)
 
 
-def test_options_are_read_as_yaml_and_reach_the_policy() -> None:
+def test_options_are_read_as_json_or_text_and_reach_the_policy() -> None:
     options = ["ent_coef=0.02", "learning_rate=lin_3e-4", "policy_kwargs.width=16", "gamma=9e-1"]
     changes = parse_options(options, hyperparameter_keys("maskable_ppo"))
     chosen = load_hyperparameters("maskable_ppo", "BlastBarrier-v0", changes)
@@ -141,14 +143,14 @@ def test_options_are_read_as_yaml_and_reach_the_policy() -> None:
         ("ent_coeff=0.1", "did you mean 'ent_coef'"),
         ("policy_kwargs.widht=3", "did you mean 'policy_kwargs.width'"),
         ("ent_coef", "must be key=value"),
-        ("ent_coef=[", "not YAML"),
+        ("ent_coef=[", "valid number"),
         ("ent_coef=-1", "ent_coef is -1: Input should be greater than or equal to 0"),
         ("gamma=1.5", "less than or equal to 1"),
         ("learning_rate=lin_fast", "'lin_' and a number"),
         ("learning_rate=0", "above 0"),
         ("batch_size=100", "must divide n_steps * n_envs = 512"),
         ("policy=MlpPolcy", "CnnPolicy"),
-        ("env_wrapper=[os.system]", "RelativeReward"),
+        ('env_wrapper=["os.system"]', "RelativeReward"),
     ],
 )
 def test_a_wrong_option_is_refused_with_the_reason(option: str, words: str) -> None:

@@ -126,13 +126,13 @@ def test_agents_are_held_against_the_best_rule_genetic_search_and_the_best_searc
     ]
     searches = [result(REFERENCE, SEARCH, blasts=200), result("annealing, 50 blasts", AGENT, 50)]
     it = standings(BARE, agent, *rules, *searches)
-    names = [verdict.reference for verdict in verdicts(it)]
+    names = [verdict.reference.name for verdict in verdicts(it)]
     assert names == ["wall near the building", REFERENCE, "annealing, 50 blasts"]
     # What begins with the agent is no search to hold it against, and is judged itself.
     own = result("agent with search, 50 blasts", [[20.0, 30.0], *AGENT[1:]], 50, has_learnt=True)
     by_both = verdicts(standings(BARE, agent, own, *rules, *searches))
-    assert [each.entry for each in by_both] == 3 * ["agent"] + 3 * [own.name]
-    assert [each.reference for each in by_both] == 2 * names
+    assert [each.result.name for each in by_both] == 3 * ["agent"] + 3 * [own.name]
+    assert [each.reference.name for each in by_both] == 2 * names
     assert by_both[-1].difference.value > 0.0
     assert by_both[-1].text.endswith("It spends 50 blasts a case.")
 
@@ -148,7 +148,8 @@ def test_agents_are_held_against_the_best_rule_genetic_search_and_the_best_searc
     ],
 )
 def test_the_interval_decides(low: float, high: float, words: str) -> None:
-    verdict = LeagueVerdict("agent", "search", Estimate(0.0, low, high), "9 cases", 1.0)
+    sides = result("agent", AGENT, training=TRAINING), result("wall", SEARCH, is_rule=True)
+    verdict = LeagueVerdict(*sides, Estimate(0.0, low, high), "9 cases")
     assert words in verdict.conclusion
     assert words in verdict.text
 

@@ -23,21 +23,21 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a run that is finished; not to be changed."""
     folder = tmp_path_factory.mktemp("finished")
     train(settings(scenario_file(folder), steps=1), hyperparameters(), folder / "run")
-    edit_configuration("steps: 1\n", "steps: 99\n")(folder / "run")
+    edit_configuration('"steps": 1,', '"steps": 99,')(folder / "run")
     return folder / "run"
 
 
 def damage_configuration(run: Path) -> None:
-    (run / "config.yaml").write_text("settings: [")
+    (run / "config.json").write_text("settings: [")
 
 
 def change_configuration(run: Path) -> None:
-    path = run / "config.yaml"
-    path.write_text(path.read_text().replace("n_steps: 16", "n_steps: many"))
+    path = run / "config.json"
+    path.write_text(path.read_text().replace('"n_steps": 16', '"n_steps": "many"'))
 
 
 def remove_configuration(run: Path) -> None:
-    (run / "config.yaml").unlink()
+    (run / "config.json").unlink()
 
 
 def change_scenario(run: Path) -> None:
@@ -64,7 +64,7 @@ def remove_checkpoint(run: Path) -> None:
 
 def edit_configuration(old: str, new: str) -> Callable[[Path], None]:
     def edit(run: Path) -> None:
-        path = run / "config.yaml"
+        path = run / "config.json"
         text = path.read_text()
         assert old in text
         path.write_text(text.replace(old, new))
@@ -94,23 +94,28 @@ def compress_checkpoint(run: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "words"),
     [
-        (damage_configuration, "config.yaml: is damaged"),
+        (damage_configuration, "config.json: is damaged"),
         (change_configuration, "n_steps is 'many': Input should be a valid integer"),
-        (remove_configuration, "is no run folder: there is no config.yaml"),
+        (remove_configuration, "is no run folder: there is no config.json"),
         (change_scenario, "it is another scenario"),
         (cut_checkpoint, "checkpoint.pt: is damaged"),
         (flip_a_bit, "checkpoint.pt: is damaged"),
         (remove_checkpoint, "there is no such checkpoint"),
         (compress_checkpoint, "is compressed"),
-        (edit_configuration("places: 1", "places: 9"), "places is 9 in the .*, must be 1"),
-        (edit_configuration("rows: 8", "rows: 9"), "policy_kwargs.rows is 9, must be 8"),
-        (edit_configuration("width: 8", "width: 9"), "width is 9 in the configuration, must be 8"),
-        (edit_configuration("gamma: 1.0", "gamma: 2024-01-01"), "gamma is '2024-01-01'"),
-        (edit_configuration("seed: 0", "seed: " + "9" * 6000), "number of 6000 digits"),
-        (edit_configuration("seed: 0", "seed: " + "[" * 3000), "is nested too deeply"),
-        (edit_configuration("format: 1", "format: 2024-01-01"), "format is '2024-01-01', must be"),
-        (edit_configuration("settings:", "settings: &a\n  x: *a"), "has an alias"),
-        (edit_checkpoint(format=1), "is of format 1, must be 2"),
+        (edit_configuration('"places": 1', '"places": 9'), "places is 9 in the .*, must be 1"),
+        (edit_configuration('"rows": 8', '"rows": 9'), "policy_kwargs.rows is 9, must be 8"),
+        (
+            edit_configuration('"width": 8', '"width": 9'),
+            "width is 9 in the configuration, must be 8",
+        ),
+        (edit_configuration('"gamma": 1.0', '"gamma": "2024-01-01"'), "gamma is '2024-01-01'"),
+        (edit_configuration('"seed": 0', '"seed": ' + "9" * 6000), "6000 digits"),
+        (edit_configuration('"seed": 0', '"seed": ' + "[" * 3000), "is nested too deeply"),
+        (
+            edit_configuration('"format": 1', '"format": "2024-01-01"'),
+            "format is '2024-01-01', must be",
+        ),
+        (edit_checkpoint(format=1), "format is 1, must be 2"),
         (edit_checkpoint(counters={"steps": "many"}), "counters.steps is 'many'"),
         (edit_checkpoint(policy={"a": torch.zeros(1).expand(10**6, 10**6)}), "not in the file"),
         (edit_checkpoint(policy={"a": 1}), "policy.a is 1"),
@@ -146,7 +151,7 @@ def test_the_folder_of_a_run_says_how_to_go_on(finished: Path, tmp_path: Path) -
 def test_tables_are_written_anew_from_the_checkpoint(finished: Path, tmp_path: Path) -> None:
     """They are for people: one that was cut at the end of a line would be taken for whole."""
     run = Path(copytree(finished, tmp_path / "run"))
-    edit_configuration("steps: 99\n", "steps: 1\n")(run)
+    edit_configuration('"steps": 99,', '"steps": 1,')(run)
     names = ("rollouts.csv", "evaluations.csv")
     before = [(run / name).read_bytes() for name in names]
     for name in names:
@@ -186,7 +191,7 @@ def test_a_folder_whose_making_was_interrupted_is_begun_anew(
     run, replace = tmp_path / "run", os.replace
 
     def killed_at(source: Path, target: Path) -> None:
-        if Path(target).name == (written or "config.yaml"):
+        if Path(target).name == (written or "config.json"):
             raise KeyboardInterrupt
         replace(source, target)
 

@@ -32,7 +32,7 @@ from blast_agents.training.self_labelling import (
 
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case
+from blast_env.evaluation import BlastEvaluator, Case, Evaluators
 from blast_env.geometry import Layout
 from blast_env.scenario import Placement, Scenario, VehicleCharge, save_scenario
 from tests.agents.training_runs import (
@@ -159,7 +159,7 @@ def test_a_race_ends_with_the_best_of_those_that_met_all_threats() -> None:
     (case,) = first_cases(scenario, 4, threat="hidden", hidden_threats=3)  # one layout for all
     assert (len(case.threats), case.charge) == (3, None)
     layouts = [(), ((0, 0),), ((3, 0), (4, 0)), ((3, 0), (4, 0), (5, 0))]
-    judge = Judge.of("event", [case], None, 1)
+    judge = Judge(Evaluators("event"))
     (met,) = race(judge, [case], [layouts])
     assert sorted(len(each) for each in met.values()) == [1, 1, 2, 3]
     assert judge.asked == judge.evaluators.blasts == 7
@@ -314,7 +314,7 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
 def test_what_it_cannot_do_is_refused_before_anything_is_written(
     tmp_path: Path, changes: dict[str, str], words: str
 ) -> None:
-    with pytest.raises(BlastEnvError, match=words):
+    with pytest.raises(ValueError, match=words):
         train(run_settings(scenario_file(tmp_path), **changes), own(), tmp_path / "run")
     assert not (tmp_path / "run").exists()
 

@@ -13,7 +13,7 @@ from blast_agents.search import LayoutAgent
 from blast_agents.training import TrainedAgent, load_agent, load_archive, train
 from blast_agents.training.agent import logits_of, make_model, policy_for
 from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.environments import make_environments, training_source
+from blast_agents.training.environments import make_environments
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from gymnasium import spaces
 from pytest_benchmark.fixture import BenchmarkFixture
@@ -21,6 +21,7 @@ from sb3_contrib import MaskablePPO
 
 from blast_env import load_scenario
 from blast_env.envs.observations import GridWithLoadObservation, Observable
+from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement, PointSource, Scenario
@@ -96,7 +97,7 @@ def test_an_agent_of_another_observation_learns_is_chosen_and_proposes(
     chosen = settings(scenario_file(tmp_path), steps=16, observation=observation)
     result = train(chosen, hyperparameters({"policy": policy}), tmp_path / "run")
     assert len(result.progress.evaluations) == 1
-    assert f"observation: {observation}\n" in (tmp_path / "run" / "config.yaml").read_text()
+    assert f'"observation": "{observation}"' in (tmp_path / "run" / "config.json").read_text()
     agent = load_agent(tmp_path / "run")
     assert agent.observation == observation
     for charge in CHARGES:
@@ -205,8 +206,8 @@ def test_code_in_a_checkpoint_does_not_run(run: Path, tmp_path: Path) -> None:
 
 def test_weights_of_another_network_are_refused(run: Path, tmp_path: Path) -> None:
     copy = Path(copytree(run, tmp_path / "run"))
-    text = (copy / "config.yaml").read_text()
-    (copy / "config.yaml").write_text(text.replace("width: 8", "width: 9"))
+    text = (copy / "config.json").read_text()
+    (copy / "config.json").write_text(text.replace('"width": 8', '"width": 9'))
     with pytest.raises(BlastEnvError, match="width is 9 in the configuration, must be 8"):
         load_agent(copy)
 
@@ -223,7 +224,7 @@ def test_an_image_agent_is_trained_loaded_and_proposes(tmp_path: Path, algorithm
 def test_an_archive_needs_trust(run: Path, tmp_path: Path) -> None:
     folder = RunFolder(run)
     configuration = folder.configuration()
-    environments = make_environments(configuration, training_source(str(run / "scenario.toml")))
+    environments = make_environments(configuration, scenario_source(str(run / "scenario.toml")))
     model = make_model(configuration, environments)
     assert isinstance(model, MaskablePPO)
     archive = tmp_path / "model.zip"

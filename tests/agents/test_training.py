@@ -11,10 +11,9 @@ from shutil import copytree
 import numpy as np
 import pytest
 import torch
-import yaml
 from blast_agents.training import resume, train
 from blast_agents.training.checkpoint import Checkpoint, Weights
-from blast_agents.training.recorder import TrainingProgress, learning_curve
+from blast_agents.training.recorder import learning_curve
 from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunFolder, read_rows
 from blast_agents.training.train import TrainingResult
 
@@ -32,7 +31,7 @@ from tests.agents.training_runs import (
 FILES = {
     "checkpoint.pt",
     "command.txt",
-    "config.yaml",
+    "config.json",
     "evaluations.csv",
     "learning_curve.png",
     "rollouts.csv",
@@ -84,7 +83,7 @@ def interrupted(run: Path, scenario: Path, after_steps: int) -> None:
 
 def test_a_run_folder_has_all_that_a_reader_asks_for(finished: Path) -> None:
     assert {path.name for path in finished.iterdir()} == FILES
-    configuration = yaml.safe_load((finished / "config.yaml").read_text())
+    configuration = json.loads((finished / "config.json").read_text())
     assert configuration["settings"]["seed"] == 0
     assert configuration["scenario_hash"] == small_scenario().content_hash
     assert load_scenario(finished / "scenario.toml") == small_scenario()
@@ -110,11 +109,7 @@ def test_the_learning_curve_tells_blasts_from_guesses(
 ) -> None:
     configuration = RunFolder(finished).configuration()
     settings = configuration.settings.model_copy(update={"engine": engine})
-    progress = TrainingProgress(
-        Checkpoint.load(finished / "checkpoint.pt").counters,
-        read_rows(finished / "rollouts.csv", RolloutRow),
-        read_rows(finished / "evaluations.csv", EvaluationRow),
-    )
+    progress = Checkpoint.load(finished / "checkpoint.pt")
     figure = learning_curve(progress, configuration.model_copy(update={"settings": settings}))
     assert figure.axes[0].get_xlabel() == f"{spent} spent on training"
 
@@ -211,10 +206,10 @@ def lines_of(path: Path) -> list[str]:
 
 def shorten(run: Path, steps: int) -> None:
     """Let a run end sooner than it was begun for."""
-    path = run / "config.yaml"
-    document = yaml.safe_load(path.read_text())
+    path = run / "config.json"
+    document = json.loads(path.read_text())
     document["settings"]["steps"] = steps
-    path.write_text(yaml.safe_dump(document))
+    path.write_text(json.dumps(document))
 
 
 def test_an_unknown_engine_is_refused_before_anything_is_written(tmp_path: Path) -> None:

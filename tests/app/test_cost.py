@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blast_env.app.cost import CostGuess, ReportCost, cost_of_blast, cost_words, time_words
+from blast_env.app.cost import CostGuess, ReportCost, cost_words, time_words
 from blast_env.app.folder import WorkFolder
 from blast_env.app.records import RECORD, EngineRecord
 from blast_env.app.session import Sessions
@@ -24,7 +24,7 @@ def test_steps_are_about_those_of_a_blast() -> None:
     """Within a third; of the seconds a clock would have to say."""
     scenario = load_scenario("visitor_entrance")
     charge = threats_of(scenario)[0].charge
-    told = cost_of_blast(scenario, charge, 0.5)
+    told = GasEngine().cost(scenario, charge)
     run = GasBlast(scenario, (), 0, GasEngine(), charge).run()
     assert told.steps == pytest.approx(run.steps, rel=0.33)
     assert told.cells == pytest.approx(np.prod(run.run.grid.array_shape), rel=0.01)
@@ -33,14 +33,14 @@ def test_steps_are_about_those_of_a_blast() -> None:
 def test_half_the_cells_cost_sixteen_times_as_much_inside() -> None:
     scenario = load_scenario("courtyard")
     charge = threats_of(scenario)[0].charge
-    coarse, fine = (cost_of_blast(scenario, charge, cell_m) for cell_m in (0.5, 0.25))
+    coarse, fine = (GasEngine(cell_m=each).cost(scenario, charge) for each in (0.5, 0.25))
     assert 8.0 < fine.seconds / coarse.seconds < 16.0  # the skirt does not grow as much
     assert fine.memory_bytes > coarse.memory_bytes
 
 
 def test_a_vehicle_costs_something_too() -> None:
     site = gate_site()
-    assert cost_of_blast(site, threats_of(site)[0].charge, 0.5).steps > 50
+    assert GasEngine().cost(site, threats_of(site)[0].charge).steps > 50
 
 
 def test_only_what_is_not_there_is_counted(tmp_path: Path) -> None:

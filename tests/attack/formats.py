@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import torch
 from blast_agents.league.report import PAGE
-from blast_agents.league.store import EvaluationKey, Model, ResultStore
+from blast_agents.league.store import ResultStore
 from blast_agents.training import load_hyperparameters
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
@@ -31,7 +31,6 @@ from blast_env.calibration.model import load_calibration, save_calibration
 from blast_env.cluster import address_of
 from blast_env.engines import simulate
 from blast_env.engines.contract import BlastLoads, StructureLoad
-from blast_env.evaluation import Threat
 from blast_env.evaluation.store import BlastKey, DiskCache
 from blast_env.fitting.free_field import FreeFieldRun
 from blast_env.importing import ImportOptions, import_site
@@ -121,7 +120,7 @@ def _configuration(folder: Path) -> Format:
     run = RunFolder(folder / "run")
     with run.making(_run_configuration(), small_scenario(), "command"):
         pass
-    path = run.path / "config.yaml"
+    path = run.path / "config.json"
     return Format((path.read_bytes(),), _from_file(path, lambda _: run.configuration()))
 
 
@@ -224,11 +223,10 @@ def _loads(folder: Path) -> Format:
 
 def _result(folder: Path) -> Format:
     store = ResultStore(folder / "results")
-    threats = tuple(Threat(Charge((1.0, 2.0), 100.0), seed) for seed in range(3))
-    key = EvaluationKey(Model("0" * 64, "event 1", "1" * 64, "2" * 64), threats, ((0, 0),))
-    store.keep_loads(key, (1.5, 2.5, 3.5))
+    store.keep_loads("a case and a layout", (1.5, 2.5, 3.5))
     (path,) = store.folder.iterdir()
-    return Format((path.read_bytes(),), _from_file(path, lambda _: store.loads(key)), True)
+    read = _from_file(path, lambda _: store.loads("a case and a layout", 3))
+    return Format((path.read_bytes(),), read, True)
 
 
 def _geojson(folder: Path) -> Format:
@@ -341,7 +339,7 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "scenario": _scenario,
         "layout": _layout,
         "calibration": _calibration,
-        "run: config.yaml": _configuration,
+        "run: config.json": _configuration,
         "run: versions.json": _versions,
         "run: rollouts.csv": _rollouts,
         "run: checkpoint.pt": _checkpoint,

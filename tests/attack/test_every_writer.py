@@ -40,6 +40,7 @@ _OWN: Final = frozenset(
         *("LayoutFile.of(scenario, layout, provenance).save", "save"),
         *("result.to_excel", "result.to_parquet", "protected.to_excel", "evaluation.to_json"),
         *("judged.save", "submission.save", "Submission(each, tuple(own)).save"),
+        *("progress.save", "self.progress.save"),
         *("report.to_json", "write_table", "self.work.open", "sessions.work.open"),
     }
 )

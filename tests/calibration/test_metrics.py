@@ -145,8 +145,8 @@ def test_an_interval_holds_the_estimate_and_narrows_with_less_scatter(fit: Fit) 
     )
     whole = fit(seed_impulses(20, 0.3).mean(axis=0), reference)
     for name, interval in wide.items():
-        assert interval.estimate == whole.coefficients[name]
-        assert interval.low < interval.estimate < interval.high
+        assert interval.value == whole.coefficients[name]
+        assert interval.low < interval.value < interval.high
         width = interval.high - interval.low
         assert 0.2 < (narrow[name].high - narrow[name].low) / width < 0.5
 

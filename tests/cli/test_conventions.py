@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from blast_agents.training.recorder import TrainingProgress
+from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.run_folder import RunFolder
 from hypothesis import given
 from hypothesis import strategies as st
@@ -347,15 +347,15 @@ def test_an_interrupted_training_says_how_to_go_on_and_can_be_evaluated(
 ) -> None:
     """Before the first evaluation there are no best weights: the last ones propose."""
     site, folder = scenario_file(tmp_path), tmp_path / "run"
-    write_tables, left = TrainingProgress.write_tables, [3]
+    write_tables, left = Checkpoint.write_tables, [3]
 
-    def interrupt(self: TrainingProgress, run_folder: RunFolder) -> None:
+    def interrupt(self: Checkpoint, run_folder: RunFolder) -> None:
         write_tables(self, run_folder)
         left[0] -= 1
         if left[0] == 0:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(TrainingProgress, "write_tables", interrupt)
+    monkeypatch.setattr(Checkpoint, "write_tables", interrupt)
     changes = ("n_steps=8", "batch_size=8", "evaluation_interval=1000", "evaluation_cases=2")
     options = [text for each in changes for text in ("--set", each)]
     result = run("train", "--scenario", site, "--run", folder, "--envs", 1, *options)

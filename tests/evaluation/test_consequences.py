@@ -13,8 +13,9 @@ from blast_env.evaluation.consequences import (
     bay_table,
     consequences,
     piece_table,
+    side_on_impulse_pa_s,
+    side_on_peak_pa,
 )
-from blast_env.evaluation.neighbours import side_on_impulse_pa_s, side_on_peak_pa
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection

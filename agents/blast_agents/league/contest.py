@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import call
 from time import perf_counter, process_time
-from typing import TypeVar
 
 import numpy as np
 
@@ -12,13 +12,7 @@ from blast_agents.league.entries import NO_BARRIER, LeagueEntry
 from blast_agents.league.standings import Result, Standings
 from blast_agents.league.store import ResultStore, evaluation_key, search_key
 from blast_agents.league.tracks import Track, practice_of
-from blast_agents.search import (
-    LayoutProblem,
-    Proposal,
-    ProposerKind,
-    SearchResult,
-    timed_proposal,
-)
+from blast_agents.search import LayoutProblem, Proposal, SearchResult, timed_proposal
 from blast_env.engines import Engine, find_engine
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, BlastMeter, BudgetError, Case, Objective
@@ -26,27 +20,14 @@ from blast_env.geometry import Layout
 from blast_env.runner import as_completed, check_workers
 from blast_env.scenario import check_layout
 
-Found = TypeVar("Found")
-
 
 @dataclass(frozen=True, eq=False)
 class SearchJob:
-    """Lets an entry propose for a case.
-
-    Attributes:
-        case: The case.
-        entry: The entry.
-        engine: Name of the engine, or the engine.
-    """
+    """Lets an entry propose for a case."""
 
     case: Case
     entry: LeagueEntry
     engine: str | Engine
-
-    @property
-    def blasts(self) -> int:
-        """Most blasts that it takes."""
-        return self.entry.budget
 
     def __call__(self) -> Proposal:
         """Return what a search proposes; it shares no blast with any other.
@@ -75,11 +56,7 @@ class SearchJob:
         return self._checked(found)
 
     def at_once(self) -> Proposal:
-        """Return what is proposed without a blast, and how long that took.
-
-        Raises:
-            BlastEnvError: If a blast is run, or the layout may not be built.
-        """
+        """Return what is proposed without a blast, and how long that took."""
         problem = self._problem(self.engine, BlastMeter(0))
         found = timed_proposal(lambda: self._result(problem).layout)
         return self._checked(replace(found, layout=tuple(sorted(found.layout))))
@@ -125,34 +102,16 @@ class SearchJob:
 
 @dataclass(frozen=True, eq=False)
 class EvaluationJob:
-    """Lets a layout meet the held-out threats of a case.
-
-    Attributes:
-        case: The case.
-        layout: The layout.
-        engine: Name of the engine, or the engine.
-    """
+    """Lets a layout meet the held-out threats of a case."""
 
     case: Case
     layout: Layout
     engine: str | Engine
 
-    @property
-    def blasts(self) -> int:
-        """Blasts that it takes."""
-        return len(self.case.threats)
-
     def __call__(self) -> tuple[float, ...]:
         """Return the loads that count, in the unit of the objective, one a held-out threat."""
         evaluator = BlastEvaluator(self.case.scenario, self.engine)
         return Objective(evaluator, self.case).counted_loads(self.layout)
-
-
-def _done(job: Callable[[], Found]) -> Found:
-    return job()
-
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -201,7 +160,6 @@ class Contest:
     engine: str | Engine = "event"
 
     def __post_init__(self) -> None:
-        """Check the entries."""
         names = [entry.name for entry in self.entries]
         for name in names:
             if names.count(name) > 1:
@@ -234,13 +192,16 @@ class Contest:
         missing = self._missing_searches()
         held_out = sum(len(job.case.threats) for job in missing)
         return Outlook(
-            search_blasts=sum(job.blasts for job in missing),
-            held_out_blasts=held_out + sum(job.blasts for job in self._missing_evaluations()),
+            search_blasts=sum(job.entry.budget for job in missing),
+            held_out_blasts=held_out
+            + sum(len(job.case.threats) for job in self._missing_evaluations()),
             searches=len(searches) * len(self.track.cases),
             kept_searches=len(searches) * len(self.track.cases) - len(missing),
         )
 
-    def play(self, processes: int = 1, progress: Progress | None = None) -> Standings:
+    def play(
+        self, processes: int = 1, progress: Callable[[float], None] = lambda _: None
+    ) -> Standings:
         """Return how the entries did.
 
         Args:
@@ -252,19 +213,23 @@ class Contest:
                 structures of a case even without a barrier.
         """
         check_workers("processes", processes)
-        meter = _Meter(self.outlook().blasts, progress)
+        whole, done = max(self.outlook().blasts, 1), 0
         searches = self._missing_searches()
-        for index, proposal in as_completed(_done, searches, processes):
+        for index, proposal in as_completed(call, searches, processes):
             job = searches[index]
             self.store.keep_proposal(search_key(job.case, job.entry, self.engine), proposal)
-            meter.add(job.blasts)
+            done += job.entry.budget
+            progress(min(done / whole, 1.0))
         evaluations = self._missing_evaluations()
-        for index, loads in as_completed(_done, evaluations, processes):
+        for index, loads in as_completed(call, evaluations, processes):
             asked = evaluations[index]
             key = evaluation_key(asked.case, asked.layout, self.engine)
             self.store.keep_loads(key, loads)
-            meter.add(asked.blasts)
-        return self._standings()
+            done += len(loads)
+            progress(min(done / whole, 1.0))
+        results = tuple(self._results())
+        bare = results[self.entries.index(NO_BARRIER)]
+        return Standings(self.track, results, bare.loads, find_engine(self.engine).words)
 
     def _missing_searches(self) -> list[SearchJob]:
         """Return the searches that are not through, the longest first."""
@@ -275,7 +240,7 @@ class Contest:
             for case in self.track.cases
             if self._found(case, entry) is None
         ]
-        return sorted(jobs, key=lambda job: -job.blasts)
+        return sorted(jobs, key=lambda job: -job.entry.budget)
 
     def _missing_evaluations(self) -> list[EvaluationJob]:
         """Return the layouts proposed so far whose loads are not known, each once."""
@@ -302,12 +267,7 @@ class Contest:
         return self.store.proposal(search_key(case, entry, self.engine), case.scenario)
 
     def _loads(self, case: Case, layout: Layout) -> tuple[float, ...] | None:
-        return self.store.loads(evaluation_key(case, layout, self.engine))
-
-    def _standings(self) -> Standings:
-        results = tuple(self._results())
-        bare = results[self.entries.index(NO_BARRIER)]
-        return Standings(self.track, results, bare.loads, find_engine(self.engine).words)
+        return self.store.loads(evaluation_key(case, layout, self.engine), len(case.threats))
 
     def _results(self) -> Iterator[Result]:
         for entry in self.entries:
@@ -316,25 +276,4 @@ class Contest:
                 self._loads(case, proposal.layout)
                 for case, proposal in zip(self.track.cases, proposals, strict=True)
             ]
-            yield Result(
-                name=entry.name,
-                method=entry.method,
-                budget=entry.budget,
-                training=entry.training,
-                is_rule=entry.kind is ProposerKind.RULE,
-                has_learnt=entry.kind is ProposerKind.LEARNT,
-                proposals=proposals,
-                loads=np.array(loads, dtype=np.float64),
-            )
-
-
-class _Meter:
-    """Says which share of the blasts is done."""
-
-    def __init__(self, blasts: int, show: Progress | None) -> None:
-        self._blasts, self._show, self._done = blasts, show, 0
-
-    def add(self, blasts: int) -> None:
-        self._done += blasts
-        if self._show is not None:
-            self._show(min(self._done / max(self._blasts, 1), 1.0))
+            yield Result(entry, proposals, np.array(loads, dtype=np.float64))

@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 from blast_agents.rules import random_layout
@@ -14,7 +13,8 @@ from blast_agents.search import (
     SearchResult,
     find_proposer,
 )
-from blast_agents.search.registry import proposer_row, proposers
+from blast_agents.search.registry import proposers
+from blast_env.engines.contract import load_plugin
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
 from blast_env.values import generator
@@ -31,6 +31,9 @@ class Training:
 
     blasts: int
     seconds: float
+
+
+NO_TRAINING = Training(0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ class LeagueEntry:
         budget: Most blasts a case; 0 for what proposes without a blast.
         title: Name in tables, that of the proposer unless given.
         kind: What it is.
-        training: What it cost before its first case, if anything.
+        training: What it cost before its first case.
         first_engine: Engine for these blasts, a cheaper one; the engine that judges then decides
             among the best few layouts, by one more blast for each threat. `None` for the judge's.
         finalists: How many these are.
@@ -89,12 +92,11 @@ class LeagueEntry:
     budget: int = 0
     title: str = ""
     kind: ProposerKind = ProposerKind.SEARCH
-    training: Training | None = None
+    training: Training = NO_TRAINING
     first_engine: str | None = None
     finalists: int = 8
 
     def __post_init__(self) -> None:
-        """Check the budget."""
         if self.budget < 0:
             raise BlastEnvError(f"budget is {self.budget} blasts, must be at least 0")
 
@@ -156,13 +158,9 @@ def searches(methods: Collection[str], budgets: Sequence[int]) -> tuple[LeagueEn
             raise BlastEnvError(f"budget is {budget} blasts, must be at least 1")
     entries: list[LeagueEntry] = []
     for name in methods:
-        is_own = ":" in name
-        method = own_proposer(name) if is_own else find_proposer(name)
-        kind = (
-            ProposerKind.LEARNT
-            if not is_own and proposer_row(name).kind is ProposerKind.LEARNT
-            else ProposerKind.SEARCH
-        )
+        method = own_proposer(name) if ":" in name else find_proposer(name)
+        has_learnt = name in proposers(ProposerKind.LEARNT)
+        kind = ProposerKind.LEARNT if has_learnt else ProposerKind.SEARCH
         entries += (LeagueEntry(method, budget, kind=kind) for budget in budgets)
     return tuple(entries)
 
@@ -176,9 +174,8 @@ def own_proposer(place: str) -> Proposer:
     Raises:
         BlastEnvError: If there is no such module or object, or it is no proposer.
     """
-    module, _, name = place.partition(":")
     try:
-        found: Any = getattr(import_module(module), name)
+        found: Any = load_plugin(place)
     except (ImportError, AttributeError, ValueError) as error:
         raise BlastEnvError(f"method {place!r} cannot be imported: {error}") from error
     if isinstance(found, type) or (callable(found) and not hasattr(found, "propose")):

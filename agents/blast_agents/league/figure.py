@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from blast_agents.league.entries import NO_TRAINING
 from blast_agents.league.standings import Result, Standings
 from blast_env.plan import INK, QUIET_INK
 from blast_env.rendering.site_plan import write_heading
@@ -36,7 +37,7 @@ def league_figure(standings: Standings) -> Figure:
     figure = Figure(figsize=(13.6, 6.4), layout="constrained")
     axes = figure.add_subplot()
     searches, agents, others = _kinds(standings)
-    spent = sorted({result.budget for each in searches.values() for result in each}) or [1]
+    spent = sorted({each.entry.budget for own in searches.values() for each in own}) or [1]
     zero = spent[0] / 4.0
     places = np.geomspace(zero / _AROUND_ZERO, zero * _AROUND_ZERO, len(others) + len(agents))
     for index, result in enumerate(agents):
@@ -44,7 +45,8 @@ def league_figure(standings: Standings) -> Figure:
     for index, result in enumerate(others):
         _draw_other(axes, standings, result, index, places[index])
     for index, (method, results) in enumerate(searches.items()):
-        _draw_search(axes, standings, method, results, index, _aside(index, len(searches)))
+        aside = _APART ** (2.0 * index - (len(searches) - 1))
+        _draw_search(axes, standings, method, results, index, aside)
     axes.set_xscale("log")
     axes.set_xlim(zero / 1.5, 1.5 * spent[-1])
     axes.set_xticks([zero, *spent], ["0", *(f"{each:,}" for each in spent)])
@@ -67,17 +69,13 @@ def _kinds(standings: Standings) -> tuple[dict[str, list[Result]], list[Result],
     searches: dict[str, list[Result]] = {}
     agents, others = [], []
     for result in standings.results:
-        if result.budget:
-            searches.setdefault(result.method, []).append(result)
-        elif result.training is not None:
+        if result.entry.budget:
+            searches.setdefault(result.entry.method, []).append(result)
+        elif result.entry.training != NO_TRAINING:
             agents.append(result)
         elif any(proposal.layout for proposal in result.proposals):
             others.append(result)
     return searches, agents, others
-
-
-def _aside(index: int, count: int) -> float:
-    return float(_APART ** (2.0 * index - (count - 1)))
 
 
 def _draw_agent(
@@ -87,8 +85,7 @@ def _draw_agent(
     value = standings.reduction(result).value
     colour = _AGENTS[index % len(_AGENTS)]
     style = _AGENT_LINES[index // len(_AGENTS) % len(_AGENT_LINES)]
-    trained = 0 if result.training is None else result.training.blasts
-    label = f"{result.name}: no blast a case, {trained:,} in training"
+    label = f"{result.name}: no blast a case, {result.entry.training.blasts:,} in training"
     axes.axhline(value, color=colour, linewidth=1.8, linestyle=style, label=label, zorder=2)
     bars = _error_bars(standings, [result])
     axes.errorbar([blasts], [value], yerr=bars, color=colour, capsize=3, linewidth=1.2, zorder=3)
@@ -120,9 +117,9 @@ def _draw_search(
     index: int,
     aside: float,
 ) -> None:
-    results = sorted(results, key=lambda result: result.budget)
+    results = sorted(results, key=lambda result: result.entry.budget)
     axes.errorbar(
-        [result.budget * aside for result in results],
+        [result.entry.budget * aside for result in results],
         [standings.reduction(result).value for result in results],
         yerr=_error_bars(standings, results),
         color=_SEARCHES[index % len(_SEARCHES)],
@@ -144,13 +141,8 @@ def _error_bars(standings: Standings, results: list[Result]) -> "np.ndarray[tupl
 
 def _subtitle(standings: Standings) -> str:
     count, threats = standings.unprotected.shape
+    over = f"{count} cases, {count_of('held-out seed', threats)} each"
+    sample = f"95 % intervals over {over}"
     if standings.has_one_case:
-        return f"one case, 95 % intervals over its {threats} held-out threats; " + _engine(
-            standings
-        )
-    over = count_of("held-out seed", threats)
-    return f"95 % intervals over {count} cases, {over} each; {_engine(standings)}"
-
-
-def _engine(standings: Standings) -> str:
-    return f"engine {standings.engine}"
+        sample = f"one case, 95 % intervals over its {threats} held-out threats"
+    return f"{sample}; engine {standings.engine}"

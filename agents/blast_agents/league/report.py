@@ -8,7 +8,6 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from blast_agents.league.entries import Training
 from blast_agents.league.figure import league_figure
 from blast_agents.league.standings import Result, Standings, verdicts
 from blast_agents.search import Proposal
@@ -21,7 +20,7 @@ from blast_env.rendering.figures import save_figure
 from blast_env.rendering.style import count_of
 from blast_env.scenario.build_scene import charge_against
 from blast_env.statistics import reductions
-from blast_env.tables import write_csv
+from blast_env.tables import markdown_table, write_csv
 
 
 def summary_table(standings: Standings) -> pd.DataFrame:
@@ -37,7 +36,7 @@ def case_table(standings: Standings) -> pd.DataFrame:
     """Return one row an entry and case; loads are what each case makes of its held-out threats."""
     return pd.DataFrame(
         [
-            {"entry": result.name, "method": result.method, "budget": result.budget}
+            {"entry": result.name, "method": result.entry.method, "budget": result.entry.budget}
             | _case(case, proposal, loads, bare)
             for result in standings.results
             for case, proposal, loads, bare in zip(
@@ -52,12 +51,12 @@ def case_table(standings: Standings) -> pd.DataFrame:
 
 
 def _summary(standings: Standings, result: Result) -> dict[str, Any]:
-    reduction, training = standings.reduction(result), result.training or Training(0, 0.0)
+    reduction, entry = standings.reduction(result), result.entry
     wins = {f"wins_{rule.name}": standings.win_share(result, rule) for rule in standings.rules}
     row = {
-        "entry": result.name,
-        "method": result.method,
-        "budget": result.budget,
+        "entry": entry.name,
+        "method": entry.method,
+        "budget": entry.budget,
         "cases": len(standings.track.cases),
         "held_out_threats": standings.unprotected.shape[1],
         "reduction": reduction.value,
@@ -70,9 +69,9 @@ def _summary(standings: Standings, result: Result) -> dict[str, Any]:
         "blasts_per_case": result.blasts_per_case,
         "other_blasts_per_case": result.other_blasts_per_case,
         "cpu_s_per_case": result.cpu_s_per_case,
-        "training_blasts": training.blasts,
+        "training_blasts": entry.training.blasts,
         "wall_time_s": result.seconds,
-        "training_time_s": training.seconds,
+        "training_time_s": entry.training.seconds,
         "proposal_ms": result.proposal_ms,
         **wins,
     }
@@ -123,7 +122,6 @@ HEADERS: Final = (
 )
 """Columns of the printed table."""
 
-
 PAGE: Final = "league.md"
 
 
@@ -153,19 +151,7 @@ def sample_text(standings: Standings) -> str:
 
 
 def write_league(all_standings: Sequence[Standings], folder: Path, command: str) -> list[Path]:
-    """Write tables and figure of each track, and the page.
-
-    Args:
-        all_standings: One a track.
-        folder: It exists.
-        command: What started the league.
-
-    Returns:
-        The paths.
-
-    Raises:
-        BlastEnvError: If a file cannot be written, or the extra `render` is missing.
-    """
+    """Write tables and figure of each track, and the page."""
     written = []
     for standings in all_standings:
         name = standings.track.name
@@ -185,8 +171,7 @@ def markdown(all_standings: Sequence[Standings], command: str) -> str:
     lines = ["# League", ""]
     for standings in all_standings:
         lines += [f"## {standings.track.title}", "", f"{sample_text(standings)}.", ""]
-        lines += [_line(HEADERS), "|---|" + "---:|" * (len(HEADERS) - 1)]
-        lines += [_line(row) for row in table_rows(standings)]
+        lines += [markdown_table(HEADERS, table_rows(standings), numbers=True)]
         lines += ["", *(f"- {line}" for line in verdict_lines(standings)), ""]
         lines += _wins(standings)
         lines += [f"![Reduction over blasts spent]({standings.track.name}.png)", ""]
@@ -206,12 +191,16 @@ def _wins(standings: Standings) -> list[str]:
     rules = standings.rules
     if not rules:
         return []
-    lines = ["Share of the cases in which it is better than a rule (a tie is half a case):", ""]
-    lines += [_line(("method", *(rule.name for rule in rules))), "|---|" + "---:|" * len(rules)]
-    for result in standings.results:
-        shares = (f"{100.0 * standings.win_share(result, rule):.0f} %" for rule in rules)
-        lines.append(_line((result.name, *shares)))
-    return [*lines, ""]
+    heading = "Share of the cases in which it is better than a rule (a tie is half a case):"
+    headers = ("method", *(rule.name for rule in rules))
+    rows = [
+        (
+            result.name,
+            *(f"{100.0 * standings.win_share(result, rule):.0f} %" for rule in rules),
+        )
+        for result in standings.results
+    ]
+    return [heading, "", markdown_table(headers, rows, numbers=True), ""]
 
 
 def _row(standings: Standings, result: Result) -> tuple[str, ...]:
@@ -233,7 +222,3 @@ def _row(standings: Standings, result: Result) -> tuple[str, ...]:
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.1f} %"
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from blast_agents.league.entries import Training, search_name
+from blast_agents.league.entries import LeagueEntry, search_name
 from blast_agents.league.tracks import Track
-from blast_agents.search import Proposal
+from blast_agents.search import Proposal, ProposerKind
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.comparison import Comparison, check_something_arrives
 from blast_env.statistics import CVAR_LEVEL, Estimate, conditional_value_at_risk, reductions
@@ -23,24 +23,29 @@ class Result:
     """What an entry did on all cases.
 
     Attributes:
-        name: Of the entry.
-        method: Of the search; else the name.
-        budget: Most blasts of a search for a case; else 0.
-        training: What an agent cost before; `None` for all others.
-        is_rule: Whether it is a rule, which takes neither training nor a blast.
-        has_learnt: Whether it is an agent, or a search that begins with one or with a surrogate.
+        entry: The entry.
         proposals: One a case; the cells are sorted.
         loads: With the layouts, in the unit of the objective (cases, held-out threats).
     """
 
-    name: str
-    method: str
-    budget: int
-    training: Training | None
+    entry: LeagueEntry
     proposals: tuple[Proposal, ...]
     loads: FloatArray
-    is_rule: bool = False
-    has_learnt: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of the entry."""
+        return self.entry.name
+
+    @property
+    def is_rule(self) -> bool:
+        """Whether it is a rule, which takes neither training nor a blast."""
+        return self.entry.kind is ProposerKind.RULE
+
+    @property
+    def has_learnt(self) -> bool:
+        """Whether it is an agent, or a search that begins with one or with a surrogate."""
+        return self.entry.kind is ProposerKind.LEARNT
 
     @property
     def other_blasts_per_case(self) -> float:
@@ -60,14 +65,12 @@ class Result:
     @property
     def blasts(self) -> int:
         """All blasts spent, those of a training among them; held-out ones are for the reader."""
-        training = 0 if self.training is None else self.training.blasts
-        return training + sum(each.blasts for each in self.proposals)
+        return self.entry.training.blasts + sum(each.blasts for each in self.proposals)
 
     @property
     def seconds(self) -> float:
         """Time that training and proposals took together, each in one process."""
-        training = 0.0 if self.training is None else self.training.seconds
-        return training + sum(each.seconds for each in self.proposals)
+        return self.entry.training.seconds + sum(each.seconds for each in self.proposals)
 
     @property
     def proposal_ms(self) -> float:
@@ -97,7 +100,6 @@ class Standings:
     engine: str
 
     def __post_init__(self) -> None:
-        """Check that there is something to reduce."""
         check_something_arrives(self.track.cases, self.unprotected)
 
     @property
@@ -123,16 +125,14 @@ class Standings:
         The best rule, the reference, and the best search that has learnt nothing, by their mean
         reductions.
         """
-        searches = [each for each in self.results if each.budget and not each.has_learnt]
-        found = (
-            *sorted(self.rules, key=self._mean)[-1:],
-            self.reference,
-            *sorted(searches, key=self._mean)[-1:],
-        )
-        return tuple(dict.fromkeys(each for each in found if each is not None))
+        searches = [each for each in self.results if each.entry.budget and not each.has_learnt]
 
-    def _mean(self, result: Result) -> float:
-        return self.reduction(result).value
+        def mean(result: Result) -> float:
+            return self.reduction(result).value
+
+        best = [max(each[::-1], key=mean, default=None) for each in (self.rules, searches)]
+        found = (best[0], self.reference, best[1])
+        return tuple(dict.fromkeys(each for each in found if each is not None))
 
     def comparison(self, result: Result) -> Comparison:
         """Return an entry's layouts against no barrier."""
@@ -175,30 +175,26 @@ class Standings:
 
 @dataclass(frozen=True)
 class LeagueVerdict:
-    """An agent, or a search that begins with one, against a rule or another search, case by case.
+    """An agent, or a search that begins with one, against a rule or a search, case by case.
 
     Attributes:
-        entry: Name of the agent or the search.
-        reference: Name of the rule or the search.
+        result: What the agent or the search did.
+        reference: What the rule or the other search did.
         difference: Its mean reduction minus that of the other.
         sample: What the interval is over, e.g. `"16 cases"`.
-        proposal_ms: Time from a case to its layout, median, ms.
-        blasts_per_case: Blasts that it spends on a case, mean; 0 for an agent.
     """
 
-    entry: str
-    reference: str
+    result: Result
+    reference: Result
     difference: Estimate
     sample: str
-    proposal_ms: float
-    blasts_per_case: float = 0.0
 
     @property
     def conclusion(self) -> str:
         """What may be said: the interval decides."""
         if isnan(self.difference.low):
             return "one threat says nothing about the others"
-        subject = "search" if self.blasts_per_case else "agent"
+        subject = "search" if self.result.blasts_per_case else "agent"
         if self.difference.low > 0.0:
             return f"the {subject} protects better"
         if self.difference.high < 0.0:
@@ -210,30 +206,23 @@ class LeagueVerdict:
         """The verdict as a sentence."""
         value, low, high = (100.0 * each for each in self.difference)
         interval = "-" if isnan(low) else f"{low:+.1f} to {high:+.1f}"
-        spent = f"It proposes in {self.proposal_ms:.1f} ms (median)."
-        if self.blasts_per_case:
-            spent = f"It spends {self.blasts_per_case:.0f} blasts a case."
+        spent = f"It proposes in {self.result.proposal_ms:.1f} ms (median)."
+        if self.result.blasts_per_case:
+            spent = f"It spends {self.result.blasts_per_case:.0f} blasts a case."
         return (
-            f"{self.entry} minus {self.reference}: {value:+.1f} percentage points of reduction "
-            f"(95 % interval {interval}, paired over {self.sample}); {self.conclusion}. {spent}"
+            f"{self.result.name} minus {self.reference.name}: {value:+.1f} percentage points of "
+            f"reduction (95 % interval {interval}, paired over {self.sample}); {self.conclusion}. "
+            f"{spent}"
         )
 
 
 def verdicts(standings: Standings) -> tuple[LeagueVerdict, ...]:
     """Return a verdict for all that has learnt, and each of the references."""
-    count = len(standings.track.cases)
-    sample = f"{count} cases"
+    sample = f"{len(standings.track.cases)} cases"
     if standings.has_one_case:
         sample = f"{standings.unprotected.shape[1]} held-out threats of one case"
     return tuple(
-        LeagueVerdict(
-            entry=result.name,
-            reference=reference.name,
-            difference=standings.difference(result, reference),
-            sample=sample,
-            proposal_ms=result.proposal_ms,
-            blasts_per_case=result.blasts_per_case,
-        )
+        LeagueVerdict(result, reference, standings.difference(result, reference), sample)
         for result in standings.results
         if result.has_learnt
         for reference in standings.references

@@ -9,7 +9,7 @@ from functools import cache
 from hashlib import sha256
 from inspect import getfile
 from pathlib import Path
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Final
 
 from pydantic import Field, TypeAdapter
 
@@ -32,86 +32,24 @@ _NO_INFLUENCE: Final = ("figure.py",)
 _ADDRESS: Final = re.compile(r" at 0x[0-9a-f]+")
 
 
-class Model(NamedTuple):
-    """What the blasts of a case depend on beside layout and threat.
-
-    Attributes:
-        scenario_hash: Content hash of the scenario.
-        engine: The engine with its version.
-        calibration: Digest of the calibration; empty for gas dynamics.
-        code: Version of the package.
-    """
-
-    scenario_hash: str
-    engine: str
-    calibration: str
-    code: str
-
-
-class SearchKey(NamedTuple):
-    """What a search's proposal depends on.
-
-    Attributes:
-        model: Of the blasts.
-        threats: What the search meets.
-        method: The method with its settings.
-        budget: Most blasts.
-        seed: Of the search.
-        code: Digest of the searches' code and of the method's, with the versions of what they draw
-            with.
-    """
-
-    model: Model
-    threats: tuple[Threat, ...]
-    method: str
-    budget: int
-    seed: int
-    code: str
-
-
-class EvaluationKey(NamedTuple):
-    """What the impulses with a layout depend on.
-
-    Attributes:
-        model: Of the blasts.
-        threats: What the layout meets.
-        layout: Its cells, sorted.
-    """
-
-    model: Model
-    threats: tuple[Threat, ...]
-    layout: Layout
-
-
-def search_key(case: Case, entry: LeagueEntry, engine: str | Engine) -> SearchKey:
-    """Return the key of a search for a case.
-
-    Raises:
-        CalibrationError: If the scenario has no calibration for the engine.
-        UnknownNameError: If there is no such engine.
-    """
+def search_key(case: Case, entry: LeagueEntry, engine: str | Engine) -> str:
+    """Return all that a search's proposal for a case depends on, as a text."""
     method = repr(entry.proposer)
     if entry.first_engine is not None:
         method += f" by {engine_text(find_engine(entry.first_engine))}, {entry.finalists} judged"
-    return SearchKey(
-        model=_model(case, engine),
-        threats=practice_of(case).threats,
-        # Functions among the settings: their names, and not where this process has them.
-        method=_ADDRESS.sub("", method),
-        budget=entry.budget,
-        seed=case.seed,
-        code=_search_code(Path(getfile(type(entry.proposer))).parent),
-    )
+    # Functions among the settings: their names, and not where this process has them.
+    method = _ADDRESS.sub("", method)
+    code = _search_code(Path(getfile(type(entry.proposer))).parent)
+    threats = practice_of(case).threats
+    return _key("search", case, engine, threats, method, entry.budget, case.seed, code)
 
 
-def evaluation_key(case: Case, layout: Layout, engine: str | Engine) -> EvaluationKey:
-    """Return the key of the loads with a layout on a case's held-out threats.
+def evaluation_key(case: Case, layout: Layout, engine: str | Engine) -> str:
+    """Return all that the loads with a layout on a case's held-out threats depend on.
 
-    Raises:
-        CalibrationError: If the scenario has no calibration for the engine.
-        UnknownNameError: If there is no such engine.
+    Errors as for `search_key`.
     """
-    return EvaluationKey(_model(case, engine), case.threats, tuple(sorted(layout)))
+    return _key("loads", case, engine, case.threats, tuple(sorted(layout)))
 
 
 _PROPOSAL: Final = TypeAdapter(Proposal)
@@ -122,11 +60,8 @@ _LOADS: Final = TypeAdapter(tuple[Load, ...])
 class ResultStore:
     """Keeps results in the files of a folder; see `FolderStore`.
 
-    Args:
-        folder: The folder; it is made if need be.
-
     Raises:
-        BlastEnvError: If the folder cannot be made.
+        BlastEnvError: If the folder cannot be made, or a result cannot be written.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -137,7 +72,7 @@ class ResultStore:
         """The folder, as an absolute path."""
         return self._store.folder
 
-    def proposal(self, key: SearchKey, scenario: AnyScenario) -> Proposal | None:
+    def proposal(self, key: str, scenario: AnyScenario) -> Proposal | None:
         """Return what a search proposed for a scenario, or `None` if that is not known."""
 
         def decode(content: bytes) -> Proposal:
@@ -145,39 +80,45 @@ class ResultStore:
             check_layout(scenario, proposal.layout)
             return proposal
 
-        return self._store.read(_text(key), decode)
+        return self._store.read(key, decode)
 
-    def keep_proposal(self, key: SearchKey, proposal: Proposal) -> None:
+    def keep_proposal(self, key: str, proposal: Proposal) -> None:
         """Keep what a search proposed.
 
         Raises:
             BlastEnvError: If it cannot be written.
         """
-        self._store.put(_text(key), _PROPOSAL.dump_json(proposal))
+        self._store.put(key, _PROPOSAL.dump_json(proposal))
 
-    def loads(self, key: EvaluationKey) -> tuple[float, ...] | None:
-        """Return the loads under the threats, in the objective's unit, or `None` if not known."""
+    def loads(self, key: str, threats: int) -> tuple[float, ...] | None:
+        """Return the loads under so many threats, in the objective's unit; `None`: not known."""
 
         def decode(content: bytes) -> tuple[float, ...]:
             loads = checked_as(tuple[Load, ...], parse_json(content.decode()))
-            if len(loads) != len(key.threats):
-                raise ValueError(f"{len(loads)} loads of {len(key.threats)} threats")
+            if len(loads) != threats:
+                raise ValueError(f"{len(loads)} loads of {threats} threats")
             return loads
 
-        return self._store.read(_text(key), decode)
+        return self._store.read(key, decode)
 
-    def keep_loads(self, key: EvaluationKey, loads: tuple[float, ...]) -> None:
+    def keep_loads(self, key: str, loads: tuple[float, ...]) -> None:
         """Keep the loads under the threats, in the unit of the objective.
 
         Raises:
             BlastEnvError: If they cannot be written.
         """
-        self._store.put(_text(key), _LOADS.dump_json(loads))
+        self._store.put(key, _LOADS.dump_json(loads))
 
 
-def _text(key: SearchKey | EvaluationKey) -> str:
-    threats = [(_plain(each.charge), each.seed) for each in key.threats]
-    return json.dumps([type(key).__name__, key._replace(threats=()), threats])
+def _key(
+    what: str, case: Case, engine: str | Engine, threats: tuple[Threat, ...], *others: object
+) -> str:
+    found = find_engine(engine)
+    law = found.calibration(case.scenario)
+    digest = "" if law is None else calibration_digest(law)
+    model = (case.scenario.content_hash, engine_text(found), digest, code_version())
+    met = [(_plain(each.charge), each.seed) for each in threats]
+    return json.dumps([what, model, met, others])
 
 
 def _plain(charge: AnyCharge) -> object:
@@ -205,10 +146,3 @@ def _search_code(own: Path) -> str:
     known = versions(packages=_PACKAGES)
     drawn_with = " ".join(f"{name} {known[name]}" for name in _PACKAGES)
     return f"{digest.hexdigest()[:16]} {drawn_with}"
-
-
-def _model(case: Case, engine: str | Engine) -> Model:
-    found = find_engine(engine)
-    law = found.calibration(case.scenario)
-    digest = "" if law is None else calibration_digest(law)
-    return Model(case.scenario.content_hash, engine_text(found), digest, code_version())

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 from blast_agents.league.entries import LeagueEntry, Training
 from blast_agents.league.tracks import Track
@@ -12,53 +11,39 @@ from blast_agents.surrogate import LearntSearch, Surrogate, search_by
 from blast_agents.training import TrainedAgent, load_agent
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
-from blast_agents.training.run_folder import RunFolder, TrainingSettings
+from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from blast_env.errors import BlastEnvError
 from blast_env.sites import FAMILIES
 
 
 @dataclass(frozen=True, eq=False)
 class TrainedRun:
-    """The agent of a run folder, and what it was trained for.
-
-    Attributes:
-        run: The folder.
-        agent: The agent, with the weights of its best evaluation.
-        name: In tables.
-        training: What it cost.
-        threat: `"visible"` or `"hidden"`.
-        scenario: Name of the scenario, for people.
-        site: Content hash of the scenario, or the family of generated sites.
-    """
+    """The agent of a run folder, and what it was trained for."""
 
     run: Path
     agent: TrainedAgent
-    name: str
+    configuration: RunConfiguration
     training: Training
-    threat: Literal["visible", "hidden"]
-    scenario: str
-    site: str
 
     @classmethod
     def load(cls, run: Path) -> "TrainedRun":
-        """Load the agent of a run folder.
-
-        Raises:
-            BlastEnvError: If it is no run folder, or damaged.
-        """
+        """Load the agent of a run folder."""
         folder = RunFolder(run)
         configuration = folder.configuration()
-        settings = configuration.settings
-        is_family = settings.scenario in FAMILIES
-        return cls(
-            run=run,
-            agent=load_agent(run),
-            name=f"{ALGORITHM_NAMES[settings.algorithm]} ({run.resolve().name})",
-            training=_training(folder, settings),
-            threat=settings.threat,
-            scenario=settings.scenario,
-            site=settings.scenario if is_family else configuration.scenario_hash,
-        )
+        training = _training(folder, configuration.settings)
+        return cls(run, load_agent(run), configuration, training)
+
+    @property
+    def name(self) -> str:
+        """Name in tables."""
+        algorithm = ALGORITHM_NAMES[self.configuration.settings.algorithm]
+        return f"{algorithm} ({self.run.resolve().name})"
+
+    @property
+    def site(self) -> str:
+        """Content hash of the scenario, or the family of generated sites."""
+        scenario = self.configuration.settings.scenario
+        return scenario if scenario in FAMILIES else self.configuration.scenario_hash
 
     @property
     def entry(self) -> LeagueEntry:
@@ -96,7 +81,7 @@ class TrainedRun:
 
     def is_for(self, track: Track) -> bool:
         """Return whether a track asks what the agent was trained for."""
-        return self.threat == track.threat and self.site == track.site
+        return (self.configuration.settings.threat, self.site) == (track.threat, track.site)
 
 
 def surrogate_entries(surrogate: Surrogate, budgets: Sequence[int]) -> tuple[LeagueEntry, ...]:
@@ -108,18 +93,13 @@ def surrogate_entries(surrogate: Surrogate, budgets: Sequence[int]) -> tuple[Lea
 
 
 def check_runs(runs: Sequence[TrainedRun], tracks: Sequence[Track]) -> None:
-    """Refuse an agent that was trained for none of the tracks.
-
-    Raises:
-        BlastEnvError: If there is one; the message says what it was trained for.
-    """
+    """Refuse an agent that was trained for none of the tracks."""
     for run in runs:
         if not any(run.is_for(track) for track in tracks):
-            names = ", ".join(track.name for track in tracks)
+            names, settings = ", ".join(track.name for track in tracks), run.configuration.settings
             raise BlastEnvError(
-                f"{run.run}: was trained for a {run.threat} threat on {run.scenario!r} "
-                f"({run.site[:12]}), which is none of the tracks "
-                f"({names}) as they are now"
+                f"{run.run}: was trained for a {settings.threat} threat on {settings.scenario!r} "
+                f"({run.site[:12]}), which is none of the tracks ({names}) as they are now"
             )
 
 

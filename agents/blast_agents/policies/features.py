@@ -88,14 +88,9 @@ class LinesOfSight(NamedTuple):
         return cls(x, y, along_x, along_y, distance, left, right)
 
     def coordinates(self, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-        """Return how far points are along each line and aside of it, in squares.
+        """Return how far points are along each line, and to the left of it, in squares.
 
-        Args:
-            x: In squares (batch, points).
-            y: Likewise.
-
-        Returns:
-            Two tensors (batch, places, points); to the left of the line is positive.
+        Two tensors (batch, places, points), of points (batch, points).
         """
         from_x, from_y = x[:, None] - self.x[..., None], y[:, None] - self.y[..., None]
         along_x, along_y = self.along_x[..., None], self.along_y[..., None]
@@ -105,17 +100,10 @@ class LinesOfSight(NamedTuple):
 def stands_before(
     lines: LinesOfSight, along: Tensor, x: Tensor, y: Tensor, target: Spread
 ) -> Tensor:
-    """Return which points lie before the structures, neither in nor behind them, 0 or 1.
+    """Return which points lie before the structures, neither in nor behind them.
 
-    Args:
-        lines: From each place of the charge (batch, places).
-        along: How far the points are along each line, in squares (batch, places, points).
-        x: Of the points, in squares (batch, points).
-        y: Likewise.
-        target: The structures.
-
-    Returns:
-        (batch, places, points); 0 also for what lies on the other side of the charge.
+    0 or 1 (batch, places, points), of points (batch, points); 0 also for what lies on the other
+    side of the charge. `along` is how far they are along each line (batch, places, points).
     """
     enter_x, leave_x = _slab(lines.x, x, target.x, target.half_extent(target.xx))
     enter_y, leave_y = _slab(lines.y, y, target.y, target.half_extent(target.yy))
@@ -127,12 +115,8 @@ def stands_before(
 def likely_places(likely: Tensor, places: int) -> tuple[Tensor, Tensor]:
     """Return places that stand for a distribution, each for as large a part of it.
 
-    Args:
-        likely: How likely the charge is in a square (batch, rows, columns).
-        places: How many; 1 gives the mean.
-
-    Returns:
-        x and y in squares (batch, places).
+    x and y in squares (batch, places), from how likely the charge is in a square (batch, rows,
+    columns). One place is the mean.
     """
     if places == 1:
         middle = Spread.of(likely)
@@ -171,10 +155,8 @@ def _corner_tangents(
 BEARINGS: Final = 96
 """Bearings that are told apart from each place of the charge."""
 
-
 MOST_OFFSET: Final = 4.0
 """They reach so many half widths of the facade to either side of its middle."""
-
 
 _MOST_DEPTH: Final = 3.0
 
@@ -206,17 +188,11 @@ class Bearings(NamedTuple):
 
     @classmethod
     def of(cls, lines: LinesOfSight, along: Tensor, aside: Tensor, before: Tensor) -> "Bearings":
-        """Find them.
+        """Find them, from how far cells are along each line and aside of it (batch, places, cells).
 
         A module hides the bearings between its two outermost corners, in whole steps of `2 *
         MOST_OFFSET / BEARINGS` half widths of the facade. What does not stand before the structures
         hides nothing.
-
-        Args:
-            lines: From each place of the charge (batch, places).
-            along: How far the cells are along each line, in squares (batch, places, cells).
-            aside: How far they are aside of it, likewise.
-            before: Which of them lie before the structures, 0 or 1, likewise.
         """
         half_facade = (lines.left - lines.right).clamp(min=1e-3)[..., None] / 2.0
         middle = (lines.left + lines.right)[..., None] / 2.0
@@ -262,12 +238,7 @@ class Occlusion(NamedTuple):
 
     @classmethod
     def of(cls, bearings: Bearings, barrier: Tensor) -> "Occlusion":
-        """Return what the modules of a barrier hide, and what one more on each cell would.
-
-        Args:
-            bearings: Of the cells.
-            barrier: Which cells hold a module, 0 or 1 (batch, cells).
-        """
+        """Return what modules hide (batch, cells; 0 or 1), and what one more on each cell would."""
         first, last, before = bearings.first, bearings.last, bearings.before
         depth = _depth(first, last, barrier[:, None] * before)
         covered = depth.gt(0.0).float()
@@ -304,7 +275,6 @@ def _sums(values: Tensor, first: Tensor, last: Tensor) -> Tensor:
 
 SHARES: Final = ("stock_share", "stock", "budget_share")
 """Channels with the same value everywhere."""
-
 
 STATIC: Final = ("protected", "cost", "charge")
 """Channels of which `ZoneGeometry` is made."""
@@ -409,10 +379,8 @@ class Planes:
 _LEVELS: Final = 255.0
 """Planes have values in steps of 1 over this; as whole numbers their sums are exact."""
 
-
 _LENGTH: Final = 20.0
 """Lengths are divided by so many squares, 10 m, to be of the order of 1."""
-
 
 _SHARE_GAIN: Final = 10.0
 """A module hides some tenth of a facade; times this it is of the order of 1."""
@@ -464,16 +432,11 @@ class ZoneGeometry(NamedTuple):
         The features of a cell turn with the site: how far it is along the line of sight and aside
         of it, in metres and as shares of the whole way and of the facade, and how much of the
         facade a module hides there. So what is learnt at one place of the charge holds at the
-        others, and on a turned site. Where the charge is hidden, they are means over places that
-        it may be at.
-
-        Args:
-            planes: Those of the observation.
-            rows: Rows of the build zone.
-            columns: Its columns.
-            places: Places that stand for where the charge may be; 1 takes the middle.
+        others, and on a turned site. Where the charge is hidden, they are means over `places` that
+        it may be at; 1 takes the middle.
         """
-        row, column = _corner(planes["cost"])
+        # Only in the build zone cells have a cost.
+        row, column = (planes["cost"].amax(dim=dim).gt(0).int().argmax(dim=1) for dim in (2, 1))
         cost = _crop(planes["cost"], row, column, rows, columns)
         # The plane shows the root of how likely the charge is in a square.
         likely = (planes["charge"] * _LEVELS).round().square()
@@ -512,13 +475,10 @@ class ZoneGeometry(NamedTuple):
         return _crop(plane, self.row, self.column, self.rows, self.columns)
 
     def view(self, planes: Planes) -> ZoneView:
-        """Return what the policy sees now.
+        """Return what the policy sees now, from the planes of the observation of these sites.
 
         For each cell there is more to say once modules stand: how much of the facade a module
         would hide there that nothing hides yet, and what stands on its bearing already.
-
-        Args:
-            planes: Those of the observation of these sites.
         """
         barrier, free = (self.crop(planes[name]) for name in ("barrier", "free"))
         seen = Occlusion.of(self.bearings, barrier.flatten(1))
@@ -550,19 +510,11 @@ def _measures(planes: Planes, likely: Tensor, target: Spread) -> SiteFeatures:
     )
 
 
-def _corner(cost: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the first row and column of the build zone (batch,): only there cells have a cost."""
-    inside_y, inside_x = cost.amax(dim=2).gt(0), cost.amax(dim=1).gt(0)
-    return inside_y.int().argmax(dim=1), inside_x.int().argmax(dim=1)
-
-
 def _crop(plane: Tensor, row: Tensor, column: Tensor, rows: int, columns: int) -> Tensor:
     """Return a rectangle of a plane (batch, rows, columns)."""
     batch = torch.arange(len(plane), device=plane.device)[:, None, None]
     row_of = row[:, None] + torch.arange(rows, device=plane.device)
     column_of = column[:, None] + torch.arange(columns, device=plane.device)
-    row_of, column_of = (
-        row_of.clamp(max=plane.shape[1] - 1),
-        column_of.clamp(max=plane.shape[2] - 1),
-    )
+    row_of = row_of.clamp(max=plane.shape[1] - 1)
+    column_of = column_of.clamp(max=plane.shape[2] - 1)
     return plane[batch, row_of[:, :, None], column_of[:, None, :]]

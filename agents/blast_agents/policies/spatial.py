@@ -22,7 +22,6 @@ from blast_env.errors import BlastEnvError
 
 _LOGIT_GAIN: Final = 0.01
 
-
 _OVERVIEW: Final = (
     *("protected", "other_structures", "charge", "barrier", "unprotected_load"),
     *("structure_height", "barrier_height", "reach_without_barrier", "reach"),
@@ -45,14 +44,6 @@ class ZoneExtractor(BaseFeaturesExtractor):
     With a catalogue the cells around show heights and where each variant may be placed as well,
     and the features of the whole have heights, costs and what is left of the items. With vehicles
     both show the ground that they reach.
-
-    Args:
-        observation_space: Of an observation of planes.
-        rows: Rows of the build zone.
-        columns: Its columns.
-        places: Places that stand for where the charge may be.
-        width: Number of features.
-        channels: Names of the planes.
 
     Raises:
         BlastEnvError: If the space is not one of these planes on a site that the zone fits in.
@@ -99,9 +90,6 @@ class ZoneExtractor(BaseFeaturesExtractor):
 
         Args:
             observations: From 0 to 1 (batch, channels, height, width).
-
-        Raises:
-            BlastEnvError: If their shape is not that of the space.
         """
         if observations.shape[1:] != self.shape:
             raise BlastEnvError(
@@ -135,11 +123,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
 def _planes_shape(
     space: spaces.Space[Any], channels: int, rows: int, columns: int
 ) -> tuple[int, ...]:
-    """Return the shape of a space of planes (channels, rows, columns).
-
-    Raises:
-        BlastEnvError: If it has another number of planes, or is smaller than the build zone.
-    """
+    """Return the shape of a space of planes (channels, rows, columns)."""
     shape = tuple(space.shape or ())
     if len(shape) != 3 or shape[0] != channels or shape[1] < rows or shape[2] < columns:
         raise BlastEnvError(
@@ -150,12 +134,7 @@ def _planes_shape(
 
 
 class ZoneLatents(MlpExtractor):
-    """Hands the features of `ZoneExtractor` on: all to the actor, those of the whole to the critic.
-
-    Args:
-        width: Number of features of a cell, and of the whole.
-        critic_width: Neurons of the critic's hidden layer.
-    """
+    """Hands the features of `ZoneExtractor` on: all to the actor, the last ones to the critic."""
 
     def __init__(self, width: int, critic_width: int) -> None:
         super().__init__(width, {"pi": [], "vf": [critic_width]}, nn.ReLU)
@@ -173,12 +152,8 @@ class ZoneLatents(MlpExtractor):
 class CellLogits(nn.Module):
     """Logits of each cell from its own features, and one of finishing from those of the whole.
 
-    A cell has one logit for each variant that can be set down from there.
-
-    Args:
-        width: Number of features of a cell, and of the whole.
-        finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
-        variants: How many variants there are; 1 without a catalogue.
+    A cell has one logit for each variant that can be set down from there; 1 without a catalogue.
+    For the arguments see `ZonePolicy`.
     """
 
     def __init__(self, width: int, finish_bias: float, variants: int = 1) -> None:
@@ -250,24 +225,17 @@ class ZonePolicy(BasePolicy):
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor = ZoneLatents(self.width, self.critic_width)
 
-    def _replace_action_net(self, learning_rate: float) -> None:
+    def _build(self, lr_schedule: Schedule) -> None:
         """Put the logits by cell in the place of the dense layer; the optimizer has to know."""
+        super()._build(lr_schedule)  # type: ignore[misc]  # that of the library's policy
         self.action_net: nn.Module = CellLogits(self.width, self.finish_bias, self.variants)
-        arguments = {"lr": learning_rate} | self.optimizer_kwargs
+        arguments = {"lr": lr_schedule(1.0)} | self.optimizer_kwargs
         self.optimizer = self.optimizer_class(self.parameters(), **arguments)
 
 
 class SpatialPolicy(ZonePolicy, ActorCriticPolicy):
     """For stable-baselines3's `PPO`; see `ZonePolicy` for the arguments."""
 
-    def _build(self, lr_schedule: Schedule) -> None:
-        super()._build(lr_schedule)
-        self._replace_action_net(lr_schedule(1.0))
-
 
 class SpatialMaskablePolicy(ZonePolicy, MaskableActorCriticPolicy):
     """For sb3-contrib's `MaskablePPO`; see `ZonePolicy` for the arguments."""
-
-    def _build(self, lr_schedule: Schedule) -> None:
-        super()._build(lr_schedule)
-        self._replace_action_net(lr_schedule(1.0))

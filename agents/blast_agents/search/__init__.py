@@ -1,10 +1,11 @@
 """Proposers: classical searches and rules, and what they are asked (`registry` lists them all)."""
 
-from blast_agents.search.by_rule import BestRuleSearch, FromRulesSearch
 from blast_agents.search.evolution import GeneticSearch, Nsga2Search
 from blast_agents.search.methods import (
     AnnealingSearch,
+    BestRuleSearch,
     ExhaustiveSearch,
+    FromRulesSearch,
     GreedySearch,
     RandomSearch,
     WinnersSearch,

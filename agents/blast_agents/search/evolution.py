@@ -12,7 +12,6 @@ from blast_env.geometry import Layout
 
 _LEAST_POPULATION: Final = 6
 
-
 _MOST_POPULATION: Final = 60
 
 

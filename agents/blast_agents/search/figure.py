@@ -27,12 +27,7 @@ _BEST = "#0072B2"
 
 
 def search_figure(result: SearchResult, problem: LayoutProblem) -> Figure:
-    """Return a figure of a search.
-
-    Args:
-        result: What the search found; it has spent blasts.
-        problem: What it was asked.
-    """
+    """Return a figure of a search."""
     panels = 2 if result.front else 1
     figure = Figure(figsize=(2.0 + 5.6 * panels, 5.4), layout="constrained")
     axes = figure.subplots(1, panels, squeeze=False)[0]
@@ -59,7 +54,9 @@ def _draw_history(axes: Axes, result: SearchResult, problem: LayoutProblem) -> N
     history = result.history
     ends = [*(each.blasts for each in history[1:]), max(result.blasts, history[-1].blasts)]
     counts = sorted({each.threats for each in history})
-    for count, colour in zip(counts, _shades(len(counts)), strict=True):
+    # The strongest colour last, for most threats.
+    colours = _COLOURS[-len(counts) :] if len(counts) <= len(_COLOURS) else (_BEST,) * len(counts)
+    for count, colour in zip(counts, colours, strict=True):
         chosen = [(each, end) for each, end in zip(history, ends, strict=True)]
         chosen = [(each, end) for each, end in chosen if each.threats == count]
         blasts = np.array([(each.blasts, end) for each, end in chosen]).ravel()
@@ -108,8 +105,3 @@ def _set_reduction_axis(axes: Axes, problem: LayoutProblem) -> None:
     axes.set_ylabel(f"reduction of the {problem.scenario.objective.noun}")
     axes.grid(alpha=0.3, which="both")
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def _shades(count: int) -> tuple[str, ...]:
-    """Return a colour for each number of threats, the last the strongest."""
-    return _COLOURS[-min(count, len(_COLOURS)) :] if count <= len(_COLOURS) else (_BEST,) * count

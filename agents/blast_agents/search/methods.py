@@ -1,7 +1,8 @@
-"""Search methods that need no further library."""
+"""Search methods that need no further library, and others that begin with the rules of thumb."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import combinations, islice
 from math import comb, exp
 from typing import Final
@@ -9,10 +10,11 @@ from typing import Final
 import numpy as np
 
 from blast_agents.rules import random_layout
+from blast_agents.search.evolution import GeneticSearch
 from blast_agents.search.moves import Draw, Moves, random_walls
-from blast_agents.search.problem import LayoutProblem
+from blast_agents.search.problem import LayoutProblem, Report, SearchResult
+from blast_agents.search.registry import layouts_by_rule
 from blast_agents.search.session import Plan, Search, SearchSession
-from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Element, Layout, Piece
 from blast_env.scenario import Placement
@@ -114,16 +116,10 @@ def _still_to_place(placement: Placement) -> int:
     """
     left, budget = placement.stock_left, placement.budget_left
     if placement.catalogue.has_items and budget is not None:
-        costs = [float(own[mask].mean()) for own, mask in _legal_costs(placement)]
+        both = zip(placement.costs, placement.legal, strict=True)
+        costs = [float(own[legal].mean()) for own, legal in both if legal.any()]
         left = min(left, max(1, round(budget / float(np.mean(costs)))))
     return left
-
-
-def _legal_costs(placement: Placement) -> Iterator[tuple[FloatArray, BoolArray]]:
-    """Yield the costs of each variant that may be placed, and where it may."""
-    for costs, legal in zip(placement.costs, placement.legal, strict=True):
-        if legal.any():
-            yield costs, legal
 
 
 @dataclass(frozen=True)
@@ -163,18 +159,16 @@ class AnnealingSearch(Search):
             neighbour = moves.neighbour(layout, rng)
             (neighbour_load,) = session.assess([neighbour]).tolist()
             worse = neighbour_load - load
-            if worse <= 0.0 or rng.random() < _likelihood(worse, temperature):
+            # Metropolis; never when all is cold.
+            likelihood = exp(-worse / temperature) if temperature > 0.0 else 0.0
+            if worse <= 0.0 or rng.random() < likelihood:
                 layout, load = neighbour, neighbour_load
 
 
 class Cooling:
     """The temperature, which falls geometrically over the blasts for exploring that are left.
 
-    Args:
-        session: Knows how many are spent.
-        scale: The load that `hot` and `cold` are shares of.
-        hot: Temperature now.
-        cold: Temperature at the end.
+    From `hot` to `cold`, which are shares of the load `scale`.
     """
 
     def __init__(self, session: SearchSession, scale: float, hot: float, cold: float) -> None:
@@ -193,13 +187,7 @@ class Cooling:
         return temperature
 
 
-def _likelihood(worse: float, temperature: float) -> float:
-    """Return how likely a worse layout is accepted (Metropolis); never when all is cold."""
-    return exp(-worse / temperature) if temperature > 0.0 else 0.0
-
-
 _LEAST_WALKERS: Final = 3
-
 
 _MOST_WALKERS: Final = 16
 
@@ -304,16 +292,9 @@ def every_layout(problem: LayoutProblem) -> Iterator[Layout]:
     places = _placeable(problem)
     for count in range(min(problem.stock, len(places)) + 1):
         for layout in combinations(places, count):
-            if _is_legal(problem, layout):
+            with suppress(LayoutError):
+                Placement.of(problem.scenario, layout)
                 yield layout
-
-
-def _is_legal(problem: LayoutProblem, layout: Layout) -> bool:
-    try:
-        Placement.of(problem.scenario, layout)
-    except LayoutError:
-        return False
-    return True
 
 
 def _placeable(problem: LayoutProblem) -> list[Element]:
@@ -326,3 +307,56 @@ def _placeable(problem: LayoutProblem) -> list[Element]:
 def _count_text(count: int) -> str:
     """Return a count, of which a few digits are enough when it is large."""
     return f"{count:,}" if count < 1_000_000 else f"{count:.3g}"
+
+
+@dataclass(frozen=True)
+class BestRuleSearch(Search):
+    """Lets the layouts of all rules meet the threats, and takes the best: a careful engineer.
+
+    Of as many rules as the budget pays for; there are at most nine. Against a hidden charge each
+    meets all threats if the budget lasts.
+    """
+
+    name: str = "best_rule"
+
+    def plan(self, problem: LayoutProblem, budget: int) -> Plan:
+        """Let each layout meet as many threats as the budget pays for."""
+        layouts = len(_layouts(problem))
+        return Plan(max(1, min(len(problem.threats), budget // layouts)), budget)
+
+    def explore(self, session: SearchSession) -> None:
+        """Try all of them."""
+        session.assess(_layouts(session.problem))
+
+
+@dataclass(frozen=True)
+class FromRulesSearch:
+    """Lets another search begin with the layouts of all rules.
+
+    Attributes:
+        method: The other search.
+    """
+
+    method: AnnealingSearch | GeneticSearch | WinnersSearch
+
+    @property
+    def name(self) -> str:
+        """Name of the other one, and that it begins with the rules."""
+        return f"{self.method.name}_from_rules"
+
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+    ) -> SearchResult:
+        """Return what the other search finds."""
+        method = replace(self.method, initial=_layouts(problem))
+        return replace(method.propose(problem, budget, seed, report), method=self.name)
+
+
+ANNEALING_FROM_RULES: Final = FromRulesSearch(AnnealingSearch())
+WINNERS_FROM_RULES: Final = FromRulesSearch(WinnersSearch())
+GENETIC_FROM_RULES: Final = FromRulesSearch(GeneticSearch())
+
+
+def _layouts(problem: LayoutProblem) -> tuple[Layout, ...]:
+    """Return the rules' layouts, each once."""
+    return tuple(dict.fromkeys(layouts_by_rule(problem.scenario, problem.told).values()))

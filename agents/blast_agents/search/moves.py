@@ -16,7 +16,6 @@ from blast_env.scenario import Catalogue, Placement, Scenario
 Draw = Callable[[Scenario, np.random.Generator], Layout]
 """Draws a legal layout to begin with."""
 
-
 _LEAST_WALL: Final = 2
 
 
@@ -205,14 +204,9 @@ class Moves:
         but: Element | None = None,
         like: Element | None = None,
     ) -> Element:
-        """Return something that can be placed near an element.
+        """Return something that can be placed near an element; something besides `but` should be.
 
-        Args:
-            placement: What stands; something besides `but` should be possible.
-            beside: What it is to be near.
-            rng: Decides it.
-            but: What it is not to be, unless nothing else is possible.
-            like: Of which item it is to be, if that is possible.
+        It is not `but`, unless nothing else is possible; of the item of `like`, if that is.
         """
         legal, catalogue = placement.legal, placement.catalogue
         if catalogue.has_items:
@@ -261,10 +255,7 @@ def _gaps(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return how many rows and columns lie between places and an element; 1 if they touch.
 
-    Args:
-        catalogue: Of the zone.
-        places: Numbers of variants, rows and columns of their lower left cells.
-        beside: The element.
+    Places are numbers of variants, rows and columns of their lower left cells.
     """
     numbers, rows, columns = places
     sizes = np.array([(each.rows, each.columns) for each in catalogue.variants])[numbers]

@@ -5,7 +5,7 @@ Needs the extra `search`.
 
 from collections.abc import Callable, Sequence
 from math import cos, pi, sin
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,10 @@ def layout_of(scenario: Scenario, actions: BoolArray) -> Layout:
     return tuple(sorted(catalogue.element(int(action)) for action in np.flatnonzero(actions)))
 
 
+_MIXED_SHARE: Final = 0.3
+"""Share of the crossed pairs that are mixed and not cut."""
+
+
 class SpatialCrossover(Crossover):
     """Children with the modules of one parent on one side and the other's on the other side.
 
@@ -54,27 +58,20 @@ class SpatialCrossover(Crossover):
     Args:
         scenario: The scenario.
         prob: Share of the pairs that are crossed at all.
-        mixed_share: Share of the crossed pairs that are mixed and not cut.
     """
 
-    def __init__(self, scenario: Scenario, prob: float, mixed_share: float = 0.3) -> None:
+    def __init__(self, scenario: Scenario, prob: float) -> None:
         super().__init__(2, 2, prob=prob)
-        self._scenario, self._mixed_share = scenario, mixed_share
+        self._scenario = scenario
 
-    def _do(
-        self,
-        _problem: Any,
-        actions: BoolArray,
-        *_: Any,
-        random_state: np.random.Generator,
-        **_options: Any,
-    ) -> BoolArray:
+    def _do(self, _problem: Any, actions: BoolArray, *_: Any, **options: Any) -> BoolArray:
+        rng: np.random.Generator = options["random_state"]
         children = np.empty_like(actions)
         for pair in range(actions.shape[1]):
             parents = [layout_of(self._scenario, actions[each, pair]) for each in (0, 1)]
-            cross = mixed if random_state.random() < self._mixed_share else cut
+            cross = mixed if rng.random() < _MIXED_SHARE else cut
             for child, (first, second) in enumerate((parents, parents[::-1])):
-                layout = cross(first, second, random_state)
+                layout = cross(first, second, rng)
                 children[child, pair] = individual(self._scenario, layout)
         return children
 
@@ -99,29 +96,16 @@ def mixed(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
 
 
 class MoveMutation(Mutation):
-    """A few moves of the neighbourhood that annealing uses too.
-
-    Args:
-        moves: The neighbourhood.
-        more: How likely each further move is after the first.
-    """
+    """A few moves of the neighbourhood that annealing uses too."""
 
     def __init__(self, moves: Moves, more: float) -> None:
         super().__init__(prob=1.0)
         self._moves, self._more = moves, more
 
-    def _do(
-        self,
-        _problem: Any,
-        actions: BoolArray,
-        *_: Any,
-        random_state: np.random.Generator,
-        **_options: Any,
-    ) -> BoolArray:
+    def _do(self, _problem: Any, actions: BoolArray, *_: Any, **options: Any) -> BoolArray:
+        rng: np.random.Generator = options["random_state"]
         scenario = self._moves.scenario
-        return np.array(
-            [individual(scenario, self._changed(each, random_state)) for each in actions]
-        )
+        return np.array([individual(scenario, self._changed(each, rng)) for each in actions])
 
     def _changed(self, actions: BoolArray, rng: np.random.Generator) -> Layout:
         scenario = self._moves.scenario
@@ -133,29 +117,17 @@ class MoveMutation(Mutation):
 
 
 class LayoutRepair(Repair):
-    """Leaves out modules or pieces of a child, at random, until all conditions hold.
-
-    Args:
-        scenario: The scenario.
-    """
+    """Leaves out modules or pieces of a child, at random, until all conditions hold."""
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__()
         self._scenario = scenario
 
-    def _do(
-        self,
-        _problem: Any,
-        actions: BoolArray,
-        *_: Any,
-        random_state: np.random.Generator,
-        **_options: Any,
-    ) -> BoolArray:
-        layouts = (
-            repaired(self._scenario, layout_of(self._scenario, each), random_state)
-            for each in actions
-        )
-        return np.array([individual(self._scenario, layout) for layout in layouts])
+    def _do(self, _problem: Any, actions: BoolArray, *_: Any, **options: Any) -> BoolArray:
+        rng: np.random.Generator = options["random_state"]
+        scenario = self._scenario
+        layouts = (repaired(scenario, layout_of(scenario, each), rng) for each in actions)
+        return np.array([individual(scenario, layout) for layout in layouts])
 
 
 def repaired(scenario: Scenario, layout: Layout, rng: np.random.Generator) -> Layout:
@@ -180,11 +152,7 @@ def operators(
 ) -> dict[str, Any]:
     """Return pymoo's arguments for how layouts are crossed, changed and repaired.
 
-    Args:
-        moves: The neighbourhood that mutation draws from.
-        first: The layouts of the first population; what is there twice is left out.
-        crossed_share: Share of the pairs of parents that are crossed.
-        more_moves: How likely a child is changed by each further move after the first.
+    What is there twice of the first population is left out. For the shares see `GeneticSearch`.
     """
     scenario = moves.scenario
     return {
@@ -197,13 +165,7 @@ def operators(
 
 
 def evolve(session: SearchSession, algorithm: Any, objectives: Objectives) -> None:
-    """Let an algorithm go on until the session ends it or it finds no new layouts.
-
-    Args:
-        session: Ends it by `SearchEndedError`; its seed decides everything that is drawn.
-        algorithm: One of pymoo's genetic algorithms.
-        objectives: Asks the session.
-    """
+    """Let an algorithm go on until the session ends it or it finds no new layouts."""
     scenario = session.problem.scenario
     count = objectives([]).shape[1]
     problem = Problem(n_var=scenario.zone.catalogue.finish, n_obj=count, vtype=bool)

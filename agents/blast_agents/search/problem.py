@@ -44,7 +44,6 @@ class LayoutProblem:
     meter: BlastMeter | None = None
 
     def __post_init__(self) -> None:
-        """Check that there is something to search."""
         check_distinct(self.case.threats)
         if self.scenario.build_zone is None:
             raise BlastEnvError(f"{self.scenario.name} has no build zone: no layout to search for")

@@ -82,7 +82,6 @@ def _rules(module: str, *titles: str, needs: Collection[Need] = ()) -> Mapping[s
 
 _METHODS: Final = "blast_agents.search.methods"
 _EVOLUTION: Final = "blast_agents.search.evolution"
-_BY_RULE: Final = "blast_agents.search.by_rule"
 _RULES: Final = "blast_agents.rules"
 _POSTS: Final = "blast_agents.posts"
 
@@ -98,15 +97,15 @@ _TABLE: Final[Mapping[str, ProposerRow]] = MappingProxyType(
         "greedy": ProposerRow(f"{_METHODS}:GreedySearch", "greedy search"),
         "random": ProposerRow(f"{_METHODS}:RandomSearch", "random search"),
         "exhaustive": ProposerRow(f"{_METHODS}:ExhaustiveSearch", "exhaustive search"),
-        "best_rule": ProposerRow(f"{_BY_RULE}:BestRuleSearch", "the best rule"),
+        "best_rule": ProposerRow(f"{_METHODS}:BestRuleSearch", "the best rule"),
         "annealing_from_rules": ProposerRow(
-            f"{_BY_RULE}:ANNEALING_FROM_RULES", "annealing from the rules"
+            f"{_METHODS}:ANNEALING_FROM_RULES", "annealing from the rules"
         ),
         "winners_from_rules": ProposerRow(
-            f"{_BY_RULE}:WINNERS_FROM_RULES", "annealing by several walkers from the rules"
+            f"{_METHODS}:WINNERS_FROM_RULES", "annealing by several walkers from the rules"
         ),
         "genetic_from_rules": ProposerRow(
-            f"{_BY_RULE}:GENETIC_FROM_RULES", "genetic search from the rules"
+            f"{_METHODS}:GENETIC_FROM_RULES", "genetic search from the rules"
         ),
         "surrogate": ProposerRow(
             "blast_agents.surrogate.search:packaged_search",
@@ -158,12 +157,7 @@ def proposer_row(name: str) -> ProposerRow:
 
 
 def check_suits(name: str, scenario: Scenario) -> None:
-    """Refuse a proposer for a site that lacks what it needs.
-
-    Raises:
-        BlastEnvError: If something is missing.
-        UnknownNameError: As for `proposer_row`.
-    """
+    """Refuse a proposer for a site that lacks what it needs."""
     for need in proposer_row(name).needs:
         if not need.is_met(scenario):
             raise BlastEnvError(f"{scenario.name} has no {need.value}: {name} is of no use there")

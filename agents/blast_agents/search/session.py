@@ -17,14 +17,11 @@ from blast_env.values import generator
 LAYOUTS_PER_REALISATION: Final = 500
 """A known charge is met with one fan and air more for so many layouts that the budget pays for."""
 
-
 CHARGES_PER_ROOT_BLAST: Final = 0.3
 """Of a hidden charge's places a layout meets so many times the square root of the budget."""
 
-
 CONFIRMED_LAYOUTS: Final = 32
 """Layouts of which the blasts that are held back can pay for all threats."""
-
 
 MOST_CONFIRMING_SHARE: Final = 0.2
 """Largest share of the budget that is held back to let the best layouts meet more threats."""
@@ -145,12 +142,8 @@ class SearchSession:
     def run(self, explore: Callable[[], None], choose: Callable[[], None]) -> bool:
         """Explore until the blasts for it are spent, then let the best meet more threats.
 
-        Args:
-            explore: Asks `assess` until it is through or `SearchEndedError` comes.
-            choose: Does the same with what was held back.
-
-        Returns:
-            Whether it was interrupted.
+        Both ask `assess` until they are through or `SearchEndedError` comes. Returns whether that
+        was interrupted.
         """
         try:
             self._until_ended(explore)

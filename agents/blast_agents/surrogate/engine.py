@@ -54,7 +54,6 @@ class SurrogateEngine(Engine):
     )
 
     def __post_init__(self) -> None:
-        """Work out the digest, which tells results of different surrogates apart."""
         object.__setattr__(self, "digest", self.surrogate.digest)
         object.__setattr__(self, "version", f"{SURROGATE} {self.digest}")
 
@@ -67,18 +66,9 @@ class SurrogateEngine(Engine):
     ) -> BlastLoads:
         """Return what the surrogate guesses, a charge and a layout at a time.
 
-        Args:
-            scenario: The scenario.
-            layout: A legal layout.
-            charge: What goes off: where it does, or the vehicle that brings it.
-            seed: Changes nothing: guesses have no noise.
-
         Returns:
             The loads. Those of a structure's modules are all the same, since only their mean is
             known.
-
-        Raises:
-            BlastEnvError: If nothing is protected.
         """
         site = self._site(scenario)
         guess = self.surrogate.guess(site, [layout], [charge_against(scenario, layout, charge)])

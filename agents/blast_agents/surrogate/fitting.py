@@ -45,7 +45,6 @@ _LEAST_SCALE: Final = 1e-3
 _LEAST_CASE: Final = 8
 """Layouts that a case must have for its rank correlation to count."""
 
-
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 
 
@@ -99,9 +98,6 @@ class Samples:
         Args:
             blasts: The table.
             scenarios: By content hash; rows of others are left out.
-
-        Raises:
-            BlastEnvError: If no row is left.
         """
         known = blasts["protected"] & blasts["scenario_hash"].isin(list(scenarios))
         rows = blasts[known & (blasts["impulse_pa_s"] > 0.0) & (blasts["peak_pa"] > 0.0)]

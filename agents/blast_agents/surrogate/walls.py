@@ -60,13 +60,7 @@ class WallPoints:
 
     @classmethod
     def on(cls, structure: AnyStructure, height_m: float, apart: float = 1.0) -> "WallPoints":
-        """Put points on a structure, one a metre along a wall and 1.5 m of its height, or so.
-
-        Args:
-            structure: The structure.
-            height_m: Its height.
-            apart: How many times as far from each other points are.
-        """
+        """Put points on a structure, one a metre along a wall and 1.5 m of its height, or so."""
         left, bottom, right, top = structure.rectangle_m
         rise_m = height_m - structure.base_m
         levels = max(1, round(rise_m / (_UP_M * apart)))
@@ -141,9 +135,6 @@ class SurrogateSite:
 
     What begins above the ground stops nothing, as if it were not there: the surrogate never met it.
 
-    Args:
-        scenario: The scenario.
-
     Attributes:
         scenario: The scenario.
         protected: Its protected structures.
@@ -179,11 +170,7 @@ class SurrogateSite:
         return self._approaches[charge]
 
     def barrier(self, layout: Sequence[Element]) -> FloatArray:
-        """Return left, bottom, right, top and height of what a layout sets down, m (pieces, 5).
-
-        Raises:
-            LayoutError: If the catalogue has no such piece.
-        """
+        """Return left, bottom, right, top and height of what a layout sets down, m (pieces, 5)."""
         zone, air_m = self.scenario.zone, self.scenario.air_height_m
         rows = [
             [*zone.element_rectangle_m(each), zone.catalogue.variant(each).height_m or air_m]
@@ -219,12 +206,7 @@ class SurrogateSite:
 
 
 def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> float:
-    """Return how many times as far apart points are as on a small site, so that they are not many.
-
-    Args:
-        structures: All that are protected.
-        heights_m: Their heights.
-    """
+    """Return how many times as far apart points are as on a small site, not to be many."""
     area_m2 = 0.0
     for structure, height_m in zip(structures, heights_m, strict=True):
         left, bottom, right, top = structure.rectangle_m

@@ -105,8 +105,7 @@ class Ways:
     def behind(self, barrier: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return to which points a barrier stops ways, and what is open to these.
 
-        Args:
-            barrier: As for `shares`.
+        Arguments as for `shares`.
 
         Returns:
             Numbers of the points (behind,), and their shares (behind, SHARES).

@@ -24,10 +24,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecTransposeImage
 
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy, ZonePolicy
 from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.hyperparameters import (
-    CommonHyperparameters,
-    schedule,
-)
+from blast_agents.training.hyperparameters import CommonHyperparameters, schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from blast_env.engines import Engine
 from blast_env.envs.arguments import check_names
@@ -35,6 +32,7 @@ from blast_env.envs.observations import (
     OBSERVATIONS,
     Array,
     EpisodeObservation,
+    ModuleLoads,
     Observable,
     SimulatedModuleLoads,
     item_channels,
@@ -47,7 +45,6 @@ from blast_env.geometry import Layout
 from blast_env.scenario import (
     AnyCharge,
     AnyScenario,
-    AnySource,
     Placement,
     Scenario,
     find_scenario,
@@ -56,12 +53,9 @@ from blast_env.scenario.vehicles import source_of
 
 Model = PPO | MaskablePPO
 
-
 Policy = ActorCriticPolicy | MaskableActorCriticPolicy
 
-
 _PLACES: Final = {"visible": 1, "hidden": 9}
-
 
 AnyOf = TypeVar("AnyOf", bound=CommonHyperparameters)
 
@@ -94,11 +88,7 @@ def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenari
 
 
 def check_fit(configuration: RunConfiguration, scenario: Scenario, folder: RunFolder) -> None:
-    """Refuse hyperparameters that are none for the scenario's build zone.
-
-    Raises:
-        BlastEnvError: If there are such.
-    """
+    """Refuse hyperparameters that are none for the scenario's build zone."""
     found = configuration.hyperparameters
     wanted = fitted(found, configuration.settings, scenario)
     for name, value in found.policy_kwargs:
@@ -210,9 +200,7 @@ def _policy_class(configuration: RunConfiguration) -> tuple[type[Any], dict[str,
 
 _ARCHIVE: Final = ".zip"
 
-
 _ARCHIVES_HOLD_CODE: Final = "such archives may hold pickled code, which runs when they are read"
-
 
 _SCHEDULES: Final = ("learning_rate", "lr_schedule", "clip_range", "clip_range_vf")
 """What only training needs; in RL Zoo's archives objects of classes that may not be installed."""
@@ -239,7 +227,6 @@ class TrainedAgent:
     engine: str | Engine = "event"
 
     def __post_init__(self) -> None:
-        """Refuse an observation that there is none of."""
         check_names("observation", [self.observation], OBSERVATIONS)
 
     @cached_property
@@ -251,14 +238,8 @@ class TrainedAgent:
         return digest.hexdigest()[:16]
 
     @cached_property
-    def _evaluators(self) -> Evaluators:
-        return Evaluators(self.engine)
-
-    def _module_loads(
-        self, scenario: Scenario, sources: tuple[AnySource, ...], blasts: int
-    ) -> NDArray[np.float64]:
-        """Return loads as the observation asks for them; nothing is made ready before."""
-        return SimulatedModuleLoads(self._evaluators)(scenario, sources, blasts)
+    def _module_loads(self) -> SimulatedModuleLoads:
+        return SimulatedModuleLoads(Evaluators(self.engine))
 
     def propose(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
         """Return the layout of the most likely legal actions.
@@ -301,12 +282,6 @@ class TrainedAgent:
         self, scenario: Scenario, charge: AnyCharge | None, draw: torch.Generator | None, count: int
     ) -> tuple[Layout, ...]:
         check_size(scenario, self.representative)
-        with torch_threads(1):  # for a few small sums more of them only wait
-            return self._placed(scenario, charge, draw, count)
-
-    def _placed(
-        self, scenario: Scenario, charge: AnyCharge | None, draw: torch.Generator | None, count: int
-    ) -> tuple[Layout, ...]:
         episode = self._episode(scenario, charge)
         catalogue = scenario.zone.catalogue
         placements = [Placement.empty(scenario)] * count
@@ -318,7 +293,8 @@ class TrainedAgent:
             observations = np.stack([episode.observe(each) for each in different.values()])
             legal = np.stack([each.legal.ravel() for each in different.values()])
             numbers = [number_of[placements[index].layout] for index in open_ones]
-            actions = self._actions(observations, legal, numbers, draw)
+            with torch_threads(1):  # for a few small sums more of them only wait
+                actions = self._actions(observations, legal, numbers, draw)
             going_on = []
             for index, action in zip(open_ones, actions, strict=True):
                 if action == catalogue.finish:
@@ -330,11 +306,11 @@ class TrainedAgent:
         return tuple(placement.layout for placement in placements)
 
     def _episode(self, scenario: Scenario, charge: AnyCharge | None) -> EpisodeObservation:
-        sources = scenario.charge
-        if charge is not None:
-            sources = (source_of(charge),)
+        sources = scenario.charge if charge is None else (source_of(charge),)
         among_vehicles = bool(self.representative.vehicles)
-        observable = Observable(scenario, sources, self._module_loads, among_vehicles)
+        # Whoever shows no loads needs no engine: it is looked for when they are asked for.
+        module_loads: ModuleLoads = lambda *asked: self._module_loads(*asked)  # noqa: E731
+        observable = Observable(scenario, sources, module_loads, among_vehicles)
         return OBSERVATIONS[self.observation].episode(observable)
 
     def _actions(

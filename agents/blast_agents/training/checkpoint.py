@@ -10,9 +10,17 @@ from zipfile import ZIP_STORED, BadZipFile, ZipFile
 
 import torch
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from stable_baselines3.common.policies import BasePolicy
 from torch import nn
 
-from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunConfiguration
+from blast_agents.training.run_folder import (
+    EvaluationRow,
+    RolloutRow,
+    RunConfiguration,
+    RunFolder,
+    check_format,
+    write_rows,
+)
 from blast_env.documents import described
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import write_atomically
@@ -27,16 +35,8 @@ Weights = Mapping[str, torch.Tensor]
 class Counters:
     """How far a training run is.
 
-    Attributes:
-        steps: Steps of all environments.
-        rollouts: Rollouts with their updates.
-        updates: Passes over rollouts.
-        episodes: Episodes that ended.
-        blasts: Blasts simulated.
-        cache_hits: Loads that needed no blast.
-        seconds: Time that the training has taken.
-        best_reduction: Of the best evaluation; minus infinity before the first.
-        best_steps: Steps at that evaluation.
+    A step is one of any environment, an update a pass over rollouts. The best evaluation is minus
+    infinity before the first.
     """
 
     steps: int = 0
@@ -65,7 +65,7 @@ class CaseLabel:
     unprotected: tuple[float, ...]
 
 
-_LABELS: Final = TypeAdapter(tuple[CaseLabel, ...])
+_LABELS: Final = TypeAdapter(list[CaseLabel])
 
 
 class Checkpoint(BaseModel):
@@ -86,7 +86,7 @@ class Checkpoint(BaseModel):
         labels: What self-labelling has found, a label a case.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
     format: Literal[2] = CHECKPOINT_FORMAT
     configuration: RunConfiguration
@@ -94,20 +94,15 @@ class Checkpoint(BaseModel):
     policy: dict[str, torch.Tensor]
     optimizer: dict[str, Any]
     best_policy: dict[str, torch.Tensor]
-    rollouts: tuple[RolloutRow, ...] = ()
-    evaluations: tuple[EvaluationRow, ...] = ()
-    labels: tuple[CaseLabel, ...] = ()
+    rollouts: list[RolloutRow] = []
+    evaluations: list[EvaluationRow] = []
+    labels: list[CaseLabel] = []
 
     @classmethod
     def of_start(
         cls, configuration: RunConfiguration, weights: Weights = MappingProxyType({})
     ) -> "Checkpoint":
-        """Return the checkpoint of a run that has not done anything.
-
-        Args:
-            configuration: Of the run.
-            weights: Those that it begins with; fresh ones unless given.
-        """
+        """Return the checkpoint of a run that has not done anything."""
         return cls(
             configuration=configuration,
             counters=Counters(),
@@ -121,12 +116,10 @@ class Checkpoint(BaseModel):
         """Whether there has not been a rollout."""
         return self.counters.rollouts == 0
 
-    def save(self, path: Path) -> None:
-        """Write the checkpoint; the file is complete or as it was.
-
-        Raises:
-            BlastEnvError: If it cannot be written.
-        """
+    def save(self, path: Path, policy: BasePolicy | None = None) -> None:
+        """Write the checkpoint, as a policy is now; the file is complete or as it was."""
+        if policy is not None:
+            self.policy, self.optimizer = policy.state_dict(), policy.optimizer.state_dict()
         content = {
             "format": self.format,
             "configuration": self.configuration.document(),
@@ -146,19 +139,11 @@ class Checkpoint(BaseModel):
 
     @classmethod
     def load(cls, path: Path) -> "Checkpoint":
-        """Read a checkpoint; nothing but tensors and plain data is accepted.
-
-        Raises:
-            BlastEnvError: If there is none, or it is damaged.
-        """
+        """Read a checkpoint; nothing but tensors and plain data is accepted."""
         if not path.is_file():
             raise BlastEnvError(f"{path}: there is no such checkpoint")
         content = load_archive(path, "no checkpoint")
-        found = content.get("format") if isinstance(content, dict) else None
-        if found != CHECKPOINT_FORMAT:
-            raise BlastEnvError(
-                f"{path}: is of format {value_text(found)}, must be {CHECKPOINT_FORMAT}"
-            )
+        check_format(path, content, CHECKPOINT_FORMAT)
         try:
             return cls.model_validate(content)
         except ValidationError as error:
@@ -166,17 +151,15 @@ class Checkpoint(BaseModel):
                 f"{path}: is damaged, or no checkpoint: {described(error)}"
             ) from error
 
+    def write_tables(self, folder: RunFolder) -> None:
+        """Write the tables for people."""
+        write_rows(folder.rollouts, RolloutRow, self.rollouts)
+        write_rows(folder.evaluations, EvaluationRow, self.evaluations)
+
     def check_configuration(self, configuration: RunConfiguration, place: Path) -> None:
         """Refuse the configuration of another run: with it the weights would say other things.
 
         Only `steps` may differ, the steps to train for: a run may be made longer or shorter.
-
-        Args:
-            configuration: As the run folder has it.
-            place: The folder, for the error.
-
-        Raises:
-            BlastEnvError: If anything else differs.
         """
         own, given = dict(_flat(self.configuration.document())), _flat(configuration.document())
         for name, value in given:
@@ -191,11 +174,6 @@ class Checkpoint(BaseModel):
     ) -> None:
         """Give a policy the weights.
 
-        Args:
-            policy: The policy.
-            place: Where they come from, for the error.
-            weights: Those of the best evaluation, or the last ones.
-
         Raises:
             BlastEnvError: If there are none yet, or they are those of another policy.
         """
@@ -208,34 +186,21 @@ class Checkpoint(BaseModel):
             )
         load_weights(policy, values, place)
 
-    def load_optimizer(self, optimizer: torch.optim.Optimizer, place: Path) -> None:
-        """Give an optimiser its state.
-
-        Args:
-            optimizer: That of the policy.
-            place: Where the state comes from, for the error.
-
-        Raises:
-            BlastEnvError: If it does not fit.
-        """
+    def load_into(self, policy: BasePolicy, place: Path) -> None:
+        """Give a policy the last weights, and its optimiser its state, as far as there are some."""
+        if self.policy:
+            self.load_policy(policy, place)
+        if self.is_start:
+            return
         try:
-            optimizer.load_state_dict(self.optimizer)
+            policy.optimizer.load_state_dict(self.optimizer)
         # torch says in errors of many kinds what does not fit.
         except Exception as error:
             raise BlastEnvError(f"{place}: the optimiser's state does not fit: {error}") from error
 
 
 def load_weights(policy: nn.Module, values: Weights, place: Path) -> None:
-    """Give a policy weights.
-
-    Args:
-        policy: The policy.
-        values: The weights, by name.
-        place: Where they come from, for the error.
-
-    Raises:
-        BlastEnvError: If they are those of another policy, or not finite.
-    """
+    """Give a policy weights."""
     try:
         policy.load_state_dict(values)
     # torch says in errors of many kinds what does not fit.
@@ -248,15 +213,7 @@ def load_weights(policy: nn.Module, values: Weights, place: Path) -> None:
 
 
 def load_archive(path: Path, otherwise: str) -> Any:
-    """Return what torch has saved; nothing but tensors and plain data is accepted.
-
-    Args:
-        path: The file.
-        otherwise: What it is if it is not damaged, for the error.
-
-    Raises:
-        BlastEnvError: If it is anything else.
-    """
+    """Return what torch has saved; nothing but tensors and plain data is accepted."""
     try:
         _check_archive(path)
         content = torch.load(path, map_location="cpu", weights_only=True)

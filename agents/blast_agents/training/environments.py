@@ -13,12 +13,12 @@ from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from blast_agents.training.hyperparameters import DEFAULT_SECTION
-from blast_agents.training.run_folder import RunConfiguration, TrainingSettings
+from blast_agents.training.run_folder import RunConfiguration
 from blast_env.engines import Engine
 from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
 from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
-from blast_env.envs.strategies import ScenarioSource, scenario_source
+from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Evaluators
 from blast_env.evaluation.store import BlastCache, LoadsCache
 from blast_env.runner import workers_told
@@ -29,10 +29,16 @@ from blast_env.values import checked_seed, real_number, whole_number
 _Env = gym.Env[Array, np.int64]
 
 
-_Wrapper = gym.Wrapper[Array, np.int64, Array, np.int64]
+class _Masked(gym.Wrapper[Array, np.int64, Array, np.int64]):
+    """A wrapper that hands on which actions are legal."""
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are legal now, (actions,)."""
+        masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
+        return masks
 
 
-class RelativeReward(_Wrapper):
+class RelativeReward(_Masked):
     """Pays the reduction when the charge goes off: the share of the impulse that is gone.
 
     Minus the impulse, the environment's own reward, depends most of all on where the charge is.
@@ -60,13 +66,8 @@ class RelativeReward(_Wrapper):
             reward -= self.illegal_action_cost
         return observation, reward, ended, truncated, info
 
-    def action_masks(self) -> NDArray[np.bool_]:
-        """Return which actions are legal now, (actions,)."""
-        masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
-        return masks
 
-
-class ThreatPool(_Wrapper):
+class ThreatPool(_Masked):
     """Draws the episodes, with their sites and charges, from a set that is fixed once for all.
 
     The blast without a barrier is then the same again and again, and the environment remembers
@@ -96,18 +97,11 @@ class ThreatPool(_Wrapper):
             self._rng = np.random.default_rng(seed)
         return self.env.reset(seed=self.seeds[self._rng.integers(len(self.seeds))], options=options)
 
-    def action_masks(self) -> NDArray[np.bool_]:
-        """Return which actions are legal now, (actions,)."""
-        masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
-        return masks
-
 
 SITES_ID: Final = "BlastBarrierSites-v0"
 
-
 _LOADS: Final = 8192
 """Loads that an environment remembers, so that a site that comes again costs no blast twice."""
-
 
 _FORK_SERVER: Final = "forkserver"
 """How stable-baselines3 starts processes where the system can."""
@@ -120,19 +114,6 @@ def environment_id(scenario: str) -> str:
     if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE | FOR_GAS:
         return barrier_id(scenario)
     return DEFAULT_SECTION
-
-
-def training_source(scenario: str) -> ScenarioSource:
-    """Return where the episodes of training get their scenario from.
-
-    Args:
-        scenario: Bundled name, path of a scenario file, or `"sites"`.
-
-    Raises:
-        ScenarioError: If there is no such scenario, or anything is wrong with it.
-        BlastEnvError: If it has no build zone.
-    """
-    return scenario_source(scenario)
 
 
 class SharedBlastsVecEnv(DummyVecEnv):
@@ -180,14 +161,7 @@ class SharedBlastsVecEnv(DummyVecEnv):
 
 @dataclass(frozen=True)
 class EnvironmentMaker:
-    """Makes one of the parallel environments; can be sent to another process.
-
-    Attributes:
-        configuration: Of the run.
-        source: Gives the episodes their scenario.
-        index: Which one it is.
-        cache: Where it looks for loads; a memory of its own unless given.
-    """
+    """Makes one of the parallel environments; can be sent to another process."""
 
     configuration: RunConfiguration
     source: ScenarioSource
@@ -197,6 +171,7 @@ class EnvironmentMaker:
     def __call__(self) -> gym.Env[Any, Any]:
         """Return the environment with its wrappers."""
         settings = self.configuration.settings
+        threats = {"threats": settings.hidden_threats} if settings.threat == "hidden" else {}
         env: gym.Env[Any, Any] = gym.make(
             "blast_env:BlastBarrier-v0",
             disable_env_checker=True,
@@ -205,19 +180,17 @@ class EnvironmentMaker:
             engine=settings.blast_engine,
             observation=settings.observation,
             cache=LoadsCache(_LOADS) if self.cache is None else self.cache,
-            **_threat_arguments(settings),
+            threat=settings.threat,
+            **threats,
         )
         for name, arguments in self.configuration.ppo.wrappers():
             if name.endswith(RelativeReward.__name__):
                 env = RelativeReward(env, **arguments)
             else:
-                env = ThreatPool(env, **{"seed": self._pool_seed, **arguments})
+                sequence = np.random.SeedSequence((settings.seed, self.index))
+                own_seed = {"seed": int(sequence.generate_state(1)[0])}
+                env = ThreatPool(env, **(own_seed | arguments))
         return Monitor(env)
-
-    @property
-    def _pool_seed(self) -> int:
-        sequence = np.random.SeedSequence((self.configuration.settings.seed, self.index))
-        return int(sequence.generate_state(1)[0])
 
 
 def make_environments(configuration: RunConfiguration, source: ScenarioSource) -> VecEnv:
@@ -237,9 +210,3 @@ def make_environments(configuration: RunConfiguration, source: ScenarioSource) -
         # The processes are forks of one that has imported all this: once, not once each.
         get_context(_FORK_SERVER).set_forkserver_preload([__name__])
     return SubprocVecEnv([*makers])
-
-
-def _threat_arguments(settings: TrainingSettings) -> dict[str, Any]:
-    if settings.threat == "visible":
-        return {"threat": "visible"}
-    return {"threat": "hidden", "threats": settings.hidden_threats}

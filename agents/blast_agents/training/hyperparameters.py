@@ -1,7 +1,8 @@
 """Hyperparameters: read from YAML, changed by options `key=value`, and checked."""
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from operator import mul
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
@@ -9,96 +10,17 @@ from typing import Annotated, Any, Final, Literal
 import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from blast_env.documents import MAX_DEPTH, MAX_DIGITS, DocumentError, described
+from blast_env.documents import DocumentError, described, parse_json
 from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, UnknownNameError, shortened
 
-MOST_CHARACTERS: Final = 100_000
-"""PyYAML takes a second for so many."""
-
-
-class _PlainLoader(yaml.SafeLoader):
-    """Reads numbers, texts, lists and tables.
-
-    No aliases, with which a kilobyte becomes gigabytes; no keys twice; no dates, which are texts.
-    """
-
-    def __init__(self, stream: str) -> None:
-        super().__init__(stream)
-        self._depth = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-        if self.check_event(yaml.AliasEvent):
-            raise self._refused("has an alias, must have none", mark)
-        self._depth += 1
-        if self._depth > MAX_DEPTH:
-            raise self._refused(f"is nested too deeply: more than {MAX_DEPTH} levels", mark)
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        return node
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        mapping = super().construct_mapping(node, deep)
-        if len(mapping) < len(node.value):
-            raise self._refused("has a key twice", node.start_mark)
-        return mapping
-
-    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
-        if len(node.value) > MAX_DIGITS:
-            digits = len(node.value)
-            raise self._refused(f"has a number of {digits} digits, too large", node.start_mark)
-        return super().construct_yaml_int(node)
-
-    @staticmethod
-    def _refused(message: str, mark: yaml.Mark) -> DocumentError:
-        return DocumentError(f"line {mark.line + 1}, column {mark.column + 1}", message)
-
-
-_PLAIN_TAGS: Final = tuple(
-    f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "seq", "map")
-)
-_PlainLoader.yaml_constructors = {
-    **{tag: yaml.SafeLoader.yaml_constructors[tag] for tag in (*_PLAIN_TAGS, None)},
-    "tag:yaml.org,2002:int": _PlainLoader.construct_yaml_int,
-}
-_PlainLoader.yaml_implicit_resolvers = {
-    first: [(tag, expression) for tag, expression in resolvers if tag in _PLAIN_TAGS]
-    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
-
-
-def parse_yaml(text: str) -> Any:
-    """Return what the text of a YAML file holds.
-
-    Raises:
-        DocumentError: If it is not YAML, or has anything of what the loader above refuses.
-    """
-    if len(text) > MOST_CHARACTERS:
-        raise DocumentError("", f"has {len(text)} characters, must have at most {MOST_CHARACTERS}")
-    try:
-        return yaml.load(text, _PlainLoader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        place = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}"
-        raise DocumentError(place, f"is not YAML: {error.problem or error.context}") from error
-    except DocumentError:
-        raise
-    # Of a character that is none, or of values such as `0b_` or `!!bool x`.
-    except (yaml.YAMLError, ValueError, KeyError) as error:
-        raise DocumentError("", f"is not YAML: {' '.join(str(error).split())[:200]}") from error
-
 
 def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
-    """Return the values of options.
-
-    Args:
-        options: `"key=value"` each; values are read as YAML.
-        known: The keys that there are.
+    """Return the values of options, `"key=value"` each; a value that is no JSON is a text.
 
     Raises:
         UnknownNameError: If there is no such key; the message names the nearest one.
-        BlastEnvError: If an option has no `=`, or its value is not YAML.
+        BlastEnvError: If an option has no `=`.
     """
     values = {}
     for option in options:
@@ -107,7 +29,10 @@ def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any
             raise BlastEnvError(f"--set {shortened(option)!r}: must be key=value")
         if key not in known:
             raise UnknownNameError("setting", key, known)
-        values[key] = _value(option, text)
+        try:
+            values[key] = parse_json(text)
+        except DocumentError:
+            values[key] = text
     return values
 
 
@@ -135,20 +60,6 @@ def option_names(model: type[BaseModel]) -> list[str]:
     return names
 
 
-def _value(option: str, text: str) -> Any:
-    """Return a value; `3e-4` is a number, though YAML wants `3.0e-4`."""
-    try:
-        value = parse_yaml(text)
-    except DocumentError as error:
-        raise BlastEnvError(f"--set {shortened(option)!r}: the value {error.message}") from error
-    if isinstance(value, str):
-        try:
-            return float(value)
-        except ValueError:
-            return value
-    return value
-
-
 LINEAR: Final = "lin_"
 
 
@@ -170,51 +81,30 @@ Amount = Annotated[float | str, AfterValidator(_checked)]
 """A number from 0 to 1, or `"lin_"` and a number: from that to 0 at the end of training."""
 
 
-@dataclass(frozen=True)
-class Falling:
-    """Falls in a straight line to 0.
-
-    Attributes:
-        start: What it begins with.
-    """
-
-    start: float
-
-    def __call__(self, share_left: float) -> float:
-        """Return the amount when a share of the training is left."""
-        return self.start * share_left
-
-
 def schedule(amount: float | str) -> float | Callable[[float], float]:
-    """Return an amount as stable-baselines3 takes it: a number, or a function."""
+    """Return an amount as stable-baselines3 takes it: a number, or one times what share is left."""
     if isinstance(amount, str):
-        return Falling(float(amount.removeprefix(LINEAR)))
+        return partial(mul, float(amount.removeprefix(LINEAR)))
     return amount
 
 
 PPO_ALGORITHMS: Final = ("ppo", "maskable_ppo")
 """Those of stable-baselines3 and sb3-contrib."""
 
-
 SELF_LABELLING: Final = "self_labelling"
 """Begins where the rules end and learns from its own best; see `training.self_labelling`."""
 
-
 ALGORITHMS: Final = (*PPO_ALGORITHMS, SELF_LABELLING)
-
 
 ALGORITHM_NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {"ppo": "PPO", "maskable_ppo": "MaskablePPO", SELF_LABELLING: "Self-labelling"}
 )
 """What people call them."""
 
-
 DEFAULT_SECTION: Final = "BlastBarrier-v0"
 """The section for scenarios that have none of their own."""
 
-
 _FOLDER: Final = Path(__file__).parents[1] / "hyperparameters"
-
 
 PolicyName = Literal[
     "blast_agents.policies.spatial.SpatialPolicy",
@@ -224,19 +114,11 @@ PolicyName = Literal[
 ]
 """Policies by the names that RL Zoo imports them by."""
 
-
-WRAPPERS: Final = (
-    "blast_agents.training.environments.RelativeReward",
-    "blast_agents.training.environments.ThreatPool",
-)
-
-
 WrapperName = Literal[
     "blast_agents.training.environments.RelativeReward",
     "blast_agents.training.environments.ThreatPool",
 ]
 """Wrappers of the environment, likewise."""
-
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -376,28 +258,19 @@ class SelfLabellingHyperparameters(CommonHyperparameters):
 
 AnyHyperparameters = Hyperparameters | SelfLabellingHyperparameters
 
-
 _MODELS: Final[Mapping[str, type[AnyHyperparameters]]] = MappingProxyType(
     dict.fromkeys(PPO_ALGORITHMS, Hyperparameters) | {SELF_LABELLING: SelfLabellingHyperparameters}
 )
 
 
 def hyperparameter_keys(algorithm: str) -> tuple[str, ...]:
-    """Return names that changes can have: `"policy_kwargs.width"` for an argument of the policy.
-
-    Raises:
-        UnknownNameError: If there is no such algorithm; the message names the nearest one.
-    """
+    """Return names that changes can have: `"policy_kwargs.width"` for an argument of the policy."""
     check_names("algorithm", [algorithm], ALGORITHMS)
     return tuple(option_names(_MODELS[algorithm]))
 
 
 def hyperparameter_file(algorithm: str) -> Path:
-    """Return the YAML file of an algorithm, which comes with the package.
-
-    Raises:
-        UnknownNameError: If there is no such algorithm; the message names the nearest one.
-    """
+    """Return the YAML file of an algorithm, which comes with the package."""
     check_names("algorithm", [algorithm], ALGORITHMS)
     return _FOLDER / f"{algorithm}.yml"
 

@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from blast_agents.training.agent import TrainedAgent, policy_for
 from blast_agents.training.checkpoint import Checkpoint, load_archive, load_weights
-from blast_agents.training.run_folder import RunConfiguration, RunFolder
-from blast_env.documents import DocumentError, checked_as, parse_json, read_text
+from blast_agents.training.run_folder import RunConfiguration, RunFolder, refusing
+from blast_env.documents import checked_as, parse_json, read_text
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
@@ -24,19 +24,7 @@ WEIGHTS: Final = Path(__file__).parents[1] / "weights"
 
 
 class LeagueResult(BaseModel):
-    """What the weights did where nothing was chosen by: a row of a league.
-
-    Attributes:
-        command: What played the league.
-        engine: The judge.
-        track: Name of the track.
-        cases: Cases of it.
-        reduction: Mean reduction of the load.
-        low: Lower end of its 95 % interval.
-        high: Upper end.
-        best_rule: Name of the rule that was best on the mean.
-        best_rule_reduction: Its mean reduction.
-    """
+    """What the weights did where nothing was chosen by: a row of a league."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -82,20 +70,7 @@ class Record(BaseModel):
 def pack(
     run: str | Path, name: str, league: LeagueResult | None = None, folder: Path = WEIGHTS
 ) -> list[Path]:
-    """Write the best weights of a run, and what belongs to them.
-
-    Args:
-        run: The run folder.
-        name: Of the files.
-        league: What they did in a league.
-        folder: It exists.
-
-    Returns:
-        The files.
-
-    Raises:
-        BlastEnvError: If it is no run folder, or damaged, or a file cannot be written.
-    """
+    """Write the best weights of a run, and what belongs to them."""
     source = RunFolder(Path(run))
     configuration, checkpoint = source.configuration(), Checkpoint.load(source.checkpoint)
     checkpoint.check_configuration(configuration, source.path)
@@ -125,19 +100,11 @@ def pack(
 
 
 def records(folder: Path | None = None) -> Iterator[tuple[Path, Record]]:
-    """Yield each file of weights with what belongs to it, by name.
-
-    Args:
-        folder: Where they are; `WEIGHTS` unless given.
-
-    Raises:
-        BlastEnvError: If a record is damaged.
-    """
+    """Yield each file of weights with what belongs to it, by name."""
     for path in sorted((folder or WEIGHTS).glob("*.json")):
-        try:
-            yield path.with_suffix(".pt"), checked_as(Record, parse_json(read_text(path)))
-        except DocumentError as error:
-            raise BlastEnvError(f"{path}: is damaged: {error}") from error
+        with refusing(path):
+            record = checked_as(Record, parse_json(read_text(path)))
+        yield path.with_suffix(".pt"), record
 
 
 def packaged_agent(
@@ -152,9 +119,6 @@ def packaged_agent(
         scenario: The scenario; its content decides, not its name.
         threat: Whether the agent is to be told the charge.
         folder: Where the weights are; `WEIGHTS` unless given.
-
-    Raises:
-        BlastEnvError: If a file is damaged.
     """
     found = [each for each in records(folder) if each[1].configuration.settings.threat == threat]
     for path, record in found:

@@ -1,7 +1,7 @@
 """What happens between two rollouts: seeds, evaluation, tables, checkpoint, learning curve."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 from statistics import fmean
@@ -13,18 +13,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import set_random_seed
 
 from blast_agents.surrogate.engine import is_surrogate
-from blast_agents.training.agent import Model, Policy, TrainedAgent
+from blast_agents.training.agent import Model, TrainedAgent
 from blast_agents.training.cases import Selection
-from blast_agents.training.checkpoint import CaseLabel, Checkpoint, Counters, Weights
+from blast_agents.training.checkpoint import Checkpoint, Counters
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
-from blast_agents.training.run_folder import (
-    EvaluationRow,
-    RolloutRow,
-    RunConfiguration,
-    RunFolder,
-    write_rows,
-)
-from blast_env.rendering.figures import save_figure
+from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunConfiguration, RunFolder
 from blast_env.rendering.site_plan import write_heading
 from blast_env.rendering.style import number_on_axis, render_extra
 from blast_env.scenario import Scenario
@@ -35,70 +28,20 @@ with render_extra():
     from matplotlib.ticker import FuncFormatter, PercentFormatter
 
 
-@dataclass
-class TrainingProgress:
-    """What a run has come to so far.
-
-    Attributes:
-        counters: How far it is.
-        rollouts: A row each.
-        evaluations: A row each.
-        best_policy: Weights of the best evaluation; none before the first one.
-    """
-
-    counters: Counters = field(default_factory=Counters)
-    rollouts: list[RolloutRow] = field(default_factory=list)
-    evaluations: list[EvaluationRow] = field(default_factory=list)
-    best_policy: Weights = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, checkpoint: Checkpoint) -> "TrainingProgress":
-        """Return what a run has come to at a checkpoint."""
-        return cls(
-            checkpoint.counters,
-            list(checkpoint.rollouts),
-            list(checkpoint.evaluations),
-            checkpoint.best_policy,
+def evaluate(so_far: Checkpoint, agent: TrainedAgent, selection: Selection) -> EvaluationRow:
+    """Evaluate a policy on held-out threats, and keep its weights if they are the best."""
+    reduction, counters = selection.reduction(agent), so_far.counters
+    row = EvaluationRow(
+        counters.steps, counters.episodes, *reduction, counters.blasts, counters.seconds
+    )
+    so_far.evaluations.append(row)
+    if reduction.value > counters.best_reduction:
+        so_far.counters = replace(
+            counters, best_reduction=reduction.value, best_steps=counters.steps
         )
-
-    def evaluate(self, agent: TrainedAgent, selection: Selection) -> EvaluationRow:
-        """Evaluate a policy on held-out threats, and keep its weights if they are the best."""
-        reduction, counters = selection.reduction(agent), self.counters
-        row = EvaluationRow(
-            counters.steps, counters.episodes, *reduction, counters.blasts, counters.seconds
-        )
-        self.evaluations.append(row)
-        if reduction.value > counters.best_reduction:
-            self.counters = replace(
-                counters, best_reduction=reduction.value, best_steps=counters.steps
-            )
-            weights = agent.policy.state_dict()
-            self.best_policy = {name: value.clone() for name, value in weights.items()}
-        return row
-
-    def checkpoint(
-        self, configuration: RunConfiguration, policy: Policy, labels: tuple[CaseLabel, ...] = ()
-    ) -> Checkpoint:
-        """Return the checkpoint of the run as it is now."""
-        return Checkpoint(
-            configuration=configuration,
-            counters=self.counters,
-            policy=policy.state_dict(),
-            optimizer=policy.optimizer.state_dict(),
-            best_policy=self.best_policy,
-            rollouts=tuple(self.rollouts),
-            evaluations=tuple(self.evaluations),
-            labels=labels,
-        )
-
-    def write_tables(self, folder: RunFolder) -> None:
-        """Write the tables for people.
-
-        Raises:
-            BlastEnvError: If they cannot be written.
-        """
-        write_rows(folder.rollouts, RolloutRow, self.rollouts)
-        write_rows(folder.evaluations, EvaluationRow, self.evaluations)
+        weights = agent.policy.state_dict()
+        so_far.best_policy = {name: value.clone() for name, value in weights.items()}
+    return row
 
 
 class TrainingRecorder(BaseCallback):
@@ -107,14 +50,6 @@ class TrainingRecorder(BaseCallback):
     A rollout begins with fresh episodes and with seeds that follow from the seed of the run and
     the number of the rollout. So a run that goes on from a checkpoint is the same, to the last
     bit, as one that was never interrupted.
-
-    Args:
-        folder: Where everything is written.
-        configuration: Of the run.
-        scenario: A scenario of the size that the policy is for.
-        selection: What the best weights are chosen by.
-        progress: What the run has come to so far; goes on from here.
-        show: Called with the share of the steps that is done.
     """
 
     def __init__(
@@ -123,7 +58,7 @@ class TrainingRecorder(BaseCallback):
         configuration: RunConfiguration,
         scenario: Scenario,
         selection: Selection,
-        progress: TrainingProgress,
+        progress: Checkpoint,
         show: Callable[[float], None],
     ) -> None:
         super().__init__()
@@ -194,8 +129,7 @@ class TrainingRecorder(BaseCallback):
         is_last = counters.steps >= self.settings.steps
         if is_last or counters.rollouts % self.settings.evaluation_interval == 0:
             self._evaluate()
-        checkpoint = self.progress.checkpoint(self.configuration, self.algorithm.policy)
-        checkpoint.save(self.folder.checkpoint)
+        self.progress.save(self.folder.checkpoint, self.algorithm.policy)
         self.progress.write_tables(self.folder)
         self._is_pending = False
 
@@ -206,7 +140,7 @@ class TrainingRecorder(BaseCallback):
             self.settings.observation,
             self.settings.real_engine,
         )
-        row = self.progress.evaluate(agent, self.selection)
+        row = evaluate(self.progress, agent, self.selection)
         self.logger.record("evaluation/reduction", row.reduction)
         self.logger.dump(row.steps)
 
@@ -252,13 +186,8 @@ _HELD_OUT: Final = "#D55E00"
 _BEST: Final = "#000000"
 
 
-def learning_curve(progress: TrainingProgress, configuration: RunConfiguration) -> Figure:
-    """Return the reduction in training and on held-out threats over the blasts, or guesses, spent.
-
-    Args:
-        progress: The tables of the run.
-        configuration: Of the run.
-    """
+def learning_curve(progress: Checkpoint, configuration: RunConfiguration) -> Figure:
+    """Return the reduction in training and on held-out threats over the blasts or guesses."""
     settings, counters = configuration.settings, progress.counters
     spent = "guesses" if is_surrogate(settings.engine) else "blasts"
     figure = Figure(figsize=(9.0, 5.4), layout="constrained")
@@ -277,21 +206,7 @@ def learning_curve(progress: TrainingProgress, configuration: RunConfiguration) 
     return figure
 
 
-def save_learning_curve(
-    progress: TrainingProgress, configuration: RunConfiguration, path: Path
-) -> Path:
-    """Save the figure.
-
-    Returns:
-        The path.
-
-    Raises:
-        BlastEnvError: If it cannot be written.
-    """
-    return save_figure(learning_curve(progress, configuration), path)
-
-
-def _draw(axes: Axes, progress: TrainingProgress) -> None:
+def _draw(axes: Axes, progress: Checkpoint) -> None:
     rollouts, evaluations = progress.rollouts, progress.evaluations
     axes.plot(
         [row.blasts for row in rollouts],

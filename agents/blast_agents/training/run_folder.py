@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from blast_agents.surrogate.engine import engine_to_train_on, is_surrogate
@@ -20,7 +19,6 @@ from blast_agents.training.hyperparameters import (
     AnyHyperparameters,
     Hyperparameters,
     SelfLabellingHyperparameters,
-    parse_yaml,
 )
 from blast_env.documents import (
     DocumentError,
@@ -40,9 +38,7 @@ from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scen
 
 CONFIGURATION_FORMAT: Final = 1
 
-
 THREATS: Final = ("visible", "hidden")
-
 
 SETTING_KEYS: Final = (
     "hidden_threats",
@@ -100,11 +96,15 @@ class TrainingSettings(BaseModel):
 
     @model_validator(mode="after")
     def _check_loads(self) -> "TrainingSettings":
-        """Refuse to show loads of modules, of which a surrogate knows only the mean."""
-        if self.guesses and self.observation == "grid_with_load":
+        """Refuse to show loads of modules where there is nothing that knows them.
+
+        A surrogate knows only their mean; for self-labelling they would take blasts of their own.
+        """
+        where = "with a surrogate" if self.guesses else "for self_labelling"
+        nobody_knows = self.guesses or self.algorithm == SELF_LABELLING
+        if nobody_knows and self.observation == "grid_with_load":
             raise ValueError(
-                "observation is 'grid_with_load', must be 'grid', 'image' or 'features' with a "
-                "surrogate"
+                f"observation is 'grid_with_load', must be 'grid', 'image' or 'features' {where}"
             )
         return self
 
@@ -156,11 +156,7 @@ class TrainingSettings(BaseModel):
 class RunConfiguration(BaseModel):
     """All that a run needs to be repeated, with the file of its scenario.
 
-    Attributes:
-        format: Version of this form.
-        settings: What is trained on what.
-        hyperparameters: How.
-        scenario_hash: Content hash of the scenario; of sites, that of the first one.
+    The hash is that of the scenario's content; of sites, that of the first one.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -267,11 +263,7 @@ Row = TypeVar("Row", RolloutRow, EvaluationRow)
 
 
 def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
-    """Write rows as CSV; the file is complete or as it was.
-
-    Raises:
-        BlastEnvError: If it cannot be written.
-    """
+    """Write rows as CSV; the file is complete or as it was."""
     with (
         write_atomically(path) as temporary,
         temporary.open("w", newline="", encoding="utf-8") as file,
@@ -282,15 +274,9 @@ def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
 
 
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:
-    """Read rows.
-
-    Raises:
-        BlastEnvError: If there is no such file, or it is damaged.
-    """
-    try:
+    """Read rows."""
+    with refusing(path, "missing or damaged"):
         return list(parse_csv(read_text(path), kind))
-    except DocumentError as error:
-        raise BlastEnvError(f"{path}: is missing or damaged: {error}") from error
 
 
 _PACKAGES: Final = (
@@ -305,13 +291,25 @@ _PACKAGES: Final = (
 )
 
 
+def check_format(path: Path, content: Any, wanted: int) -> None:
+    """Refuse a file of another version."""
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != wanted:
+        raise BlastEnvError(f"{path}: format is {value_text(found)}, must be {wanted}")
+
+
+@contextmanager
+def refusing(path: Path, what: str = "damaged") -> Iterator[None]:
+    """Say of a file in which this block finds something wrong that it is damaged."""
+    try:
+        yield
+    except DocumentError as error:
+        raise BlastEnvError(f"{path}: is {what}: {error}") from error
+
+
 @dataclass(frozen=True)
 class RunFolder:
-    """The files of a run.
-
-    Attributes:
-        path: The folder.
-    """
+    """The files of a run."""
 
     path: Path
 
@@ -347,30 +345,18 @@ class RunFolder:
 
     @property
     def command(self) -> str:
-        """What started the run.
-
-        Raises:
-            BlastEnvError: If the file is missing or damaged.
-        """
+        """What started the run."""
         return self._said("command.txt").strip()
 
     @property
     def versions(self) -> dict[str, str]:
-        """With which versions it was started.
-
-        Raises:
-            BlastEnvError: If the file is missing or damaged.
-        """
-        try:
+        """With which versions it was started."""
+        with refusing(self.path / "versions.json"):
             return checked_as(dict[str, str], parse_json(self._said("versions.json")))
-        except DocumentError as error:
-            raise BlastEnvError(f"{self.path / 'versions.json'}: is damaged: {error}") from error
 
     def _said(self, name: str) -> str:
-        try:
+        with refusing(self.path / name, "missing or damaged"):
             return read_text(self.path / name)
-        except DocumentError as error:
-            raise BlastEnvError(f"{self.path / name}: is missing or damaged: {error}") from error
 
     @property
     def blasts(self) -> Path:
@@ -379,7 +365,7 @@ class RunFolder:
 
     @property
     def _configuration(self) -> Path:
-        return self.path / "config.yaml"
+        return self.path / "config.json"
 
     @property
     def _scenario(self) -> Path:
@@ -388,7 +374,7 @@ class RunFolder:
     @property
     def _unfinished(self) -> Path:
         """The configuration while the folder is made; renamed, it makes the folder a run's."""
-        return self.path / ".config.yaml"
+        return self.path / ".config.json"
 
     @contextmanager
     def making(
@@ -399,21 +385,17 @@ class RunFolder:
         The folder is a run's when the block has ended well, by one rename. If this was interrupted
         before, it begins anew in what is there.
 
-        Args:
-            configuration: Of the run.
-            scenario: The scenario; of sites, the first one.
-            command: What started the run.
-
         Raises:
             BlastEnvError: If the folder cannot be made, or anything else is in it.
         """
         make_folder(self.path)
         self._check_empty()
-        _write(self._unfinished, yaml.safe_dump(configuration.document(), sort_keys=False))
+        _write(self._unfinished, json.dumps(configuration.document(), indent=2) + "\n")
         self.clear_temporaries()
         save_scenario(scenario, self._scenario)
         _write(self.path / "command.txt", f"{command}\n")
-        _write(self.path / "versions.json", json.dumps(_versions(), indent=2) + "\n")
+        known = {"platform": platform.platform()} | versions(packages=_PACKAGES)
+        _write(self.path / "versions.json", json.dumps(known, indent=2) + "\n")
         yield
         try:
             os.replace(self._unfinished, self._configuration)
@@ -440,36 +422,21 @@ class RunFolder:
             raise BlastEnvError(f"{self.path}: has {taken[0]!r} in it, must be empty")
 
     def configuration(self) -> RunConfiguration:
-        """Return the configuration of the run.
-
-        Raises:
-            BlastEnvError: If there is none, or it is damaged.
-        """
+        """Return the configuration of the run."""
         path = self._configuration
         if not path.exists():
             raise BlastEnvError(
                 f"{self.path}: is no run folder: there is no {path.name} in it"
                 + ("; its making was interrupted: train begins anew" * self._unfinished.exists())
             )
-        try:
-            document = parse_yaml(read_text(path))
-        except DocumentError as error:
-            raise BlastEnvError(f"{path}: is damaged: {error}") from error
-        found = document.get("format") if isinstance(document, dict) else None
-        if found != CONFIGURATION_FORMAT:
-            raise BlastEnvError(
-                f"{path}: format is {value_text(found)}, must be {CONFIGURATION_FORMAT}"
-            )
-        try:
+        with refusing(path):
+            document = parse_json(read_text(path))
+        check_format(path, document, CONFIGURATION_FORMAT)
+        with refusing(path):
             return checked_as(RunConfiguration, document)
-        except DocumentError as error:
-            raise BlastEnvError(f"{path}: is damaged: {error}") from error
 
     def scenario(self, configuration: RunConfiguration) -> Scenario:
         """Return the scenario of the run.
-
-        Args:
-            configuration: Of the run.
 
         Raises:
             BlastEnvError: If there is none, it is damaged, or it is another one than that of the
@@ -484,26 +451,12 @@ class RunFolder:
 
 
 def check_scenario(scenario: Scenario, configuration: RunConfiguration, place: str) -> None:
-    """Refuse a scenario that is not the one of a run.
-
-    Args:
-        scenario: The scenario.
-        configuration: Of the run.
-        place: Where the scenario comes from, for the error.
-
-    Raises:
-        BlastEnvError: If the hashes differ.
-    """
+    """Refuse a scenario that is not the one of a run."""
     if scenario.content_hash != configuration.scenario_hash:
         raise BlastEnvError(
             f"{place}: the scenario's hash is {scenario.content_hash[:12]}..., must be "
             f"{configuration.scenario_hash[:12]}..., that of the run: it is another scenario"
         )
-
-
-def _versions() -> dict[str, str]:
-    """Return the versions that a result depends on."""
-    return {"platform": platform.platform()} | versions(packages=_PACKAGES)
 
 
 def _write(path: Path, text: str) -> None:

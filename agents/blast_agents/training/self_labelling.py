@@ -32,15 +32,13 @@ from blast_agents.training.agent import Policy, TrainedAgent, as_tensor, policy_
 from blast_agents.training.cases import Selection, training_cases
 from blast_agents.training.checkpoint import CaseLabel, Checkpoint
 from blast_agents.training.hyperparameters import schedule
-from blast_agents.training.recorder import TrainingProgress
+from blast_agents.training.recorder import evaluate
 from blast_agents.training.run_folder import RolloutRow, RunConfiguration, RunFolder
-from blast_env.engines import Engine
 from blast_env.envs.observations import OBSERVATIONS, EpisodeObservation, Observable
 from blast_env.envs.strategies import ScenarioSource
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, Evaluators
 from blast_env.evaluation.evaluator import BlastAsked
-from blast_env.evaluation.store import BlastCache, DiskCache, LoadsCache
+from blast_env.evaluation.store import DiskCache, LoadsCache
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement
@@ -117,19 +115,6 @@ class Demonstration:
         return OBSERVATIONS[self.observation].episode(observable)
 
 
-def check_observation(observation: str) -> None:
-    """Refuse an observation that demonstrations cannot show.
-
-    Raises:
-        BlastEnvError: For one with loads, which would take blasts of its own.
-    """
-    if observation == "grid_with_load":
-        raise BlastEnvError(
-            "observation is 'grid_with_load', must be 'grid', 'image' or 'features' for "
-            "self_labelling"
-        )
-
-
 def logits_and_values(policy: Policy, observations: Tensor) -> tuple[Tensor, Tensor]:
     """Return the logit of each action, legal or not (batch, actions), and the value (batch,)."""
     features = policy.extract_features(observations)
@@ -145,12 +130,7 @@ def imitation_loss(logits: Tensor, legal: Tensor, wanted: Tensor) -> Tensor:
     """Return how unlikely the policy finds what is wanted, mean over a batch.
 
     The cross-entropy to the distribution in which every wanted action is as likely, among the
-    legal ones.
-
-    Args:
-        logits: (batch, actions).
-        legal: Which actions are legal, likewise.
-        wanted: Which of them are wanted, at least one of each, likewise.
+    legal ones. All tensors are (batch, actions); at least one action of each is wanted.
     """
     likely = logits.masked_fill(~legal, -torch.inf).log_softmax(dim=1)
     shares = wanted / wanted.sum(dim=1, keepdim=True)
@@ -167,17 +147,9 @@ def imitate(
     max_grad_norm: float,
     rng: np.random.Generator,
 ) -> float:
-    """Let a policy learn from demonstrations, with its own optimiser.
+    """Let a policy learn from demonstrations, with its own optimiser, in minibatches of moments.
 
-    Args:
-        policy: The policy.
-        demonstrations: At least one.
-        updates: Minibatches.
-        batch_size: Moments in each of them.
-        learning_rate: Of the optimiser.
-        vf_coef: Weight of the critic's error: it learns what the layouts are worth.
-        max_grad_norm: Largest gradient.
-        rng: Draws demonstrations and moments.
+    The critic, whose error weighs `vf_coef`, learns what the layouts are worth.
 
     Returns:
         Mean loss of the imitation over the last tenth of the minibatches; NaN without any.
@@ -227,23 +199,10 @@ class Judge:
     processes: int = 1
     asked: int = 0
 
-    @classmethod
-    def of(
-        cls, engine: str | Engine, cases: Sequence[Case], cache: BlastCache | None, processes: int
-    ) -> "Judge":
-        """Return the judge of cases, with an evaluator for each of their scenarios."""
-        scenarios = {case.scenario.content_hash for case in cases}
-        return cls(Evaluators(engine, cache, most=len(scenarios)), processes)
-
     def loads(
         self, asked: Sequence[tuple[Case, Layout]], threats: slice
     ) -> list[tuple[float, ...]]:
-        """Return the loads that count, one a threat, for each pair.
-
-        Args:
-            asked: Layouts with their cases.
-            threats: Which threats of each case they meet.
-        """
+        """Return the loads that count, one a threat, for each pair."""
         blasts = [
             BlastAsked(case.scenario, layout, threat)
             for case, layout in asked
@@ -269,11 +228,6 @@ def race(judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]
 
     All meet the first threat, the better half of them the second, the better quarter the next two,
     and so on; the blasts of all cases run side by side.
-
-    Args:
-        judge: Runs the blasts.
-        cases: The cases, each with as many threats.
-        layouts: Of each case, none twice.
 
     Returns:
         For each case, what every layout met; those that met all threats are the last ones left.
@@ -331,13 +285,7 @@ class Lessons:
     def improve(
         self, judge: Judge, indices: Sequence[int], layouts: Sequence[Sequence[Layout]]
     ) -> list[float]:
-        """Let layouts race against the labels of some cases; return the reduction of each.
-
-        Args:
-            judge: Runs the blasts.
-            indices: The cases.
-            layouts: Of each of them; those that are the label already are left out.
-        """
+        """Let layouts race against the labels of some cases; return the reduction of each."""
         fresh = [
             [each for each in dict.fromkeys(own) if each != self.labels[index].layout]
             for index, own in zip(indices, layouts, strict=True)
@@ -396,7 +344,7 @@ class SelfLabelling:
     lessons: Lessons
     judge: Judge
     selection: Selection
-    progress: TrainingProgress
+    progress: Checkpoint
     logger: Logger
     uncounted: int = 0
 
@@ -407,51 +355,32 @@ class SelfLabelling:
         configuration: RunConfiguration,
         source: ScenarioSource,
         selection: Selection,
-        checkpoint: Checkpoint,
-        progress: TrainingProgress,
+        progress: Checkpoint,
     ) -> "SelfLabelling":
-        """Return the training as it was at a checkpoint.
-
-        Args:
-            folder: Of the run.
-            configuration: Of the run.
-            source: Gives the cases their scenario.
-            selection: What the best weights are chosen by.
-            checkpoint: Where it goes on from.
-            progress: What the run has come to by then; goes on from there.
-
-        Raises:
-            BlastEnvError: If the checkpoint does not fit.
-        """
+        """Return the training as it was at a checkpoint."""
         settings, hyperparameters = configuration.settings, configuration.self_labelling
         set_random_seed(settings.seed % 2**32)
         scenario = source.representative
         policy = policy_for(configuration, scenario)
-        if checkpoint.policy:
-            checkpoint.load_policy(policy, folder.checkpoint)
-        if not checkpoint.is_start:
-            checkpoint.load_optimizer(policy.optimizer, folder.checkpoint)
+        progress.load_into(policy, folder.checkpoint)
         policy.set_training_mode(False)
         cases = training_cases(settings, source, hyperparameters.cases)
         # Guesses cost less than to read them from a file.
         cache = LoadsCache(_GUESSES) if settings.guesses else DiskCache(folder.blasts, _MOST_BYTES)
-        judge = Judge.of(settings.blast_engine, cases, cache, hyperparameters.n_envs)
-        judge.asked = progress.counters.steps
+        scenarios = {case.scenario.content_hash for case in cases}
+        evaluators = Evaluators(settings.blast_engine, cache, most=len(scenarios))
+        judge = Judge(evaluators, hyperparameters.n_envs, progress.counters.steps)
         return cls(
             folder=folder,
             configuration=configuration,
             agent=TrainedAgent(policy, scenario, settings.observation, settings.real_engine),
-            lessons=Lessons(cases, [*checkpoint.labels]),
+            lessons=Lessons(cases, progress.labels),
             judge=judge,
             selection=selection,
             progress=progress,
             logger=configure(str(folder.tensorboard), ["tensorboard"]),
             uncounted=0 if settings.guesses else max(len(cache) - progress.counters.blasts, 0),
         )
-
-    @property
-    def _policy(self) -> Policy:
-        return self.agent.policy
 
     def do_round(self) -> None:
         """Let layouts race, let the policy learn, and write it all down."""
@@ -524,7 +453,7 @@ class SelfLabelling:
         left = 1.0 - self.progress.counters.steps / settings.steps
         rate = schedule(hyperparameters.learning_rate)
         return imitate(
-            self._policy,
+            self.agent.policy,
             demonstrations,
             updates,
             hyperparameters.batch_size,
@@ -555,11 +484,11 @@ class SelfLabelling:
         self.logger.record("blasts/simulated", row.blasts)
         is_last = counters.steps >= settings.steps
         if is_last or counters.rollouts % settings.evaluation_interval == 0:
-            evaluation = progress.evaluate(self.agent, self.selection)
+            evaluation = evaluate(progress, self.agent, self.selection)
             self.logger.record("evaluation/reduction", evaluation.reduction)
         self.logger.dump(counters.steps)
-        checkpoint = progress.checkpoint(self.configuration, self._policy, tuple(lessons.labels))
-        checkpoint.save(self.folder.checkpoint)
+        progress.labels = lessons.labels
+        progress.save(self.folder.checkpoint, self.agent.policy)
         progress.write_tables(self.folder)
 
 

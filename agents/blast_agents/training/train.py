@@ -8,41 +8,35 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stable_baselines3.common.logger import configure
-from stable_baselines3.common.vec_env import VecEnv
 
 from blast_agents.training.agent import check_fit, fitted, make_model, policy_for, torch_threads
 from blast_agents.training.cases import Selection
 from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.environments import make_environments, training_source
+from blast_agents.training.environments import make_environments
 from blast_agents.training.hyperparameters import SELF_LABELLING, AnyHyperparameters
-from blast_agents.training.recorder import TrainingProgress, TrainingRecorder, save_learning_curve
+from blast_agents.training.recorder import TrainingRecorder, learning_curve
 from blast_agents.training.run_folder import (
     RunConfiguration,
     RunFolder,
     TrainingSettings,
     check_scenario,
 )
-from blast_agents.training.self_labelling import SelfLabelling, check_observation
-from blast_env.envs.strategies import ScenarioSource, SingleScenario
+from blast_agents.training.self_labelling import SelfLabelling
+from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
+from blast_env.rendering.figures import save_figure
 from blast_env.scenario import Scenario
 from blast_env.sites import FAMILIES
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingResult:
-    """What a run has come to.
-
-    Attributes:
-        folder: The run folder.
-        configuration: Of the run.
-        progress: Counters and tables.
-    """
+    """What a run has come to."""
 
     folder: RunFolder
     configuration: RunConfiguration
-    progress: TrainingProgress
+    progress: Checkpoint
 
 
 def train(
@@ -62,7 +56,7 @@ def train(
     Raises:
         BlastEnvError: If the scenario or the folder is of no use, or something does not fit.
     """
-    source = training_source(settings.scenario)
+    source = scenario_source(settings.scenario)
     scenario = source.representative
     configuration = RunConfiguration(
         settings=settings,
@@ -101,12 +95,12 @@ def resume(
     folder = RunFolder(Path(run))
     configuration = folder.configuration()
     if scenario is not None:
-        check_scenario(training_source(scenario).representative, configuration, scenario)
+        check_scenario(scenario_source(scenario).representative, configuration, scenario)
     own = folder.scenario(configuration)
     check_fit(configuration, own, folder)
     source: ScenarioSource = SingleScenario(own)
     if configuration.settings.scenario in FAMILIES:
-        source = training_source(configuration.settings.scenario)
+        source = scenario_source(configuration.settings.scenario)
         check_scenario(source.representative, configuration, "generated sites")
     selection = _selection(configuration, source)
     job = _Run(folder, configuration, source, selection)
@@ -132,22 +126,14 @@ def _selection(configuration: RunConfiguration, source: ScenarioSource) -> Selec
 
     Self-labelling runs their blasts in its worker processes.
     """
-    if configuration.settings.algorithm != SELF_LABELLING:
-        return Selection.of(configuration.settings, source)
-    check_observation(configuration.settings.observation)
-    return Selection.of(configuration.settings, source, configuration.hyperparameters.n_envs)
+    is_own = configuration.settings.algorithm == SELF_LABELLING
+    processes = configuration.hyperparameters.n_envs if is_own else 1
+    return Selection.of(configuration.settings, source, processes)
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """What a run needs.
-
-    Attributes:
-        folder: The run folder.
-        configuration: Its configuration.
-        source: Gives the episodes their scenario.
-        selection: What the best weights are chosen by.
-    """
+    """What a run needs."""
 
     folder: RunFolder
     configuration: RunConfiguration
@@ -155,15 +141,15 @@ class _Run:
     selection: Selection
 
 
-def _run(job: _Run, checkpoint: Checkpoint, show: Callable[[float], None]) -> TrainingResult:
+def _run(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> TrainingResult:
     """Train from a checkpoint to the end."""
-    settings, so_far = job.configuration.settings, TrainingProgress.of(checkpoint)
+    settings = job.configuration.settings
     so_far.write_tables(job.folder)  # a killed run may not have come to it
     if so_far.counters.steps < settings.steps:
         learn = _learn_from_own_best if settings.algorithm == SELF_LABELLING else _learn_by_acting
         try:
             with torch_threads(settings.torch_threads):
-                learn(job, so_far, checkpoint, show)
+                learn(job, so_far, show)
         except (EOFError, ConnectionError) as error:
             raise BlastEnvError(
                 f"{job.folder.path}: a process with an environment has ended, for want of memory "
@@ -173,57 +159,38 @@ def _run(job: _Run, checkpoint: Checkpoint, show: Callable[[float], None]) -> Tr
             raise BlastEnvError(
                 f"{job.folder.path}: cannot be written: {error.strerror or error}; --resume goes on"
             ) from error
-    save_learning_curve(so_far, job.configuration, job.folder.learning_curve)
+    save_figure(learning_curve(so_far, job.configuration), job.folder.learning_curve)
     return TrainingResult(job.folder, job.configuration, so_far)
 
 
-def _learn_from_own_best(
-    job: _Run, so_far: TrainingProgress, checkpoint: Checkpoint, show: Callable[[float], None]
-) -> None:
+def _learn_from_own_best(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> None:
     """Train by self-labelling, from a checkpoint on."""
-    training = SelfLabelling.of(
-        job.folder, job.configuration, job.source, job.selection, checkpoint, so_far
-    )
+    training = SelfLabelling.of(job.folder, job.configuration, job.source, job.selection, so_far)
     while so_far.counters.steps < job.configuration.settings.steps:
         training.do_round()
         show(min(so_far.counters.steps / job.configuration.settings.steps, 1.0))
 
 
-def _learn_by_acting(
-    job: _Run, so_far: TrainingProgress, checkpoint: Checkpoint, show: Callable[[float], None]
-) -> None:
+def _learn_by_acting(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> None:
     """Train by PPO or MaskablePPO, from a checkpoint on."""
+    settings = job.configuration.settings
     environments = make_environments(job.configuration, job.source)
     try:
-        _learn(job, so_far, checkpoint, environments, show)
+        model = make_model(job.configuration, environments)
+        so_far.load_into(model.policy, job.folder.checkpoint)
+        if not so_far.is_start:
+            model.num_timesteps = so_far.counters.steps
+            model._n_updates = so_far.counters.updates
+        scenario = job.source.representative
+        recorder = TrainingRecorder(
+            job.folder, job.configuration, scenario, job.selection, so_far, show
+        )
+        recorder.algorithm = model
+        model.set_logger(configure(str(job.folder.tensorboard), ["tensorboard"]))
+        left = settings.steps - so_far.counters.steps
+        model.learn(left, callback=recorder, reset_num_timesteps=so_far.is_start)
+        model.logger.close()
     finally:
         # After Ctrl-C the processes have ended already.
         with suppress(EOFError, OSError):
             environments.close()
-
-
-def _learn(
-    job: _Run,
-    so_far: TrainingProgress,
-    checkpoint: Checkpoint,
-    environments: VecEnv,
-    show: Callable[[float], None],
-) -> None:
-    """Train from a checkpoint on environments that are open."""
-    settings = job.configuration.settings
-    model = make_model(job.configuration, environments)
-    if checkpoint.policy:
-        checkpoint.load_policy(model.policy, job.folder.checkpoint)
-    if not checkpoint.is_start:
-        checkpoint.load_optimizer(model.policy.optimizer, job.folder.checkpoint)
-        model.num_timesteps = checkpoint.counters.steps
-        model._n_updates = checkpoint.counters.updates
-    scenario = job.source.representative
-    recorder = TrainingRecorder(
-        job.folder, job.configuration, scenario, job.selection, so_far, show
-    )
-    recorder.algorithm = model
-    model.set_logger(configure(str(job.folder.tensorboard), ["tensorboard"]))
-    left = settings.steps - so_far.counters.steps
-    model.learn(left, callback=recorder, reset_num_timesteps=checkpoint.is_start)
-    model.logger.close()
