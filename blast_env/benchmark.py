@@ -279,11 +279,7 @@ class EnvironmentCost:
 def environment_cost(
     scenario: Scenario, engine: str, episodes: int, environments: int
 ) -> EnvironmentCost:
-    """Time the environment in one process, and in a vector of processes.
-
-    Raises:
-        BlastEnvError: If the environment cannot be made of the scenario.
-    """
+    """Time the environment in one process, and in a vector of processes."""
     env = gym.make(ENV_ID, scenario=scenario, engine=engine)
     rng = np.random.default_rng(0)
     _episode(env, rng, 0)

@@ -1,7 +1,7 @@
 """Many independent pieces of work, several at a time: here, or on a cluster (`on_cluster`)."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor
 from functools import partial
 from typing import Any, Literal, TypeVar, overload
 
@@ -15,46 +15,34 @@ Result = TypeVar("Result")
 Tell = Callable[[float], None]
 """Told which share of some work is done."""
 
-Workers = Literal["processes", "threads"]
-"""What does the work. Threads copy nothing, and pay with compiled engines, which let other threads
-run; pymunk and plain Python want processes."""
-
 
 def run_all(
     function: Callable[[Item], Result],
     items: Sequence[Item],
     workers: int = 1,
-    progress: Callable[[float], None] | None = None,
-    kind: Workers = "processes",
+    progress: Tell | None = None,
 ) -> list[Result]:
-    """Return the results of all items in their order.
+    """Return the results of all items in their order; processes do the work.
 
     The number of workers changes nothing but the time. When an item raises, what has not begun is
     left out; of several errors the first in the order of the items counts. Where joblib has been
-    told of another backend (`joblib.parallel_config`, `on_cluster`), that one does what is for
-    processes, with as many workers as it was told.
+    told of another backend (`joblib.parallel_config`, `on_cluster`), that one does the work, with
+    as many workers as it was told.
 
     Args:
-        function: Does one item; for processes, it and the items must pickle.
+        function: Does one item; it and the items must pickle.
         items: The work; a single item is done here.
         workers: How many items are under way at the same time; a single one does them here.
         progress: Called with the share of the items that is done.
-        kind: Processes or threads.
 
     Raises:
         BlastEnvError: If `workers` is not a whole number of at least 1, or a worker process was
             killed.
     """
     check_workers("workers", workers)
-    in_threads = kind == "threads"
-    count = min(workers, len(items)) if in_threads else _processes(workers, len(items))
-    found: Iterator[Result]
-    if count <= 1:
-        found = map(function, items)
-    elif in_threads:
-        found = _in_threads(function, items, workers)
-    else:
-        found = _parallel(function, items, count, "generator")
+    count = _processes(workers, len(items))
+    here = count == 1
+    found = map(function, items) if here else _parallel(function, items, count, "generator")
     results: list[Result] = []
     for result in found:
         results.append(result)
@@ -103,18 +91,6 @@ def check_workers(name: str, workers: int) -> None:
     """Refuse a number of workers that is not a whole number of at least 1 (`BlastEnvError`)."""
     if not isinstance(workers, int) or isinstance(workers, bool) or workers < 1:
         raise BlastEnvError(f"{name} is {workers!r}, must be a whole number of at least 1")
-
-
-def _in_threads(
-    function: Callable[[Item], Result], items: Sequence[Item], workers: int
-) -> Iterator[Result]:
-    """Not joblib's threads: of several errors those raise the one that came first in time."""
-    with ThreadPoolExecutor(workers) as pool:
-        futures = [pool.submit(function, item) for item in items]
-        try:
-            yield from (future.result() for future in futures)
-        finally:
-            pool.shutdown(cancel_futures=True)
 
 
 def _numbered(function: Callable[[Any], Any], numbered: tuple[int, Any]) -> tuple[int, Any]:

@@ -103,12 +103,7 @@ Line = tuple[tuple[Cell, ...], ...]
 
 
 class _Post(NamedTuple):
-    """What stands along a run.
-
-    Attributes:
-        variant: Number of the variant.
-        length: Modules along the run.
-    """
+    """What stands along a run: the number of its variant, and its length in modules."""
 
     variant: int
     length: int
@@ -123,11 +118,7 @@ class _Post(NamedTuple):
 
 @dataclass(frozen=True)
 class _Vehicles:
-    """All vehicles of a scenario together, and the squares of its build zone's grid.
-
-    Attributes:
-        scenario: The scenario.
-    """
+    """All vehicles of a scenario together, and the squares of its build zone's grid."""
 
     scenario: Scenario
 
@@ -197,12 +188,7 @@ class _Vehicles:
         return sorted({each.item for each in variants if each.stops_vehicles})
 
     def with_posts(self, line: Line, item: int) -> Placement | None:
-        """Return as few posts as close a line, or `None` if they do not.
-
-        Args:
-            line: The line.
-            item: Number of the item that the posts are.
-        """
+        """Return as few posts as close a line, or `None` if they do not."""
         placement = Placement.empty(self.scenario)
         for run in line:
             post = self._along(item, run)

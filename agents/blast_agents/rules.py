@@ -197,10 +197,9 @@ def ring_around_building(scenario: AnyScenario, charge: AnyCharge | None) -> Lay
     """
     placement = Placement.empty(scenario)
     protected = [each.rectangle_m for each in placement.scenario.structures if each.protected]
-    x_m, y_m = _place_m(placement, charge)
-    here = Rectangle(x_m, y_m, x_m, y_m)
-    nearest = min(protected, key=lambda rectangle: _gap_m(rectangle, here))
-    return _ring(placement, nearest, (x_m, y_m))
+    place_m = _place_m(placement, charge)
+    nearest = min(protected, key=lambda rectangle: rectangle.distance_to(place_m))
+    return _ring(placement, nearest, place_m)
 
 
 def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
@@ -230,8 +229,7 @@ def expected_charge(sources: Sequence[AnySource]) -> Charge:
         vehicle is the middle of its first entry.
     """
     weights = np.array([source.weight for source in sources])
-    middles_m = np.array([_middle_m(source) for source in sources])
-    x_m, y_m = weights @ middles_m / weights.sum()
+    x_m, y_m = weights @ [_middle_m(source) for source in sources] / weights.sum()
     tnt_kg = weights @ [source.tnt_kg for source in sources] / weights.sum()
     height_m = weights @ [source.height_m for source in sources] / weights.sum()
     return Charge((float(x_m), float(y_m)), float(tnt_kg), float(height_m))
@@ -430,12 +428,6 @@ def _around(
     fixed = np.array([of_item[each.item] == 1 for each in variants])[:, np.newaxis, np.newaxis]
     lies_along = fixed | np.where(upright, up_m > right_m, right_m > up_m)
     return turn_rad, np.maximum(gap_x_m, gap_y_m).round(9), lies_along
-
-
-def _gap_m(one: Rectangle, other: Rectangle) -> float:
-    """Return the distance between two rectangles."""
-    across = max(0.0, one.left - other.right, other.left - one.right)
-    return hypot(across, max(0.0, one.bottom - other.top, other.bottom - one.top))
 
 
 def _middle_m(source: AnySource) -> PointM:

@@ -134,12 +134,7 @@ class EventEngine(ParticleEngine):
 
 
 def find_particle_engine(engine: str | Engine) -> ParticleEngine:
-    """Return an engine of particles by its name, or the engine itself.
-
-    Raises:
-        UnknownNameError: If there is no engine of that name.
-        BlastEnvError: If it is no engine of particles.
-    """
+    """Return an engine of particles by its name, or the engine itself."""
     found = find_engine(engine)
     if not isinstance(found, ParticleEngine):
         raise BlastEnvError(

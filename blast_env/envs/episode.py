@@ -296,12 +296,7 @@ def find_realisations(realisations: int | None, threat: str | ThreatModel, engin
 
 
 def find_risk(risk: str | Risk | None, cvar_level: float) -> Risk | None:
-    """Return the risk measure for the arguments `risk` and `cvar_level`; `None` for none.
-
-    Raises:
-        UnknownNameError: If there is no risk measure of that name.
-        BlastEnvError: If the level is no number or out of bounds.
-    """
+    """Return the risk measure for the arguments `risk` and `cvar_level`; `None` for none."""
     level = real_number("cvar_level", cvar_level, 0.0, 1.0)
     if risk is None:
         return None

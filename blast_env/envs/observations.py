@@ -477,10 +477,8 @@ class GridObservation:
         vehicles = VehicleView.of(scenario, observable.sources)
         episode = GridEpisode(static, lattice, channels, vehicles)
         protected, others, heights = _structure_planes(grid, scenario)
-        costs, charge = (
-            lattice.plane(cost_shares(scenario)),
-            _charge_plane(grid, observable.sources),
-        )
+        costs = lattice.plane(cost_shares(scenario))
+        charge = _charge_plane(grid, observable.sources)
         names = ("protected", "other_structures", "cost", "charge")
         episode.show(static, names, np.stack((protected, others, costs, charge)))
         if zone.items:

@@ -44,9 +44,6 @@ class ZoneExtractor(BaseFeaturesExtractor):
     With a catalogue the cells around show heights and where each variant may be placed as well,
     and the features of the whole have heights, costs and what is left of the items. With vehicles
     both show the ground that they reach.
-
-    Raises:
-        BlastEnvError: If the space is not one of these planes on a site that the zone fits in.
     """
 
     def __init__(
@@ -86,11 +83,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
         self.whole = nn.Linear(3 * width, width)
 
     def forward(self, observations: Tensor) -> Tensor:
-        """Return the features (batch, width * (rows * columns + 1)).
-
-        Args:
-            observations: From 0 to 1 (batch, channels, height, width).
-        """
+        """Return the features (batch, width * (rows * columns + 1)) of planes from 0 to 1."""
         if observations.shape[1:] != self.shape:
             raise BlastEnvError(
                 f"observations have the shape {tuple(observations.shape[1:])}, must have the "

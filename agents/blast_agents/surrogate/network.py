@@ -172,13 +172,10 @@ class Member(NamedTuple):
     last_bias: FloatArray
 
     def __call__(self, features: FloatArray) -> FloatArray:
-        """Return by how much the logarithm of a load differs from Kingery and Bulmash's.
+        """Return by how much the logarithm of a load differs from Kingery and Bulmash's (points,).
 
         Args:
             features: Of points, less their mean, over their scale (points, features).
-
-        Returns:
-            Shape (points,).
         """
         differs = np.empty(len(features))
         for start in range(0, len(features), _AT_ONCE):

@@ -134,12 +134,6 @@ class SurrogateSite:
     """A scenario as the surrogate sees it.
 
     What begins above the ground stops nothing, as if it were not there: the surrogate never met it.
-
-    Attributes:
-        scenario: The scenario.
-        protected: Its protected structures.
-        counts_peaks: Whether its objective counts peak overpressures.
-        alternatives: The bays of its facades, where their response counts.
     """
 
     def __init__(self, scenario: Scenario) -> None:

@@ -251,12 +251,7 @@ def race(judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]
 
 @dataclass(eq=False)
 class Lessons:
-    """The cases of a training and their labels.
-
-    Attributes:
-        cases: The cases, each with as many threats.
-        labels: A label a case; none before the first round.
-    """
+    """The cases of a training and their labels."""
 
     cases: tuple[Case, ...]
     labels: list[CaseLabel] = field(default_factory=list)
