@@ -94,10 +94,11 @@ def peak_memory_mb(scenario: Scenario, engine: str) -> float:
 
 def _peak_memory_mb(scenario: Scenario, engine: str) -> float:
     simulate(scenario, engine=engine)
-    return _own_memory_mb()
+    return own_memory_mb()
 
 
-def _own_memory_mb() -> float:
+def own_memory_mb() -> float:
+    """Return the peak memory, MB, of this process."""
     try:
         # Linux hands the maximum of getrusage on from the process that started this one.
         status = Path("/proc/self/status").read_text(encoding="utf-8")
@@ -215,7 +216,7 @@ def _site_cost(length_m: float, engine: "GasEngine") -> SiteCost:
         cell_updates=solver.cell_updates,
         told_s=told.seconds,
         cpu_s=cpu_s,
-        memory_mb=_own_memory_mb(),
+        memory_mb=own_memory_mb(),
     )
 
 

@@ -11,6 +11,12 @@ SITES: Final = "sites"
 ITEM_SITES: Final = "item_sites"
 """Name of the generated sites with heights, catalogues and vehicles, in the same place."""
 
+LARGE_SITES: Final = "large_sites"
+"""Name of such sites of real size, in the same place."""
+
+REAL_SIZE: Final = frozenset({"street_front", "government_forecourt", "campus", "car_park"})
+"""Bundled scenarios of 90 to 120 m: tracks and studies take them only where they are named."""
+
 
 def bundled_scenarios() -> tuple[str, ...]:
     """Return the names of the scenarios that come with the package."""

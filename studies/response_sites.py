@@ -1,6 +1,7 @@
 """Sites whose facades count: the criterion they were chosen by, and what impulse says of response.
 
 python -m studies.response_sites criterion
+python -m studies.response_sites criterion --real-size --cells fine --rule-cells coarse
 python -m studies.response_sites compare
 python -m studies.response_sites pictures
 """
@@ -15,6 +16,7 @@ from blast_agents.search import LayoutProblem, find_proposer
 from blast_agents.search.advice import MeasureKind, advise
 from blast_agents.search.registry import layouts_by_rule
 
+from blast_env.bundled import REAL_SIZE
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.engines.contract import Engine, find_engine
 from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats
@@ -22,6 +24,7 @@ from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import consequences
 from blast_env.files import make_folder
 from blast_env.geometry import Layout, layout_words
+from blast_env.physics.gas.settings import UNIFORM
 from blast_env.plan import INK, PROTECTED, charge_feature, site_features, vehicle_features
 from blast_env.rendering.facade import LEVEL_COLOURS
 from blast_env.rendering.figures import save_figure
@@ -38,7 +41,6 @@ from blast_env.response.damage import fails_from, worst
 from blast_env.scenario import AnyCharge, Placement, Scenario, load_layout, load_scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.scenario.versions import SCHEMA_VERSION
-from blast_env.scenario.zone import distance_m
 from blast_env.tables import markdown_table
 
 with render_extra():
@@ -68,32 +70,48 @@ app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=F
 @app.command()
 def criterion(
     sites: SomeSites = None,
-    cell: Annotated[float, typer.Option(help="Side of the cells, m.")] = 0.25,
+    cell: Annotated[float, typer.Option(help="Side of the smallest cells, m.")] = 0.25,
+    cells: Annotated[str, typer.Option(help="uniform, coarse or fine.")] = UNIFORM,
+    rule_cells: Annotated[
+        str | None,
+        typer.Option(help="Those of the empty site and the rules, from 0.5 m, if others."),
+    ] = None,
+    real_size: Annotated[
+        bool, typer.Option("--real-size", help="The sites of 90 to 120 m, unless some are given.")
+    ] = False,
 ) -> None:
     """Print whether the empty site fails, every rule fails, and what a search found passes."""
     headers = ("site", "charge", "wanted", "no layout", "rules that pass", "found", "cost")
     with user_errors():
         rows = []
+        judge = find_engine("gas", cell, cells=cells)
+        first = judge if rule_cells is None else find_engine("gas", cells=rule_cells)
         with progress_bar("criterion") as progress:
-            for number, name in enumerate(sites or SITES, start=1):
-                rows.append(criterion_row(load_scenario(name), cell))
-                progress(number / len(sites or SITES))
-        print_line(f"cells of {cell:g} m")
+            every = sites or (sorted(REAL_SIZE) if real_size else SITES)
+            for number, name in enumerate(every, start=1):
+                rows.append(criterion_row(load_scenario(name), judge, first))
+                progress(number / len(every))
+        print_line(f"found: {judge.words}; empty site and rules: {first.words}")
         print_line(markdown_table((*headers, "level", "with sharp peaks"), rows))
 
 
-def criterion_row(scenario: Scenario, cell_m: float) -> Row:
-    """Return what the criterion says of a site; the last four cells are of what was found."""
-    engine, target = find_engine("gas", cell_m), _target(scenario)
-    charges = site_charges(scenario)
+def criterion_row(scenario: Scenario, judge: Engine, first: Engine) -> Row:
+    """Return what the criterion says of a site; the last four cells are of what was found.
+
+    Args:
+        scenario: The site.
+        judge: Judges what was found.
+        first: Judges the empty site and the rules.
+    """
+    target, charges = _target(scenario), site_charges(scenario)
     rules = layouts_by_rule(scenario)
-    passing = [name for name, each in rules.items() if reaches(scenario, each, charges, engine)]
+    passing = [name for name, each in rules.items() if reaches(scenario, each, charges, first)]
     found = load_layout(FOUND / f"{scenario.name}.json", scenario)
-    bare, judged = (consequences(scenario, each, charges, engine) for each in ((), found))
-    source, (structure, *_) = scenario.charge[0], scenario.structures
+    bare = consequences(scenario, (), charges, first)
+    judged = consequences(scenario, found, charges, judge)
     return (
         f"`{scenario.name}`",
-        f"{source.tnt_kg:g} kg, {distance_m(source, structure.rectangle_m):.0f} m",
+        _charge_words(scenario, charges),
         target.label,
         min(bare.level(each) for each in bare.buildings).label,
         ", ".join(passing) or f"none of {len(rules)}",
@@ -102,6 +120,16 @@ def criterion_row(scenario: Scenario, cell_m: float) -> Row:
         min(judged.level(each) for each in judged.buildings).label,
         "passes" if judged.stands_up(target) else "fails",
     )
+
+
+def _charge_words(scenario: Scenario, charges: Sequence[AnyCharge]) -> str:
+    """Return how large charges are, and how near one comes to what is protected."""
+    met = [charge_against(scenario, (), each) for each in charges]
+    masses_kg = [each.tnt_kg for each in met]
+    protected = [each.rectangle_m for each in scenario.structures if each.protected]
+    near_m = min(each.distance_to(charge.position_m) for each in protected for charge in met)
+    ends = dict.fromkeys((f"{min(masses_kg):g}", f"{max(masses_kg):g}"))
+    return f"{' to '.join(ends)} kg, {near_m:.0f} m"
 
 
 def reaches(

@@ -17,6 +17,7 @@ from blast_agents.search.advice import (
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import (
     CELL_HELP,
+    CELLS_HELP,
     SCENARIO_HELP,
     TARGET_HELP,
     ChargeOptions,
@@ -24,7 +25,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import ResultTable, print_line, progress_bar, result_console
 from blast_env.cli.targets import PICTURES
-from blast_env.engines.contract import JUDGE, find_engine
+from blast_env.engines.contract import JUDGE, Engine, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
@@ -58,7 +59,11 @@ class AdviseCommand(ChargeOptions):
     seed: int = option(0, "Decides what is drawn.", min=0)
     processes: int = option(1, "Worker processes.", min=1)
     cell_m: float | None = option(None, CELL_HELP)
+    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
     judge_cell_m: float = option(0.25, "Side of the cells that judge what was found, m.")
+    judge_cells: str | None = option(
+        None, "The same as --cells, for what judges what was found.", show_default="uniform"
+    )
     out: Path | None = option(
         None, "Layout file of the best layout of all: .json.", writes=(".json",)
     )
@@ -74,7 +79,8 @@ class AdviseCommand(ChargeOptions):
         drawn = draw_threats(scenario, range(self.charges))
         fixed = [replace(each, charge=self.fixed(scenario, each.charge)) for each in drawn]
         threats = one_of_each_charge(fixed)
-        engine, judge = find_engine(JUDGE, self.cell_m), find_engine(JUDGE, self.judge_cell_m)
+        engine = find_engine(JUDGE, self.cell_m, cells=self.cells)
+        judge = find_engine(JUDGE, self.judge_cell_m, cells=self.judge_cells)
         problem = LayoutProblem(
             BlastEvaluator(scenario, engine), Case(scenario, threats), self.processes
         )
@@ -102,12 +108,12 @@ class AdviseCommand(ChargeOptions):
             with progress_bar(f"{kind}") as progress:
                 found.append(advise_until(*arguments, progress, rounds=self.rounds))
         best = best_of(found, verdict)
-        self._print(scenario, target, best, found, judged)
+        self._print(scenario, target, best, found, judged, judge)
         if self.out is not None:
             made = {"method": "advise", "seed": self.seed, "versions": versions(engine.version)}
             print_line(f"wrote {write_layout(self.out, scenario, best.layout, made)}")
         if self.picture is not None:
-            self._draw(self.picture, scenario, target, found, judged)
+            self._draw(self.picture, scenario, target, found, judged, judge)
 
     def _draw(
         self,
@@ -116,6 +122,7 @@ class AdviseCommand(ChargeOptions):
         target: LevelOfProtection,
         found: list[Advice],
         judged: dict[Layout, Consequences],
+        judge: Engine,
     ) -> None:
         # Here, because pictures need the extra `render`.
         from blast_env.rendering.cost_level import PricedDamage, cost_level_figure
@@ -130,8 +137,7 @@ class AdviseCommand(ChargeOptions):
         ]
         charges = len(next(iter(judged.values())).barriers)
         title = f"{scenario.name}: what each step up costs, the worst of {charges} charges"
-        words = f"cells of {self.judge_cell_m:g} m"
-        figure = cost_level_figure(tried, points, target, title, words)
+        figure = cost_level_figure(tried, points, target, title, judge.words)
         print_line(f"wrote {save_figure(figure, path)}")
 
     def _asked(self, scenario: Scenario) -> Scenario:
@@ -155,6 +161,7 @@ class AdviseCommand(ChargeOptions):
         best: Advice,
         found: list[Advice],
         judged: dict[Layout, Consequences],
+        judge: Engine,
     ) -> None:
         print_line(_answer(scenario, target, best, found, judged))
         title = (
@@ -176,8 +183,8 @@ class AdviseCommand(ChargeOptions):
             )
         result_console().print(table)
         print_line(
-            f"passes: by the search; level, judged: cells of {self.judge_cell_m:g} m; sharp peaks: "
-            "the same impulses with peaks that cells do not clip."
+            f"passes: by the search; level, judged: {judge.words}; sharp peaks: the same impulses "
+            "with peaks that cells do not clip."
         )
 
 

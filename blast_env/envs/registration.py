@@ -4,7 +4,7 @@ from typing import Final
 
 import gymnasium as gym
 
-from blast_env.bundled import ITEM_SITES, SITES, bundled_scenarios
+from blast_env.bundled import ITEM_SITES, LARGE_SITES, REAL_SIZE, SITES, bundled_scenarios
 
 BARRIER_ENTRY_POINT: Final = "blast_env.envs.barrier_env:BlastBarrierEnv"
 
@@ -13,6 +13,7 @@ WITHOUT_BUILD_ZONE: Final = frozenset({"free_field"})
 
 FOR_GAS: Final = frozenset(
     {
+        *REAL_SIZE,
         *("clinic_front", "control_room", "guard_post", "hotel_forecourt", "ministry_kerb"),
         *("school_and_clinic", "school_wing", "shopping_street", "visitor_entrance"),
     }
@@ -39,6 +40,7 @@ def register_environments() -> None:
     _register_barrier("BlastBarrierGas-v0", scenario="courtyard", engine="gas")
     _register_barrier("BlastBarrierSites-v0", scenario=SITES)
     _register_barrier("BlastBarrierItemSites-v0", scenario=ITEM_SITES, engine="gas")
+    _register_barrier("BlastBarrierLargeSites-v0", scenario=LARGE_SITES, engine="gas")
     for name in bundled_scenarios():
         if name not in WITHOUT_BUILD_ZONE:
             engine = {"engine": "gas"} if name in FOR_GAS else {}

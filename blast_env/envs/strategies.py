@@ -107,8 +107,8 @@ def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
     """Return the source for what a user calls a scenario.
 
     Args:
-        scenario: Bundled name, `"sites"` or `"item_sites"` for generated sites to train on, path of
-            a scenario file, a scenario or its plain data, or a source.
+        scenario: Bundled name, `"sites"`, `"item_sites"` or `"large_sites"` for generated sites to
+            train on, path of a scenario file, a scenario or its plain data, or a source.
 
     Raises:
         ScenarioError: If there is no such scenario, or anything is wrong with it.

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.errors import UnknownNameError
-from blast_env.geometry import Element, layout_counts
+from blast_env.geometry import Element, layout_words
 from blast_env.plan import (
     INK,
     Feature,
@@ -130,9 +130,7 @@ def _subtitle(scenario: Scenario, placement: Placement) -> str:
     parts = [" or ".join(f"{mass:g}" for mass in masses) + " kg TNT"]
     zone = scenario.build_zone
     if zone is not None:
-        parts.append(
-            layout_counts(placement.layout, "barrier") if placement.layout else "no barrier"
-        )
+        parts.append(layout_words(placement.layout) if placement.layout else "no barrier")
         if zone.budget is not None:
             parts.append(f"cost {placement.cost:.4g} of {zone.budget:g}")
     parts.append(stand_off_text(scenario, placement.layout))

@@ -438,3 +438,5 @@ def write_heading(figure: Figure, title: str, subtitle: str) -> None:
         annotation_clip=False,
     )
     line.set_in_layout(False)
+    share = line.get_window_extent().width / (_HEADING_SHARE * figure.bbox.width)
+    line.set_fontsize(10 / max(share, 1.0))

@@ -1,6 +1,6 @@
 """Generated sites: varied, valid, worth solving, and all of one size."""
 
-from blast_env.bundled import ITEM_SITES, SITES
+from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
 from blast_env.sites.criterion import (
     Objection,
     SiteCriterion,
@@ -10,7 +10,7 @@ from blast_env.sites.criterion import (
     visibility_layout,
 )
 from blast_env.sites.generate import draw_site, generate_site
-from blast_env.sites.item_sites import ItemSiteRanges
+from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
 from blast_env.sites.ranges import SiteRanges
 from blast_env.sites.source import (
     FAMILIES,
@@ -24,6 +24,7 @@ __all__ = [
     "FAMILIES",
     "HELD_OUT_SITES",
     "ITEM_SITES",
+    "LARGE_SITES",
     "SITES",
     "ItemSiteRanges",
     "Objection",
@@ -35,6 +36,7 @@ __all__ = [
     "VisibilityCriterion",
     "draw_site",
     "generate_site",
+    "large_ranges",
     "training_sites",
     "turned",
     "visibility_layout",

@@ -192,6 +192,59 @@ class ItemSiteRanges:
         return round(self.zone_side_m / MODULE_SIDE_M)
 
 
+LARGE_SIDE_M: Final = 60.0
+"""Side of the sites of `large_sites`."""
+
+_LARGE_SIDES_M: Final = (40.0, 100.0)
+
+
+def large_ranges(side_m: float = LARGE_SIDE_M) -> ItemSiteRanges:
+    """Return what a site of real size may be.
+
+    Stand-offs, buildings and roads grow with the site. Pieces and the build zone, which closes a
+    forecourt, do not.
+
+    Args:
+        side_m: Width and height of the site, 40 to 100 m in whole modules.
+
+    Raises:
+        BlastEnvError: If the side is out of bounds.
+    """
+    low_m, high_m = _LARGE_SIDES_M
+    if not low_m <= side_m <= high_m:
+        raise BlastEnvError(f"side_m is {side_m:g}, must be {low_m:g} to {high_m:g}")
+
+    def span_m(low: float, high: float) -> Span:
+        """Return a span in m that grows with the site."""
+        return on_grid(low * side_m), on_grid(high * side_m)
+
+    return ItemSiteRanges(
+        side_m=side_m,
+        air_height_m=18.0,
+        zone_side_m=18.0,
+        tnt_kg=(50.0, 500.0),
+        vehicle_probability=0.7,
+        road_length_m=span_m(0.25, 0.6),
+        entry_m=(6.0, 10.0),
+        forecourt_m=(7.0, 16.0),
+        kerb_m=(8.0, 14.0),
+        zone_from_border_m=span_m(0.1, 0.14),
+        stand_off_m=span_m(0.4, 0.6),
+        facade_m=span_m(0.22, 0.34),
+        depth_m=span_m(0.13, 0.23),
+        storeys=(1, 4),
+        second_probability=0.5,
+        shed_side_m=(3.0, 8.0),
+        shift_m=span_m(-0.1, 0.1),
+        path_width_m=(2.0, 3.0),
+        trees=(0, 4),
+        tree_side_m=(1.0, 3.0),
+        clearance_m=(1.0, 3.0),
+        access_way_width_m=(3.5, 4.5),
+        budget=(20.0, 60.0),
+    )
+
+
 _ROAD_M: Final = 2.0
 """From the left border to a road, and the depth of a parking area."""
 

@@ -8,15 +8,15 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.bundled import ITEM_SITES, SITES
+from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario
 from blast_env.sites.criterion import SiteCriterion
 from blast_env.sites.generate import MOST_SEED, RANGES, AnyRanges, generate_site
-from blast_env.sites.item_sites import ItemSiteRanges
+from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
 
 FAMILIES: Final[Mapping[str, AnyRanges]] = MappingProxyType(
-    {SITES: RANGES, ITEM_SITES: ItemSiteRanges()}
+    {SITES: RANGES, ITEM_SITES: ItemSiteRanges(), LARGE_SITES: large_ranges()}
 )
 """The families of generated sites that have names."""
 

@@ -123,8 +123,9 @@ def test_bundled_vehicles_are_for_engines_that_can_judge_them() -> None:
 
 
 def test_each_family_of_sites_is_a_track_of_its_own() -> None:
-    (plain,), (items,) = (find_tracks(family, 2, 1) for family in FAMILIES)
+    (plain,), (items,), (large,) = (find_tracks(family, 2, 1) for family in FAMILIES)
     assert (plain.site, items.site) == (plain.name, items.name) == ("sites", "item_sites")
+    assert large.site == large.name == "large_sites"
     assert all(not case.scenario.zone.items for case in plain.cases)
     assert all(case.scenario.zone.items for case in items.cases)
 

@@ -19,6 +19,7 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from blast_env import bundled_scenarios, load_scenario
+from blast_env.bundled import REAL_SIZE
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import OBSERVATIONS, GridObservation
 from blast_env.errors import BlastEnvError
@@ -26,7 +27,7 @@ from blast_env.scenario import Placement, Scenario
 from blast_env.sites import FAMILIES, generate_site
 from tests.catalogue_sites import yard_document
 
-BUNDLED = tuple(name for name in bundled_scenarios() if name != "free_field")
+BUNDLED = tuple(sorted({*bundled_scenarios()} - {"free_field"} - REAL_SIZE))
 
 
 def shaped_yard(width_m: float, height_m: float) -> Scenario:

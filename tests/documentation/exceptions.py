@@ -195,6 +195,9 @@ SMALLER: Final[dict[str, str]] = {
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.response_sites criterion": "guard_post --cell 0.5",
+    "python -m studies.response_sites criterion --real-size --cells fine --rule-cells coarse": (
+        "guard_post --cell 0.5 --cells uniform"
+    ),
     "python -m studies.response_sites compare --budget 30": "guard_post",
     "python -m studies.response_sites pictures": "clinic_front",
     "python -m studies.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",

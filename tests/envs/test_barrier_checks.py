@@ -28,7 +28,7 @@ def test_both_checkers_pass_on_every_id(env_id: str) -> None:
     if env_id == "BlastBarrierGas-v0":
         site = {"width_m": 18.0, "height_m": 18.0, "air_height_m": 4.0}  # 36 pixels a side
         arguments["scenario"] = hut(site=site)
-    elif env_id == "BlastBarrierItemSites-v0":
+    elif env_id in ("BlastBarrierItemSites-v0", "BlastBarrierLargeSites-v0"):
         arguments = {"engine": "event", "realisations": 1}
     env = gym.make(env_id, render_mode="rgb_array", **arguments)
     check_env(env.unwrapped)

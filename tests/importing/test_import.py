@@ -391,3 +391,18 @@ def test_streets_keep_clear_of_buildings_and_border(tmp_path: Path) -> None:
     assert ends_m(west)[1][0] == pytest.approx(10.0 - gap_m, abs=0.02)
     assert ends_m(east)[0][0] == pytest.approx(16.0 + gap_m, abs=0.02)
     assert ends_m(east)[1][0] == pytest.approx(26.0 - gap_m, abs=0.02)
+
+
+def test_the_bundled_car_park_is_what_the_page_s_command_imports() -> None:
+    options = ImportOptions(
+        origin=(26.943884, 60.521887),
+        size_m=(96.0, 96.0),
+        protect_near=(26.944, 60.5227),
+        default_height_m=5.0,
+    )
+    made = import_site(BLOCK.parent / "car_park.osm", options).scenario
+    bundled = load_scenario("car_park")
+    assert {each.name: (each.building, each.rectangle_m) for each in bundled.structures} == {
+        each.name: (each.building, each.rectangle_m) for each in made.structures
+    }
+    assert bundled.georeference == made.georeference

@@ -17,9 +17,11 @@ from blast_env.sites import (
     FAMILIES,
     HELD_OUT_SITES,
     ITEM_SITES,
+    LARGE_SITES,
     ItemSiteRanges,
     SiteSource,
     generate_site,
+    large_ranges,
 )
 from blast_env.sites.criterion import TARGETS, Visibility, cut_share_of
 from blast_env.sites.generate import ITEM_CRITERION
@@ -144,6 +146,32 @@ def test_a_low_wall_cuts_the_lines_to_the_foot_of_a_building_alone() -> None:
 
 def test_the_criterion_is_kept(item_sites: tuple[Scenario, ...]) -> None:
     assert all(ITEM_CRITERION.objection(site) is None for site in item_sites)
+
+
+def test_large_sites_of_a_side_share_the_spaces_and_keep_the_criterion() -> None:
+    source = SiteSource.held_out(ranges=FAMILIES[LARGE_SITES])
+    for seed in range(3):
+        site = source.site(seed)
+        check_size(site, source.representative)
+        assert (site.site.width_m, site.site.height_m) == (60.0, 60.0)
+        assert ITEM_CRITERION.objection(site) is None
+        assert generate_site(seed, large_ranges()) == site
+    assert source.representative.vehicles
+
+
+@pytest.mark.parametrize("side_m", [40.0, 100.0])
+def test_stand_offs_grow_with_large_sites(side_m: float) -> None:
+    site = generate_site(0, large_ranges(side_m))
+    assert site.site.width_m == side_m
+    assert site.zone.shape == generate_site(0, large_ranges()).zone.shape
+    for source in site.vehicles:
+        assert 0.4 * side_m <= site.vehicle_ground(source).entry_stand_off_m <= 0.7 * side_m
+
+
+@pytest.mark.parametrize("side_m", [39.5, 100.5])
+def test_sides_out_of_bounds_are_refused(side_m: float) -> None:
+    with pytest.raises(BlastEnvError, match=r"side_m is .* must be 40 to 100"):
+        large_ranges(side_m)
 
 
 @pytest.mark.parametrize(

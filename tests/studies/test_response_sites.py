@@ -5,6 +5,7 @@ And the test of a beam that the response is held against.
 
 import pytest
 
+from blast_env.bundled import REAL_SIZE
 from blast_env.engines import find_engine
 from blast_env.response.walls import DamageLevel
 from blast_env.scenario import Placement, load_layout, load_scenario
@@ -12,7 +13,7 @@ from studies.response import BEAM_DEFLECTION_MM, BEAM_STEEL_DEPTHS_M, beam_respo
 from studies.response_sites import FOUND, OLDER, SITES, glazed, reaches, site_charges
 
 
-@pytest.mark.parametrize("name", SITES)
+@pytest.mark.parametrize("name", [*SITES, *sorted(REAL_SIZE)])
 def test_what_was_found_is_for_the_site_as_it_is_and_within_its_budget(name: str) -> None:
     scenario = load_scenario(name)
     found = load_layout(FOUND / f"{name}.json", scenario)

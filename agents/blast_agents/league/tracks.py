@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final, Literal
 
+from blast_env.bundled import REAL_SIZE
 from blast_env.envs.arguments import check_names
 from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
 from blast_env.errors import BlastEnvError
@@ -23,7 +24,7 @@ from blast_env.scenario import (
     load_scenario,
 )
 from blast_env.scenario.build_scene import draw_threat
-from blast_env.sites import FAMILIES, ITEM_SITES, SITES, SiteSource
+from blast_env.sites import FAMILIES, ITEM_SITES, LARGE_SITES, SITES, SiteSource
 from blast_env.values import whole_number
 
 TRACKS: Final = ("known", "hidden", "vehicle", *FAMILIES)
@@ -36,6 +37,7 @@ _SITES_TITLES: Final[Mapping[str, str]] = MappingProxyType(
     {
         SITES: "Hidden threat on unseen generated sites",
         ITEM_SITES: "Hidden threat on unseen generated sites with heights and a catalogue",
+        LARGE_SITES: "Hidden threat on unseen generated sites of real size",
     }
 )
 
@@ -232,7 +234,8 @@ def find_tracks(
         known = [load_scenario(each) for each in scenarios or HIDDEN_SCENARIOS]
         tracks += [hidden_track(scenario, seeds, seed, noisy=noisy) for scenario in known]
     if name in ("vehicle", "all"):
-        known = [load_scenario(each) for each in scenarios or bundled_scenarios()]
+        every = (each for each in bundled_scenarios() if each not in REAL_SIZE)
+        known = [load_scenario(each) for each in scenarios or every]
         if not scenarios or name == "all":
             known = [scenario for scenario in known if scenario.vehicles]
         if not scenarios and noisy:
@@ -243,7 +246,7 @@ def find_tracks(
                 "particles; gas dynamics needs none (--engine gas)"
             )
         tracks += [vehicle_track(scenario, seeds, seed, noisy=noisy) for scenario in known]
-    families = [each for each in FAMILIES if name in (each, "all")]
+    families = [name] if name in FAMILIES else [SITES, ITEM_SITES] if name == "all" else []
     if name == "all" and noisy:
         families.remove(ITEM_SITES)
     for family in families:
