@@ -448,6 +448,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.scale workers --gas-blasts 12 --episodes 4": (
         "--workers 1 --pauses 5 --gas-blasts 1 --episodes 1"
     ),
+    "python -m studies.large_zones": "visitor_entrance",
     "python -m studies.scale store": "--entries 100",
     "python -m studies.scale costs --price 0.04": "--blasts 1",
     "python -m studies.difficulty": (

@@ -12,7 +12,7 @@ WITH_ZONE = ("courtyard", "perimeter_gate", "street_junction")
 
 @pytest.mark.parametrize("name", bundled_scenarios())
 def test_four_right_angles_are_none(name: str) -> None:
-    scenario = load_scenario(name)
+    scenario = load_scenario(name).model_copy(update={"georeference": None})  # which turning drops
     assert turned(scenario, 4) == scenario
     assert turned(turned(scenario, 1), 3) == scenario
     assert turned(scenario, -1) == turned(scenario, 3)
