@@ -33,8 +33,6 @@ _CATALOGUE: Final = (
     ("t_wall_3_6", 12),
 )
 
-app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
-
 
 @dataclass(frozen=True)
 class ZoneCost:
@@ -89,7 +87,6 @@ def zone_cost(name: str) -> ZoneCost:
     return ZoneCost(actions, mask_s, rules_s, sight_s, proposal_s, own_memory_mb())
 
 
-@app.command()
 def main(
     sites: Annotated[
         list[str] | None, typer.Argument(help="The street and bundled sites unless given.")
@@ -111,4 +108,4 @@ def main(
 
 
 if __name__ == "__main__":
-    app()
+    typer.run(main)
