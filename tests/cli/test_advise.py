@@ -150,3 +150,8 @@ def test_bad_input_gets_the_usual_errors(
 
 def test_a_target_needs_a_facade() -> None:
     assert "no protected structure has a facade" in run("visitor_entrance", "--budget", "3")
+
+
+@pytest.mark.parametrize("option", ["--cells", "--judge-cells"])
+def test_cells_that_grow_are_for_the_search_and_for_the_judge(option: str) -> None:
+    assert "cells is 'huge', must be one of 'uniform'" in run("guard_post", option, "huge")
