@@ -35,18 +35,22 @@ _INK: Final = ("#0072B2", "#000000")
 Component = tuple[Glazing | Wall, float]
 """A component, and the height of the storey that it stands in."""
 
+Members = tuple[list[int], ...]
+"""Of each row, the bays that a component stands in."""
+
 
 def pressure_impulse_diagram(rows: Sequence[tuple[str, FacadeResponse]], title: str) -> Figure:
     """Return a diagram a component, with a point a bay and row: its peak and its impulse.
 
-    Regions are those of a triangular load, which falls from its peak at once. The four components
-    that stand in most bays are shown.
+    Regions are those of a triangular load, which falls from its peak at once. A bay's point is in
+    the diagram of what stands there in that row. The four components with most points are shown.
 
     Args:
-        rows: What a row is, in words, and the same facade each time: without a barrier, and with.
+        rows: What a row is, in words, and the same bays each time: without a layout, and with. A
+            layout that hardens them puts other components there.
         title: Above the picture.
     """
-    groups = _groups(rows[0][1].bays)[:_MOST_PANELS]
+    groups = _groups([facade.bays for _, facade in rows])[:_MOST_PANELS]
     columns = min(len(groups), 2)
     lines = -(-len(groups) // columns)
     width_in, height_in = _PANEL_IN
@@ -77,30 +81,31 @@ def pressure_impulse_diagram(rows: Sequence[tuple[str, FacadeResponse]], title: 
     return figure
 
 
-def _groups(bays: Sequence[FilledBay]) -> list[tuple[Component, list[int]]]:
-    """Return the components, each with the bays that it stands in, the most frequent first."""
-    found: list[tuple[Component, list[int]]] = []
-    for index, each in enumerate(bays):
-        for component in (each.glazing, each.wall):
-            if component is None:
-                continue
-            storey_m = round(each.bay.height_m, 3) if isinstance(component, Wall) else 0.0
-            key = (component, storey_m)
-            members = next((own for known, own in found if known == key), None)
-            if members is None:
-                found.append((key, [index]))
-            else:
-                members.append(index)
-    return sorted(found, key=lambda item: -len(item[1]))
+def _groups(rows: Sequence[Sequence[FilledBay]]) -> list[tuple[Component, Members]]:
+    """Return the components, each with the bays of each row that it stands in, most bays first."""
+    found: list[tuple[Component, Members]] = []
+    for row, bays in enumerate(rows):
+        for index, each in enumerate(bays):
+            for component in (each.glazing, each.wall):
+                if component is None:
+                    continue
+                storey_m = round(each.bay.height_m, 3) if isinstance(component, Wall) else 0.0
+                key = (component, storey_m)
+                members = next((own for known, own in found if known == key), None)
+                if members is None:
+                    members = tuple([] for _ in rows)
+                    found.append((key, members))
+                members[row].append(index)
+    return sorted(found, key=lambda item: -sum(map(len, item[1])))
 
 
 def _draw(
     axes: Axes,
     component: Component,
-    members: Sequence[int],
+    members: Members,
     rows: Sequence[tuple[str, FacadeResponse]],
 ) -> None:
-    loads = [_loads(facade, members) for _, facade in rows]
+    loads = [_loads(facade, own) for (_, facade), own in zip(rows, members, strict=True)]
     every = np.concatenate(loads)
     most = every.max(axis=0)
     low, high = np.maximum(every.min(axis=0), most / _DECADES) / _REACH, most * _REACH
@@ -117,8 +122,11 @@ def _draw(
             points[:, 1], points[:, 0], marker, color=colour, markerfacecolor=fill, markersize=5.0
         )
     if len(loads) == 2:
-        for first, second in zip(*loads, strict=True):
-            ends = np.array([first, second])
+        places = [
+            dict(zip(own, points, strict=True)) for own, points in zip(members, loads, strict=True)
+        ]
+        for index in places[0].keys() & places[1].keys():
+            ends = np.array([each[index] for each in places])
             axes.plot(ends[:, 1], ends[:, 0], "-", color="0.25", linewidth=0.5)
     axes.set(xscale="log", yscale="log", xlim=(low[1], high[1]), ylim=(low[0], high[0]))
     axes.set(xlabel="impulse of all positive phases (Pa s)", ylabel="peak of the mean (kPa)")

@@ -1,5 +1,7 @@
 """Pictures of damage: facades unfolded and in three dimensions, pressure-impulse diagrams."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
@@ -80,6 +82,30 @@ def test_a_diagram_has_a_point_a_bay_and_layout(site: Scenario) -> None:
     peaks = [np.asarray(line.get_ydata(), dtype=np.float64) for line in points]
     assert [len(each) for each in peaks] == [4, 4]
     assert peaks[0].max() == pytest.approx(40.0)
+
+
+def test_a_bay_with_better_glass_is_in_the_diagram_of_that_glass(site: Scenario) -> None:
+    """Its point among the regions of the old glass would say that it fails."""
+    better = find_component("window_laminated_12")
+    assert isinstance(better, Glazing)
+    bare = response(site, 4e4)
+    bays = [replace(each, glazing=better) for each in site.bays]
+    hardened = respond(bays, bare.time_s, bare.pressure_pa)
+    figure = pressure_impulse_diagram([("nothing", bare), ("laminated", hardened)], "hut")
+    counts = {
+        axes.get_title(): [
+            len(np.asarray(line.get_xdata()))
+            for line in axes.lines
+            if line.get_linestyle() == "None"
+        ]
+        for axes in figure.axes
+        if axes.get_visible()
+    }
+    assert counts == {
+        "reinforced concrete wall, 200 mm": [4, 4],
+        "window, 4 mm annealed": [4, 0],
+        "window, laminated, 6 + 6 mm, 1.52 mm PVB": [0, 4],
+    }
 
 
 def test_worse_levels_begin_at_larger_impulses_and_thicker_glass_holds_more() -> None:

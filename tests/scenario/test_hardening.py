@@ -9,7 +9,7 @@ import pytest
 
 from blast_env.errors import LayoutError
 from blast_env.export.bill import LayoutPlan, bill_of_quantities, element_table
-from blast_env.geometry import Measure, Piece, standing
+from blast_env.geometry import Measure, Piece, layout_counts, layout_words, standing
 from blast_env.plan import barrier_features
 from blast_env.scenario import Placement, Scenario, ScenarioError, load_layout, write_layout
 from tests.catalogue_sites import WALL, yard_document
@@ -54,6 +54,13 @@ def test_a_measure_covers_no_cell_and_can_be_taken_once() -> None:
         placement.place(Piece(1, 0, "glass"))
     with pytest.raises(LayoutError, match="it is not turned"):
         placement.place(Piece(0, 0, "glass", True))
+
+
+def test_a_measure_is_no_piece_in_words() -> None:
+    assert layout_counts((*WALL[:2], TAKEN), "barrier") == "2 barrier pieces (2 wall), glass"
+    assert layout_counts((*WALL[:1], TAKEN), of=9) == "1 of 9 pieces (1 wall), glass"
+    assert layout_counts((TAKEN,)) == layout_words((TAKEN,)) == "glass"
+    assert layout_words(()) == "nothing"
 
 
 def test_measures_take_from_the_budget() -> None:
