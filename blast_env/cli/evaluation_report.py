@@ -210,6 +210,7 @@ def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
     written = [evaluation.to_json(out / "evaluation.json")]
     tables = {
         "structures.csv": evaluation.table,
+        "buildings.csv": evaluation.building_table,
         "modules.csv": evaluation.module_table,
         "threats.csv": evaluation.threat_table,
     }

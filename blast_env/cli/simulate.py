@@ -561,10 +561,10 @@ def _record(
             if all_of_it or not name.startswith("parameter ")
         },
         "structures": _rows(result.structures),
+        "buildings": _rows(result.buildings),
         "impulse": {name: _scaled(result, name) for name in result.structures["structure"]},
     }
     if not isinstance(result, BlastResult):
-        content["buildings"] = _rows(result.buildings)
         content["gauges"] = _rows(result.gauges)
         content["bays"] = _rows(result.bays)
         content["pieces"] = _rows(result.pieces)

@@ -58,7 +58,7 @@ from blast_env.scenario import (
     find_scenario,
 )
 from blast_env.scenario.build_scene import build_site, draw_threat
-from blast_env.scenario.staircase import stepped_buildings
+from blast_env.scenario.staircase import STEPPED, stepped_buildings
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.tables import table_of
 
@@ -71,8 +71,6 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
 NOT_COMPLETE: Final = "more than 2 % of the impulse may still come"
 """Note on a load that is not complete; `GasSettings.until` says what a run waits for."""
 
-STEPPED: Final = "an oblique wall is a staircase of modules, whose peaks are too high"
-"""Note on a building with one; impulses are hardly wrong (`python -m studies.gas oblique`)."""
 
 _PROGRESS_CALLS: Final = 100
 

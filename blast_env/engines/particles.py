@@ -263,6 +263,14 @@ class BlastResult:
 
         return structure_table(self.obstacles)
 
+    @cached_property
+    def buildings(self) -> "pd.DataFrame":
+        """One row a building, whose parts are one; see `recording.tables.BUILDING_COLUMNS`."""
+        from blast_env.recording.tables import building_table
+
+        names = {each.name: each.building_name for each in self.blast.scenario.structures}
+        return building_table(self.structures, names)
+
     @property
     def bays(self) -> "pd.DataFrame":
         """Refused (`BlastEnvError`): particles have no pressure that could load a pane or panel."""

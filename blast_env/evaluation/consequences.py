@@ -43,6 +43,7 @@ from blast_env.response.facade import FacadeResponse, peak_factor, respond, shar
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.scenario.facade import with_glass
+from blast_env.scenario.staircase import STEPPED, stepped_buildings
 from blast_env.tables import Column, table_of
 
 if TYPE_CHECKING:  # a third of a second to import
@@ -63,6 +64,7 @@ class BuildingResponse:
         facade: What became of its bays.
         peak_factor: What its peaks would be multiplied by if cells did not clip them.
         tails: How much is still to come to its bays, by name, where that is known.
+        stepped: Whether a wall of it is a staircase of modules, as an oblique one is.
     """
 
     building: str
@@ -70,6 +72,7 @@ class BuildingResponse:
     facade: FacadeResponse
     peak_factor: float = 1.0
     tails: Mapping[str, BayTail] = field(default_factory=dict)
+    stepped: bool = False
 
     @cached_property
     def sharpened(self) -> FacadeResponse:
@@ -143,15 +146,17 @@ class Consequences:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What there is to say of the loads: that bays are not complete."""
+        """What there is to say of the loads: oblique walls, and bays that are not complete."""
+        stepped = dict.fromkeys(each.building for each in self.responses if each.stepped)
+        notes = [f"{name}: {STEPPED}; each step is a bay, the worst is too bad" for name in stepped]
         tails = [tail for each in self.responses for tail in each.tails.values()]
         late = sum(not each.complete for each in tails)
-        if not late:
-            return ()
-        return (
-            f"{late} of {len(tails)} bays of all charges are not complete: more than 2 % of their"
-            " impulse may still come",
-        )
+        if late:
+            notes.append(
+                f"{late} of {len(tails)} bays of all charges are not complete: more than 2 % of"
+                " their impulse may still come"
+            )
+        return tuple(notes)
 
     def of(self, building: str) -> tuple[BuildingResponse, ...]:
         """Return what the charges do to one building."""
@@ -355,6 +360,7 @@ def by_building(
 ) -> list[BuildingResponse]:
     """Return what a blast does to each building with a facade."""
     names = {each.name: each.building_name for each in scenario.structures}
+    stepped = stepped_buildings(scenario.structures)
     owners = [names[each.bay.structure] for each in facade.bays]
     found = []
     for building in dict.fromkeys(owners):
@@ -363,7 +369,8 @@ def by_building(
             [facade.bays[index] for index in own.tolist()], facade.time_s, facade.pressure_pa[own]
         )
         inside = {each.bay.name: tails[each.bay.name] for each in part.bays if tails}
-        found.append(BuildingResponse(building, charge, part, peak_factor, inside))
+        is_stepped = building in stepped
+        found.append(BuildingResponse(building, charge, part, peak_factor, inside, is_stepped))
     return found
 
 

@@ -529,6 +529,7 @@ class LayoutEvaluation:
             "notes": list(self.notes),
             "threats": _rows(self.threat_table),
             "structures": _rows(self.table),
+            "buildings": _rows(self.building_table),
             "modules": _rows(self.module_table),
         }
 

@@ -1,6 +1,6 @@
 """The tables of a blast as data frames, with the unit and the meaning of every column."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -90,6 +90,12 @@ STRUCTURE_COLUMNS: Final = (
     Column("first_hit_s", "s", "time of the first collision"),
     Column("modules_destroyed", "", "modules whose impulse passed their capacity"),
 )
+
+BUILDING_COLUMNS: Final = (
+    Column("building", "", "name of the building; structures that are parts of it are one"),
+    *(column for column in STRUCTURE_COLUMNS if column.name not in ("structure", "kind")),
+)
+
 
 STRUCTURE_PA_S_COLUMNS: Final = (
     Column("impulse_pa_s", "Pa s", "impulse per area through the scenario's calibration"),
@@ -226,6 +232,23 @@ def structure_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
     ]
     table = pd.DataFrame(rows, columns=[column.name for column in STRUCTURE_COLUMNS])
     return as_types(table, {"structure": "str", "kind": "str"})
+
+
+def building_table(structures: pd.DataFrame, buildings: Mapping[str, str]) -> pd.DataFrame:
+    """Return one row a building; see `BUILDING_COLUMNS`.
+
+    Args:
+        structures: The structure table of a blast.
+        buildings: The building that a structure is part of, by its name; what is not there, as the
+            barrier, is one of its own.
+    """
+    together = dict.fromkeys(("modules", "hits", "modules_destroyed", "weight"), "sum")
+    together |= {"impulse_sim": "sum", "transferred_impulse_sim": "sum"}
+    together |= {"protected": "any", "first_hit_s": "min"}
+    names = [buildings.get(name, name) for name in structures["structure"]]
+    grouped = structures.assign(building=names).groupby("building", sort=False)
+    table = grouped.agg(together).reset_index()
+    return table[[column.name for column in BUILDING_COLUMNS]]
 
 
 def _or_nan(value: float | None) -> float:

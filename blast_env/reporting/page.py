@@ -154,6 +154,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "sources": _sources(study, verdict, summary),
         "standing": _standing(verdict),
         "spread": _spread(study),
+        "noun": study.scenario.objective.noun,
         "bay_tables": _bay_tables(study),
         "two_sizes": coarse != fine,
         "cells": f"cells of {' and '.join(f'{cell_m} m' for cell_m in options.sizes_m)}",

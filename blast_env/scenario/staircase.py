@@ -13,6 +13,9 @@ from blast_env.units import MODULE_SIDE_M
 LEAST_STEPS: Final = 3
 """So many steps to one side, none back between them, are a staircase."""
 
+STEPPED: Final = "an oblique wall is a staircase of modules, whose peaks are too high"
+"""Note on a building with one; impulses are hardly wrong (`python -m studies.gas oblique`)."""
+
 _MOST_MODULES: Final = 4
 """Depth of a step: a deeper one is a wing of the building."""
 

@@ -353,10 +353,12 @@ def oblique(
                     f"{angle_deg:g}",
                     *(f"{impulse:.0f}" for impulse in impulses),
                     *(f"{peak / PA_PER_KPA:.0f}" for peak in peaks),
+                    *(f"{1e3 * each:.1f}" for each in (found.stepped_m, found.projected_m)),
                 )
             )
     headers = ("degrees", "impulse (Pa s)", "along the normal", "peak of faces (kPa)", "largest")
-    print_line(markdown_table((*headers, "peak of bays (kPa)", "largest of bays"), rows))
+    more = ("peak of bays (kPa)", "largest of bays", "deflection, 10 ms (mm): worst step")
+    print_line(markdown_table((*headers, *more, "worst bay"), rows))
 
 
 @app.command()

@@ -1,7 +1,7 @@
 """A facade turned against the grid: what the staircase of cells does to its loads."""
 
 from dataclasses import dataclass, field
-from math import cos, radians, sin
+from math import cos, pi, radians, sin
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +12,7 @@ from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.geometry import stacked_runs
 from blast_env.physics.gas.engine import GasRun
 from blast_env.physics.gas.solver import Gas
+from blast_env.response.sdof import Resistance, System, responses
 from blast_env.scenario import Scenario
 from blast_env.units import MODULE_SIDE_M
 
@@ -21,6 +22,9 @@ HEIGHT_M: Final = 6.0
 DISTANCE_M: Final = 12.5
 CHARGE_KG: Final = 100.0
 BAY_M: Final = 3.0
+_PERIOD_S: Final = 0.01
+_MASS_KG_M2: Final = 50.0
+_NEVER_YIELDS_PA: Final = 1e12
 _SIDE_M: Final = 38.0
 _CHARGE_M: Final = (10.0, 10.0)
 
@@ -77,9 +81,11 @@ class _Projected:
     share: FloatArray
     area: FloatArray
     history: list[FloatArray] = field(default_factory=list)
+    time_s: list[float] = field(default_factory=list)
 
-    def record(self, solver: Gas, step_s: float) -> None:  # noqa: ARG002
+    def record(self, solver: Gas, step_s: float) -> None:
         """Add a step."""
+        self.time_s.append(step_s + (self.time_s[-1] if self.time_s else 0.0))
         pressure = solver.wall_overpressure_pa()
         chosen = self.bay >= 0
         sums = np.bincount(self.bay[chosen], weights=(pressure * self.share)[chosen])
@@ -97,6 +103,8 @@ class ObliqueLoads:
         projected_pa_s: Mean impulse along the facade's own normal.
         projected_peak_pa: Mean over its bays of the largest mean overpressure along that normal.
         largest_projected_pa: The largest of them.
+        stepped_m: Largest deflection of an elastic component of 10 ms on any step of the staircase.
+        projected_m: The same on any bay along that normal.
     """
 
     impulse_pa_s: float
@@ -105,6 +113,8 @@ class ObliqueLoads:
     projected_pa_s: float
     projected_peak_pa: float
     largest_projected_pa: float
+    stepped_m: float
+    projected_m: float
 
 
 def oblique_loads(
@@ -124,7 +134,12 @@ def oblique_loads(
     recorder = _Projected(
         bay, share, np.bincount(bay[chosen], weights=share[chosen]).astype(np.float64)
     )
+    steps = _steps(run, chosen, bay)
+    count = steps.max() + 1
+    faces = np.bincount(steps[chosen], minlength=count).astype(np.float64)
+    stepped = _Projected(steps, np.ones(len(share)), faces)
     run.record(recorder)
+    run.record(stepped)
     while run.end_reason is None:
         run.advance(run.time_s + 1.0)
     impulse, peak = run.loads.positive_impulse_pa_s, run.loads.peak_pa
@@ -136,6 +151,30 @@ def oblique_loads(
         projected_pa_s=float((impulse * share)[chosen].sum() / share[chosen].sum()),
         projected_peak_pa=float(bay_peaks.mean()),
         largest_projected_pa=float(bay_peaks.max()),
+        stepped_m=_deflection_m(stepped),
+        projected_m=_deflection_m(recorder),
+    )
+
+
+def _steps(run: GasRun, chosen: BoolArray, bay: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return on which tread or riser of the staircase, and storey, each face is; -1 elsewhere."""
+    faces, centre_m = run.table.faces, run.table.centre_m
+    axis = np.minimum(faces.axis, 1)
+    plane_m = np.take_along_axis(centre_m[:, :2], axis[:, np.newaxis], axis=1)[:, 0]
+    keys = np.column_stack([faces.axis, np.round(plane_m, 3), bay])
+    _, number = np.unique(keys[chosen], axis=0, return_inverse=True)
+    steps = np.full(len(chosen), -1)
+    steps[chosen] = number.ravel()
+    return steps
+
+
+def _deflection_m(recorder: _Projected) -> float:
+    """Return the largest deflection of an elastic component of 10 ms under any of the histories."""
+    stiffness = (2.0 * pi / _PERIOD_S) ** 2 * _MASS_KG_M2
+    system = System(_MASS_KG_M2, 1.0, Resistance.elastic_plastic(stiffness, _NEVER_YIELDS_PA))
+    histories = np.array(recorder.history).T
+    return float(
+        responses([system] * len(histories), np.array(recorder.time_s), histories).peak_m.max()
     )
 
 

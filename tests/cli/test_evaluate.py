@@ -50,7 +50,8 @@ def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: P
     assert f"mean of the worst 20 % {expected.cvar_pa_s:,.0f} Pa s" in result.stdout
     assert f"seed {expected.worst.threat.seed}: {expected.worst.impulse_pa_s:,.0f}" in result.stdout
     assert "means over 3 threats (seeds 7 to 9)" in result.stdout
-    for name in ("evaluation.json", "structures.csv", "modules.csv", "threats.csv"):
+    tables = [f"{each}.csv" for each in ("structures", "buildings", "modules", "threats")]
+    for name in ("evaluation.json", *tables):
         assert f"wrote {out / name}" in result.stdout
     for name, table in (("structures", expected.table), ("threats", expected.threat_table)):
         written = pd.read_csv(out / f"{name}.csv")

@@ -5,9 +5,11 @@ from typing import Any
 
 import pytest
 
-from blast_env.engines.gas import STEPPED, GasBlast, GasEngine
+from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation import draw_threats
+from blast_env.evaluation.consequences import consequences
 from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
-from blast_env.scenario.staircase import stepped_buildings
+from blast_env.scenario.staircase import STEPPED, stepped_buildings
 from studies.gas.oblique import turned_block
 from tests.gas_sites import site_document
 from tests.office_park import office_park
@@ -59,3 +61,14 @@ def test_tables_and_notes_say_it() -> None:
     ]
     assert [each.buildings["stepped"].tolist() for each in found] == [[True], [False]]
     assert [each.stepped_notes for each in found] == [(f"hall: {STEPPED}",), ()]
+
+
+def test_an_assessment_says_it_of_a_building_with_a_facade() -> None:
+    """A step is a bay of its own there; an oblique wall has no other."""
+    stairs = parts_of(*STAIRS).model_dump(mode="json")
+    for each in stairs["structures"]:
+        each["facade"] = {"wall": "concrete_200"}
+    scenario = Scenario.from_document(stairs, "stairs")
+    engine = GasEngine(border_m=0.0, until=0.01)
+    found = consequences(scenario, (), [draw_threats(scenario, [0])[0].charge], engine)
+    assert found.notes[0].startswith(f"hall: {STEPPED}")

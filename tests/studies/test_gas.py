@@ -93,6 +93,8 @@ def test_a_turned_facade_has_its_own_peaks_along_its_own_normal() -> None:
     assert turned.projected_pa_s == pytest.approx(straight.projected_pa_s, rel=0.06)
     assert turned.largest_peak_pa > 1.2 * straight.largest_peak_pa
     assert turned.largest_projected_pa < 1.1 * straight.largest_projected_pa
+    assert turned.stepped_m > 1.1 * straight.stepped_m
+    assert turned.projected_m == pytest.approx(straight.projected_m, rel=0.08)
 
 
 def test_what_came_later_is_held_against_what_tables_say() -> None:
