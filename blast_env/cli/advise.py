@@ -8,7 +8,7 @@ from blast_agents.search import LayoutProblem
 from blast_agents.search.advice import (
     Advice,
     MeasureKind,
-    Verdict,
+    AdviceVerdict,
     advise_until,
     best_of,
     kinds_for,
@@ -96,7 +96,7 @@ class AdviseCommand(ChargeOptions):
         charges = [threat.charge for threat in threats]
         judged: dict[Layout, Consequences] = {}
 
-        def verdict(layout: Layout) -> Verdict:
+        def verdict(layout: Layout) -> AdviceVerdict:
             if layout not in judged:
                 judged[layout] = consequences(scenario, layout, charges, judge)
             return _verdict_of(judged[layout], target)
@@ -188,10 +188,10 @@ class AdviseCommand(ChargeOptions):
         )
 
 
-def _verdict_of(seen: Consequences, target: LevelOfProtection) -> Verdict:
+def _verdict_of(seen: Consequences, target: LevelOfProtection) -> AdviceVerdict:
     if seen.stands_up(target):
-        return Verdict.PASSES
-    return Verdict.PASSES_BARELY if seen.passes(target) else Verdict.FAILS
+        return AdviceVerdict.PASSES
+    return AdviceVerdict.PASSES_BARELY if seen.passes(target) else AdviceVerdict.FAILS
 
 
 def _answer(

@@ -13,9 +13,9 @@ from blast_env.tables import markdown_table
 
 _HEAD = """# Standings
 
-Judged entries to the [benchmark](benchmark.md). `blast-env judge --page` writes this page from the
-files in `blast_env/problems/data/standings`: the layouts of every run, and what gas dynamics leaves
-of the load behind them. Intervals are of 95 %, over the seeds of the runs.
+Judged entries to the [benchmark](benchmark.md). The files in `blast_env/problems/data/standings`
+have the layouts of every run. `blast-env judge --page` writes this page from them. The tables say
+how much of the load each layout takes off, by gas dynamics. Intervals are of 95 %, over the seeds.
 """
 
 

@@ -6,7 +6,7 @@ import pytest
 from blast_agents.search import LayoutProblem
 from blast_agents.search.advice import (
     MeasureKind,
-    Verdict,
+    AdviceVerdict,
     advise,
     advise_until,
     against_each,
@@ -107,11 +107,11 @@ def test_what_a_judge_fails_is_searched_for_again_with_a_margin(
     problem = LayoutProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
     once = advise(problem, MeasureKind.TOGETHER, 12)
 
-    def judge(layout: Layout) -> Verdict:
-        return Verdict.FAILS if layout == once.layout else Verdict.PASSES
+    def judge(layout: Layout) -> AdviceVerdict:
+        return AdviceVerdict.FAILS if layout == once.layout else AdviceVerdict.PASSES
 
     found = advise_until(judge, problem, MeasureKind.TOGETHER, 12, rounds=3)
-    assert judge(found.layout) is Verdict.PASSES
+    assert judge(found.layout) is AdviceVerdict.PASSES
     assert found.passes
     assert found.best.damage < once.best.damage - 0.05
     assert found.best.cost > once.best.cost

@@ -41,7 +41,7 @@ _FEWER_SHARE: Final = 0.4
 """Share of the changes that take a piece away: the cheapest layout that passes is wanted."""
 
 
-class Verdict(IntEnum):
+class AdviceVerdict(IntEnum):
     """What a judge says of a layout, the better the larger.
 
     Attributes:
@@ -224,7 +224,7 @@ def advise(
 
 
 def advise_until(
-    judge: Callable[[Layout], Verdict],
+    judge: Callable[[Layout], AdviceVerdict],
     problem: LayoutProblem,
     kind: MeasureKind,
     budget: int,
@@ -257,7 +257,7 @@ def advise_until(
         every.append(found)
         if progress is not None:
             progress(len(every) / rounds)
-        if not found.passes or judge(found.layout) is Verdict.PASSES:
+        if not found.passes or judge(found.layout) is AdviceVerdict.PASSES:
             break
         below = found.best.damage - _MARGIN
         begin_with = (*begin_with, found.layout)
@@ -268,7 +268,7 @@ def advise_until(
     )
 
 
-def best_of(found: Iterable[Advice], judge: Callable[[Layout], Verdict]) -> Advice:
+def best_of(found: Iterable[Advice], judge: Callable[[Layout], AdviceVerdict]) -> Advice:
     """Return the cheapest of those that the judge says most for, or the one nearest to passing."""
     return min(found, key=lambda each: (-judge(each.layout), each.best))
 
