@@ -7,8 +7,8 @@ from typing import Final
 from blast_agents.search import LayoutProblem
 from blast_agents.search.advice import (
     Advice,
-    MeasureKind,
     AdviceVerdict,
+    MeasureKind,
     advise_until,
     best_of,
     kinds_for,

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from blast_agents.search import LayoutProblem
 from blast_agents.search.advice import (
-    MeasureKind,
     AdviceVerdict,
+    MeasureKind,
     advise,
     advise_until,
     against_each,
