@@ -174,11 +174,7 @@ def standing(layout: "Iterable[Element]") -> "Layout":
 
 def met_by_blasts(layout: "Iterable[Element]") -> "Layout":
     """Return what of a layout its loads depend on: all but the measures that harden facades."""
-    return tuple(
-        element
-        for element in layout
-        if isinstance(element, Removal) or not isinstance(element, Measure)
-    )
+    return tuple(element for element in layout if type(element) is not Measure)
 
 
 def layout_text(layout: Iterable[Element]) -> str:

@@ -134,7 +134,7 @@ CONTENT_HASHES: Final = {
     "street_front": "b088a354e90ec7e2f011afe6c60a280ffa4d522f18023169c0879187817891b7",
     "government_forecourt": "81fda966f11e6a2df1bdba6098858def65dcdb0c1c5136090db4829f275d3981",
     "car_park": "a79ee3baa8399f79372be5bc2d386432aa29ec15a202bfa0c16ec48002af0271",
-    "campus": "19bcf2e741b1ffdf9ba22f6fee3c666e4c4ec5c49347413a00f2dda5dedb5c8d",
+    "campus": "d5799deb8d55a7d9255402d7b8dc0dc9e4319cd4565b13e3d4a103a35d8a4729",
     "clinic_front": "d2fc02932afa74582250ccb52aea44d016093c32f7caea6bf4e0582c31c3a036",
     "control_room": "f0b4d497dccfd3fb5c7fa88a4d7442000a78207db5b421985695c92a320c52d6",
     "courtyard": "76c48339ea3f457b906e152fbc0abd85ec13b276c4ecda0be3a9c6dcc0131cb7",

@@ -84,8 +84,7 @@ class BayLoads:
     @cached_property
     def response(self) -> FacadeResponse:
         """What becomes of the bays."""
-        histories = self.recorder.history_pa.astype(np.float64)
-        return respond(self.bays, self.recorder.time_s, histories)
+        return respond(self.bays, *self._histories)
 
     def damages(
         self, alternatives: Sequence[Alternatives], peak_factor: float
@@ -98,8 +97,18 @@ class BayLoads:
         """
         by_name = {each.name: each for each in alternatives}
         own = [by_name[each.bay.name] for each in self.bays]
-        histories = self.recorder.history_pa.astype(np.float64)
-        return bay_damages(own, self.recorder.time_s, histories, peak_factor) if own else ()
+        return bay_damages(own, *self._histories, peak_factor) if own else ()
+
+    @property
+    def _histories(self) -> tuple[FloatArray, FloatArray]:
+        """Times, two or more however soon a run ended, and overpressures at them (bays, times)."""
+        time_s, step_s = self.recorder.time_s, self.recorder.step_s
+        history_pa = self.recorder.history_pa.astype(np.float64)
+        if len(time_s) > 1:
+            return time_s, history_pa
+        if not len(time_s):
+            return np.array([0.0, 1.0]), np.zeros((len(self.bays), 2))
+        return time_s + 0.5 * step_s * np.array([-1.0, 1.0]), np.repeat(history_pa, 2, axis=1)
 
     def history(self, name: str) -> "pd.DataFrame":
         """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`."""

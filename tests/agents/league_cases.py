@@ -51,8 +51,11 @@ def result(
     kind = ProposerKind.RULE if is_rule else ProposerKind.SEARCH
     if has_learnt or training != NO_TRAINING:
         kind = ProposerKind.LEARNT
+    method, _, spent = name.rpartition(", ")
     return Result(
-        LeagueEntry(NoBarrier(name.partition(",")[0]), blasts, kind=kind, training=training),
+        LeagueEntry(
+            NoBarrier(method if "blasts" in spent else name), blasts, kind=kind, training=training
+        ),
         tuple(Proposal(layout, each, blasts) for each in times),
         np.array(impulse_pa_s, dtype=np.float64),
     )

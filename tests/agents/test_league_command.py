@@ -42,7 +42,7 @@ def test_it_has_help_and_is_listed() -> None:
     result = league("--help")
     assert result.exit_code == 0
     words = result.stdout.replace("│", " ").split()
-    assert "known, hidden, vehicle, sites, item_sites or all" in " ".join(words)
+    assert "known, hidden, vehicle, sites, item_sites, large_sites or all" in " ".join(words)
 
 
 def test_all_enter_and_all_is_written(run: Path, tmp_path: Path) -> None:

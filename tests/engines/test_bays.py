@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import blast_env
-from blast_env.engines.gas import GasResult
+from blast_env.engines.gas import GasEngine, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.scenario import Scenario
 
@@ -82,3 +82,11 @@ def test_particles_say_that_they_have_no_bays() -> None:
     result = blast_env.simulate(site(FACADE), engine="event", charge=CHARGE)
     with pytest.raises(BlastEnvError, match="no overpressure"):
         _ = result.bays
+
+
+@pytest.mark.parametrize("until_s", [1e-6, 1e-3])
+def test_a_run_that_ends_before_the_blast_arrives_harms_nothing(until_s: float) -> None:
+    early = blast_env.simulate(site(FACADE), engine=GasEngine(until=until_s), charge=CHARGE)
+    assert early.bay_loads is not None
+    assert len(early.bay_loads.recorder.time_s) < 3
+    assert (early.bays["break_probability"].fillna(0.0) == 0.0).all()

@@ -53,6 +53,9 @@ GIVEN_BY_THE_CALLER = {
 }
 
 
+FOR_AUTHORS = {"Engine"}  # who write one, and are given a loaded scenario
+
+
 def _callables(module_name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
     module = import_module(module_name)
     names = getattr(module, "__all__", [name for name in vars(module) if name[0] != "_"])
@@ -61,7 +64,9 @@ def _callables(module_name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
         if not callable(value) or not getattr(value, "__module__", "").startswith("blast"):
             continue
         if getattr(value, "_is_protocol", False) or inspect.isabstract(value):
-            continue  # for those who write one, and are given a loaded scenario
+            continue
+        if name in FOR_AUTHORS:
+            continue
         if name not in GIVEN_BY_THE_CALLER:
             yield name, value
         if inspect.isclass(value):

@@ -12,7 +12,10 @@ from blast_env.physics.gas.settings import CHECKED_CELLS
 from blast_env.scenario import Placement, Scenario
 from blast_env.scenario.build_scene import worst_places
 
-WITH_VEHICLES = ("hotel_forecourt", "ministry_kerb", "shopping_street")
+WITH_VEHICLES = (
+    *("car_park", "government_forecourt", "hotel_forecourt", "ministry_kerb"),
+    *("shopping_street", "street_front"),
+)
 
 
 @pytest.mark.parametrize("name", sorted(FOR_GAS))
