@@ -7,6 +7,7 @@ from typing import Any, Final
 import gymnasium as gym
 
 import blast_env  # noqa: F401  # registers the environments
+from blast_env.bundled import REAL_SIZE
 from blast_env.engines.gas import GasEngine
 from blast_env.envs.registration import FOR_GAS, barrier_id
 from tests.envs.small import ThinEngine
@@ -16,6 +17,8 @@ IDS: Final = tuple(
     sorted(name for name, spec in gym.registry.items() if "blast_env" in str(spec.entry_point))
 )
 BARRIER_IDS: Final = tuple(name for name in IDS if name.startswith("BlastBarrier"))
+OTHERS: Final = frozenset(barrier_id(name) for name in REAL_SIZE - {"street_front"})
+"""Sites of real size beside one: what differs from it is looked at in `tests/envs`."""
 
 
 def arguments(name: str) -> dict[str, Any]:

@@ -40,12 +40,12 @@ SMALL = Effort(
 )
 THREATS = 12
 BARE = np.linspace(90.0, 110.0, THREATS)
-RNG = np.random.default_rng(0)
 
 
 def outcome(*left: float, scatter: float = 0.01) -> WayOutcome:
-    """Return an outcome of layouts that leave such shares of the impulse."""
-    shares = np.array(left)[:, None] + scatter * RNG.normal(size=(len(left), THREATS))
+    """Return an outcome of layouts that leave such shares of the impulse, the same each time."""
+    rng = np.random.default_rng([round(1000.0 * each) for each in left])
+    shares = np.array(left)[:, None] + scatter * rng.normal(size=(len(left), THREATS))
     return WayOutcome("made up", ((),) * len(left), shares * BARE, BARE)
 
 
