@@ -64,9 +64,13 @@ class BlastCost:
 
 
 def blast_cost(scenario: Scenario, engine: str, repeats: int, *, memory: bool = True) -> BlastCost:
-    """Time blasts of a scenario without a barrier, with seeds from 0 on.
+    """Time blasts of a scenario without a barrier.
 
-    The memory is that of a process of its own.
+    Args:
+        scenario: The scenario.
+        engine: Name of the engine.
+        repeats: Number of blasts; their seeds are 0 and up.
+        memory: Whether to measure the memory, too, in a process of its own.
     """
     run = partial(simulate, scenario, engine=engine)
     result: Any = run(seed=0)  # compiles what is not on disk yet
@@ -222,7 +226,13 @@ def _site_cost(length_m: float, engine: "GasEngine") -> SiteCost:
 
 @dataclass(frozen=True)
 class Crowd:
-    """The same blasts in one process and in several at once, by the clock."""
+    """The same blasts in one process and in several at once, by the clock.
+
+    Attributes:
+        processes: How many.
+        alone_per_s: Blasts a second of one process.
+        together_per_s: Blasts a second of all.
+    """
 
     processes: int
     alone_per_s: float
@@ -235,7 +245,14 @@ class Crowd:
 
 
 def crowd(scenario: Scenario, engine: str, cpu_s: float, processes: int) -> Crowd:
-    """Run lots of blasts in one worker process, then in several at once."""
+    """Run lots of blasts in one worker process, then in several at once.
+
+    Args:
+        scenario: The scenario.
+        engine: Name of the engine.
+        cpu_s: About how long one blast takes.
+        processes: How many.
+    """
     lot = max(2, ceil(_LOT_S / cpu_s))
     rates = []
     for count in (1, processes):
@@ -280,7 +297,17 @@ class EnvironmentCost:
 def environment_cost(
     scenario: Scenario, engine: str, episodes: int, environments: int
 ) -> EnvironmentCost:
-    """Time the environment in one process, and in a vector of processes."""
+    """Time the environment in one process, and in a vector of processes.
+
+    Args:
+        scenario: The scenario; it needs a build zone, and a calibration where the engine does.
+        engine: Name of the engine.
+        episodes: Episodes that are timed; one more comes before them.
+        environments: Processes of the vector.
+
+    Raises:
+        BlastEnvError: If the environment cannot be made of the scenario.
+    """
     env = gym.make(ENV_ID, scenario=scenario, engine=engine)
     rng = np.random.default_rng(0)
     _episode(env, rng, 0)

@@ -98,7 +98,14 @@ class _SchedulerFile:
 
 
 def address_of(scheduler: str) -> str:
-    """Return the address of a scheduler, from that or from the path of its scheduler file."""
+    """Return the address of a scheduler.
+
+    Args:
+        scheduler: The address, or the path of its scheduler file.
+
+    Raises:
+        BlastEnvError: If a scheduler file cannot be read.
+    """
     if not os.path.isfile(scheduler):
         return scheduler
     try:

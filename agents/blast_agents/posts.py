@@ -66,7 +66,12 @@ def posts_and_wall(
     The wall stands across the line of sight from the worst place that the posts leave a vehicle to
     the protected structures, as near to that place as it can; see `line_of_sight_wall`.
 
-    Arguments and errors as for `line_of_posts`.
+    Args:
+        scenario: As for `line_of_posts`.
+        charge: As for `line_of_posts`.
+
+    Raises:
+        BlastEnvError: As for `line_of_posts`.
     """
     found = find_scenario(scenario)
     posts = _line_of_posts(found)

@@ -102,13 +102,14 @@ def wall_added_to(
 ) -> Placement:
     """Return a placement with a wall beside what stands already; see `line_of_sight_wall`.
 
-    Errors as for `line_of_sight_wall`.
-
     Args:
         placement: What stands already.
         charge_m: Where the charge is.
         share: As for `line_of_sight_wall`.
         kind: As for `line_of_sight_wall`.
+
+    Raises:
+        BlastEnvError: As for `line_of_sight_wall`.
     """
     if not 0.0 <= share <= 1.0:
         raise BlastEnvError(f"share is {share:g}, must be from 0 to 1")
@@ -180,7 +181,8 @@ def long_wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> 
 def ring_around_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return a wall that bends around the charge, as near to it as the build zone lets it stand.
 
-    Errors as for `line_of_sight_wall`.
+    Raises:
+        BlastEnvError: As for `line_of_sight_wall`.
     """
     placement = Placement.empty(scenario)
     (x_m, y_m), radius_m = _place_m(placement, charge), placement.scenario.charge_radius_m

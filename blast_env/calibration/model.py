@@ -308,6 +308,10 @@ def _of_the_package(name: str, engine: str) -> Calibration:
 def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:
     """Return the calibration that a scenario names, checked against its parameters.
 
+    Args:
+        scenario: The scenario.
+        engine: Name of the engine that runs its blasts.
+
     Raises:
         CalibrationError: If the scenario names no calibration, or one that was made with other
             parameters or another engine.

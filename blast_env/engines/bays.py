@@ -64,14 +64,24 @@ class BayTail(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BayLoads:
-    """The pressure histories of the bays of a blast."""
+    """The pressure histories of the bays of a blast.
+
+    Attributes:
+        bays: The bays with air before them.
+        recorder: Their histories, a patch each.
+    """
 
     bays: tuple[FilledBay, ...]
     recorder: "PatchHistories"
 
     @classmethod
     def begin(cls, run: "GasRun", bays: Sequence[FilledBay]) -> "BayLoads":
-        """Return the recorder of a run that has not begun; the run has to record it."""
+        """Return the recorder of a run that has not begun; the run has to record it.
+
+        Args:
+            run: The run.
+            bays: The bays of its scenario.
+        """
         from blast_env.physics.gas.probes import PatchHistories
 
         patch = _patches(run.table, [each.name for each in run.site.structures], bays)
@@ -111,7 +121,11 @@ class BayLoads:
         return time_s + 0.5 * step_s * np.array([-1.0, 1.0]), np.repeat(history_pa, 2, axis=1)
 
     def history(self, name: str) -> "pd.DataFrame":
-        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`."""
+        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
+
+        Raises:
+            UnknownNameError: If there is no bay of that name with air before it.
+        """
         import pandas as pd
 
         names = [each.bay.name for each in self.bays]
@@ -121,7 +135,11 @@ class BayLoads:
         return pd.DataFrame({"time_s": self.recorder.time_s, "overpressure_pa": history})
 
     def table(self, run: "GasRun") -> "pd.DataFrame":
-        """Return one row a bay; see `LOADED_BAY_COLUMNS`."""
+        """Return one row a bay; see `LOADED_BAY_COLUMNS`.
+
+        Args:
+            run: The run that has recorded them.
+        """
         if not self.bays:
             return table_of([], LOADED_BAY_COLUMNS)
         tails = self.tails(run)
@@ -129,7 +147,11 @@ class BayLoads:
         return table_of(rows, LOADED_BAY_COLUMNS)
 
     def tails(self, run: "GasRun") -> dict[str, BayTail]:
-        """Return how much of its impulse is still to come to each bay, by name."""
+        """Return how much of its impulse is still to come to each bay, by name.
+
+        Args:
+            run: The run that has recorded them.
+        """
         names = [each.name for each in run.site.structures]
         passed = {name: run.has_passed(index) for index, name in enumerate(names)}
         (middle_s, first_s), time_s = run.tail.since_s, self.response.time_s

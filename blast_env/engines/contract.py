@@ -181,7 +181,13 @@ class BlastLoads:
 def structure_response(
     bays: Collection[BayDamage], named: Collection[NamedBay], objective: ObjectiveSection
 ) -> tuple[float, float]:
-    """Return what counts of the response of one structure, and the largest damage of its bays."""
+    """Return what counts of the response of one structure, and the largest damage of its bays.
+
+    Args:
+        bays: The damage of its bays under each component that they may have.
+        named: What stands in the bays, of all structures.
+        objective: Says what counts.
+    """
     chosen = {each.bay.name: each for each in named}
     is_glazing = objective.measure == "glazing"
     damage, area_m2 = [], []
@@ -225,7 +231,11 @@ class RunnableBlast(Protocol):
     """One blast that can be run to its end."""
 
     def run(self, progress: Callable[[float], None] | None = None) -> BlastOutcome:
-        """Run the blast; `progress` is told the share of the time limit that has passed."""
+        """Run the blast.
+
+        Args:
+            progress: Called from time to time with the share of the time limit that has passed.
+        """
 
 
 class Engine(ABC):

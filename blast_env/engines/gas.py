@@ -247,7 +247,11 @@ class GasResult:
 
     @property
     def collisions(self) -> "pd.DataFrame":
-        """Refused (`BlastEnvError`): a gas has no particles that collide."""
+        """There are none: a gas has no particles that collide.
+
+        Raises:
+            BlastEnvError: Always; the message says what there is instead.
+        """
         raise BlastEnvError(
             "engine 'gas' has no collisions: loads are in structures, modules, faces and gauges"
         )
@@ -463,6 +467,9 @@ class GasResult:
     def to_excel(self, path: str | Path) -> Path:
         """Write a workbook with structures, modules, gauges and the run record.
 
+        Returns:
+            The path.
+
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
@@ -484,6 +491,9 @@ class GasResult:
 
     def to_parquet(self, path: str | Path) -> Path:
         """Write the loads on all faces of cells as Parquet, the run record in its metadata.
+
+        Returns:
+            The path.
 
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.

@@ -170,7 +170,12 @@ def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataF
 
 
 def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
-    """Return one row a face of a module that touches air; see `MODULE_COLUMNS`."""
+    """Return one row a face of a module that touches air; see `MODULE_COLUMNS`.
+
+    Args:
+        run: The run.
+        faces: Its `face_table`.
+    """
     table = _grouped(run, faces, ["structure", "module_id", "row", "column", "face"])
     outlines = run.site.structures
     corners = {outline.name: outline.corner_m for outline in outlines}
@@ -203,10 +208,13 @@ def structure_table(
     buildings: Mapping[str, str] | None = None,
     stepped: Collection[str] = (),
 ) -> "pd.DataFrame":
-    """Return one row a structure; see `STRUCTURE_COLUMNS`.
+    """Return one row a structure, or one a building; see `STRUCTURE_COLUMNS`, `BUILDING_COLUMNS`.
 
-    Or one a building, given the building that each structure is a part of, by name, and the
-    buildings with a wall that is a staircase; see `BUILDING_COLUMNS`.
+    Args:
+        run: The run.
+        faces: Its `face_table`.
+        buildings: The building that each structure is a part of, by name.
+        stepped: The buildings with a wall that is a staircase.
     """
     together: dict[str, list[StructureOutline]] = {}
     for outline in run.site.structures:

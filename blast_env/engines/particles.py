@@ -134,7 +134,12 @@ class EventEngine(ParticleEngine):
 
 
 def find_particle_engine(engine: str | Engine) -> ParticleEngine:
-    """Return an engine of particles by its name, or the engine itself."""
+    """Return an engine of particles by its name, or the engine itself.
+
+    Raises:
+        UnknownNameError: If there is no engine of that name.
+        BlastEnvError: If it is no engine of particles.
+    """
     found = find_engine(engine)
     if not isinstance(found, ParticleEngine):
         raise BlastEnvError(
@@ -168,7 +173,12 @@ class Blast:
 
     @cached_property
     def particle_engine(self) -> ParticleEngine:
-        """The engine itself; refused as by `find_particle_engine`."""
+        """The engine itself.
+
+        Raises:
+            UnknownNameError: If there is no such engine.
+            BlastEnvError: If it is no engine of particles.
+        """
         return find_particle_engine(self.engine)
 
     def start(self) -> BlastRun:
@@ -273,21 +283,35 @@ class BlastResult:
 
     @property
     def bays(self) -> "pd.DataFrame":
-        """Refused (`BlastEnvError`): particles have no pressure that could load a pane or panel."""
+        """There are none: particles have no pressure that could load a pane or a panel.
+
+        Raises:
+            BlastEnvError: Always; the message says what does.
+        """
         raise BlastEnvError(
             f"engine {self.engine_name!r} knows no overpressure, so no response of bays: take 'gas'"
         )
 
     @property
     def pieces(self) -> "pd.DataFrame":
-        """Refused (`BlastEnvError`): particles have no pressure that could push a piece."""
+        """There are none: particles have no pressure that could push a piece.
+
+        Raises:
+            BlastEnvError: Always; the message says what does.
+        """
         raise BlastEnvError(
             f"engine {self.engine_name!r} knows no overpressure, so no push on pieces: take 'gas'"
         )
 
     @cached_property
     def calibration(self) -> Calibration:
-        """The scenario's calibration; errors as for `scenario_calibration`."""
+        """The scenario's calibration.
+
+        Raises:
+            UnknownNameError: If there is no calibration of that name.
+            CalibrationError: If the scenario names no calibration, or one that was made with
+                other parameters or another engine.
+        """
         return scenario_calibration(self.blast.scenario, self.engine_name)
 
     def obstacle(self, name: str) -> ModularObstacle:
@@ -304,7 +328,11 @@ class BlastResult:
     def impulse_sim(self, structure: str) -> float:
         """Return the sum of m |v| over the collisions with a structure, simulation units.
 
-        Errors as for `obstacle`.
+        Args:
+            structure: Name of the structure.
+
+        Raises:
+            UnknownNameError: If there is no structure of that name.
         """
         return self.obstacle(structure).impulse
 
@@ -431,6 +459,9 @@ class BlastResult:
     def to_excel(self, path: str | Path) -> Path:
         """Write a workbook with collisions, modules, structures and the run record.
 
+        Returns:
+            The path.
+
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
@@ -440,6 +471,9 @@ class BlastResult:
 
     def to_parquet(self, path: str | Path) -> Path:
         """Write the collision table as Parquet, the run record in its metadata.
+
+        Returns:
+            The path.
 
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.

@@ -90,6 +90,11 @@ class PieceLoads:
     ) -> "PieceLoads | None":
         """Return the recorder of a run that has not begun; the run has to record it.
 
+        Args:
+            run: The run.
+            scenario: Its scenario.
+            layout: Its layout.
+
         Returns:
             `None` where no piece has a height.
         """
@@ -179,7 +184,11 @@ class PieceLoads:
         )
 
     def history(self, name: str) -> "pd.DataFrame":
-        """Return the mean overpressures on a piece over time: `time_s`, and a column a side."""
+        """Return the mean overpressures on a piece over time: `time_s`, and a column a side.
+
+        Raises:
+            UnknownNameError: If there is no such piece.
+        """
         import pandas as pd
 
         if name not in self.names:
@@ -191,7 +200,11 @@ class PieceLoads:
         return pd.DataFrame(columns)
 
     def table(self, end_s: float) -> "pd.DataFrame":
-        """Return one row a piece; see `PIECE_COLUMNS`."""
+        """Return one row a piece; see `PIECE_COLUMNS`.
+
+        Args:
+            end_s: When the blast is over.
+        """
         rows = [self._row(piece, end_s) for piece in range(len(self.elements))]
         return table_of(rows, PIECE_COLUMNS)
 

@@ -43,7 +43,16 @@ def checked_keywords(
 
 
 def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> None:
-    """Refuse a name that is not known."""
+    """Refuse a name that is not known.
+
+    Args:
+        kind: What is named, for the error.
+        names: The names given.
+        known: The names that exist.
+
+    Raises:
+        UnknownNameError: If there is one; the message names the nearest known one.
+    """
     known = list(known)
     for name in names:
         if name not in known:
@@ -83,6 +92,10 @@ def _common_methods(strategies: Iterable[object]) -> list[str]:
 
 def checked_options(options: Mapping[str, Any] | None, known: Iterable[str]) -> Mapping[str, Any]:
     """Return the options of a call of `reset`.
+
+    Args:
+        options: As given.
+        known: The names that exist.
 
     Raises:
         UnknownNameError: If there is no such option; the message names the nearest one.

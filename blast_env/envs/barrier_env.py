@@ -274,7 +274,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return self._episode.blasts_due(int(action), self.illegal)
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return which actions are legal now, (actions,)."""
+        """Return which actions are legal now, (actions,).
+
+        Raises:
+            gymnasium.error.ResetNeeded: If `reset` has not been called.
+        """
         return self._episode.action_mask()
 
     def explain(self, element: Element) -> str | None:
@@ -289,7 +293,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return self.placement.explain(element)
 
     def explain_vehicles(self) -> tuple[str, ...]:
-        """Return a sentence for each vehicle: how near it comes now, by which way, how fast."""
+        """Return a sentence for each vehicle: how near it comes now, by which way, how fast.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If `reset` has not been called.
+        """
         return self.placement.explain_vehicles()
 
     @property
@@ -352,7 +360,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         self._display.marked = action
 
     def cell_at(self, place_px: tuple[int, int]) -> Cell | None:
-        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one."""
+        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one.
+
+        Raises:
+            gymnasium.error.ResetNeeded: If `reset` has not been called.
+        """
         return self._display.cell_at(self._episode, place_px)
 
     def close(self) -> None:

@@ -93,8 +93,14 @@ _FRAMES_PER_PLACEMENT: Final = 5  # in the window: 0.2 s, so that a person can f
 class Display:
     """Shows an episode of placing, and the blast at its end.
 
-    Drawing objects are made when they are needed and left out when this is pickled. `marked` is the
-    action that is marked in the frames, before the charge goes off.
+    Drawing objects are made when they are needed and left out when this is pickled.
+
+    Args:
+        render_mode: `"human"`, `"rgb_array"`, `"ansi"`, or `None` for nothing.
+        frames_per_s: Frames a second of the window and of films.
+
+    Attributes:
+        marked: The action that is marked in the frames, before the charge goes off.
     """
 
     def __init__(self, render_mode: str | None, frames_per_s: float) -> None:

@@ -148,7 +148,11 @@ class Episode:
         return {"action_mask": mask, "illegal_actions": self.illegal_actions}
 
     def final_information(self, evaluators: Evaluators) -> dict[str, Any]:
-        """Return what is told when the charge has gone off."""
+        """Return what is told when the charge has gone off.
+
+        Args:
+            evaluators: They know how many blasts there were.
+        """
         protected, unprotected = self.assess()
         case = self.objective.case
         seeds = [threat.seed for threat in case.threats]
@@ -205,8 +209,14 @@ HIDDEN_THREATS: Final = 16
 class Task:
     """What is placed where, against what, and what is seen of it.
 
-    Each charge has `realisations` blasts, with different fan and air. Without a risk measure the
-    scenario says how the loads of several charges become one.
+    Attributes:
+        source: Gives each episode its scenario.
+        threat_model: Draws the charges of an episode.
+        realisations: Blasts for each charge, with different fan and air.
+        risk: How the loads of several charges become one; as the scenario says if `None`.
+        observation: What is seen.
+        actions: What an action says.
+        evaluators: Run the blasts.
     """
 
     source: ScenarioSource
@@ -296,7 +306,12 @@ def find_realisations(realisations: int | None, threat: str | ThreatModel, engin
 
 
 def find_risk(risk: str | Risk | None, cvar_level: float) -> Risk | None:
-    """Return the risk measure for the arguments `risk` and `cvar_level`; `None` for none."""
+    """Return the risk measure for the arguments `risk` and `cvar_level`; `None` for none.
+
+    Raises:
+        UnknownNameError: If there is no risk measure of that name.
+        BlastEnvError: If the level is no number or out of bounds.
+    """
     level = real_number("cvar_level", cvar_level, 0.0, 1.0)
     if risk is None:
         return None

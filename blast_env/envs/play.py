@@ -86,7 +86,11 @@ class Cursor:
 
 
 def barrier_env(env: gym.Env[Any, Any]) -> BlastBarrierEnv:
-    """Return the barrier environment within wrappers."""
+    """Return the barrier environment within wrappers.
+
+    Raises:
+        BlastEnvError: If it is another one, or does not give frames.
+    """
     inner = env.unwrapped
     if not isinstance(inner, BlastBarrierEnv):
         raise BlastEnvError(f"env is {env}, must be a BlastBarrier environment: nothing is placed")

@@ -172,7 +172,11 @@ class UnfoldingParticles(Unfolding):
         }
 
     def result(self) -> BlastResult:
-        """Return what happened, at the end."""
+        """Return what happened, at the end.
+
+        Raises:
+            ValueError: If the run has not ended.
+        """
         return self.blast.result(self.run)
 
     def frame(self) -> NDArray[np.uint8]:
@@ -261,7 +265,11 @@ class UnfoldingGas(Unfolding):
         }
 
     def result(self) -> "GasResult":
-        """Return what happened, at the end."""
+        """Return what happened, at the end.
+
+        Raises:
+            ValueError: If the run has not ended.
+        """
         if self.run.end_reason is None:
             raise ValueError(f"the run is at {self.time_s} s and has not ended: advance it first")
         return self._so_far()

@@ -257,6 +257,9 @@ def practice_visible(
         realisations: How many fans and airs, at least one.
         seed: Decides the seeds of the blasts, and what the search draws.
         risk: As for `Case`.
+
+    Raises:
+        BlastEnvError: If there are to be none.
     """
     _at_least_one("realisations", realisations)
     drawn = SeedRange.SEARCH.draw_distinct(generator(seed), realisations)
@@ -280,6 +283,9 @@ def practice_hidden(
         A case whose first charge is the one in the middle of all, and each further one as far as
         possible from those before it, so that the first few stand for all. Those of vehicles come
         before them, the worst first.
+
+    Raises:
+        BlastEnvError: If there are to be none.
     """
     _at_least_one("charges", charges)
     _at_least_one("realisations", realisations)

@@ -289,7 +289,8 @@ def loads_of_both(
 ) -> tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]:
     """Return the loads with a layout and without a barrier, one a threat of the case each.
 
-    Errors as for `compare`.
+    Raises:
+        BlastEnvError: As for `compare`.
     """
     check_distinct(case.threats)
     pairs = [(each, threat) for threat in case.threats for each in (layout, ())]
@@ -303,6 +304,9 @@ def check_something_arrives(cases: Sequence[Case], unprotected: FloatArray) -> N
     Args:
         cases: The cases.
         unprotected: Load on the protected structures without a barrier (cases, threats).
+
+    Raises:
+        BlastEnvError: If it is 0 under every threat of a case; the message says of which.
     """
     for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
         if not mean > 0.0:

@@ -182,7 +182,11 @@ class Consequences:
         return self.passes(target) and not self.depends_on_cells(target)
 
     def doubt(self, target: LevelOfProtection) -> str:
-        """Return with what a verdict that passes would fail, in words; empty if with nothing."""
+        """Return with what a verdict that passes would fail, in words; empty if with nothing.
+
+        Args:
+            target: The level that the buildings reach.
+        """
         return _SHARPER if self.depends_on_cells(target) else ""
 
     @property
@@ -244,7 +248,11 @@ _NO_TAIL: Final = BayTail()
 
 
 def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
-    """Return one row a layout, charge and bay: `CASE_COLUMNS`, then `LOADED_BAY_COLUMNS`."""
+    """Return one row a layout, charge and bay: `CASE_COLUMNS`, then `LOADED_BAY_COLUMNS`.
+
+    Args:
+        found: What charges do, by the words for the layout.
+    """
     rows = [
         _case(name, each.charge) | row | each.tails.get(str(row["bay"]), _NO_TAIL)._asdict()
         for name, judged in found.items()
@@ -255,7 +263,11 @@ def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
 
 
 def piece_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
-    """Return one row a layout, charge and piece: `CASE_COLUMNS`, then `PIECE_COLUMNS`."""
+    """Return one row a layout, charge and piece: `CASE_COLUMNS`, then `PIECE_COLUMNS`.
+
+    Args:
+        found: What charges do, by the words for the layout.
+    """
     rows = [
         _case(name, each.charge) | row
         for name, judged in found.items()
@@ -315,7 +327,14 @@ def consequences(
 def consequences_of(
     scenario: Scenario, result: "GasResult", charge: Charge, taken_away: Layout = ()
 ) -> Consequences:
-    """Return what a blast that was run does to the buildings and the barrier."""
+    """Return what a blast that was run does to the buildings and the barrier.
+
+    Args:
+        scenario: The scenario.
+        result: The blast.
+        charge: The charge where it went off.
+        taken_away: Pieces that were taken away for it.
+    """
     responses: list[BuildingResponse] = []
     if result.bay_loads is not None and result.bay_loads.bays:
         factor = peak_factor(result.run.grid.cell_m, charge.tnt_kg)

@@ -208,7 +208,13 @@ def _run_one(work: tuple[Engine, Scenario, BlastKey, AnyCharge]) -> BlastLoads:
 
 
 class BlastAsked(NamedTuple):
-    """A blast that somebody will ask for."""
+    """A blast that somebody will ask for.
+
+    Attributes:
+        scenario: The scenario.
+        layout: What stands on the site.
+        threat: The charge and the seed.
+    """
 
     scenario: Scenario
     layout: Layout

@@ -536,6 +536,9 @@ class LayoutEvaluation:
     def to_json(self, path: str | Path) -> Path:
         """Write `to_dict` to a file.
 
+        Returns:
+            The path.
+
         Raises:
             BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
@@ -613,8 +616,6 @@ def evaluate_against(
 
     For several layouts on the same threats: the empty site is simulated only once.
 
-    Errors as for `evaluate_layout`.
-
     Args:
         evaluator: Runs the blasts.
         layout: As for `evaluate_layout`.
@@ -622,6 +623,9 @@ def evaluate_against(
         processes: As for `evaluate_layout`.
         cvar_level: As for `evaluate_layout`.
         progress: As for `evaluate_layout`.
+
+    Raises:
+        BlastEnvError: As for `evaluate_layout`.
     """
     check_cvar_level(cvar_level)
     scenario = evaluator.scenario

@@ -48,7 +48,12 @@ _SIMULATED, _REFERENCE = "#0072B2", "#000000"
 
 
 def calibration_figure(report: CalibrationReport, name: str) -> Figure:
-    """Return the simulated impulse, the three laws beside the reference, and their residuals."""
+    """Return the simulated impulse, the three laws beside the reference, and their residuals.
+
+    Args:
+        report: The report.
+        name: Name of the calibration, for the heading.
+    """
     figure = Figure(figsize=(12.0, 8.6), layout="constrained")
     grid = figure.add_gridspec(2, 2, height_ratios=(3, 2))
     _draw_simulated(figure.add_subplot(grid[:, 0]), report)

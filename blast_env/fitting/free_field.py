@@ -274,7 +274,17 @@ def kingery_bulmash_reference(
 
 @dataclass(frozen=True, eq=False)
 class CalibrationReport:
-    """A study with its three fits."""
+    """A study with its three fits.
+
+    Attributes:
+        study: What was run.
+        runs: One row a blast.
+        summary: One row a distance; see `summarise`.
+        reference: What it was fitted to.
+        laws: The three laws by name.
+        metrics: How well each agrees.
+        simulated: Which sum over the collisions they convert.
+    """
 
     study: FreeFieldStudy
     runs: pd.DataFrame
@@ -337,6 +347,12 @@ def calibrate(
     simulated: SimulatedQuantity = "impulse",
 ) -> CalibrationReport:
     """Fit the three laws to the runs of a study.
+
+    Args:
+        study: The study.
+        runs: Its runs.
+        reference: What to fit to.
+        simulated: Which sum over the collisions to convert.
 
     Raises:
         BlastEnvError: If the runs cannot be fitted, e.g. because nothing arrived at a distance.

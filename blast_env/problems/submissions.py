@@ -124,7 +124,11 @@ class Submission:
 
 
 def write_runs(path: str | Path, record: Any) -> Path:
-    """Write a dataclass with `runs` as JSON, a run a line."""
+    """Write a dataclass with `runs` as JSON, a run a line.
+
+    Raises:
+        BlastEnvError: If it cannot be written.
+    """
     rest = {name: value for name, value in asdict(record).items() if name != "runs"}
     lines = ",\n".join(f"    {json.dumps(asdict(run))}" for run in record.runs)
     head = json.dumps(rest, indent=2, allow_nan=False)[:-2]

@@ -56,7 +56,11 @@ class SearchJob:
         return self._checked(found)
 
     def at_once(self) -> Proposal:
-        """Return what is proposed without a blast, and how long that took."""
+        """Return what is proposed without a blast, and how long that took.
+
+        Raises:
+            BlastEnvError: If a blast is run, or the layout may not be built.
+        """
         problem = self._problem(self.engine, BlastMeter(0))
         found = timed_proposal(lambda: self._result(problem).layout)
         return self._checked(replace(found, layout=tuple(sorted(found.layout))))

@@ -151,7 +151,19 @@ def sample_text(standings: Standings) -> str:
 
 
 def write_league(all_standings: Sequence[Standings], folder: Path, command: str) -> list[Path]:
-    """Write tables and figure of each track, and the page."""
+    """Write tables and figure of each track, and the page.
+
+    Args:
+        all_standings: One a track.
+        folder: It exists.
+        command: What started the league.
+
+    Returns:
+        The paths.
+
+    Raises:
+        BlastEnvError: If a file cannot be written, or the extra `render` is missing.
+    """
     written = []
     for standings in all_standings:
         name = standings.track.name

@@ -60,8 +60,11 @@ _LOADS: Final = TypeAdapter(tuple[Load, ...])
 class ResultStore:
     """Keeps results in the files of a folder; see `FolderStore`.
 
+    Args:
+        folder: The folder; it is made if need be.
+
     Raises:
-        BlastEnvError: If the folder cannot be made, or a result cannot be written.
+        BlastEnvError: If the folder cannot be made.
     """
 
     def __init__(self, folder: str | Path) -> None:

@@ -121,11 +121,17 @@ def known_track(
 def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0, *, noisy: bool = True) -> Track:
     """Return the track of a hidden threat on a known site: one case.
 
-    A search meets `HIDDEN_THREATS` charges, one fan and air each; the case itself `HIDDEN_SEEDS`
-    times as many held-out threats as `seeds` says. Without noise a charge that is drawn again is
-    the same blast again, and is there once; so it is with a few places, as of a vehicle.
+    A search meets `HIDDEN_THREATS` charges, one fan and air each.
 
-    Arguments and errors as for `known_track`.
+    Args:
+        scenario: As for `known_track`.
+        seeds: The case meets `HIDDEN_SEEDS` times as many held-out threats.
+        seed: As for `known_track`.
+        noisy: As for `known_track`; if not, a charge that is drawn again is the same blast again,
+            and is there once. So it is with a few places, as of a vehicle.
+
+    Raises:
+        BlastEnvError: As for `known_track`.
     """
     scenario = find_scenario(scenario)
     scenario.zone  # noqa: B018  # refuses a scenario without one
@@ -148,7 +154,14 @@ def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0, *, noisy: boo
 def vehicle_track(scenario: AnyScenario, seeds: int, seed: int = 0, *, noisy: bool = True) -> Track:
     """Return the track of a vehicle on a known site: one case, a hidden threat.
 
-    Arguments and errors as for `hidden_track`; there has to be a vehicle.
+    Args:
+        scenario: As for `known_track`; it has a vehicle.
+        seeds: As for `hidden_track`.
+        seed: As for `known_track`.
+        noisy: As for `hidden_track`.
+
+    Raises:
+        BlastEnvError: As for `known_track`, or if there is no vehicle.
     """
     scenario = find_scenario(scenario)
     if not scenario.vehicles:
@@ -166,13 +179,14 @@ def vehicle_track(scenario: AnyScenario, seeds: int, seed: int = 0, *, noisy: bo
 def sites_track(sites: Sequence[Scenario], seeds: int, seed: int = 0, family: str = SITES) -> Track:
     """Return the track of a hidden threat on generated sites, each of them a case.
 
-    Errors as for `known_track`.
-
     Args:
         sites: Sites that no training has seen, at most 1,000.
         seeds: Held-out threats of each, at most 1,000.
-        seed: Decides everything, at most 1,000.
+        seed: As for `known_track`.
         family: What the sites are of, one of `FAMILIES`.
+
+    Raises:
+        BlastEnvError: As for `known_track`.
     """
     firsts = _first_seeds(len(sites), seeds, seed)
     return Track(
@@ -189,7 +203,11 @@ def sites_track(sites: Sequence[Scenario], seeds: int, seed: int = 0, family: st
 
 
 def practice_of(case: Case) -> Case:
-    """Return what a search for a case may spend its blasts on."""
+    """Return what a search for a case may spend its blasts on.
+
+    Raises:
+        BlastEnvError: If the case has none.
+    """
     if case.practice is None:
         raise BlastEnvError(f"case {case.name!r} has no threats for a search")
     return case.practice

@@ -88,9 +88,14 @@ class LinesOfSight(NamedTuple):
         return cls(x, y, along_x, along_y, distance, left, right)
 
     def coordinates(self, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-        """Return how far points are along each line, and to the left of it, in squares.
+        """Return how far points are along each line and aside of it, in squares.
 
-        Two tensors (batch, places, points), of points (batch, points).
+        Args:
+            x: In squares (batch, points).
+            y: Likewise.
+
+        Returns:
+            Two tensors (batch, places, points); to the left of the line is positive.
         """
         from_x, from_y = x[:, None] - self.x[..., None], y[:, None] - self.y[..., None]
         along_x, along_y = self.along_x[..., None], self.along_y[..., None]
@@ -100,10 +105,17 @@ class LinesOfSight(NamedTuple):
 def stands_before(
     lines: LinesOfSight, along: Tensor, x: Tensor, y: Tensor, target: Spread
 ) -> Tensor:
-    """Return which points lie before the structures, neither in nor behind them.
+    """Return which points lie before the structures, neither in nor behind them, 0 or 1.
 
-    0 or 1 (batch, places, points), of points (batch, points); 0 also for what lies on the other
-    side of the charge. `along` is how far they are along each line (batch, places, points).
+    Args:
+        lines: From each place of the charge (batch, places).
+        along: How far the points are along each line, in squares (batch, places, points).
+        x: Of the points, in squares (batch, points).
+        y: Likewise.
+        target: The structures.
+
+    Returns:
+        (batch, places, points); 0 also for what lies on the other side of the charge.
     """
     enter_x, leave_x = _slab(lines.x, x, target.x, target.half_extent(target.xx))
     enter_y, leave_y = _slab(lines.y, y, target.y, target.half_extent(target.yy))
@@ -115,8 +127,12 @@ def stands_before(
 def likely_places(likely: Tensor, places: int) -> tuple[Tensor, Tensor]:
     """Return places that stand for a distribution, each for as large a part of it.
 
-    x and y in squares (batch, places), from how likely the charge is in a square (batch, rows,
-    columns). One place is the mean.
+    Args:
+        likely: How likely the charge is in a square (batch, rows, columns).
+        places: How many; 1 gives the mean.
+
+    Returns:
+        x and y in squares (batch, places).
     """
     if places == 1:
         middle = Spread.of(likely)
@@ -188,11 +204,17 @@ class Bearings(NamedTuple):
 
     @classmethod
     def of(cls, lines: LinesOfSight, along: Tensor, aside: Tensor, before: Tensor) -> "Bearings":
-        """Find them, from how far cells are along each line and aside of it (batch, places, cells).
+        """Find them.
 
         A module hides the bearings between its two outermost corners, in whole steps of `2 *
         MOST_OFFSET / BEARINGS` half widths of the facade. What does not stand before the structures
         hides nothing.
+
+        Args:
+            lines: From each place of the charge (batch, places).
+            along: How far the cells are along each line, in squares (batch, places, cells).
+            aside: How far they are aside of it, likewise.
+            before: Which of them lie before the structures, 0 or 1, likewise.
         """
         half_facade = (lines.left - lines.right).clamp(min=1e-3)[..., None] / 2.0
         middle = (lines.left + lines.right)[..., None] / 2.0
@@ -238,7 +260,12 @@ class Occlusion(NamedTuple):
 
     @classmethod
     def of(cls, bearings: Bearings, barrier: Tensor) -> "Occlusion":
-        """Return what modules hide (batch, cells; 0 or 1), and what one more on each cell would."""
+        """Return what the modules of a barrier hide, and what one more on each cell would.
+
+        Args:
+            bearings: Of the cells.
+            barrier: Which cells hold a module, 0 or 1 (batch, cells).
+        """
         first, last, before = bearings.first, bearings.last, bearings.before
         depth = _depth(first, last, barrier[:, None] * before)
         covered = depth.gt(0.0).float()
@@ -475,10 +502,13 @@ class ZoneGeometry(NamedTuple):
         return _crop(plane, self.row, self.column, self.rows, self.columns)
 
     def view(self, planes: Planes) -> ZoneView:
-        """Return what the policy sees now, from the planes of the observation of these sites.
+        """Return what the policy sees now.
 
         For each cell there is more to say once modules stand: how much of the facade a module
         would hide there that nothing hides yet, and what stands on its bearing already.
+
+        Args:
+            planes: Those of the observation of these sites.
         """
         barrier, free = (self.crop(planes[name]) for name in ("barrier", "free"))
         seen = Occlusion.of(self.bearings, barrier.flatten(1))

@@ -44,6 +44,17 @@ class ZoneExtractor(BaseFeaturesExtractor):
     With a catalogue the cells around show heights and where each variant may be placed as well,
     and the features of the whole have heights, costs and what is left of the items. With vehicles
     both show the ground that they reach.
+
+    Args:
+        observation_space: Of an observation of planes.
+        rows: Rows of the build zone.
+        columns: Its columns.
+        places: Places that stand for where the charge may be.
+        width: Number of features.
+        channels: Names of the planes.
+
+    Raises:
+        BlastEnvError: If the space is not one of these planes on a site that the zone fits in.
     """
 
     def __init__(
@@ -83,7 +94,14 @@ class ZoneExtractor(BaseFeaturesExtractor):
         self.whole = nn.Linear(3 * width, width)
 
     def forward(self, observations: Tensor) -> Tensor:
-        """Return the features (batch, width * (rows * columns + 1)) of planes from 0 to 1."""
+        """Return the features (batch, width * (rows * columns + 1)).
+
+        Args:
+            observations: From 0 to 1 (batch, channels, height, width).
+
+        Raises:
+            BlastEnvError: If their shape is not that of the space.
+        """
         if observations.shape[1:] != self.shape:
             raise BlastEnvError(
                 f"observations have the shape {tuple(observations.shape[1:])}, must have the "
@@ -127,7 +145,12 @@ def _planes_shape(
 
 
 class ZoneLatents(MlpExtractor):
-    """Hands the features of `ZoneExtractor` on: all to the actor, the last ones to the critic."""
+    """Hands the features of `ZoneExtractor` on: all to the actor, those of the whole to the critic.
+
+    Args:
+        width: Number of features of a cell, and of the whole.
+        critic_width: Neurons of the critic's hidden layer.
+    """
 
     def __init__(self, width: int, critic_width: int) -> None:
         super().__init__(width, {"pi": [], "vf": [critic_width]}, nn.ReLU)
@@ -145,8 +168,12 @@ class ZoneLatents(MlpExtractor):
 class CellLogits(nn.Module):
     """Logits of each cell from its own features, and one of finishing from those of the whole.
 
-    A cell has one logit for each variant that can be set down from there; 1 without a catalogue.
-    For the arguments see `ZonePolicy`.
+    A cell has one logit for each variant that can be set down from there.
+
+    Args:
+        width: Number of features of a cell, and of the whole.
+        finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
+        variants: How many variants there are; 1 without a catalogue.
     """
 
     def __init__(self, width: int, finish_bias: float, variants: int = 1) -> None:

@@ -27,7 +27,12 @@ _BEST = "#0072B2"
 
 
 def search_figure(result: SearchResult, problem: LayoutProblem) -> Figure:
-    """Return a figure of a search."""
+    """Return a figure of a search.
+
+    Args:
+        result: What the search found; it has spent blasts.
+        problem: What it was asked.
+    """
     panels = 2 if result.front else 1
     figure = Figure(figsize=(2.0 + 5.6 * panels, 5.4), layout="constrained")
     axes = figure.subplots(1, panels, squeeze=False)[0]

@@ -168,7 +168,11 @@ class AnnealingSearch(Search):
 class Cooling:
     """The temperature, which falls geometrically over the blasts for exploring that are left.
 
-    From `hot` to `cold`, which are shares of the load `scale`.
+    Args:
+        session: Knows how many are spent.
+        scale: The load that `hot` and `cold` are shares of.
+        hot: Temperature now.
+        cold: Temperature at the end.
     """
 
     def __init__(self, session: SearchSession, scale: float, hot: float, cold: float) -> None:

@@ -20,7 +20,12 @@ _LEAST_WALL: Final = 2
 
 
 def legal_part(scenario: Scenario, layout: Iterable[Element]) -> Placement:
-    """Return the placement of a layout, in its order, without what may not stand or has no cell."""
+    """Return the placement of a layout, in its order, leaving out what may not stand.
+
+    Args:
+        scenario: The scenario.
+        layout: Modules or pieces, also of cells that do not exist.
+    """
     placement = Placement.empty(scenario)
     for element in layout:
         if _is_legal(placement, element):

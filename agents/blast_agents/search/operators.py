@@ -96,7 +96,12 @@ def mixed(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
 
 
 class MoveMutation(Mutation):
-    """A few moves of the neighbourhood that annealing uses too."""
+    """A few moves of the neighbourhood that annealing uses too.
+
+    Args:
+        moves: The neighbourhood.
+        more: How likely each further move is after the first.
+    """
 
     def __init__(self, moves: Moves, more: float) -> None:
         super().__init__(prob=1.0)
@@ -117,7 +122,11 @@ class MoveMutation(Mutation):
 
 
 class LayoutRepair(Repair):
-    """Leaves out modules or pieces of a child, at random, until all conditions hold."""
+    """Leaves out modules or pieces of a child, at random, until all conditions hold.
+
+    Args:
+        scenario: The scenario.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__()
@@ -152,7 +161,11 @@ def operators(
 ) -> dict[str, Any]:
     """Return pymoo's arguments for how layouts are crossed, changed and repaired.
 
-    What is there twice of the first population is left out. For the shares see `GeneticSearch`.
+    Args:
+        moves: The neighbourhood that mutation draws from.
+        first: The layouts of the first population; what is there twice is left out.
+        crossed_share: Share of the pairs of parents that are crossed.
+        more_moves: How likely a child is changed by each further move after the first.
     """
     scenario = moves.scenario
     return {
@@ -165,7 +178,13 @@ def operators(
 
 
 def evolve(session: SearchSession, algorithm: Any, objectives: Objectives) -> None:
-    """Let an algorithm go on until the session ends it or it finds no new layouts."""
+    """Let an algorithm go on until the session ends it or it finds no new layouts.
+
+    Args:
+        session: Ends it by `SearchEndedError`; its seed decides everything that is drawn.
+        algorithm: One of pymoo's genetic algorithms.
+        objectives: Asks the session.
+    """
     scenario = session.problem.scenario
     count = objectives([]).shape[1]
     problem = Problem(n_var=scenario.zone.catalogue.finish, n_obj=count, vtype=bool)

@@ -157,7 +157,12 @@ def proposer_row(name: str) -> ProposerRow:
 
 
 def check_suits(name: str, scenario: Scenario) -> None:
-    """Refuse a proposer for a site that lacks what it needs."""
+    """Refuse a proposer for a site that lacks what it needs.
+
+    Raises:
+        BlastEnvError: If something is missing.
+        UnknownNameError: As for `proposer_row`.
+    """
     for need in proposer_row(name).needs:
         if not need.is_met(scenario):
             raise BlastEnvError(f"{scenario.name} has no {need.value}: {name} is of no use there")

@@ -142,8 +142,12 @@ class SearchSession:
     def run(self, explore: Callable[[], None], choose: Callable[[], None]) -> bool:
         """Explore until the blasts for it are spent, then let the best meet more threats.
 
-        Both ask `assess` until they are through or `SearchEndedError` comes. Returns whether that
-        was interrupted.
+        Args:
+            explore: Asks `assess` until it is through or `SearchEndedError` comes.
+            choose: Does the same with what was held back.
+
+        Returns:
+            Whether it was interrupted.
         """
         try:
             self._until_ended(explore)

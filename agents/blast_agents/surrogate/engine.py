@@ -66,9 +66,18 @@ class SurrogateEngine(Engine):
     ) -> BlastLoads:
         """Return what the surrogate guesses, a charge and a layout at a time.
 
+        Args:
+            scenario: The scenario.
+            layout: A legal layout.
+            charge: What goes off: where it does, or the vehicle that brings it.
+            seed: Changes nothing: guesses have no noise.
+
         Returns:
             The loads. Those of a structure's modules are all the same, since only their mean is
             known.
+
+        Raises:
+            BlastEnvError: If nothing is protected.
         """
         site = self._site(scenario)
         guess = self.surrogate.guess(site, [layout], [charge_against(scenario, layout, charge)])

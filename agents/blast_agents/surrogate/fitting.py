@@ -95,7 +95,12 @@ class Samples:
     def of(cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario]) -> "Samples":
         """Return the loads on protected structures of a table of `studies.blast_table`.
 
-        The scenarios are by content hash; rows of others are left out.
+        Args:
+            blasts: The table.
+            scenarios: By content hash; rows of others are left out.
+
+        Raises:
+            BlastEnvError: If no row is left.
         """
         known = blasts["protected"] & blasts["scenario_hash"].isin(list(scenarios))
         rows = blasts[known & (blasts["impulse_pa_s"] > 0.0) & (blasts["peak_pa"] > 0.0)]

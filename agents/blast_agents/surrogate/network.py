@@ -222,6 +222,9 @@ class Surrogate:
             site: The site.
             layouts: Legal layouts.
             charges: What goes off behind each of them, where it does (layouts,).
+
+        Raises:
+            LayoutError: If the catalogue has no such piece.
         """
         barriers = [site.barrier(layout) for layout in layouts]
         approaches = [site.approaches(charge) for charge in charges]
@@ -232,7 +235,11 @@ class Surrogate:
         return Guess(*(np.stack(each, axis=1) for each in zip(*columns, strict=True)))
 
     def save(self, path: str | Path) -> Path:
-        """Write everything as one JSON file, numbers to six digits."""
+        """Write everything as one JSON file, numbers to six digits.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
         path = Path(path)
         content = _File(
             fit=self.fit,

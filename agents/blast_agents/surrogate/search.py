@@ -45,7 +45,13 @@ _SITE_SHARE: Final = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Guesses:
-    """What the surrogate says of the layouts of a case; each is asked once."""
+    """What the surrogate says of the layouts of a case; each is asked once.
+
+    Attributes:
+        surrogate: The surrogate.
+        case: What layouts meet.
+        site: The scenario as the surrogate sees it.
+    """
 
     surrogate: Surrogate
     case: Case
@@ -54,7 +60,11 @@ class Guesses:
 
     @classmethod
     def of(cls, surrogate: Surrogate, case: Case) -> "Guesses":
-        """Begin with none."""
+        """Begin with none.
+
+        Raises:
+            BlastEnvError: If nothing is protected.
+        """
         return cls(surrogate, case, site_of(case.scenario))
 
     def loads(self, layouts: Sequence[Layout]) -> FloatArray:
@@ -166,7 +176,11 @@ class LearntSearch(Search):
     def propose(
         self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
-        """Return the best layout that was met; with a budget of 0 the best one by guesses."""
+        """Return the best layout that was met; with a budget of 0 the best one by guesses.
+
+        Raises:
+            BlastEnvError: If nothing is protected.
+        """
         if budget:
             return super().propose(problem, budget, seed, report)
 
@@ -185,13 +199,14 @@ class LearntSearch(Search):
     ) -> Layout:
         """Return the layout that is proposed without a blast; always the same one.
 
-        Errors as for `propose`.
-
         Args:
             scenario: The scenario; it has a build zone.
             charge: Where the charge is, if that is known; otherwise the layout is for some of the
                 places where the scenario may have one.
             tell: Is told the share that is done.
+
+        Raises:
+            BlastEnvError: As for `propose`.
         """
         if self.surrogate is None:
             return tuple(sorted(_given(self.agent).propose(scenario, charge)))

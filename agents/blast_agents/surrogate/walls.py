@@ -60,7 +60,13 @@ class WallPoints:
 
     @classmethod
     def on(cls, structure: AnyStructure, height_m: float, apart: float = 1.0) -> "WallPoints":
-        """Put points on a structure, one a metre along a wall and 1.5 m of its height, or so."""
+        """Put points on a structure, one a metre along a wall and 1.5 m of its height, or so.
+
+        Args:
+            structure: The structure.
+            height_m: Its height.
+            apart: How many times as far from each other points are.
+        """
         left, bottom, right, top = structure.rectangle_m
         rise_m = height_m - structure.base_m
         levels = max(1, round(rise_m / (_UP_M * apart)))
@@ -134,6 +140,15 @@ class SurrogateSite:
     """A scenario as the surrogate sees it.
 
     What begins above the ground stops nothing, as if it were not there: the surrogate never met it.
+
+    Args:
+        scenario: The scenario.
+
+    Attributes:
+        scenario: The scenario.
+        protected: Its protected structures.
+        counts_peaks: Whether its objective counts peak overpressures.
+        alternatives: The bays of its facades, where their response counts.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -164,7 +179,11 @@ class SurrogateSite:
         return self._approaches[charge]
 
     def barrier(self, layout: Sequence[Element]) -> FloatArray:
-        """Return left, bottom, right, top and height of what a layout sets down, m (pieces, 5)."""
+        """Return left, bottom, right, top and height of what a layout sets down, m (pieces, 5).
+
+        Raises:
+            LayoutError: If the catalogue has no such piece.
+        """
         zone, air_m = self.scenario.zone, self.scenario.air_height_m
         rows = [
             [*zone.element_rectangle_m(each), zone.catalogue.variant(each).height_m or air_m]

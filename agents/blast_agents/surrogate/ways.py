@@ -105,7 +105,8 @@ class Ways:
     def behind(self, barrier: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return to which points a barrier stops ways, and what is open to these.
 
-        Arguments as for `shares`.
+        Args:
+            barrier: As for `shares`.
 
         Returns:
             Numbers of the points (behind,), and their shares (behind, SHARES).

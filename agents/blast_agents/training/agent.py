@@ -88,7 +88,11 @@ def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenari
 
 
 def check_fit(configuration: RunConfiguration, scenario: Scenario, folder: RunFolder) -> None:
-    """Refuse hyperparameters that are none for the scenario's build zone."""
+    """Refuse hyperparameters that are none for the scenario's build zone.
+
+    Raises:
+        BlastEnvError: If there are such.
+    """
     found = configuration.hyperparameters
     wanted = fitted(found, configuration.settings, scenario)
     for name, value in found.policy_kwargs:

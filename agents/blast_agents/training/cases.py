@@ -18,7 +18,13 @@ from blast_env.statistics import Estimate
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Cases by which the best weights of a run are chosen."""
+    """Cases by which the best weights of a run are chosen.
+
+    Attributes:
+        cases: The cases.
+        evaluators: Run their blasts, and remember those without a barrier.
+        processes: Worker processes for them.
+    """
 
     cases: tuple[Case, ...]
     evaluators: Evaluators
@@ -31,6 +37,11 @@ class Selection:
         """Draw the cases of a run; they follow from the settings alone.
 
         Of generated sites they are the last of those that training never sees.
+
+        Args:
+            settings: Of the run.
+            source: Of the run.
+            processes: Worker processes for the blasts; they change nothing but the time.
 
         Raises:
             CalibrationError: If the scenario has no calibration for the judge.
@@ -49,7 +60,11 @@ class Selection:
         return cls(_cases(settings, scenarios, seeds), evaluators, processes)
 
     def reduction(self, agent: LayoutAgent) -> Estimate:
-        """Return the reduction over all cases, with its 95 % interval."""
+        """Return the reduction over all cases, with its 95 % interval.
+
+        Raises:
+            BlastEnvError: If nothing arrives in a case even without a barrier.
+        """
         layouts = [agent.propose(case.scenario, case.charge) for case in self.cases]
         return compare(self.evaluators, self.cases, layouts, self.processes).reduction
 

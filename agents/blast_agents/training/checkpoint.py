@@ -35,8 +35,16 @@ Weights = Mapping[str, torch.Tensor]
 class Counters:
     """How far a training run is.
 
-    A step is one of any environment, an update a pass over rollouts. The best evaluation is minus
-    infinity before the first.
+    Attributes:
+        steps: Steps of all environments.
+        rollouts: Rollouts with their updates.
+        updates: Passes over rollouts.
+        episodes: Episodes that ended.
+        blasts: Blasts simulated.
+        cache_hits: Loads that needed no blast.
+        seconds: Time that the training has taken.
+        best_reduction: Of the best evaluation; minus infinity before the first.
+        best_steps: Steps at that evaluation.
     """
 
     steps: int = 0
@@ -102,7 +110,12 @@ class Checkpoint(BaseModel):
     def of_start(
         cls, configuration: RunConfiguration, weights: Weights = MappingProxyType({})
     ) -> "Checkpoint":
-        """Return the checkpoint of a run that has not done anything."""
+        """Return the checkpoint of a run that has not done anything.
+
+        Args:
+            configuration: Of the run.
+            weights: Those that it begins with; fresh ones unless given.
+        """
         return cls(
             configuration=configuration,
             counters=Counters(),
@@ -160,6 +173,13 @@ class Checkpoint(BaseModel):
         """Refuse the configuration of another run: with it the weights would say other things.
 
         Only `steps` may differ, the steps to train for: a run may be made longer or shorter.
+
+        Args:
+            configuration: As the run folder has it.
+            place: The folder, for the error.
+
+        Raises:
+            BlastEnvError: If anything else differs.
         """
         own, given = dict(_flat(self.configuration.document())), _flat(configuration.document())
         for name, value in given:
@@ -173,6 +193,11 @@ class Checkpoint(BaseModel):
         self, policy: nn.Module, place: Path, weights: Literal["best", "last"] = "last"
     ) -> None:
         """Give a policy the weights.
+
+        Args:
+            policy: The policy.
+            place: Where they come from, for the error.
+            weights: Those of the best evaluation, or the last ones.
 
         Raises:
             BlastEnvError: If there are none yet, or they are those of another policy.
@@ -200,7 +225,16 @@ class Checkpoint(BaseModel):
 
 
 def load_weights(policy: nn.Module, values: Weights, place: Path) -> None:
-    """Give a policy weights."""
+    """Give a policy weights.
+
+    Args:
+        policy: The policy.
+        values: The weights, by name.
+        place: Where they come from, for the error.
+
+    Raises:
+        BlastEnvError: If they are those of another policy, or not finite.
+    """
     try:
         policy.load_state_dict(values)
     # torch says in errors of many kinds what does not fit.
@@ -213,7 +247,15 @@ def load_weights(policy: nn.Module, values: Weights, place: Path) -> None:
 
 
 def load_archive(path: Path, otherwise: str) -> Any:
-    """Return what torch has saved; nothing but tensors and plain data is accepted."""
+    """Return what torch has saved; nothing but tensors and plain data is accepted.
+
+    Args:
+        path: The file.
+        otherwise: What it is if it is not damaged, for the error.
+
+    Raises:
+        BlastEnvError: If it is anything else.
+    """
     try:
         _check_archive(path)
         content = torch.load(path, map_location="cpu", weights_only=True)

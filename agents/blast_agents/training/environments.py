@@ -155,7 +155,14 @@ class SharedBlastsVecEnv(DummyVecEnv):
 
 @dataclass(frozen=True)
 class EnvironmentMaker:
-    """Makes one of the parallel environments; can be sent to another process."""
+    """Makes one of the parallel environments; can be sent to another process.
+
+    Attributes:
+        configuration: Of the run.
+        source: Gives the episodes their scenario.
+        index: Which one it is.
+        cache: Where it looks for loads; a memory of its own unless given.
+    """
 
     configuration: RunConfiguration
     source: ScenarioSource

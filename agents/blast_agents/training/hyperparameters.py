@@ -264,13 +264,21 @@ _MODELS: Final[Mapping[str, type[AnyHyperparameters]]] = MappingProxyType(
 
 
 def hyperparameter_keys(algorithm: str) -> tuple[str, ...]:
-    """Return names that changes can have: `"policy_kwargs.width"` for an argument of the policy."""
+    """Return names that changes can have: `"policy_kwargs.width"` for an argument of the policy.
+
+    Raises:
+        UnknownNameError: If there is no such algorithm; the message names the nearest one.
+    """
     check_names("algorithm", [algorithm], ALGORITHMS)
     return tuple(option_names(_MODELS[algorithm]))
 
 
 def hyperparameter_file(algorithm: str) -> Path:
-    """Return the YAML file of an algorithm, which comes with the package."""
+    """Return the YAML file of an algorithm, which comes with the package.
+
+    Raises:
+        UnknownNameError: If there is no such algorithm; the message names the nearest one.
+    """
     check_names("algorithm", [algorithm], ALGORITHMS)
     return _FOLDER / f"{algorithm}.yml"
 

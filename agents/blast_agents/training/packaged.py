@@ -24,7 +24,19 @@ WEIGHTS: Final = Path(__file__).parents[1] / "weights"
 
 
 class LeagueResult(BaseModel):
-    """What the weights did where nothing was chosen by: a row of a league."""
+    """What the weights did where nothing was chosen by: a row of a league.
+
+    Attributes:
+        command: What played the league.
+        engine: The judge.
+        track: Name of the track.
+        cases: Cases of it.
+        reduction: Mean reduction of the load.
+        low: Lower end of its 95 % interval.
+        high: Upper end.
+        best_rule: Name of the rule that was best on the mean.
+        best_rule_reduction: Its mean reduction.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -70,7 +82,20 @@ class Record(BaseModel):
 def pack(
     run: str | Path, name: str, league: LeagueResult | None = None, folder: Path = WEIGHTS
 ) -> list[Path]:
-    """Write the best weights of a run, and what belongs to them."""
+    """Write the best weights of a run, and what belongs to them.
+
+    Args:
+        run: The run folder.
+        name: Of the files.
+        league: What they did in a league.
+        folder: It exists.
+
+    Returns:
+        The files.
+
+    Raises:
+        BlastEnvError: If it is no run folder, or damaged, or a file cannot be written.
+    """
     source = RunFolder(Path(run))
     configuration, checkpoint = source.configuration(), Checkpoint.load(source.checkpoint)
     checkpoint.check_configuration(configuration, source.path)
@@ -119,6 +144,9 @@ def packaged_agent(
         scenario: The scenario; its content decides, not its name.
         threat: Whether the agent is to be told the charge.
         folder: Where the weights are; `WEIGHTS` unless given.
+
+    Raises:
+        BlastEnvError: If a file is damaged.
     """
     found = [each for each in records(folder) if each[1].configuration.settings.threat == threat]
     for path, record in found:

@@ -156,7 +156,11 @@ class TrainingSettings(BaseModel):
 class RunConfiguration(BaseModel):
     """All that a run needs to be repeated, with the file of its scenario.
 
-    The hash is that of the scenario's content; of sites, that of the first one.
+    Attributes:
+        format: Version of this form.
+        settings: What is trained on what.
+        hyperparameters: How.
+        scenario_hash: Content hash of the scenario; of sites, that of the first one.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -263,7 +267,11 @@ Row = TypeVar("Row", RolloutRow, EvaluationRow)
 
 
 def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
-    """Write rows as CSV; the file is complete or as it was."""
+    """Write rows as CSV; the file is complete or as it was.
+
+    Raises:
+        BlastEnvError: If it cannot be written.
+    """
     with (
         write_atomically(path) as temporary,
         temporary.open("w", newline="", encoding="utf-8") as file,
@@ -309,7 +317,11 @@ def refusing(path: Path, what: str = "damaged") -> Iterator[None]:
 
 @dataclass(frozen=True)
 class RunFolder:
-    """The files of a run."""
+    """The files of a run.
+
+    Attributes:
+        path: The folder.
+    """
 
     path: Path
 
@@ -345,7 +357,11 @@ class RunFolder:
 
     @property
     def command(self) -> str:
-        """What started the run."""
+        """What started the run.
+
+        Raises:
+            BlastEnvError: If the file is missing or damaged.
+        """
         return self._said("command.txt").strip()
 
     @property
@@ -438,6 +454,9 @@ class RunFolder:
     def scenario(self, configuration: RunConfiguration) -> Scenario:
         """Return the scenario of the run.
 
+        Args:
+            configuration: Of the run.
+
         Raises:
             BlastEnvError: If there is none, it is damaged, or it is another one than that of the
                 configuration.
@@ -451,7 +470,16 @@ class RunFolder:
 
 
 def check_scenario(scenario: Scenario, configuration: RunConfiguration, place: str) -> None:
-    """Refuse a scenario that is not the one of a run."""
+    """Refuse a scenario that is not the one of a run.
+
+    Args:
+        scenario: The scenario.
+        configuration: Of the run.
+        place: Where the scenario comes from, for the error.
+
+    Raises:
+        BlastEnvError: If the hashes differ.
+    """
     if scenario.content_hash != configuration.scenario_hash:
         raise BlastEnvError(
             f"{place}: the scenario's hash is {scenario.content_hash[:12]}..., must be "

@@ -130,7 +130,12 @@ def imitation_loss(logits: Tensor, legal: Tensor, wanted: Tensor) -> Tensor:
     """Return how unlikely the policy finds what is wanted, mean over a batch.
 
     The cross-entropy to the distribution in which every wanted action is as likely, among the
-    legal ones. All tensors are (batch, actions); at least one action of each is wanted.
+    legal ones.
+
+    Args:
+        logits: (batch, actions).
+        legal: Which actions are legal, likewise.
+        wanted: Which of them are wanted, at least one of each, likewise.
     """
     likely = logits.masked_fill(~legal, -torch.inf).log_softmax(dim=1)
     shares = wanted / wanted.sum(dim=1, keepdim=True)
@@ -147,9 +152,17 @@ def imitate(
     max_grad_norm: float,
     rng: np.random.Generator,
 ) -> float:
-    """Let a policy learn from demonstrations, with its own optimiser, in minibatches of moments.
+    """Let a policy learn from demonstrations, with its own optimiser.
 
-    The critic, whose error weighs `vf_coef`, learns what the layouts are worth.
+    Args:
+        policy: The policy.
+        demonstrations: At least one.
+        updates: Minibatches.
+        batch_size: Moments in each of them.
+        learning_rate: Of the optimiser.
+        vf_coef: Weight of the critic's error: it learns what the layouts are worth.
+        max_grad_norm: Largest gradient.
+        rng: Draws demonstrations and moments.
 
     Returns:
         Mean loss of the imitation over the last tenth of the minibatches; NaN without any.
@@ -202,7 +215,12 @@ class Judge:
     def loads(
         self, asked: Sequence[tuple[Case, Layout]], threats: slice
     ) -> list[tuple[float, ...]]:
-        """Return the loads that count, one a threat, for each pair."""
+        """Return the loads that count, one a threat, for each pair.
+
+        Args:
+            asked: Layouts with their cases.
+            threats: Which threats of each case they meet.
+        """
         blasts = [
             BlastAsked(case.scenario, layout, threat)
             for case, layout in asked
@@ -229,6 +247,11 @@ def race(judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]
     All meet the first threat, the better half of them the second, the better quarter the next two,
     and so on; the blasts of all cases run side by side.
 
+    Args:
+        judge: Runs the blasts.
+        cases: The cases, each with as many threats.
+        layouts: Of each case, none twice.
+
     Returns:
         For each case, what every layout met; those that met all threats are the last ones left.
     """
@@ -251,7 +274,12 @@ def race(judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]
 
 @dataclass(eq=False)
 class Lessons:
-    """The cases of a training and their labels."""
+    """The cases of a training and their labels.
+
+    Attributes:
+        cases: The cases, each with as many threats.
+        labels: A label a case; none before the first round.
+    """
 
     cases: tuple[Case, ...]
     labels: list[CaseLabel] = field(default_factory=list)
@@ -280,7 +308,13 @@ class Lessons:
     def improve(
         self, judge: Judge, indices: Sequence[int], layouts: Sequence[Sequence[Layout]]
     ) -> list[float]:
-        """Let layouts race against the labels of some cases; return the reduction of each."""
+        """Let layouts race against the labels of some cases; return the reduction of each.
+
+        Args:
+            judge: Runs the blasts.
+            indices: The cases.
+            layouts: Of each of them; those that are the label already are left out.
+        """
         fresh = [
             [each for each in dict.fromkeys(own) if each != self.labels[index].layout]
             for index, own in zip(indices, layouts, strict=True)
