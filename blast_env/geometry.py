@@ -172,11 +172,6 @@ def standing(layout: "Iterable[Element]") -> "Layout":
     return tuple(element for element in layout if not isinstance(element, Measure))
 
 
-def met_by_blasts(layout: "Iterable[Element]") -> "Layout":
-    """Return what of a layout its loads depend on: all but the measures that harden facades."""
-    return tuple(element for element in layout if type(element) is not Measure)
-
-
 def layout_text(layout: Iterable[Element]) -> str:
     """Return a layout for one field of a table: `3,4 3,5`, `3,4,t_wall 7,4,t_wall,turned`."""
     return " ".join(map(_element_text, layout))

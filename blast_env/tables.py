@@ -1,5 +1,6 @@
 """Tables: columns with unit and meaning in one place; as Markdown, and as CSV files."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -36,6 +37,19 @@ def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) ->
 
     names = [column.name for column in columns]
     return pd.DataFrame([[row[name] for name in names] for row in rows], columns=names)
+
+
+def table_records(table: "pd.DataFrame") -> list[dict[str, Any]]:
+    """Return the rows of a table as what JSON knows; NaN is `None`."""
+    return [
+        {str(name): number_or_none(value) for name, value in row.items()}
+        for row in table.to_dict("records")
+    ]
+
+
+def number_or_none(value: Any) -> Any:
+    """Return the value, or `None` for a number that does not exist."""
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def texts(values: Any) -> Any:

@@ -37,7 +37,7 @@ from blast_env.engines import Blast
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.files import make_folder, write_atomically
-from blast_env.geometry import Layout, met_by_blasts
+from blast_env.geometry import Layout
 from blast_env.provenance import versions
 from blast_env.rendering.canvas import Frame
 from blast_env.rendering.figures import save_figure
@@ -55,6 +55,7 @@ from blast_env.rendering.style import render_extra
 from blast_env.runner import Tell, share_of
 from blast_env.scenario import AnyCharge, Scenario, load_scenario
 from blast_env.scenario.build_scene import charge_against
+from blast_env.scenario.placement import met_by_blasts
 from blast_env.statistics import mean_estimate
 from blast_env.units import MS_PER_S, PA_PER_KPA
 

@@ -15,9 +15,10 @@ from blast_env.documents import read_text
 from blast_env.engines.contract import CALIBRATED_ENGINES
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.geometry import Layout, met_by_blasts
+from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.scenario import ObjectiveSection, Scenario
+from blast_env.scenario.placement import met_by_blasts
 from blast_env.statistics import reductions
 from blast_env.units import PA_PER_KPA
 

@@ -45,7 +45,7 @@ from blast_env.evaluation import (
     Threat,
     compare,
 )
-from blast_env.evaluation.report import case_table, comparison_record
+from blast_env.evaluation.comparison import case_table, comparison_record
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
 from blast_env.provenance import command, versions

@@ -66,19 +66,7 @@ class PublishedBlasts:
             return None if self.behind is None else self.behind.get(key)
         structures = self.scenarios[key.scenario_hash].structures
         loads = tuple(
-            StructureLoad(
-                name=each.name,
-                protected=each.protected,
-                weight=each.weight,
-                impulse_sim=np.nan,
-                transferred_impulse_sim=np.nan,
-                impulse_pa_s=known[each.name][0],
-                peak_pa=known[each.name][1],
-                peak_weight=each.counted_peak_weight,
-                in_range=True,
-                notes=(),
-            )
-            for each in structures
+            StructureLoad.on(each, *known[each.name], in_range=True) for each in structures
         )
         modules = sum(each.rows * each.columns for each in structures)
         return BlastLoads(loads, np.zeros(modules))  # the tables know no single modules

@@ -28,6 +28,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import BayDamage, level_of, worst
 from blast_env.scenario import AnyCharge, AnyScenario, ObjectiveSection, Scenario, find_scenario
 from blast_env.scenario.facade import NamedBay
+from blast_env.scenario.models import StructureSection
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
@@ -66,6 +67,37 @@ class StructureLoad:
     notes: tuple[str, ...]
     response: float | None = None
     worst_damage: float | None = None
+
+    @classmethod
+    def on(
+        cls,
+        structure: StructureSection,
+        impulse_pa_s: float,
+        peak_pa: float | None = None,
+        in_range: bool = False,
+        notes: tuple[str, ...] = (),
+    ) -> Self:
+        """Return the load on a structure of a scenario by an engine without simulation units.
+
+        Args:
+            structure: The structure.
+            impulse_pa_s: Impulse per area, Pa*s.
+            peak_pa: Largest overpressure on its walls, Pa.
+            in_range: Whether the engine was checked for this distance and charge.
+            notes: Why not, a sentence each.
+        """
+        return cls(
+            name=structure.name,
+            protected=structure.protected,
+            weight=structure.weight,
+            impulse_sim=np.nan,
+            transferred_impulse_sim=np.nan,
+            impulse_pa_s=impulse_pa_s,
+            peak_pa=peak_pa,
+            peak_weight=structure.counted_peak_weight,
+            in_range=in_range,
+            notes=notes,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -368,21 +368,14 @@ class GasResult:
 
     def loads(self) -> BlastLoads:
         """Return the loads on all structures; gas has no simulation units (NaN)."""
-        peak_weights = {
-            each.name: each.counted_peak_weight for each in self.blast.scenario.structures
-        }
+        named = {each.name: each for each in self.blast.scenario.structures}
         loads = tuple(
-            StructureLoad(
-                name=outline.name,
-                protected=outline.protected,
-                weight=outline.weight,
-                impulse_sim=np.nan,
-                transferred_impulse_sim=np.nan,
-                impulse_pa_s=scaled.pa_s,
-                peak_pa=float(self.run.loads.peak_pa[self._walls(index)].max(initial=0.0)),
-                peak_weight=peak_weights[outline.name],
-                in_range=scaled.in_range,
-                notes=scaled.notes,
+            StructureLoad.on(
+                named[outline.name],
+                scaled.pa_s,
+                float(self.run.loads.peak_pa[self._walls(index)].max(initial=0.0)),
+                scaled.in_range,
+                scaled.notes,
             )
             for index, outline in enumerate(self.run.site.structures)
             if outline.cells is None

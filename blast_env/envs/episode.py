@@ -31,8 +31,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, SeedRange, Threat
 from blast_env.evaluation.comparison import Assessment, Objective
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
-from blast_env.geometry import Layout, met_by_blasts
+from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, Placement, Scenario
+from blast_env.scenario.placement import met_by_blasts
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
 

@@ -9,15 +9,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby, islice
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.engines.contract import BlastLoads
+from blast_env.engines.contract import BlastLoads, Engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, check_distinct
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
 from blast_env.geometry import Element, Layout
+from blast_env.physics.scene import Charge
+from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import share_of
 from blast_env.scenario import check_layout
@@ -30,7 +33,11 @@ from blast_env.statistics import (
     reduction_estimate,
     reductions,
 )
+from blast_env.tables import Column, number_or_none, table_of, table_records
 from blast_env.units import PA_PER_PSI
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -353,3 +360,85 @@ def _counted(cases: Sequence[Case], loads: Sequence[Sequence[BlastLoads]]) -> Fl
             for case, of_case in zip(cases, loads, strict=True)
         ]
     )
+
+
+CHARGE_COLUMNS: Final = (
+    Column("charge_x_m", "m", "centre of the charge, from the left border"),
+    Column("charge_y_m", "m", "centre of the charge, from the lower border"),
+    Column("charge_height_m", "m", "height of its centre; 0: it lies on the ground"),
+    Column("tnt_kg", "kg", "TNT-equivalent mass of the charge"),
+)
+
+CASE_COLUMNS: Final = (
+    Column("scenario", "", "name of the scenario"),
+    Column("seed", "", "seed of the first threat's fan and air; the charge is that threat's"),
+    *CHARGE_COLUMNS,
+    Column("modules", "", "modules, or pieces, of the layout"),
+    Column("load", "", "protected structures, with the layout, over the threats"),
+    Column("unprotected_load", "", "the same without a barrier"),
+    Column("unit", "", "of that load; empty where impulse and peak count together"),
+    Column("reduction", "", "of that load"),
+    Column("in_range", "", "whether the calibration was made for every threat"),
+)
+
+
+def charge_values(charge: Charge) -> dict[str, object]:
+    """Return the values of `CHARGE_COLUMNS`."""
+    values = (*charge.position_m, charge.height_m, charge.tnt_kg)
+    return {column.name: value for column, value in zip(CHARGE_COLUMNS, values, strict=True)}
+
+
+def case_table(comparison: Comparison) -> "pd.DataFrame":
+    """Return one row a case; see `CASE_COLUMNS`."""
+    rows = []
+    for index, (case, layout) in enumerate(zip(comparison.cases, comparison.layouts, strict=True)):
+        threat = case.threats[0]
+        rows.append(
+            {
+                "scenario": case.scenario.name,
+                "seed": threat.seed,
+                **charge_values(threat.charge_against(case.scenario, layout)),
+                "modules": len(layout),
+                "load": case.counted(comparison.loads[index], layout),
+                "unprotected_load": case.counted(comparison.unprotected[index]),
+                "unit": case.scenario.objective.unit,
+                "reduction": float(comparison.case_reductions[index]),
+                "in_range": bool(comparison.in_range[index].all()),
+            }
+        )
+    return table_of(rows, CASE_COLUMNS)
+
+
+def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
+    """Return a comparison as what JSON knows; NaN is `None`."""
+    cases = [
+        {
+            **row,
+            "scenario_hash": case.scenario.content_hash,
+            "calibration": case.scenario.calibration,
+            "layout": [list(cell) for cell in layout],
+        }
+        for row, case, layout in zip(
+            table_records(case_table(comparison)), comparison.cases, comparison.layouts, strict=True
+        )
+    ]
+    return {
+        "engine": engine.name,
+        "versions": versions(engine.version),
+        "result": {
+            "reduction": estimate_record(comparison.reduction),
+            "load": estimate_record(comparison.mean),
+            "unprotected_load": estimate_record(comparison.unprotected_mean),
+            "unit": comparison.cases[0].scenario.objective.unit,
+            "cvar_level": comparison.cvar_level,
+            "cvar": comparison.cvar,
+            "unprotected_cvar": comparison.unprotected_cvar,
+        },
+        "cases": cases,
+    }
+
+
+def estimate_record(estimate: Estimate) -> dict[str, float | None]:
+    """Return an estimate with its interval as what JSON knows."""
+    value, low, high = map(number_or_none, estimate)
+    return {"value": value, "ci95_low": low, "ci95_high": high}

@@ -18,11 +18,12 @@ from blast_env.evaluation.store import (
     engine_text,
     find_cache,
 )
-from blast_env.geometry import Element, Layout, Measure, met_by_blasts
+from blast_env.geometry import Element, Layout
 from blast_env.physics.scene import Charge
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, check_layout, find_scenario
+from blast_env.scenario.placement import met_by_blasts
 
 
 class BlastEvaluator:
@@ -156,9 +157,7 @@ class BlastEvaluator:
         ]
 
     def _key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
-        # Measures that harden facades change no load: they need no blast of their own.
-        checked = check_layout(self.scenario, layout)
-        cells = tuple(sorted(each for each in checked if type(each) is not Measure))
+        cells = tuple(sorted(met_by_blasts(check_layout(self.scenario, layout))))
         # Without noise there is nothing to draw: a charge has one realisation.
         seed = threat.seed if self.engine.has_noise else 0
         charge = threat.charge_against(self.scenario, cells)

@@ -1,7 +1,6 @@
 """A layout against no barrier, in full: by structure, module and threat, as tables and as JSON."""
 
 import json
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +13,13 @@ from blast_env.arrays import FloatArray
 from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.cases import Case, Threat, draw_threats
-from blast_env.evaluation.comparison import Comparison, loads_of_both
+from blast_env.evaluation.comparison import (
+    CHARGE_COLUMNS,
+    Comparison,
+    charge_values,
+    estimate_record,
+    loads_of_both,
+)
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.store import BlastCache
 from blast_env.files import write_atomically
@@ -33,7 +38,7 @@ from blast_env.statistics import (
     reduction_estimate,
     reductions,
 )
-from blast_env.tables import Column, table_of
+from blast_env.tables import Column, number_or_none, table_of, table_records
 from blast_env.units import PA_PER_PSI
 
 if TYPE_CHECKING:  # takes a third of a second to import
@@ -71,16 +76,9 @@ MODULE_COLUMNS: Final = (
     Column("reduction", "", "of the sum of m |v|"),
 )
 
-_CHARGE_COLUMNS: Final = (
-    Column("charge_x_m", "m", "centre of the charge, from the left border"),
-    Column("charge_y_m", "m", "centre of the charge, from the lower border"),
-    Column("charge_height_m", "m", "height of its centre; 0: it lies on the ground"),
-    Column("tnt_kg", "kg", "TNT-equivalent mass of the charge"),
-)
-
 THREAT_COLUMNS: Final = (
     Column("seed", "", "seed of fan and air"),
-    *_CHARGE_COLUMNS,
+    *CHARGE_COLUMNS,
     Column("impulse_pa_s", "Pa s", "protected structures, with the barrier"),
     Column("unprotected_impulse_pa_s", "Pa s", "protected structures, without it"),
     Column("peak_pa", "Pa", "largest overpressure on them, with the barrier"),
@@ -91,18 +89,6 @@ THREAT_COLUMNS: Final = (
     Column("in_range", "", "whether the calibration was made for this threat"),
     Column("stand_off_m", "m", "from the charge to the nearest protected wall, with the barrier"),
     Column("unprotected_stand_off_m", "m", "the same without it: less only for a vehicle"),
-)
-
-CASE_COLUMNS: Final = (
-    Column("scenario", "", "name of the scenario"),
-    Column("seed", "", "seed of the first threat's fan and air; the charge is that threat's"),
-    *_CHARGE_COLUMNS,
-    Column("modules", "", "modules, or pieces, of the layout"),
-    Column("load", "", "protected structures, with the layout, over the threats"),
-    Column("unprotected_load", "", "the same without a barrier"),
-    Column("unit", "", "of that load; empty where impulse and peak count together"),
-    Column("reduction", "", "of that load"),
-    Column("in_range", "", "whether the calibration was made for every threat"),
 )
 
 
@@ -130,12 +116,6 @@ def _of_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
         peak_pa=max(peaks_pa, default=None),
         in_range=all(each.in_range for each in counted),
     )
-
-
-def _of_charge(charge: Charge) -> dict[str, object]:
-    """Return the values of `_CHARGE_COLUMNS`."""
-    values = (*charge.position_m, charge.height_m, charge.tnt_kg)
-    return {column.name: value for column, value in zip(_CHARGE_COLUMNS, values, strict=True)}
 
 
 def _structure_row(
@@ -168,63 +148,13 @@ SCHEMA_VERSION: Final = 1
 """The version of the file that `LayoutEvaluation.to_json` writes."""
 
 
-def case_table(comparison: Comparison) -> "pd.DataFrame":
-    """Return one row a case; see `CASE_COLUMNS`."""
-    rows = []
-    for index, (case, layout) in enumerate(zip(comparison.cases, comparison.layouts, strict=True)):
-        threat = case.threats[0]
-        rows.append(
-            {
-                "scenario": case.scenario.name,
-                "seed": threat.seed,
-                **_of_charge(threat.charge_against(case.scenario, layout)),
-                "modules": len(layout),
-                "load": case.counted(comparison.loads[index], layout),
-                "unprotected_load": case.counted(comparison.unprotected[index]),
-                "unit": case.scenario.objective.unit,
-                "reduction": float(comparison.case_reductions[index]),
-                "in_range": bool(comparison.in_range[index].all()),
-            }
-        )
-    return table_of(rows, CASE_COLUMNS)
-
-
-def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
-    """Return a comparison as what JSON knows; NaN is `None`."""
-    cases = [
-        {
-            **row,
-            "scenario_hash": case.scenario.content_hash,
-            "calibration": case.scenario.calibration,
-            "layout": [list(cell) for cell in layout],
-        }
-        for row, case, layout in zip(
-            _rows(case_table(comparison)), comparison.cases, comparison.layouts, strict=True
-        )
-    ]
-    return {
-        "engine": engine.name,
-        "versions": versions(engine.version),
-        "result": {
-            "reduction": _estimate(comparison.reduction),
-            "load": _estimate(comparison.mean),
-            "unprotected_load": _estimate(comparison.unprotected_mean),
-            "unit": comparison.cases[0].scenario.objective.unit,
-            "cvar_level": comparison.cvar_level,
-            "cvar": comparison.cvar,
-            "unprotected_cvar": comparison.unprotected_cvar,
-        },
-        "cases": cases,
-    }
-
-
 def _result(evaluation: "LayoutEvaluation") -> dict[str, Any]:
     return {
-        "reduction": _estimate(evaluation.reduction),
-        "impulse_pa_s": _estimate(evaluation.impulse_pa_s),
-        "impulse_psi_s": _estimate(evaluation.impulse_pa_s.scaled(1.0 / PA_PER_PSI)),
-        "unprotected_impulse_pa_s": _estimate(evaluation.unprotected_impulse_pa_s),
-        "unprotected_impulse_psi_s": _estimate(
+        "reduction": estimate_record(evaluation.reduction),
+        "impulse_pa_s": estimate_record(evaluation.impulse_pa_s),
+        "impulse_psi_s": estimate_record(evaluation.impulse_pa_s.scaled(1.0 / PA_PER_PSI)),
+        "unprotected_impulse_pa_s": estimate_record(evaluation.unprotected_impulse_pa_s),
+        "unprotected_impulse_psi_s": estimate_record(
             evaluation.unprotected_impulse_pa_s.scaled(1.0 / PA_PER_PSI)
         ),
         "cvar_level": evaluation.cvar_level,
@@ -243,11 +173,6 @@ def _result(evaluation: "LayoutEvaluation") -> dict[str, Any]:
     }
 
 
-def _estimate(estimate: Estimate) -> dict[str, float | None]:
-    value, low, high = map(_or_none, estimate)
-    return {"value": value, "ci95_low": low, "ci95_high": high}
-
-
 def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
     return {
         "seed": outcome.threat.seed,
@@ -258,21 +183,9 @@ def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
         "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
         "load": outcome.load,
         "unprotected_load": outcome.unprotected_load,
-        "reduction": _or_none(outcome.reduction),
+        "reduction": number_or_none(outcome.reduction),
         "in_range": outcome.in_range,
     }
-
-
-def _rows(table: "pd.DataFrame") -> list[dict[str, Any]]:
-    return [
-        {str(name): _or_none(value) for name, value in row.items()}
-        for row in table.to_dict("records")
-    ]
-
-
-def _or_none(value: Any) -> Any:
-    """Return the value, or `None` for a number that does not exist."""
-    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 @dataclass(frozen=True)
@@ -483,7 +396,7 @@ class LayoutEvaluation:
     def threat_table(self) -> "pd.DataFrame":
         """One row a threat; see `THREAT_COLUMNS`."""
         rows = [
-            {"seed": each.threat.seed, **_of_charge(each.charge), **vars(each)}
+            {"seed": each.threat.seed, **charge_values(each.charge), **vars(each)}
             | {"reduction": each.reduction}
             for each in self.outcomes
         ]
@@ -527,10 +440,10 @@ class LayoutEvaluation:
             "versions": versions(self.engine.version),
             "result": _result(self),
             "notes": list(self.notes),
-            "threats": _rows(self.threat_table),
-            "structures": _rows(self.table),
-            "buildings": _rows(self.building_table),
-            "modules": _rows(self.module_table),
+            "threats": table_records(self.threat_table),
+            "structures": table_records(self.table),
+            "buildings": table_records(self.building_table),
+            "modules": table_records(self.module_table),
         }
 
     def to_json(self, path: str | Path) -> Path:

@@ -1,7 +1,7 @@
 """Placing modules or pieces: what may stand where, and layouts that are legal."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import fsum
@@ -468,6 +468,11 @@ def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
         An array of shape (rows, columns), read-only; (0, 0) without a build zone.
     """
     return Placement.empty(scenario).usable
+
+
+def met_by_blasts(layout: Iterable[Element]) -> Layout:
+    """Return what of a layout its loads depend on: all but the measures that harden facades."""
+    return tuple(element for element in layout if type(element) is not Measure)
 
 
 def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:

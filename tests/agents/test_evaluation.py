@@ -9,7 +9,7 @@ from blast_agents.training.run_folder import TrainingSettings
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators, SeedRange, compare, draw_threats, evaluate_layout
-from blast_env.evaluation.report import case_table, comparison_record
+from blast_env.evaluation.comparison import case_table, comparison_record
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.agents.training_runs import small_scenario
 

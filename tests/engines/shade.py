@@ -42,16 +42,9 @@ class ShadeEngine(Engine):
             left, bottom, right, top = each.rectangle_m
             distance_m = hypot(0.5 * (left + right) - x_m, 0.5 * (bottom + top) - y_m)
             loads.append(
-                StructureLoad(
-                    name=each.name,
-                    protected=each.protected,
-                    weight=each.weight,
-                    impulse_sim=np.nan,
-                    transferred_impulse_sim=np.nan,
-                    impulse_pa_s=1000.0 / distance_m * self.share ** len(layout),
-                    peak_pa=None,
-                    peak_weight=each.counted_peak_weight,
-                    in_range=False,
+                StructureLoad.on(
+                    each,
+                    1000.0 / distance_m * self.share ** len(layout),
                     notes=("a formula, not a blast",),
                 )
             )

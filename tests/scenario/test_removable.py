@@ -15,10 +15,11 @@ from blast_env.errors import LayoutError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import visible_case
 from blast_env.export.bill import LayoutPlan, bill_of_quantities
-from blast_env.geometry import Piece, Removal, layout_words, met_by_blasts, standing
+from blast_env.geometry import Piece, Removal, layout_words, standing
 from blast_env.plan import Kinds, site_features
 from blast_env.scenario import Placement, Scenario, ScenarioError, load_layout, write_layout
 from blast_env.scenario.build_scene import build_site, worst_places
+from blast_env.scenario.placement import met_by_blasts
 from tests.catalogue_sites import WALL, yard_document
 
 FENCE = {"kind": "ModularObstacle", "name": "fence", "rows": 8, "columns": 1}

@@ -17,9 +17,10 @@ from blast_agents.search.moves import Moves, legal_part
 from blast_agents.search.problem import LayoutProblem
 from blast_agents.search.registry import layouts_by_rule
 from blast_env.evaluation import BlastMeter, BudgetError
-from blast_env.geometry import Layout, Measure, met_by_blasts
+from blast_env.geometry import Layout, Measure
 from blast_env.response.damage import worst
 from blast_env.scenario import AnyCharge, Placement, Scenario
+from blast_env.scenario.placement import met_by_blasts
 from blast_env.values import generator
 
 _LOW_M: Final = 1.5

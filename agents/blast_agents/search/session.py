@@ -11,7 +11,8 @@ import numpy as np
 from blast_agents.search.problem import Candidate, LayoutProblem, Progress, Report, SearchResult
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Layout, met_by_blasts
+from blast_env.geometry import Layout
+from blast_env.scenario.placement import met_by_blasts
 from blast_env.values import generator
 
 LAYOUTS_PER_REALISATION: Final = 500

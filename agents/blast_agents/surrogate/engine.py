@@ -91,21 +91,8 @@ class SurrogateEngine(Engine):
         nothing = [None] * len(impulse_pa_s)
         peak_pa = nothing if guess.peak_pa is None else of_all(guess.peak_pa[0])
         structures = tuple(
-            StructureLoad(
-                name=each.name,
-                protected=each.protected,
-                weight=each.weight,
-                impulse_sim=np.nan,
-                transferred_impulse_sim=np.nan,
-                impulse_pa_s=load_pa_s,
-                peak_pa=on_peak_pa,
-                peak_weight=each.counted_peak_weight,
-                in_range=False,
-                notes=("a guess of the surrogate, not a blast",),
-            )
-            for each, load_pa_s, on_peak_pa in zip(
-                scenario.structures, impulse_pa_s, peak_pa, strict=True
-            )
+            StructureLoad.on(*told, notes=("a guess of the surrogate, not a blast",))
+            for told in zip(scenario.structures, impulse_pa_s, peak_pa, strict=True)
         )
         modules = [each.rows * each.columns for each in scenario.structures]
         bays = guess.bays(site, 0) if scenario.objective.is_response else ()
