@@ -500,15 +500,12 @@ CODE_OF_THE_BUILD: Final = {
 """Pages whose code `make docs` runs and `make test` compiles only, and why."""
 
 CODE_NOT_RUN: Final = {
-    ("docs/researchers/benchmark.md", 2): "needs Optuna, which the project does not have",
-    ("docs/researchers/benchmark.md", 3): "needs Nevergrad, which the project does not have",
-    ("docs/researchers/benchmark.md", 5): "needs BoTorch, which the project does not have",
-    ("docs/researchers/benchmark.md", 6): "needs SMAC, which the project does not have",
-    ("docs/researchers/benchmark.md", 8): "needs Minari and jax, which the project does not have",
+    ("docs/researchers/benchmark.md", 3): "needs Optuna, which the project does not have",
+    ("docs/researchers/benchmark.md", 5): "needs SMAC, which the project does not have",
+    ("docs/researchers/benchmark.md", 7): "needs Minari and jax, which the project does not have",
     ("docs/howto/cluster.md", 2): "needs Slurm and submitit",
     ("docs/researchers/libraries.md", 6): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
     ),
-    ("docs/researchers/libraries.md", 7): "needs Ray; tests/libraries/run_rllib.py is this code",
 }
 """Blocks of Python, by their number on the page, that are compiled only, and why."""
