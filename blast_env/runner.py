@@ -81,6 +81,12 @@ def share_of(progress: Tell | None, done: int, whole: int, part: int = 1) -> Tel
     """Return a function that reports the share of a part as a share of the whole.
 
     So much of the whole is done before the part.
+
+    Args:
+        progress: Takes the share of the whole.
+        done: How much of the whole comes before the part.
+        whole: How much there is in all.
+        part: How much the part is.
     """
     if progress is None:
         return None

@@ -195,7 +195,8 @@ def ring_around_building(scenario: AnyScenario, charge: AnyCharge | None) -> Lay
 
     It begins on the side of the charge and goes round both ways.
 
-    Errors as for `line_of_sight_wall`.
+    Raises:
+        BlastEnvError: As for `line_of_sight_wall`.
     """
     placement = Placement.empty(scenario)
     protected = [each.rectangle_m for each in placement.scenario.structures if each.protected]

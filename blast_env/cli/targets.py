@@ -33,6 +33,9 @@ def checked_targets(targets: Sequence[Target]) -> Iterator[None]:
     So no result is lost for want of a place, and a command that fails or is interrupted leaves no
     folder behind that it has put nothing into.
 
+    Args:
+        targets: The files and folders, with their options; folders need not be there.
+
     Raises:
         BlastEnvError: If a file or folder cannot be written, or two options name one file.
     """

@@ -56,7 +56,20 @@ class IllegalActions:
 
 @dataclass
 class Episode:
-    """The state of an episode."""
+    """The state of an episode.
+
+    Attributes:
+        observable: What may be observed before the end.
+        objective: Assesses layouts.
+        observation: Observes the episode.
+        initial: The layout at the start.
+        placement: The modules placed so far.
+        actions: What the actions are.
+        chosen: What has been chosen of the next module or piece.
+        illegal_actions: How many illegal actions there were.
+        begun: Whether there has been an action.
+        ended: Whether the charge has gone off.
+    """
 
     observable: Observable
     objective: Objective
@@ -91,7 +104,16 @@ class Episode:
         return self.observation.observe(placement)
 
     def act(self, action: int, reward: Reward, illegal: IllegalActions) -> dict[str, float]:
-        """Place a module or a piece, choose a part of it, or finish; return the reward's terms."""
+        """Place a module or a piece, choose a part of it, or finish; return the reward's terms.
+
+        Args:
+            action: One of `actions`.
+            reward: Pays for the action.
+            illegal: What an illegal action leads to.
+
+        Raises:
+            BlastEnvError: If the reward names a term that is taken.
+        """
         before = self.placement
         self.placement, self.chosen, is_illegal, self.ended = self._after(action, illegal)
         self.illegal_actions += is_illegal
@@ -112,7 +134,12 @@ class Episode:
         return {**terms, ILLEGAL_TERM: -illegal.cost if is_illegal else 0.0}
 
     def blasts_due(self, action: int, illegal: IllegalActions) -> tuple[BlastAsked, ...]:
-        """Return the blasts that `final_information` asks for if the action ends the episode."""
+        """Return the blasts that `final_information` asks for if the action ends the episode.
+
+        Args:
+            action: As for `act`, which is still to be called.
+            illegal: What an illegal action leads to.
+        """
         placement, _, _, ended = self._after(action, illegal)
         case = self.objective.case
         barrier = met_by_blasts(placement.layout)
@@ -140,7 +167,11 @@ class Episode:
         return placement, chosen, is_illegal, finishes or exhausted or placement.is_full
 
     def assess(self) -> tuple[Assessment, Assessment]:
-        """Return what the layout is worth, and what no barrier is."""
+        """Return what the layout is worth, and what no barrier is.
+
+        Raises:
+            BlastEnvError: As `BlastEvaluator.loads_of_many`.
+        """
         return self.objective.assess(self.placement.checked), self.objective.assess(())
 
     def information(self) -> dict[str, Any]:

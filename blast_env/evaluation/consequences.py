@@ -123,7 +123,13 @@ class BarrierResponse:
 
 @dataclass(frozen=True, eq=False)
 class Consequences:
-    """What charges do to the buildings of a site behind a layout."""
+    """What charges do to the buildings of a site behind a layout.
+
+    Attributes:
+        responses: One a building with a facade and charge.
+        neighbours: One a building without and charge.
+        barriers: One a charge.
+    """
 
     responses: tuple[BuildingResponse, ...]
     neighbours: tuple[Neighbour, ...] = ()
@@ -210,7 +216,11 @@ class Consequences:
         return all(self.level(building) >= target for building in self.buildings)
 
     def with_glazing(self, glazing: Glazing) -> "Consequences":
-        """Return the same with other glass in all windows; sizes and sills stay."""
+        """Return the same with other glass in all windows; sizes and sills stay.
+
+        Args:
+            glazing: The component whose glass is taken.
+        """
         return replace(
             self,
             responses=tuple(
@@ -377,7 +387,15 @@ def by_building(
     peak_factor: float = 1.0,
     tails: Mapping[str, BayTail] = MappingProxyType({}),
 ) -> list[BuildingResponse]:
-    """Return what a blast does to each building with a facade."""
+    """Return what a blast does to each building with a facade.
+
+    Args:
+        scenario: Says which structures are parts of one building.
+        facade: What became of all bays of the site.
+        charge: The charge where it went off.
+        peak_factor: What its peaks would be multiplied by if cells did not clip them.
+        tails: How much is still to come to the bays, by name, where that is known.
+    """
     names = {each.name: each.building_name for each in scenario.structures}
     stepped = stepped_buildings(scenario.structures)
     owners = [names[each.bay.structure] for each in facade.bays]
@@ -407,7 +425,13 @@ def side_on_impulse_pa_s(reflected_pa_s: FloatArray) -> FloatArray:
 
 
 def neighbours_of(scenario: Scenario, result: "GasResult", charge: Charge) -> list[Neighbour]:
-    """Return what a blast would do to ordinary houses where buildings without a facade stand."""
+    """Return what a blast would do to ordinary houses where buildings without a facade stand.
+
+    Args:
+        scenario: Says which structures are parts of one building, and which have a facade.
+        result: The blast.
+        charge: The charge where it went off.
+    """
     parts: dict[str, list[str]] = {}
     faced = {each.building or each.name for each in scenario.structures if each.facade is not None}
     for each in scenario.structures:

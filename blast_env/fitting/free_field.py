@@ -304,7 +304,12 @@ class CalibrationReport:
         return table
 
     def calibration(self, name: str, law: LawName = "power") -> Calibration:
-        """Return the calibration of one of the laws."""
+        """Return the calibration of one of the laws.
+
+        Args:
+            name: Its name.
+            law: Which of the laws.
+        """
         study, by_seed = self.study, impulse_by_seed(self.runs, self.simulated)
         reference = self.reference.impulse_psi_s
         left_out = leave_one_out(

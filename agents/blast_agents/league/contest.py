@@ -23,7 +23,13 @@ from blast_env.scenario import check_layout
 
 @dataclass(frozen=True, eq=False)
 class SearchJob:
-    """Lets an entry propose for a case."""
+    """Lets an entry propose for a case.
+
+    Attributes:
+        case: The case.
+        entry: The entry.
+        engine: Name of the engine, or the engine.
+    """
 
     case: Case
     entry: LeagueEntry
@@ -106,7 +112,13 @@ class SearchJob:
 
 @dataclass(frozen=True, eq=False)
 class EvaluationJob:
-    """Lets a layout meet the held-out threats of a case."""
+    """Lets a layout meet the held-out threats of a case.
+
+    Attributes:
+        case: The case.
+        layout: The layout.
+        engine: Name of the engine, or the engine.
+    """
 
     case: Case
     layout: Layout

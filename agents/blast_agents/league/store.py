@@ -33,7 +33,12 @@ _ADDRESS: Final = re.compile(r" at 0x[0-9a-f]+")
 
 
 def search_key(case: Case, entry: LeagueEntry, engine: str | Engine) -> str:
-    """Return all that a search's proposal for a case depends on, as a text."""
+    """Return all that a search's proposal for a case depends on, as a text.
+
+    Raises:
+        CalibrationError: If the scenario has no calibration for the engine.
+        UnknownNameError: If there is no such engine.
+    """
     method = repr(entry.proposer)
     if entry.first_engine is not None:
         method += f" by {engine_text(find_engine(entry.first_engine))}, {entry.finalists} judged"
@@ -47,7 +52,9 @@ def search_key(case: Case, entry: LeagueEntry, engine: str | Engine) -> str:
 def evaluation_key(case: Case, layout: Layout, engine: str | Engine) -> str:
     """Return all that the loads with a layout on a case's held-out threats depend on.
 
-    Errors as for `search_key`.
+    Raises:
+        CalibrationError: If the scenario has no calibration for the engine.
+        UnknownNameError: If there is no such engine.
     """
     return _key("loads", case, engine, case.threats, tuple(sorted(layout)))
 
@@ -76,7 +83,12 @@ class ResultStore:
         return self._store.folder
 
     def proposal(self, key: str, scenario: AnyScenario) -> Proposal | None:
-        """Return what a search proposed for a scenario, or `None` if that is not known."""
+        """Return what a search proposed for a scenario, or `None` if that is not known.
+
+        Args:
+            key: Of `search_key`.
+            scenario: The scenario; a layout that does not fit it counts as not known.
+        """
 
         def decode(content: bytes) -> Proposal:
             proposal = checked_as(Proposal, parse_json(content.decode()))
@@ -94,7 +106,12 @@ class ResultStore:
         self._store.put(key, _PROPOSAL.dump_json(proposal))
 
     def loads(self, key: str, threats: int) -> tuple[float, ...] | None:
-        """Return the loads under so many threats, in the objective's unit; `None`: not known."""
+        """Return the loads under the threats, in the objective's unit; `None`: not known.
+
+        Args:
+            key: Of `evaluation_key`.
+            threats: How many there are.
+        """
 
         def decode(content: bytes) -> tuple[float, ...]:
             loads = checked_as(tuple[Load, ...], parse_json(content.decode()))

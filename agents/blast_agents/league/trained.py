@@ -18,7 +18,14 @@ from blast_env.sites import FAMILIES
 
 @dataclass(frozen=True, eq=False)
 class TrainedRun:
-    """The agent of a run folder, and what it was trained for."""
+    """The agent of a run folder, and what it was trained for.
+
+    Attributes:
+        run: The folder.
+        agent: The agent, with the weights of its best evaluation.
+        configuration: Of the run: scenario and threat, among others.
+        training: What it cost.
+    """
 
     run: Path
     agent: TrainedAgent
@@ -27,7 +34,11 @@ class TrainedRun:
 
     @classmethod
     def load(cls, run: Path) -> "TrainedRun":
-        """Load the agent of a run folder."""
+        """Load the agent of a run folder.
+
+        Raises:
+            BlastEnvError: If it is no run folder, or damaged.
+        """
         folder = RunFolder(run)
         configuration = folder.configuration()
         training = _training(folder, configuration.settings)
@@ -85,7 +96,12 @@ class TrainedRun:
 
 
 def surrogate_entries(surrogate: Surrogate, budgets: Sequence[int]) -> tuple[LeagueEntry, ...]:
-    """Return a surrogate's own proposals, and its searches."""
+    """Return a surrogate's own proposals, and its searches.
+
+    Args:
+        surrogate: The surrogate.
+        budgets: Blasts that its searches may spend on a case.
+    """
     search = search_by(surrogate)
     training = Training(surrogate.fit.blasts, surrogate.fit.seconds)
     alone = LeagueEntry(search, kind=ProposerKind.LEARNT, training=training)
@@ -93,7 +109,11 @@ def surrogate_entries(surrogate: Surrogate, budgets: Sequence[int]) -> tuple[Lea
 
 
 def check_runs(runs: Sequence[TrainedRun], tracks: Sequence[Track]) -> None:
-    """Refuse an agent that was trained for none of the tracks."""
+    """Refuse an agent that was trained for none of the tracks.
+
+    Raises:
+        BlastEnvError: If there is one; the message says what it was trained for.
+    """
     for run in runs:
         if not any(run.is_for(track) for track in tracks):
             names, settings = ", ".join(track.name for track in tracks), run.configuration.settings

@@ -461,6 +461,12 @@ class ZoneGeometry(NamedTuple):
         facade a module hides there. So what is learnt at one place of the charge holds at the
         others, and on a turned site. Where the charge is hidden, they are means over `places` that
         it may be at; 1 takes the middle.
+
+        Args:
+            planes: Those of the observation.
+            rows: Rows of the build zone.
+            columns: Its columns.
+            places: Places that stand for where the charge may be; 1 takes the middle.
         """
         # Only in the build zone cells have a cost.
         row, column = (planes["cost"].amax(dim=dim).gt(0).int().argmax(dim=1) for dim in (2, 1))

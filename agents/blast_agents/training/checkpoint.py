@@ -130,7 +130,11 @@ class Checkpoint(BaseModel):
         return self.counters.rollouts == 0
 
     def save(self, path: Path, policy: BasePolicy | None = None) -> None:
-        """Write the checkpoint, as a policy is now; the file is complete or as it was."""
+        """Write the checkpoint, as a policy is now; the file is complete or as it was.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
         if policy is not None:
             self.policy, self.optimizer = policy.state_dict(), policy.optimizer.state_dict()
         content = {
@@ -152,7 +156,11 @@ class Checkpoint(BaseModel):
 
     @classmethod
     def load(cls, path: Path) -> "Checkpoint":
-        """Read a checkpoint; nothing but tensors and plain data is accepted."""
+        """Read a checkpoint; nothing but tensors and plain data is accepted.
+
+        Raises:
+            BlastEnvError: If there is none, or it is damaged.
+        """
         if not path.is_file():
             raise BlastEnvError(f"{path}: there is no such checkpoint")
         content = load_archive(path, "no checkpoint")
@@ -165,7 +173,11 @@ class Checkpoint(BaseModel):
             ) from error
 
     def write_tables(self, folder: RunFolder) -> None:
-        """Write the tables for people."""
+        """Write the tables for people.
+
+        Raises:
+            BlastEnvError: If they cannot be written.
+        """
         write_rows(folder.rollouts, RolloutRow, self.rollouts)
         write_rows(folder.evaluations, EvaluationRow, self.evaluations)
 
@@ -212,7 +224,15 @@ class Checkpoint(BaseModel):
         load_weights(policy, values, place)
 
     def load_into(self, policy: BasePolicy, place: Path) -> None:
-        """Give a policy the last weights, and its optimiser its state, as far as there are some."""
+        """Give a policy the last weights, and its optimiser its state, as far as there are some.
+
+        Args:
+            policy: The policy.
+            place: Where they come from, for the error.
+
+        Raises:
+            BlastEnvError: If they are those of another policy.
+        """
         if self.policy:
             self.load_policy(policy, place)
         if self.is_start:

@@ -48,6 +48,9 @@ class RelativeReward(_Masked):
     Args:
         env: A `BlastBarrier` environment with `reward="terminal"`.
         illegal_action_cost: What an illegal action costs.
+
+    Raises:
+        BlastEnvError: If the cost is out of bounds.
     """
 
     def __init__(self, env: _Env, illegal_action_cost: float = 0.01) -> None:
@@ -75,6 +78,9 @@ class ThreatPool(_Masked):
         env: A `BlastBarrier` environment.
         size: Number of episodes in the set.
         seed: Decides which; another one for each of parallel environments.
+
+    Raises:
+        BlastEnvError: If the size or the seed is out of bounds.
     """
 
     def __init__(self, env: _Env, size: int, seed: int = 0) -> None:

@@ -18,6 +18,10 @@ from blast_env.errors import BlastEnvError, UnknownNameError, shortened
 def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
     """Return the values of options, `"key=value"` each; a value that is no JSON is a text.
 
+    Args:
+        options: The options.
+        known: The keys that there are.
+
     Raises:
         UnknownNameError: If there is no such key; the message names the nearest one.
         BlastEnvError: If an option has no `=`.

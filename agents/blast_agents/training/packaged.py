@@ -125,7 +125,14 @@ def pack(
 
 
 def records(folder: Path | None = None) -> Iterator[tuple[Path, Record]]:
-    """Yield each file of weights with what belongs to it, by name."""
+    """Yield each file of weights with what belongs to it, by name.
+
+    Args:
+        folder: Where they are; `WEIGHTS` unless given.
+
+    Raises:
+        BlastEnvError: If a record is damaged.
+    """
     for path in sorted((folder or WEIGHTS).glob("*.json")):
         with refusing(path):
             record = checked_as(Record, parse_json(read_text(path)))

@@ -50,6 +50,14 @@ class TrainingRecorder(BaseCallback):
     A rollout begins with fresh episodes and with seeds that follow from the seed of the run and
     the number of the rollout. So a run that goes on from a checkpoint is the same, to the last
     bit, as one that was never interrupted.
+
+    Args:
+        folder: Where everything is written.
+        configuration: Of the run.
+        scenario: A scenario of the size that the policy is for.
+        selection: What the best weights are chosen by.
+        progress: What the run has come to so far; goes on from here.
+        show: Called with the share of the steps that is done.
     """
 
     def __init__(
@@ -187,7 +195,12 @@ _BEST: Final = "#000000"
 
 
 def learning_curve(progress: Checkpoint, configuration: RunConfiguration) -> Figure:
-    """Return the reduction in training and on held-out threats over the blasts or guesses."""
+    """Return the reduction in training and on held-out threats over the blasts or guesses.
+
+    Args:
+        progress: The tables of the run.
+        configuration: Of the run.
+    """
     settings, counters = configuration.settings, progress.counters
     spent = "guesses" if is_surrogate(settings.engine) else "blasts"
     figure = Figure(figsize=(9.0, 5.4), layout="constrained")

@@ -282,7 +282,11 @@ def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
 
 
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:
-    """Read rows."""
+    """Read rows.
+
+    Raises:
+        BlastEnvError: If there is no such file, or it is damaged.
+    """
     with refusing(path, "missing or damaged"):
         return list(parse_csv(read_text(path), kind))
 
@@ -300,7 +304,16 @@ _PACKAGES: Final = (
 
 
 def check_format(path: Path, content: Any, wanted: int) -> None:
-    """Refuse a file of another version."""
+    """Refuse a file of another version.
+
+    Args:
+        path: The file, for the error.
+        content: What is in it.
+        wanted: The version.
+
+    Raises:
+        BlastEnvError: If its `format` is another one.
+    """
     found = content.get("format") if isinstance(content, dict) else None
     if found != wanted:
         raise BlastEnvError(f"{path}: format is {value_text(found)}, must be {wanted}")
@@ -308,7 +321,15 @@ def check_format(path: Path, content: Any, wanted: int) -> None:
 
 @contextmanager
 def refusing(path: Path, what: str = "damaged") -> Iterator[None]:
-    """Say of a file in which this block finds something wrong that it is damaged."""
+    """Say of a file in which this block finds something wrong that it is damaged.
+
+    Args:
+        path: The file.
+        what: What it is then.
+
+    Raises:
+        BlastEnvError: If the block raises a `DocumentError`.
+    """
     try:
         yield
     except DocumentError as error:
@@ -337,7 +358,7 @@ class RunFolder:
 
     @property
     def evaluations(self) -> Path:
-        """The evaluations on held-out threats, a row each, likewise."""
+        """The evaluations on held-out threats, a row each; the checkpoint has them too."""
         return self.path / "evaluations.csv"
 
     @property
@@ -366,7 +387,11 @@ class RunFolder:
 
     @property
     def versions(self) -> dict[str, str]:
-        """With which versions it was started."""
+        """With which versions it was started.
+
+        Raises:
+            BlastEnvError: If the file is missing or damaged.
+        """
         with refusing(self.path / "versions.json"):
             return checked_as(dict[str, str], parse_json(self._said("versions.json")))
 
@@ -400,6 +425,11 @@ class RunFolder:
 
         The folder is a run's when the block has ended well, by one rename. If this was interrupted
         before, it begins anew in what is there.
+
+        Args:
+            configuration: Of the run.
+            scenario: The scenario; of sites, the first one.
+            command: What started the run.
 
         Raises:
             BlastEnvError: If the folder cannot be made, or anything else is in it.
@@ -438,7 +468,11 @@ class RunFolder:
             raise BlastEnvError(f"{self.path}: has {taken[0]!r} in it, must be empty")
 
     def configuration(self) -> RunConfiguration:
-        """Return the configuration of the run."""
+        """Return the configuration of the run.
+
+        Raises:
+            BlastEnvError: If there is none, or it is damaged.
+        """
         path = self._configuration
         if not path.exists():
             raise BlastEnvError(

@@ -386,7 +386,18 @@ class SelfLabelling:
         selection: Selection,
         progress: Checkpoint,
     ) -> "SelfLabelling":
-        """Return the training as it was at a checkpoint."""
+        """Return the training as it was at a checkpoint.
+
+        Args:
+            folder: Of the run.
+            configuration: Of the run.
+            source: Gives the cases their scenario.
+            selection: What the best weights are chosen by.
+            progress: What the run has come to by then; goes on from there.
+
+        Raises:
+            BlastEnvError: If the checkpoint does not fit.
+        """
         settings, hyperparameters = configuration.settings, configuration.self_labelling
         set_random_seed(settings.seed % 2**32)
         scenario = source.representative

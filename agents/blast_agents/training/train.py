@@ -32,7 +32,13 @@ from blast_env.sites import FAMILIES
 
 @dataclass(frozen=True, eq=False)
 class TrainingResult:
-    """What a run has come to."""
+    """What a run has come to.
+
+    Attributes:
+        folder: The run folder.
+        configuration: Of the run.
+        progress: Counters and tables.
+    """
 
     folder: RunFolder
     configuration: RunConfiguration
