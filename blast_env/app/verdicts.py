@@ -43,7 +43,7 @@ def keep_histories(result: Any, folder: Path) -> None:
             temporary,
             names=np.array([each.bay.name for each in loads.bays]),
             time_s=loads.recorder.time_s,
-            pressure_pa=loads.recorder.history_pa,
+            pressure_pa=loads.history_pa,
         )
 
 

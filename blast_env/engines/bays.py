@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.engines.gas_tables import TAIL_COLUMNS
+from blast_env.engines.oblique_walls import ObliqueLoads
 from blast_env.errors import UnknownNameError
 from blast_env.physics.gas.settings import FACE_NAMES, is_complete, still_to_come
 from blast_env.response.damage import Alternatives, BayDamage, bay_damages
@@ -69,27 +70,47 @@ class BayLoads:
     Attributes:
         bays: The bays with air before them.
         recorder: Their histories, a patch each.
+        oblique: Loads on oblique walls; `None` without such a wall.
+        on_oblique: In which bay of an oblique wall each of these is, -1 for in none (bays,).
     """
 
     bays: tuple[FilledBay, ...]
     recorder: "PatchHistories"
+    oblique: ObliqueLoads | None
+    on_oblique: NDArray[np.int64]
 
     @classmethod
-    def begin(cls, run: "GasRun", bays: Sequence[FilledBay]) -> "BayLoads":
+    def begin(
+        cls, run: "GasRun", bays: Sequence[FilledBay], oblique: ObliqueLoads | None = None
+    ) -> "BayLoads":
         """Return the recorder of a run that has not begun; the run has to record it.
 
         Args:
             run: The run.
             bays: The bays of its scenario.
+            oblique: Its loads on oblique walls, recorded in the same way.
         """
         from blast_env.physics.gas.probes import PatchHistories
 
-        patch = _patches(run.table, [each.name for each in run.site.structures], bays)
+        patch = bay_patches(run.table, [each.name for each in run.site.structures], bays)
         seen = np.unique(patch[patch >= 0])
         renumbered = np.full(len(bays) + 1, -1)  # the last is for no bay
         renumbered[seen] = np.arange(len(seen))
         shown = tuple(bays[index] for index in seen.tolist())
-        return cls(shown, PatchHistories(renumbered[patch], len(shown)))
+        patch = renumbered[patch]
+        on_oblique = (
+            np.full(len(shown), -1) if oblique is None else oblique.bay_of(patch, len(shown))
+        )
+        return cls(shown, PatchHistories(patch, len(shown)), oblique, on_oblique)
+
+    @property
+    def history_pa(self) -> NDArray[np.float32]:
+        """Mean overpressures, along their own normals on oblique walls (bays, steps)."""
+        history_pa = self.recorder.history_pa
+        if self.oblique is not None:
+            chosen = self.on_oblique >= 0
+            history_pa[chosen] = self.oblique.recorder.history_pa[self.on_oblique[chosen]]
+        return history_pa
 
     @cached_property
     def response(self) -> FacadeResponse:
@@ -113,7 +134,7 @@ class BayLoads:
     def _histories(self) -> tuple[FloatArray, FloatArray]:
         """Times, two or more however soon a run ended, and overpressures at them (bays, times)."""
         time_s, step_s = self.recorder.time_s, self.recorder.step_s
-        history_pa = self.recorder.history_pa.astype(np.float64)
+        history_pa = self.history_pa.astype(np.float64)
         if len(time_s) > 1:
             return time_s, history_pa
         if not len(time_s):
@@ -131,7 +152,7 @@ class BayLoads:
         names = [each.bay.name for each in self.bays]
         if name not in names:
             raise UnknownNameError("bay", name, names)
-        history = self.recorder.history_pa[names.index(name)]
+        history = self.history_pa[names.index(name)]
         return pd.DataFrame({"time_s": self.recorder.time_s, "overpressure_pa": history})
 
     def table(self, run: "GasRun") -> "pd.DataFrame":
@@ -212,7 +233,7 @@ def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:
     return rows
 
 
-def _patches(
+def bay_patches(
     table: "FaceTable", structures: Sequence[str], bays: Sequence[FilledBay]
 ) -> NDArray[np.int64]:
     """Return which bay each face of a cell is in, -1 for none (faces,)."""

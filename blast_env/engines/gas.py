@@ -35,6 +35,7 @@ from blast_env.engines.gas_tables import (
     structure_table,
     wall_table,
 )
+from blast_env.engines.oblique_walls import ObliqueLoads
 from blast_env.engines.pieces import PIECE_COLUMNS, PieceLoads
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Element, layout_text
@@ -190,7 +191,8 @@ class GasBlast:
                 result, in `run.solver.recorders`.
         """
         run = self.engine.start_on(self.site, recorders)
-        bays = BayLoads.begin(run, self.scenario.bays_with(self.layout))
+        oblique = ObliqueLoads.begin(run, self.scenario.structures)
+        bays = BayLoads.begin(run, self.scenario.bays_with(self.layout), oblique)
         if bays.bays:
             run.record(bays.recorder)
         pieces = PieceLoads.begin(run, self.scenario, self.layout)
@@ -200,7 +202,7 @@ class GasBlast:
             run.advance(run.time_s + run.limit_s / _PROGRESS_CALLS)
             if progress is not None:
                 progress(min(run.time_s / run.limit_s, 1.0))
-        return GasResult(self, run, bays, pieces)
+        return GasResult(self, run, bays, pieces, oblique)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,12 +215,14 @@ class GasResult:
         bay_loads: Histories of the bays of facades; `None` where nobody recorded them.
         piece_loads: Histories on both sides of the barrier's pieces; `None` where nobody recorded
             them, or no piece has a height.
+        oblique: Loads on oblique walls along their own normals; `None` without one.
     """
 
     blast: GasBlast
     run: "GasRun"
     bay_loads: BayLoads | None = None
     piece_loads: PieceLoads | None = None
+    oblique: ObliqueLoads | None = None
 
     @property
     def engine_name(self) -> str:
@@ -262,6 +266,13 @@ class GasResult:
         return face_table(self.run)
 
     @cached_property
+    def on_walls(self) -> "pd.DataFrame":
+        """The same, with loads on oblique walls along their own normals; `share` is of the area."""
+        return (
+            self.faces.assign(share=1.0) if self.oblique is None else self.oblique.table(self.faces)
+        )
+
+    @cached_property
     def modules(self) -> "pd.DataFrame":
         """One row a face of a module that touches air; see `MODULE_COLUMNS`."""
         return module_table(self.run, self.faces)
@@ -269,19 +280,19 @@ class GasResult:
     @cached_property
     def walls(self) -> "pd.DataFrame":
         """One row a wall or roof of a structure; see `WALL_COLUMNS`."""
-        return wall_table(self.run, self.faces)
+        return wall_table(self.run, self.on_walls)
 
     @cached_property
     def structures(self) -> "pd.DataFrame":
         """One row a structure; see `STRUCTURE_COLUMNS`."""
-        return structure_table(self.run, self.faces)
+        return structure_table(self.run, self.on_walls)
 
     @cached_property
     def buildings(self) -> "pd.DataFrame":
         """One row a building, whose parts are one; see `BUILDING_COLUMNS`."""
         names = {each.name: each.building_name for each in self.blast.scenario.structures}
         stepped = stepped_buildings(self.blast.scenario.structures)
-        return structure_table(self.run, self.faces, names, stepped)
+        return structure_table(self.run, self.on_walls, names, stepped)
 
     @property
     def stepped_notes(self) -> tuple[str, ...]:
@@ -373,7 +384,7 @@ class GasResult:
             StructureLoad.on(
                 named[outline.name],
                 scaled.pa_s,
-                float(self.run.loads.peak_pa[self._walls(index)].max(initial=0.0)),
+                float(self._peak_pa[self._walls(index)].max(initial=0.0)),
                 scaled.in_range,
                 scaled.notes,
             )
@@ -393,9 +404,21 @@ class GasResult:
         counting = [FACE_NAMES.index(name) for name in self.run.site.structures[index].faces]
         return np.flatnonzero((table.structure == index) & np.isin(table.face, counting))
 
+    @cached_property
+    def _peak_pa(self) -> FloatArray:
+        """Peaks on the faces of cells, along the normals of oblique walls (faces,)."""
+        peak_pa = self.run.loads.peak_pa
+        return peak_pa if self.oblique is None else self.oblique.peaks_pa(peak_pa)
+
+    @cached_property
+    def _impulse_pa_s(self) -> FloatArray:
+        """Positive impulses on the faces of cells, in the same way (faces,)."""
+        impulse_pa_s = self.run.loads.positive_impulse_pa_s
+        return impulse_pa_s if self.oblique is None else self.oblique.along_normals(impulse_pa_s)
+
     def _scaled(self, index: int) -> ScaledImpulse:
         """Return the impulse on a structure, by its index into those of the site."""
-        on_walls = self.run.loads.positive_impulse_pa_s[self._walls(index)]
+        on_walls = self._impulse_pa_s[self._walls(index)]
         notes = self._notes(index)
         pa_s = float(on_walls.mean()) if len(on_walls) else np.nan
         return ScaledImpulse(pa_s, not notes, notes)

@@ -166,7 +166,8 @@ def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataF
     how: Any = dict.fromkeys(means, "mean") | {"peak_pa": "max", "arrival_s": "min"}
     table: pd.DataFrame = groups.agg(how)
     _add_tail(table)
-    return table.assign(area_m2=groups.size() * run.grid.cell_m**2).reset_index()
+    faces_of = groups["share"].sum() if "share" in faces else groups.size()
+    return table.assign(area_m2=faces_of * run.grid.cell_m**2).reset_index()
 
 
 def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
@@ -193,7 +194,12 @@ def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
 
 
 def wall_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
-    """Return one row a wall or roof of a structure; arguments as for `module_table`."""
+    """Return one row a wall or roof of a structure; see `WALL_COLUMNS`.
+
+    Args:
+        run: The run.
+        faces: Its `face_table` with the `share` of the area that each face has.
+    """
     counting = {each.name: each.faces for each in run.site.structures if each.cells is None}
     own = faces[faces["structure"].isin(list(counting))]
     table = _grouped(run, own, ["structure", "face"])
@@ -212,7 +218,7 @@ def structure_table(
 
     Args:
         run: The run.
-        faces: Its `face_table`.
+        faces: As for `wall_table`.
         buildings: The building that each structure is a part of, by name.
         stepped: The buildings with a wall that is a staircase.
     """
@@ -249,7 +255,7 @@ def _structure_row(
         "weight": parts[0].weight,
         "height_m": max(each.height_m or run.site.air_height_m for each in parts),
         "faces": " ".join(wall for wall in WALLS if any(wall in each.faces for each in parts)),
-        "area_m2": len(walls) * run.grid.cell_m**2,
+        "area_m2": walls["share"].sum() * run.grid.cell_m**2,
         "positive_impulse_pa_s": impulse_pa_s,
         "first_impulse_pa_s": walls["first_impulse_pa_s"].mean(),
         "negative_impulse_pa_s": walls["negative_impulse_pa_s"].mean(),

@@ -224,7 +224,10 @@ class UnfoldingGas(Unfolding):
 
     def __init__(self, blast: "GasBlast") -> None:
         self.blast = blast
+        from blast_env.engines.oblique_walls import ObliqueLoads
+
         self.run = blast.engine.start_on(blast.site)
+        self._oblique = ObliqueLoads.begin(self.run, blast.scenario.structures)
         grid = self.run.grid
         margin = round(-grid.origin_m[0] / grid.cell_m)
         rows, columns = _plan_shape(blast.scenario, grid.cell_m)
@@ -286,7 +289,7 @@ class UnfoldingGas(Unfolding):
         """Return what has happened so far, in the form of a result."""
         from blast_env.engines.gas import GasResult
 
-        return GasResult(self.blast, self.run)
+        return GasResult(self.blast, self.run, oblique=self._oblique)
 
     @staticmethod
     def space(scenario: Scenario, engine: "GasEngine") -> spaces.Dict:

@@ -154,7 +154,7 @@ class Consequences:
     def notes(self) -> tuple[str, ...]:
         """What there is to say of the loads: oblique walls, and bays that are not complete."""
         stepped = dict.fromkeys(each.building for each in self.responses if each.stepped)
-        notes = [f"{name}: {STEPPED}; each step is a bay, the worst is too bad" for name in stepped]
+        notes = [f"{name}: {STEPPED}; each step is a bay" for name in stepped]
         tails = [tail for each in self.responses for tail in each.tails.values()]
         late = sum(not each.complete for each in tails)
         if late:
@@ -438,7 +438,7 @@ def neighbours_of(scenario: Scenario, result: "GasResult", charge: Charge) -> li
         building = each.building or each.name
         if building not in faced:
             parts.setdefault(building, []).append(each.name)
-    faces = result.faces
+    faces = result.on_walls
     walls = faces[faces["face"].isin(WALLS)]
     found = []
     for building, names in parts.items():

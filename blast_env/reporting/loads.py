@@ -217,7 +217,7 @@ class MeasuredBlast:
     @cached_property
     def loads(self) -> dict[str, TargetLoad]:
         """The load on every building with a wall in the air, by name."""
-        faces = self.result.faces
+        faces = self.result.on_walls
         loads = {}
         for target in self.targets:
             counting = [

@@ -78,6 +78,11 @@ class Bay:
         return self.width_m * self.height_m
 
 
+def storeys_in(rise_m: float, storey_m: float) -> int:
+    """Return how many storeys fit: what is left is one if it is at least half of one."""
+    return max(1, floor(rise_m / storey_m + 0.5))
+
+
 def divide(
     structure: str,
     ground_m: Rectangle,
@@ -108,7 +113,7 @@ def divide(
     for name, value in (("height_m", rise_m), ("storey_m", storey_m), ("bay_m", bay_m)):
         if not value > 0.0:
             raise BlastEnvError(f"facade of {structure!r}: {name} is {value}, must be above 0")
-    storeys = max(1, floor(rise_m / storey_m + 0.5))
+    storeys = storeys_in(rise_m, storey_m)
     floors = [base_m + storey_m * storey for storey in range(storeys)] + [height_m]
     bays: list[Bay] = []
     for wall in walls:

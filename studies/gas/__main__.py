@@ -337,28 +337,35 @@ def oblique(
 ) -> None:
     """Print the loads on a facade of 12 m that is turned against the grid, and looks at the charge.
 
-    By faces of cells, and by bays of 3 m along the facade's own normal.
+    By faces of cells and steps, and as tables and responses have it: by bays of 3 m along the
+    facade's own normal.
     """
     rows = []
     with user_errors():
         for angle_deg in _numbers(angles):
             found = oblique_loads(angle_deg, cell, until)
-            peaks = (
+            peaks_pa = (
                 *(found.mean_peak_pa, found.largest_peak_pa),
-                *(found.projected_peak_pa, found.largest_projected_pa),
+                *(found.told_peak_pa, found.largest_told_pa),
             )
-            impulses = (found.impulse_pa_s, found.projected_pa_s)
+            impulses = (found.impulse_pa_s, found.told_pa_s)
             rows.append(
                 (
                     f"{angle_deg:g}",
                     *(f"{impulse:.0f}" for impulse in impulses),
-                    *(f"{peak / PA_PER_KPA:.0f}" for peak in peaks),
-                    *(f"{1e3 * each:.1f}" for each in (found.stepped_m, found.projected_m)),
+                    *(f"{peak / PA_PER_KPA:.0f}" for peak in peaks_pa),
+                    *(f"{1e3 * each:.1f}" for each in (found.stepped_m, found.told_m)),
                 )
             )
-    headers = ("degrees", "impulse (Pa s)", "along the normal", "peak of faces (kPa)", "largest")
-    more = ("peak of bays (kPa)", "largest of bays", "deflection, 10 ms (mm): worst step")
-    print_line(markdown_table((*headers, *more, "worst bay"), rows))
+    headers = ("turned by (degrees)", "impulse on faces (Pa s)", "as told")
+    peaks = (
+        "mean peak of faces (kPa)",
+        "largest",
+        "mean peak of bays, as told",
+        "largest, as told",
+    )
+    more = ("deflection of a component of 10 ms (mm), worst step", "as told")
+    print_line(markdown_table((*headers, *peaks, *more), rows))
 
 
 @app.command()

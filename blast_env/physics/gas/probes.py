@@ -166,6 +166,7 @@ class PatchHistories:
     Args:
         patch: Which patch each of the solver's faces belongs to, -1 for none (faces,).
         count: Number of patches; each has at least one face.
+        share: How much each face counts; all as much unless given (faces,).
 
     Attributes:
         faces: How many faces each patch has (patches,).
@@ -174,9 +175,13 @@ class PatchHistories:
         BlastEnvError: If a patch has no face.
     """
 
-    def __init__(self, patch: NDArray[np.int64], count: int) -> None:
+    def __init__(
+        self, patch: NDArray[np.int64], count: int, share: NDArray[np.float64] | None = None
+    ) -> None:
         self._members = np.flatnonzero(patch >= 0)
         self._patch = patch[self._members]
+        self._share = np.ones(len(self._patch)) if share is None else share[self._members]
+        self._area = np.bincount(self._patch, weights=self._share, minlength=count)
         self.faces = np.bincount(self._patch, minlength=count)
         if len(self.faces) != count or not self.faces.all():
             raise BlastEnvError(f"{count} patches of wall: each must have a face of a cell")
@@ -187,10 +192,10 @@ class PatchHistories:
     def record(self, solver: Gas, step_s: float) -> None:
         """Add a step: the mean over its time, in its middle."""
         over = solver.wall_pressure[self._members] - 1.0
-        sums = np.bincount(self._patch, weights=over, minlength=len(self.faces))
+        sums = np.bincount(self._patch, weights=self._share * over, minlength=len(self.faces))
         self._times.append(solver.time_s - 0.5 * step_s)
         self._steps.append(step_s)
-        self._history.append((solver.pressure_pa * sums / self.faces).astype(np.float32))
+        self._history.append((solver.pressure_pa * sums / self._area).astype(np.float32))
 
     @property
     def time_s(self) -> NDArray[np.float64]:

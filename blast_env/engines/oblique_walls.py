@@ -1,0 +1,180 @@
+"""Loads on oblique walls along their own normals.
+
+An oblique wall is a staircase of modules, whose corners have peaks that the real wall has not. What
+counts is the momentum along the wall's own normal, per area of the real wall: the mean over a bay
+of the overpressures on the steps, each by how far it looks along that normal.
+
+Impulses are such means of the impulses on faces of cells; peaks are those of the mean.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.physics.gas.settings import FACE_NAMES
+from blast_env.physics.scene import WALLS
+from blast_env.response.facade import BAY_M, STOREY_M, storeys_in
+from blast_env.scenario.sections import AnyStructure
+from blast_env.scenario.staircase import Edge, ObliqueWall, oblique_walls
+from blast_env.units import MODULE_SIDE_M
+
+if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
+    import pandas as pd
+
+    from blast_env.physics.gas.engine import FaceTable, GasRun
+    from blast_env.physics.gas.probes import PatchHistories
+
+_OUTWARDS: Final[Mapping[str, tuple[float, float]]] = {
+    "west": (-1.0, 0.0),
+    "east": (1.0, 0.0),
+    "south": (0.0, -1.0),
+    "north": (0.0, 1.0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ObliqueLoads:
+    """The loads on the bays of oblique walls of a blast.
+
+    Attributes:
+        bay: Which of these bays each face of a cell is in, -1 for none (faces,).
+        share: How far each face looks along the normal of its wall, 1 elsewhere (faces,).
+        recorder: Mean overpressures along the normals, a patch a bay.
+    """
+
+    bay: NDArray[np.int64]
+    share: FloatArray
+    recorder: "PatchHistories"
+
+    @classmethod
+    def begin(cls, run: "GasRun", structures: Sequence[AnyStructure]) -> "ObliqueLoads | None":
+        """Return what a run that has not begun will record; `None` without an oblique wall.
+
+        Args:
+            run: The run.
+            structures: The structures of its scenario.
+        """
+        from blast_env.physics.gas.probes import PatchHistories
+
+        walls = oblique_walls(structures)
+        if not walls:
+            return None
+        bay = np.full(len(run.table.faces), -1)
+        share = np.ones(len(bay))
+        by_name = {each.name: each for each in structures}
+        owners = [by_name.get(each.name) for each in run.site.structures]
+        for wall in walls:
+            _add_bays(run.table, owners, wall, bay, share)
+        recorder = PatchHistories(bay, int(bay.max()) + 1, share)
+        run.record(recorder)
+        return cls(bay, share, recorder)
+
+    @cached_property
+    def members(self) -> BoolArray:
+        """Whether a face is part of an oblique wall (faces,)."""
+        return np.asarray(self.bay >= 0)
+
+    def along_normals(self, values: FloatArray) -> FloatArray:
+        """Return values of faces, those of oblique walls as means over their bays (faces,)."""
+        bay, share = self.bay[self.members], self.share[self.members]
+        area = np.bincount(bay, weights=share)
+        means = np.bincount(bay, weights=share * values[self.members]) / area
+        found = values.copy()
+        found[self.members] = means[bay]
+        return found
+
+    def peaks_pa(self, peak_pa: FloatArray) -> FloatArray:
+        """Return the peaks of faces, those of oblique walls as peaks of their bays (faces,)."""
+        found = peak_pa.copy()
+        peaks = self.recorder.history_pa.max(axis=1, initial=0.0).astype(np.float64)
+        found[self.members] = peaks[self.bay[self.members]]
+        return found
+
+    def table(self, faces: "pd.DataFrame") -> "pd.DataFrame":
+        """Return a `face_table` with the loads of oblique walls along their own normals."""
+        columns = [each for each in map(str, faces) if each.endswith("_pa_s")]
+        changed = {each: self.along_normals(faces[each].to_numpy()) for each in columns}
+        peaks = self.peaks_pa(faces["peak_pa"].to_numpy())
+        return faces.assign(**changed, peak_pa=peaks, share=self.share)
+
+    def bay_of(self, patch: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+        """Return in which bay of an oblique wall patches of faces are, -1 for in none (count,).
+
+        Args:
+            patch: The patch of each face, -1 for none (faces,).
+            count: How many patches there are.
+        """
+        found = np.full(count, -1)
+        for index in range(count):
+            own = self.bay[patch == index]
+            on_wall = own[own >= 0]
+            if 2 * len(on_wall) > len(own):
+                found[index] = np.bincount(on_wall).argmax()
+        return found
+
+
+def _add_bays(
+    table: "FaceTable",
+    owners: Sequence[AnyStructure | None],
+    wall: ObliqueWall,
+    bay: NDArray[np.int64],
+    share: FloatArray,
+) -> None:
+    """Number the bays of a wall on from those that there are, in the order of their faces.
+
+    Args:
+        table: The faces of cells.
+        owners: The structure of each index; `None` for the barrier.
+        wall: The wall.
+        bay: Bays of the faces, changed.
+        share: How far the faces look along the normals of their walls, changed.
+    """
+    parts = {i: each for i, each in enumerate(owners) if each and _is_part(each, wall)}
+    of_building = np.isin(table.structure, list(parts)) & (table.face < len(WALLS))
+    chosen = [
+        index
+        for index in np.flatnonzero(of_building).tolist()
+        if _edge(table, index, wall) in wall.edges
+    ]
+    if not chosen:
+        return
+    own = np.array(chosen)
+    outwards = np.array([_OUTWARDS[FACE_NAMES[each]] for each in table.face[own].tolist()])
+    normal = np.array(wall.normal)
+    share[own] = outwards @ normal
+    facade = next((each.facade for each in parts.values() if each.facade is not None), None)
+    bay_m = BAY_M if facade is None else facade.bay_m
+    storey_m = STOREY_M if facade is None else facade.storey_m
+    along_m = table.centre_m[own, :2] @ np.array([-normal[1], normal[0]])
+    length_m = MODULE_SIDE_M * sum(np.dot(_OUTWARDS[each.wall], normal) for each in wall.edges)
+    columns = max(1, round(length_m / bay_m))
+    start_m = 0.5 * (along_m.min() + along_m.max() - length_m)
+    column = np.clip((along_m - start_m) // (length_m / columns), 0, columns - 1)
+    base_m = np.array([parts[each].base_m for each in table.structure[own].tolist()])
+    storey = np.floor((table.centre_m[own, 2] - base_m) / storey_m)
+    highest = [
+        np.inf if part.height_m is None else storeys_in(part.height_m - part.base_m, storey_m) - 1
+        for part in (parts[each] for each in table.structure[own].tolist())
+    ]
+    keys = columns * np.minimum(storey, highest) + column
+    _, number = np.unique(keys, return_inverse=True)
+    bay[own] = int(bay.max(initial=-1)) + 1 + number.ravel()
+
+
+def _is_part(structure: AnyStructure, wall: ObliqueWall) -> bool:
+    return structure.building_name == wall.building
+
+
+def _edge(table: "FaceTable", index: int, wall: ObliqueWall) -> Edge:
+    """Return the side of a module that a face of a cell is on, in the plan of a building."""
+    x_m, y_m = table.centre_m[index, :2].tolist()
+    name = WALLS[table.face[index]]
+    inwards_x, inwards_y = (-0.5 * MODULE_SIDE_M * each for each in _OUTWARDS[name])
+    left_m, bottom_m = wall.corner_m
+    row = int((y_m + inwards_y - bottom_m) // MODULE_SIDE_M)
+    return Edge(row, int((x_m + inwards_x - left_m) // MODULE_SIDE_M), name)
