@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from blast_env.bundled import bundled_scenarios
-from blast_env.envs.registration import register_environments as _register_environments
+from blast_env.envs import register_environments as _register_environments
 from blast_env.provenance import package_version
 
 if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checkers

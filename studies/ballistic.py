@@ -16,7 +16,7 @@ import typer
 from scipy.stats import qmc
 
 from blast_env.calibration import fit_metrics, fit_power_law, paper_table, shape_rms_percent
-from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, user_errors
 from blast_env.engines import simulate
 from blast_env.files import make_folder, write_atomically

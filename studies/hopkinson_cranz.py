@@ -14,7 +14,7 @@ import pandas as pd
 import typer
 
 from blast_env.calibration import fit_metrics, fit_power_law, kingery_bulmash, load_calibration
-from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.files import make_folder
 from blast_env.fitting.free_field import FreeFieldStudy, free_field, summarise

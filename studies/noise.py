@@ -13,7 +13,7 @@ import typer
 from blast_agents.rules import random_layout
 
 from blast_env.arrays import FloatArray
-from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.envs.strategies import DEPOSIT
 from blast_env.evaluation.cases import Threat

@@ -24,7 +24,7 @@ from blast_agents.surrogate.search import Guesses, LearntSearch, improved
 from blast_agents.surrogate.walls import ALL_FEATURES, FEATURES
 from blast_agents.training import load_agent
 
-from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats

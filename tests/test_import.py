@@ -29,7 +29,6 @@ def test_the_package_imports_nothing_heavy() -> None:
         "blast_env",
         "blast_env.bundled",
         "blast_env.envs",
-        "blast_env.envs.registration",
         "blast_env.provenance",
     }
 

@@ -13,8 +13,14 @@ from blast_env.cli.options import (
     ChargeOptions,
     wanted_level,
 )
-from blast_env.cli.output import ResultTable, print_line, print_table, progress_bar, result_console
-from blast_env.cli.pieces import print_pieces
+from blast_env.cli.output import (
+    ResultTable,
+    print_line,
+    print_pieces,
+    print_table,
+    progress_bar,
+    result_console,
+)
 from blast_env.cli.targets import PICTURES
 from blast_env.engines import JUDGE, find_engine
 from blast_env.engines.bays import LOADED_BAY_COLUMNS

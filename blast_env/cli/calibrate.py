@@ -11,9 +11,8 @@ from blast_env.calibration.model import (
     save_calibration,
 )
 from blast_env.calibration.references import paper_table
-from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option
-from blast_env.cli.options import ClusterOptions, ProcessOptions
+from blast_env.cli.options import ClusterOptions, ProcessOptions, running_on
 from blast_env.cli.output import (
     ResultTable,
     print_line,

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from blast_env.cli.cluster import running_on
 from blast_env.cli.command import option
 from blast_env.cli.evaluation_report import EvaluateOptions, report_layout
+from blast_env.cli.options import running_on
 from blast_env.engines import find_engine
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator

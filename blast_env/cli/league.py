@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 from blast_agents.search import proposers
 
-from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option
-from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions, ProcessOptions
+from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions, ProcessOptions, running_on
 from blast_env.cli.output import (
     print_line,
     print_table,

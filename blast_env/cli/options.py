@@ -1,16 +1,45 @@
-"""Options that several commands have in common, with one name and one meaning in all of them."""
+"""Options that commands and studies have in common, with one name and one meaning in all."""
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
-from blast_env.cli.cluster import CLUSTER_HELP
+import typer
+
 from blast_env.cli.command import FOLDER, Command, option
+from blast_env.cli.output import message_console, printable
+from blast_env.cluster import on_cluster
 from blast_env.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
+
+CLUSTER_HELP: Final = (
+    "Address or scheduler file of a Dask cluster, which then runs the blasts in the place of "
+    "worker processes (docs/howto/cluster.md)."
+)
+
+ClusterAddress = Annotated[str | None, typer.Option("--cluster", help=CLUSTER_HELP)]
+
+
+@contextmanager
+def running_on(cluster: str | None) -> Iterator[None]:
+    """Run the blasts of this block on a cluster, if one is given; see `on_cluster`."""
+    if cluster is None:
+        yield
+        return
+    # What happens to workers, Dask says in its own words; what matters of it becomes an error.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    with on_cluster(cluster) as size:
+        now = f"{size.workers} workers with {size.threads} threads now"
+        text = f"cluster {cluster}: {now if size.workers else 'waits for the first worker'}"
+        message_console().print(printable(text))
+        yield
+
 
 SCENARIO_HELP: Final = "Bundled name, or a scenario file."
 ENGINE_HELP: Final = (

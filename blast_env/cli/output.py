@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from math import isnan
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -21,7 +21,11 @@ from rich.text import Text
 from blast_env.errors import BlastEnvError, MissingExtraError
 from blast_env.geometry import Element
 from blast_env.scenario import Scenario
+from blast_env.units import MS_PER_S, PA_PER_KPA
 from blast_env.values import STEERING
+
+if TYPE_CHECKING:  # a third of a second to import
+    import pandas as pd
 
 _PIPE_COLUMNS = 120
 _LINE_EVERY_S: Final = 30.0
@@ -239,3 +243,44 @@ def print_written(paths: Iterable[Path]) -> None:
 def percent(share: float) -> str:
     """Return a share for people; a dash for one that does not exist."""
     return "-" if isnan(share) else f"{100.0 * share:.1f} %"
+
+
+_PIECE_HEADERS: Final = (
+    *("piece", "what it does", "mass (kg)", "peak push (kPa)", "push (Pa s)"),
+    *("slides (m)", "tilt, 1 overturns", "overturns at (ms)"),
+)
+_MOST_PIECES: Final = 12
+
+
+def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
+    """Print what becomes of a barrier's pieces, those that move most first; nothing without any.
+
+    Args:
+        pieces: As `GasResult.pieces`.
+        title: Of the table, before how many do what.
+    """
+    if not len(pieces):
+        return
+    counts = ", ".join(f"{count} {word}" for word, count in outcome_counts(pieces).items())
+    table = ResultTable(f"{title}: {counts}", _PIECE_HEADERS, text_columns=2)
+    ordered = pieces.sort_values(["tilt", "slide_m"], ascending=False, kind="stable")
+    for row in ordered.head(_MOST_PIECES).to_dict("records"):
+        overturn_s = row["overturn_s"]
+        table.add_row(
+            row["piece"],
+            row["outcome"],
+            f"{row['mass_kg']:,.0f}",
+            f"{row['peak_pa'] / PA_PER_KPA:,.1f}",
+            f"{row['impulse_pa_s']:,.0f}",
+            f"{row['slide_m']:.2f}",
+            f"{row['tilt']:.2f}",
+            "-" if isnan(overturn_s) else f"{MS_PER_S * overturn_s:,.0f}",
+        )
+    result_console().print(table)
+    if len(ordered) > _MOST_PIECES:
+        print_line(f"and {len(ordered) - _MOST_PIECES} more pieces that move less")
+
+
+def outcome_counts(pieces: "pd.DataFrame") -> dict[str, int]:
+    """Return how many pieces do what, the most frequent first."""
+    return {str(word): int(n) for word, n in pieces["outcome"].value_counts().items()}

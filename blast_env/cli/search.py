@@ -19,7 +19,6 @@ from blast_agents.search import Progress as SearchProgress
 from blast_agents.search.registry import DEFAULT_BUDGET, check_suits, proposer_row
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import (
     CELL_HELP,
@@ -30,6 +29,7 @@ from blast_env.cli.options import (
     ChargeOptions,
     ClusterOptions,
     ProcessOptions,
+    running_on,
 )
 from blast_env.cli.output import (
     LAYOUT_PICTURE,

@@ -22,12 +22,12 @@ from blast_env.cli.output import (
     ResultTable,
     print_json,
     print_line,
+    print_pieces,
     print_table,
     print_written,
     progress_bar,
     result_console,
 )
-from blast_env.cli.pieces import print_pieces
 from blast_env.cli.targets import PICTURES
 from blast_env.engines import Blast, BlastResult, Engine, find_engine
 from blast_env.engines.contract import load_plugin

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from blast_env.cli.cluster import running_on
 from blast_env.cli.command import FOLDER, option, options_of
-from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions
+from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions, running_on
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
     print_line,

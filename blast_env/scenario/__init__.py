@@ -4,8 +4,7 @@ from blast_env.bundled import bundled_scenarios
 from blast_env.geometry import Cell, Element, Layout, Piece
 from blast_env.physics.scene import Charge
 from blast_env.scenario.access_way import AccessWay
-from blast_env.scenario.barriers import StockBarrier, stock_barriers
-from blast_env.scenario.catalogue import Catalogue, Item, PlacedModule
+from blast_env.scenario.catalogue import Catalogue, Item, PlacedModule, StockBarrier, stock_barriers
 from blast_env.scenario.files import (
     AnyScenario,
     ScenarioField,

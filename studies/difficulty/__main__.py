@@ -17,7 +17,7 @@ import numpy as np
 import typer
 
 from blast_env import load_scenario
-from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import ResultTable, print_line, progress_bar, result_console, user_errors
 from blast_env.evaluation import evaluate_against
 from blast_env.files import make_folder, write_atomically

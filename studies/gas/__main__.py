@@ -13,7 +13,7 @@ from blast_agents.rules import random_layout, wall_near_building, wall_near_char
 
 from blast_env.arrays import FloatArray
 from blast_env.benchmark import street
-from blast_env.cli.cluster import ClusterAddress, running_on
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.files import make_folder

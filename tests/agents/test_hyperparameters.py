@@ -25,7 +25,7 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 
 from blast_env import load_scenario
-from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE
+from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import bundled_scenarios

@@ -14,7 +14,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_agen
 
 import blast_env
 from blast_env.engines import BlastResult
-from blast_env.envs.registration import FOR_GAS
+from blast_env.envs import FOR_GAS
 from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.scenario import Scenario, ScenarioError

@@ -6,7 +6,7 @@ from blast_agents.rules import random_layout
 
 from blast_env import load_scenario
 from blast_env.engines.gas import GasBlast, GasEngine
-from blast_env.envs.registration import FOR_GAS
+from blast_env.envs import FOR_GAS
 from blast_env.geometry import Layout, Piece
 from blast_env.physics.gas.settings import CHECKED_CELLS
 from blast_env.scenario import Placement, Scenario

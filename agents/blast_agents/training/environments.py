@@ -15,9 +15,9 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 from blast_agents.training.hyperparameters import DEFAULT_SECTION
 from blast_agents.training.run_folder import RunConfiguration
 from blast_env.engines import Engine
+from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
-from blast_env.envs.registration import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Evaluators
 from blast_env.evaluation.store import BlastCache, LoadsCache
