@@ -36,7 +36,6 @@ _LOT_S: Final = 3.0
 """How long one process is to have work: shorter lots measure how processes begin."""
 
 _SHORTEST_M: Final = 20.0
-
 _PACKAGES: Final = ("numpy", "numba", "pymunk")
 
 

@@ -12,7 +12,6 @@ from blast_env.geometry import Rectangle
 from blast_env.plan import Feature, FeatureKind, Kinds
 
 Point = tuple[float, float]
-
 _NOTHING: Final = 1e-6  # of a place: what may be covered by rounding
 
 

@@ -212,7 +212,6 @@ STANDING: Final = (Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE, Kinds.BARRIER)
 SITE_KINDS: Final = tuple(each for each in vars(Kinds).values() if isinstance(each, FeatureKind))
 """All kinds, the lowest first."""
 
-
 FREE_CELL: Final = FeatureKind("free_cell", "free cell", 1.12, Look(fill=(214, 238, 219)))
 NO_CELL: Final = FeatureKind(
     "no_cell", "cell not available", 1.1, Look(fill=(226, 228, 232), hatched=True)

@@ -14,7 +14,6 @@ from blast_env.errors import BlastEnvError, value_text
 MOST_SEED: Final = 2**63 - 1
 """The largest seed: tables and files keep it in 64 bits."""
 
-
 STEERING: Final = re.compile(
     r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )

@@ -24,7 +24,6 @@ from blast_env.scenario.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 
 Document = dict[str, Any]
-
 _HALF: Final = MODULE_SIDE_M / 2.0
 
 

@@ -36,7 +36,6 @@ TOKEN: Final = "token"
 
 _GONE_S: Final = 0.1
 _UNANSWERED: Final = "No response returned."
-
 _TOKEN_BYTES: Final = 32
 _EVERYWHERE: Final = ("0.0.0.0", "::", "")
 _OWN_NAMES: Final = ("localhost", "127.0.0.1", "[::1]")

@@ -20,7 +20,6 @@ _GRACE_S: Final = 5.0
 """How long work may take to stop with the server before its process is ended."""
 
 _MOST_READINGS: Final = 2
-
 _COMMAND: Final = (sys.executable, "-m", "blast_env.app.worker")
 
 

@@ -39,7 +39,6 @@ from blast_env.units import MODULE_SIDE_M
 _FITS: Final = "#0072B2"  # Okabe and Ito: blue and orange, whatever one's colour vision
 _REFUSED: Final = "#D55E00"
 _SELECTED: Final = "#0072B2"
-
 _LEAST_CELL_PX: Final = 9.0  # below it cells are not drawn one by one
 _LEAST_LINES_PX: Final = 24.0
 _MARGIN: Final = 0.04

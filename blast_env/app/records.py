@@ -27,7 +27,6 @@ RECORD: Final = "record.json"
 
 _DASH: Final = "\N{EN DASH}"
 _TOGETHER: Final = "all protected"
-
 FILM: Final = "film.json"
 MOST_BYTES: Final = 50_000_000
 """Most that a file of the work folder may have."""

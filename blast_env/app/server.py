@@ -26,7 +26,6 @@ with import_extra("app", "page to design on"):
     from blast_env.app.page.start_page import StartPage
 
 LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
-
 _PAGE_FILES: Final = Path(__file__).parent / "page"
 _PRIMARY: Final = "#005a8c"  # on white and under white it can be read
 _TICK_S: Final = 0.05
@@ -41,7 +40,6 @@ _UNUSED_S: Final = 30.0
 
 _MOST_CONNECTIONS: Final = 400
 _MOST_MESSAGE_BYTES: Final = 2_000_000
-
 _KEPT_BY_BROWSER: Final = {"Cache-Control": "private, max-age=31536000, immutable"}
 
 

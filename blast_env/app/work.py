@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 TASK: Final = "task.json"
 STATUS: Final = "status.json"
-
 _LEAST_SHARE: Final = 0.05  # before that nobody knows
-
 State = Literal["waiting", "running", "done", "failed", "stopped"]
 
 

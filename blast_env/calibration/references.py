@@ -235,9 +235,7 @@ def _read(name: str) -> str:
 
 
 _SERIES_BELOW: Final = 0.5  # of b; the closed forms lose digits there
-
 _SERIES: Final = tuple((-1.0) ** order / factorial(order + 2) for order in range(16))
-
 _BISECTIONS: Final = 64
 
 

@@ -72,7 +72,6 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
 NOT_COMPLETE: Final = "more than 2 % of the impulse may still come"
 """Note on a load that is not complete; `GasSettings.until` says what a run waits for."""
 
-
 _PROGRESS_CALLS: Final = 100
 
 

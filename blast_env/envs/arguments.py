@@ -16,9 +16,7 @@ from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
 from blast_env.values import MOST_SEED, finite_number, number_pair, whole_number
 
 _Parameters = ParamSpec("_Parameters")
-
 _Returned = TypeVar("_Returned")
-
 _Strategy = TypeVar("_Strategy")
 
 

@@ -86,7 +86,6 @@ def _inside(rectangle_m: Rectangle, x: FloatArray, y: FloatArray) -> BoolArray:
 
 
 Frame = NDArray[np.uint8]
-
 _FRAMES_PER_PLACEMENT: Final = 5  # in the window: 0.2 s, so that a person can follow
 
 

@@ -20,7 +20,6 @@ from blast_env.values import path_of
 
 _DIGITS: Final = 9  # of a coordinate on a map: a tenth of a millimetre in degrees
 
-
 SITE_METRES: Final = (
     "local site metres: x to the right and y upwards from the lower left corner of the site; "
     "not longitude and latitude (not WGS 84)"

@@ -41,9 +41,7 @@ _SIMULATED_LABELS: Final[Mapping[SimulatedQuantity, str]] = MappingProxyType(
 )
 
 _LEAST_TICK_RATIO: Final = 1.18
-
 _PAPER_LOOKS: Final = (("#0072B2", "--", "s"), ("#009E73", "-.", "^"), ("#D55E00", "-", "D"))
-
 _SIMULATED, _REFERENCE = "#0072B2", "#000000"
 
 

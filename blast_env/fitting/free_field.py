@@ -41,7 +41,6 @@ from blast_env.scenario import Scenario, load_scenario
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
 RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")
-
 Amount = Annotated[float, Field(ge=0.0)]
 
 

@@ -37,7 +37,6 @@ _BAND_CELLS: Final = 2**20
 _PAIRS: Final = 2**21
 _LINE_STEP_M: Final = 0.1  # of outlines: how densely their distances are measured
 _LINE_POINTS: Final = 50_000
-
 Shares = NDArray[np.float32]
 
 

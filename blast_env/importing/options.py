@@ -27,7 +27,6 @@ CALIBRATIONS: Final[Mapping[str, str]] = MappingProxyType(
 MOST_SITE_M: Final = 2000.0
 """The longest side of a site, as scenario files have it."""
 
-
 _BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
     {
         "margin_m": (0.0, MOST_SITE_M),

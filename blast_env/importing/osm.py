@@ -41,7 +41,6 @@ _PACKED: Final[Mapping[str, Callable[[Path, str], Any]]] = MappingProxyType(
     {".gz": gzip.open, ".bz2": bz2.open}
 )
 _PART_BYTES: Final = 2**20
-
 _WGS84: Final = "EPSG:4326"
 _CUT: Final = "ways of which the extract does not have all nodes, which were left out"
 _LEAST_RING: Final = 4  # points, the first one again at the end

@@ -277,7 +277,6 @@ _COLLISIONAL_AIR: Final = with_overrides(
     },
 )
 
-
 PRESETS: Final[Mapping[str, SimulationParameters]] = MappingProxyType(
     {
         # Sparse air, as the paper's figures suggest: balls fly almost free between collisions.

@@ -13,8 +13,6 @@ from blast_env.physics.particles import CollisionType
 from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
 
 _HALF: Final = MODULE_SIDE_UNITS / 2.0
-
-
 _BEYOND: Final = 1e-6  # how far past an edge we look, units
 
 
@@ -108,7 +106,6 @@ def _lattices(centres: FloatArray) -> Iterator[_Lattice]:
 
 
 Colour = tuple[int, int, int]
-
 
 BARRIER_NAME: Final = "barrier"
 """Name of the structure that the modules of a layout form."""

@@ -96,7 +96,6 @@ BUILDING_COLUMNS: Final = (
     *(column for column in STRUCTURE_COLUMNS if column.name not in ("structure", "kind")),
 )
 
-
 STRUCTURE_PA_S_COLUMNS: Final = (
     Column("impulse_pa_s", "Pa s", "impulse per area through the scenario's calibration"),
     Column("calibration_in_range", "", "yes if the calibration was made for it, or why not"),

@@ -37,9 +37,7 @@ Quantity = Literal["impulse", "peak"]
 """What is drawn: the impulse of all positive phases, or the largest overpressure."""
 
 PA_PER_KPA: Final = 1000.0
-
 MINUS: Final = "\N{MINUS SIGN}"
-
 _PERCENT: Final = 100.0
 
 

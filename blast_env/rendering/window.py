@@ -15,7 +15,6 @@ with render_extra():
 
 _SHARE_OF_SCREEN = 0.9
 _KEYS_HELD_MS = (300, 60)  # until a key that is held counts again, and then each time
-
 _LETTERS: Final = ("w", "a", "s", "d")
 _NAMED: Final = ("up", "down", "left", "right", "space", "tab", "return", "backspace", "escape")
 KEY_NUMBERS: Final[Mapping[str, int]] = MappingProxyType(

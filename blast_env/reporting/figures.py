@@ -57,7 +57,6 @@ _HEIGHTS_IN: Final = (3.6, 8.5)
 _STILL_PX: Final = 1200
 _STILL_HEIGHT_M: Final = 1.5
 _BARE, _WALLED = "#D55E00", "#0072B2"  # Okabe and Ito's
-
 _ZONE: Final = (Kinds.BUILD_ZONE, Kinds.KEEP_OUT, Kinds.COST_AREA, Kinds.GATE, Kinds.ACCESS_WAY)
 
 Picture = tuple[str, bytes]

@@ -35,13 +35,10 @@ from blast_env.scenario.sections import FOR_PEOPLE, Count, Height, Name, Section
 from blast_env.units import MODULE_SIDE_M
 
 Cost = Annotated[StrictFloat, Field(gt=0.0, le=1e9)]
-
-
 Mass = Annotated[StrictFloat, Field(gt=0.0, le=1e6)]
 BaseWidth = Annotated[StrictFloat, Field(gt=0.0, le=20.0)]
 Friction = Annotated[StrictFloat, Field(ge=0.0, le=2.0)]
 Anchorage = Annotated[StrictFloat, Field(ge=0.0, le=1e9)]
-
 _FILE: Final = "barriers.toml"
 
 
@@ -86,7 +83,6 @@ def stock_barriers() -> Mapping[str, StockBarrier]:
 
 MOST_ITEMS: Final = 20
 """Items of a catalogue; each has an action for every cell and orientation."""
-
 
 _SIZE_KEYS: Final = ("length_modules", "thickness_modules", "height_m")
 
@@ -509,8 +505,6 @@ class Catalogue:
 
 
 _PAIR: Final = "must be a pair of integers (row, column)"
-
-
 _PIECE: Final = "must be (row, column, item, turned), two integers, a name and a truth value"
 
 

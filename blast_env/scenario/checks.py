@@ -50,36 +50,19 @@ from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
 Checked = TypeVar("Checked")
 
-
 MOST_AIR_BALLS: Final = 1_000_000
 """What fits into the memory of a common computer."""
-
 
 MOST_MODULES: Final = 250_000
 """Of a scene: 250 m x 250 m of buildings, with which a blast takes 2 s more."""
 
-
 _SITE: Final = TypeAdapter(Site)
-
-
 _SOURCE: Final[TypeAdapter[AnySource]] = TypeAdapter(AnySource)
-
-
 _STRUCTURE: Final[TypeAdapter[AnyStructure]] = TypeAdapter(AnyStructure)
-
-
 _BUILD_ZONE: Final = TypeAdapter(BuildZone)
-
-
 _GAUGE: Final = TypeAdapter(GaugeSection)
-
-
 _COMPONENTS: Final[TypeAdapter[Mapping[str, Glazing | Wall]]] = TypeAdapter(dict[str, Component])
-
-
 _SIMULATION: Final = TypeAdapter(SimulationSection)
-
-
 _OBJECTIVE: Final = TypeAdapter(ObjectiveSection)
 
 

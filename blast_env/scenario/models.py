@@ -107,18 +107,15 @@ __all__ = [
     "VehicleSource",
 ]
 
-
 _LATER_KEYS: Final = (
     *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
     *("hardening", "removable"),
 )
 """Keys of a build zone that are newer than the first hashes: their defaults do not count."""
 
-
 _NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference", "components"}
 """Sections that do not count for the hash; what `simulation` says is there as parameters, and
 components count where the response of facades does."""
-
 
 Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
 """Where the charge comes from."""

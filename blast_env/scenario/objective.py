@@ -20,17 +20,9 @@ from blast_env.statistics import (
 from blast_env.units import PA_PER_PSI
 
 Reference = Annotated[StrictFloat, Field(gt=0.0, le=1e12)]
-
-
 Level = Annotated[StrictFloat, Field(ge=0.0, lt=1.0)]
-
-
 _UNITS: Final = {"impulse": "Pa s", "peak": "Pa", "both": ""}
-
-
 _NOUNS: Final = {"impulse": "impulse", "peak": "peak overpressure", "both": "load"}
-
-
 _TERMS: Final = {"impulse": "impulse", "peak": "peak", "both": "load"}
 
 

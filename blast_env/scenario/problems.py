@@ -164,14 +164,12 @@ _BOUNDS: Final[Mapping[str, tuple[str, str]]] = {
     "less_than": ("lt", "less than"),
 }
 
-
 _LENGTHS: Final[Mapping[str, tuple[str, str, str]]] = {
     "too_short": ("min_length", "values", "at least"),
     "too_long": ("max_length", "values", "at most"),
     "string_too_short": ("min_length", "characters", "at least"),
     "string_too_long": ("max_length", "characters", "at most"),
 }
-
 
 _TYPES: Final[Mapping[str, str]] = {
     "bool_type": "true or false",

@@ -22,7 +22,6 @@ from blast_env.units import MODULE_SIDE_M
 _PER_M: Final = 1_000_000
 """Steps of length in a metre: micrometres, so that what is equal is equal to the last bit."""
 
-
 _MOST_STEPS: Final = 1000
 """Most places along a side of the site at which the charge may go off, obstacles aside."""
 

@@ -40,27 +40,17 @@ from blast_env.units import MODULE_SIDE_M
 from blast_env.values import STEERING
 
 Coordinate = Annotated[StrictFloat, Field(ge=0.0, le=2000.0)]
-
-
 Length = Annotated[StrictFloat, Field(gt=0.0, le=2000.0)]
-
-
 PointM = tuple[Coordinate, Coordinate]
-
-
 SizeM = tuple[Length, Length]
-
 
 Height = Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0)]
 """Of something that stands: a module at least."""
 
-
 Count = Annotated[StrictInt, Field(ge=1, le=1000)]
-
 
 VehicleMass = Annotated[StrictFloat, Field(ge=50.0, le=200_000.0)]
 """Of a vehicle, kg."""
-
 
 Speed = Annotated[StrictFloat, Field(ge=1.0, le=300.0)]
 """Of a vehicle, km/h."""
@@ -76,7 +66,6 @@ def _check_text(text: str) -> str:
 
 FOR_PEOPLE: Final = AfterValidator(_check_text)
 """Annotation of what somebody wrote for people."""
-
 
 Reason = Annotated[str, Field(min_length=1, max_length=200), FOR_PEOPLE]
 
@@ -366,7 +355,6 @@ class VehicleSource(ChargeSource):
 PlaceSource = PointSource | SegmentSource | RectangleSource
 """A source whose places are known before any layout."""
 
-
 AnySource = Annotated[PlaceSource | VehicleSource, Field(discriminator="kind")]
 
 
@@ -379,7 +367,6 @@ def _check_faces(faces: tuple[WallName, ...]) -> tuple[WallName, ...]:
 
 
 Walls = Annotated[tuple[WallName, ...], Field(min_length=1, max_length=4)]
-
 
 Storeys = Annotated[
     tuple[Annotated[StrictInt, Field(ge=1, le=200)], ...], Field(min_length=1, max_length=200)

@@ -44,7 +44,6 @@ from blast_env.units import MODULE_SIDE_M
 _SAME_M: Final = 1e-9
 """Edges that differ by less are the same, as in `Rectangle.contains`."""
 
-
 MOST_PLACES: Final = 3_000_000
 """Places of all vehicles at which their charges may go off: three vehicles on the largest site."""
 

@@ -11,10 +11,8 @@ from blast_env.scenario.problems import Problem
 SCHEMA_VERSION: Final = 2
 """The newest version of the file format; this release reads all of them."""
 
-
 FIRST_VERSION: Final = 1
 """The version without heights, in which every wall is as high as the air."""
-
 
 NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "": ("gauges", "objective", "georeference", "components"),
@@ -27,10 +25,8 @@ NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """What version 2 added, by section; all of it has a default, which is what version 1 means."""
 
-
 NEW_KINDS: Final[Mapping[str, tuple[str, ...]]] = {"charge": ("vehicle",)}
 """Kinds of sections that version 2 added."""
-
 
 MAX_ITEMS: Final = 100
 """Longer arrays are errors of their own; their other items are not looked at."""

@@ -55,7 +55,6 @@ from blast_env.units import MODULE_SIDE_M
 BUDGET_TOLERANCE: Final = 1e-9
 """Share of the budget by which rounding may exceed it."""
 
-
 MOST_STOCK: Final = 10_000
 """Modules, or pieces of all items together, that there may be to place."""
 
@@ -294,7 +293,6 @@ def _pieces_of(item: Any) -> int:
 
 NO_ZONE: Final = BuildZone.model_construct(corner_m=(0.0, 0.0), rows=0, columns=0, stock=0)
 """What stands for the zone of a scenario without one where that is no error: it has no cells."""
-
 
 Boxes = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """Left, bottom, right and top of many rectangles; the four arrays broadcast."""
@@ -566,7 +564,6 @@ def _overlapping(rectangle: Rectangle, boxes: Boxes) -> BoolArray:
 
 LEAST_AIR_HEIGHT_M: Final = 12.0
 """Height of the air over a site on which nothing is higher than half of it."""
-
 
 AIR_ABOVE_M: Final = 6.0
 """Air above the highest thing on the site: what the blast needs to go over it."""

@@ -32,10 +32,8 @@ from blast_env.units import MODULE_SIDE_M
 DIRECTIONS: Final = 360
 """Lines that leave each place."""
 
-
 TARGETS: Final = 3
 """Heights on a facade that lines go to, where it has a height: the middles of thirds."""
-
 
 PLACES: Final = 9
 """Places along a segment or an entry, or in a rectangle, 3 x 3."""
@@ -278,7 +276,6 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
 
 _ROUNDING: Final = 1e-9
 """Share of the lines that is nothing: what rounding leaves where weights are no whole numbers."""
-
 
 _NUMBERS_AT_ONCE: Final = 1_000_000
 """Truth values that are turned into numbers at a time, eight bytes each."""

@@ -214,14 +214,11 @@ def _yard(ground: SiteGround) -> Rectangle:
 AnyRanges = SiteRanges | ItemSiteRanges
 """A family of sites: what they may be."""
 
-
 RANGES: Final = SiteRanges()
 """The ranges that sites are drawn from unless others are given."""
 
-
 CRITERION: Final = VisibilityCriterion()
 """The criterion that sites of `SiteRanges` meet unless another one is given."""
-
 
 ITEM_CRITERION: Final = VisibilityCriterion(
     least_layout_share=0.5, most_layout_share=1.0, least_advantage=0.25
@@ -237,13 +234,10 @@ def criterion_of(ranges: AnyRanges) -> SiteCriterion:
 MOST_TRIES: Final = 200
 """Sites that are drawn for a seed before it is given up."""
 
-
 MOST_SEED: Final = 2**63 - 1
-
 
 PROTECTED: Final = "building"
 """Name of the protected structure."""
-
 
 _SIDES: Final = ("left", "lower", "right", "upper")
 

@@ -58,7 +58,6 @@ ITEM_KINDS: Final = (
 )
 """The items: a road barrier, two T-walls, an earth-filled basket, a bollard."""
 
-
 POST: Final = "post"
 
 
@@ -248,10 +247,8 @@ def large_ranges(side_m: float = LARGE_SIDE_M) -> ItemSiteRanges:
 _ROAD_M: Final = 2.0
 """From the left border to a road, and the depth of a parking area."""
 
-
 _BETWEEN_M: Final = 2.0
 """Between two buildings."""
-
 
 STOREY_M: Final = 3.0
 

@@ -19,10 +19,8 @@ from blast_env.units import MODULE_SIDE_M
 Span = tuple[float, float]
 """Lowest and highest value, both possible."""
 
-
 WholeSpan = tuple[int, int]
 """Lowest and highest whole number, both possible."""
-
 
 _TOLERANCE: Final = 1e-9  # of a module
 
@@ -126,7 +124,6 @@ def _has_grid(span_m: Span) -> bool:
 
 
 Probability = Annotated[float, Bounds(0.0, 1.0)]
-
 
 MARGIN_M: Final = 1.0
 """What stays free along the border of a site."""

@@ -26,7 +26,6 @@ HELD_OUT_SITES: Final = 10_000
 TRAINING_SITES: Final = 2**31
 """Number of seeds for training, as good as endless."""
 
-
 _MOST_LOOKED_AT: Final = 50
 
 

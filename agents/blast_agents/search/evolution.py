@@ -11,7 +11,6 @@ from blast_agents.search.session import Search, SearchSession
 from blast_env.geometry import Layout
 
 _LEAST_POPULATION: Final = 6
-
 _MOST_POPULATION: Final = 60
 
 

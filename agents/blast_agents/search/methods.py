@@ -192,7 +192,6 @@ class Cooling:
 
 
 _LEAST_WALKERS: Final = 3
-
 _MOST_WALKERS: Final = 16
 
 

@@ -22,7 +22,6 @@ from blast_env.physics.scene import Charge
 from blast_env.response.damage import BayDamage, triangular_damages
 
 IntArray = NDArray[np.int64]
-
 _PACKAGED: Final = Path(__file__).with_name("gas.json")
 
 HIDDEN: Final = 48

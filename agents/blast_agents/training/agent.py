@@ -52,11 +52,8 @@ from blast_env.scenario import (
 from blast_env.scenario.vehicles import source_of
 
 Model = PPO | MaskablePPO
-
 Policy = ActorCriticPolicy | MaskableActorCriticPolicy
-
 _PLACES: Final = {"visible": 1, "hidden": 9}
-
 AnyOf = TypeVar("AnyOf", bound=CommonHyperparameters)
 
 
@@ -203,7 +200,6 @@ def _policy_class(configuration: RunConfiguration) -> tuple[type[Any], dict[str,
 
 
 _ARCHIVE: Final = ".zip"
-
 _ARCHIVES_HOLD_CODE: Final = "such archives may hold pickled code, which runs when they are read"
 
 _SCHEDULES: Final = ("learning_rate", "lr_schedule", "clip_range", "clip_range_vf")

@@ -27,7 +27,6 @@ from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 
 CHECKPOINT_FORMAT: Final = 2
-
 Weights = Mapping[str, torch.Tensor]
 
 

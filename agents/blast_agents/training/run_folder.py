@@ -37,7 +37,6 @@ from blast_env.provenance import versions
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
 
 CONFIGURATION_FORMAT: Final = 1
-
 THREATS: Final = ("visible", "hidden")
 
 SETTING_KEYS: Final = (

@@ -19,7 +19,6 @@ from blast_env.reading import Reading
 from blast_env.scenario import Scenario
 
 Read = TypeVar("Read")
-
 _MOST_LETTERS: Final = 100
 
 

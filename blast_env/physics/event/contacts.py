@@ -17,7 +17,6 @@ Balls of the size of a gap between modules are caught in its mouth, where collis
 would go on for up to millions of times.
 """
 
-
 _PRESSED: Final = 128
 """Collisions of any kind within one contact after which balls stick, to each other and to modules.
 

@@ -43,29 +43,15 @@ from blast_env.physics.scene import Scene
 
 # Why the loop came back.
 UNTIL: Final = 0
-
-
 RECORD_FULL: Final = 1
-
-
 OUT_OF_REACH: Final = 2
-
-
 EVENT_LIMIT: Final = 3
-
-
 MODULE_DESTROYED: Final = 4
-
-
 PAUSED: Final = 5
-
-
 _COLLISIONS_BETWEEN_CHECKS: Final = 512
-
 
 _EVENTS_PER_CALL: Final = 10_000
 """After which the loop comes back, so that Ctrl-C is heard: an event takes 1 to 10 us."""
-
 
 _NUMBER: Final[Any] = np.int64
 """Of a ball, as in loops over them: for two kinds of integers most would be compiled twice."""
@@ -236,8 +222,6 @@ def _can_reach(
 
 
 _LOGGER: Final = logging.getLogger("blast_env")
-
-
 _FIRST_CALL: Final = Lock()
 
 
@@ -321,10 +305,8 @@ def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
 
 _RECORD_ROWS: Final = 4096
 
-
 MOST_RECORDS: Final = 20_000_000
 """Hits on modules after which a run ends as at `most_collisions`: they take some 2 GB."""
-
 
 _END_REASONS: Final = {
     OUT_OF_REACH: EndReason.OUT_OF_REACH,

@@ -15,40 +15,26 @@ from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
 
 RecordArray = NDArray[np.void]
 
-
 Record = Any
 """One element of a `RecordArray`."""
 
 
 # Partners of a ball that are not balls.
 NOBODY: Final = -1
-
-
 BORDER: Final = -2
-
-
 FIRST_SURFACE: Final = -3  # surface k is FIRST_SURFACE - k
 
 
 # Kinds of surfaces.
 FACE_X: Final = 0  # its normal is along x
-
-
 FACE_Y: Final = 1
-
-
 CORNER: Final = 2
 
 
 # What the loop has to do before it goes on.
 NEW: Final = 0  # put the balls into their cells
-
-
 RUNNING: Final = 1
-
-
 CHANGED: Final = 2  # look at the walls again
-
 
 BALL: Final = np.dtype(
     [
@@ -81,7 +67,6 @@ BALL: Final = np.dtype(
     align=True,
 )
 
-
 CELL: Final = np.dtype(
     [
         ("left", np.float64),
@@ -93,7 +78,6 @@ CELL: Final = np.dtype(
     ]
 )
 
-
 HEAP_ENTRY: Final = np.dtype(
     [
         ("time_s", np.float64),
@@ -104,7 +88,6 @@ HEAP_ENTRY: Final = np.dtype(
     ]
 )
 """Entry 0 is no entry: its `ball` is the number of entries."""
-
 
 SURFACE: Final = np.dtype(
     [
@@ -119,7 +102,6 @@ SURFACE: Final = np.dtype(
     align=True,
 )
 
-
 LOAD: Final = np.dtype(
     [
         ("hits", np.int64),
@@ -129,7 +111,6 @@ LOAD: Final = np.dtype(
         ("capacity", np.float64),  # impulse that the module bears, inf for any
     ]
 )
-
 
 RULES: Final = np.dtype(
     [
@@ -160,7 +141,6 @@ RULES: Final = np.dtype(
     align=True,
 )
 
-
 PROGRESS: Final = np.dtype(
     [
         ("time_s", np.float64),  # of the last collision
@@ -174,7 +154,6 @@ PROGRESS: Final = np.dtype(
         ("source_digest", np.int64),  # of the compiled code
     ]
 )
-
 
 RECORD_COLUMNS: Final = (
     "time_s",
@@ -192,12 +171,8 @@ RECORD_COLUMNS: Final = (
 )
 """Columns of the record that the compiled code writes; fields of `COLLISION_DTYPE`."""
 
-
 _HALF: Final = MODULE_SIDE_UNITS / 2.0
-
-
 _TOLERANCE: Final = 1e-9  # units; faces overlap by it, so that rounding opens no gap
-
 
 _CORNERS: Final = _HALF * np.array([(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)])
 """From the centre of a module, in the order of `WallSurface.covered_corners`."""
@@ -325,9 +300,7 @@ def _boxes(surfaces: RecordArray) -> tuple[NDArray[np.float64], NDArray[np.float
 _CELL_SPACINGS: Final = 1.2
 """Side of a cell in spacings of the air; measured to be about the fastest."""
 
-
 _CELL_MARGIN: Final = 1e-6
-
 
 _REST_SHARE: Final = 1e-12
 """Of the fastest ball's first speed: slower than that, within one contact, is at rest."""

@@ -33,7 +33,6 @@ The step is at most half a radius and half a half module, so twice the speed sti
 centre of a ball in the outer half of a module that it hits.
 """
 
-
 _SLOW: Final = 0.5
 """Below this share of the speed that the step was made for, the step is doubled."""
 

@@ -23,10 +23,7 @@ from blast_env.units import MODULE_SIDE_UNITS
 CHARGE_GROUP: Final = 1
 """Shapes of one group do not collide with each other: the balls of a charge."""
 
-
 _BORDER_THICKNESS_UNITS: Final = 4.0
-
-
 _HASH_CELLS: Final = 5000
 
 
@@ -237,7 +234,6 @@ _BODY_FIELDS: Final = (
     | pymunk.batch.BodyFields.POSITION
     | pymunk.batch.BodyFields.VELOCITY
 )
-
 
 _CONTACT_FIELDS: Final = (
     pymunk.batch.ArbiterFields.BODY_A_ID
