@@ -37,7 +37,7 @@ from blast_env.scenario.build_scene import (
 )
 from blast_env.scenario.driving import WayPoint
 from blast_env.scenario.reach import squares_of
-from blast_env.scenario.sections import PointM
+from blast_env.scenario.sections import PointM, buildings_of
 from blast_env.scenario.vehicles import Impact
 from blast_env.scenario.worst_places import nearest_point_m
 from blast_env.units import MODULE_SIDE_M
@@ -460,10 +460,7 @@ def barrier_features(zone: BuildZone, layout: Sequence[Element]) -> Iterator[Fea
 
 def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
     """Yield the structures; of a building in several parts the largest one has the label."""
-    buildings: dict[str, list[AnyStructure]] = {}
-    for structure in structures:
-        buildings.setdefault(structure.building_name, []).append(structure)
-    for name, parts in buildings.items():
+    for name, parts in buildings_of(structures).items():
         largest = max(parts, key=lambda each: each.rows * each.columns)
         heights = [each.height_m for each in parts if each.height_m is not None]
         label = f"{name}\n{max(heights):g} m" if len(heights) == len(parts) else name

@@ -357,7 +357,7 @@ def comparison(
 def _shown(record: BlastRecord, scenario: Scenario) -> Iterator[tuple[Load, tuple[Load, ...]]]:
     """Yield the loads that have a row, with those of their parts: a building is one of them."""
     known = {each.structure: each for each in record.buildings}
-    names = {each.name: each.building_name for each in scenario.structures}
+    names = scenario.building_names
     together: dict[str, list[Load]] = {}
     for load in record.loads:
         building = names.get(load.structure, load.structure)

@@ -38,6 +38,8 @@ from blast_env.physics.structure import ModularObstacle
 from blast_env.runner import Tell, share_of
 from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario
 from blast_env.scenario.build_scene import draw_threat
+from blast_env.scenario.sections import buildings_of
+from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
@@ -302,7 +304,7 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         scaled = {
             each.name: _scaled(result, each.name) for each in result.obstacles if each.cells is None
         }
-        names = {each.name: each.building_name for each in blast.scenario.structures}
+        names = blast.scenario.building_names
         buildings: dict[str, list[ModularObstacle]] = {}
         for obstacle in result.obstacles:
             buildings.setdefault(names.get(obstacle.name, obstacle.name), []).append(obstacle)
@@ -449,10 +451,10 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
     def print_loads(self, result: "GasResult") -> None:
         """Print tables of the buildings' loads and of the gauges, and how the run went."""
         scaled = {name: _scaled(result, name) for name in result.structures["structure"]}
-        in_range: dict[str, bool] = {}
-        for part in self.blast.scenario.structures:
-            known = in_range.get(part.building_name, True)
-            in_range[part.building_name] = known and bool(scaled[part.name]["in_range"])
+        in_range = {
+            name: all(scaled[each.name]["in_range"] for each in parts)
+            for name, parts in buildings_of(self.blast.scenario.structures).items()
+        }
         rows = [
             (
                 each["building"],
@@ -560,19 +562,14 @@ def _record(
             for name, value in result.run_record.items()
             if all_of_it or not name.startswith("parameter ")
         },
-        "structures": _rows(result.structures),
-        "buildings": _rows(result.buildings),
+        "structures": table_records(result.structures),
+        "buildings": table_records(result.buildings),
         "impulse": {name: _scaled(result, name) for name in result.structures["structure"]},
     }
     if not isinstance(result, BlastResult):
-        content["gauges"] = _rows(result.gauges)
-        content["bays"] = _rows(result.bays)
-        content["pieces"] = _rows(result.pieces)
+        content["gauges"] = table_records(result.gauges)
+        content["bays"] = table_records(result.bays)
+        content["pieces"] = table_records(result.pieces)
     if all_of_it:
-        content["modules"] = _rows(result.modules)
+        content["modules"] = table_records(result.modules)
     return content | {"files": [str(path) for path in written]}
-
-
-def _rows(table: "pd.DataFrame") -> list[dict[str, object]]:
-    plain = table.astype(object).where(table.notna(), None)
-    return [{str(key): value for key, value in row.items()} for row in plain.to_dict("records")]

@@ -289,7 +289,7 @@ class GasResult:
     @cached_property
     def buildings(self) -> "pd.DataFrame":
         """One row a building, whose parts are one; see `BUILDING_COLUMNS`."""
-        names = {each.name: each.building_name for each in self.blast.scenario.structures}
+        names = self.blast.scenario.building_names
         stepped = stepped_buildings(self.blast.scenario.structures)
         return structure_table(self.run, self.on_walls, names, stepped)
 

@@ -278,8 +278,7 @@ class BlastResult:
         """One row a building, whose parts are one; see `recording.tables.BUILDING_COLUMNS`."""
         from blast_env.recording.tables import building_table
 
-        names = {each.name: each.building_name for each in self.blast.scenario.structures}
-        return building_table(self.structures, names)
+        return building_table(self.structures, self.blast.scenario.building_names)
 
     @property
     def bays(self) -> "pd.DataFrame":

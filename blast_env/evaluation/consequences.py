@@ -43,6 +43,7 @@ from blast_env.response.facade import FacadeResponse, peak_factor, respond, shar
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.scenario.facade import with_glass
+from blast_env.scenario.sections import buildings_of
 from blast_env.scenario.staircase import STEPPED, stepped_buildings
 from blast_env.tables import Column, table_of
 
@@ -396,7 +397,7 @@ def by_building(
         peak_factor: What its peaks would be multiplied by if cells did not clip them.
         tails: How much is still to come to the bays, by name, where that is known.
     """
-    names = {each.name: each.building_name for each in scenario.structures}
+    names = scenario.building_names
     stepped = stepped_buildings(scenario.structures)
     owners = [names[each.bay.structure] for each in facade.bays]
     found = []
@@ -432,17 +433,13 @@ def neighbours_of(scenario: Scenario, result: "GasResult", charge: Charge) -> li
         result: The blast.
         charge: The charge where it went off.
     """
-    parts: dict[str, list[str]] = {}
-    faced = {each.building or each.name for each in scenario.structures if each.facade is not None}
-    for each in scenario.structures:
-        building = each.building or each.name
-        if building not in faced:
-            parts.setdefault(building, []).append(each.name)
     faces = result.on_walls
     walls = faces[faces["face"].isin(WALLS)]
     found = []
-    for building, names in parts.items():
-        own = walls[walls["structure"].isin(names)]
+    for building, parts in buildings_of(scenario.structures).items():
+        if any(each.facade is not None for each in parts):
+            continue
+        own = walls[walls["structure"].isin([each.name for each in parts])]
         if not len(own):
             continue
         means = own.groupby("face", observed=True)[["positive_impulse_pa_s", "peak_pa"]].mean()

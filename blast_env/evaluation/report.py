@@ -366,7 +366,7 @@ class LayoutEvaluation:
         Impulses on parts are averaged by their weights, as rewards count them; the peak is the
         largest.
         """
-        names = {each.name: each.building_name for each in self.scenario.structures}
+        names = self.scenario.building_names
         return self._by_name(lambda loads: _together(loads.structures, names))
 
     def _by_name(self, loads_of: Callable[[BlastLoads], Sequence[StructureLoad]]) -> "pd.DataFrame":

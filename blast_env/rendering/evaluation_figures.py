@@ -270,7 +270,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
     """
     table = evaluation.table.set_index("structure")
     protected = table[table.protected]
-    names = {each.name: each.building_name for each in evaluation.scenario.structures}
+    names = evaluation.scenario.building_names
     owners = np.array([names[each] for each in protected.index])
     counted = protected.weight * protected.unprotected_impulse_pa_s
     name = str(counted.groupby(owners).sum().idxmax())

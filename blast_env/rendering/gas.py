@@ -25,6 +25,7 @@ from blast_env.rendering.site_plan import (
     write_heading,
 )
 from blast_env.rendering.style import barrier_text, nice_ceiling, render_extra, unit_interval
+from blast_env.scenario.sections import buildings_of
 from blast_env.units import MS_PER_S
 
 with render_extra():
@@ -281,10 +282,10 @@ def _walled(result: GasResult, name: str | None) -> _Walled:
     """Return the structure or building of a name, or the worst building."""
     site, scenario = result.run.site, result.blast.scenario
     known = {each.name: (each,) for each in site.structures if each.cells is None}
-    buildings: dict[str, tuple[StructureOutline, ...]] = {}
-    for each in scenario.structures:
-        own = buildings.get(each.building_name, ())
-        buildings[each.building_name] = (*own, *known[each.name])
+    buildings = {
+        building: tuple(outline for each in parts for outline in known[each.name])
+        for building, parts in buildings_of(scenario.structures).items()
+    }
     if name is None:
         table = result.buildings
         if not len(table):

@@ -19,6 +19,7 @@ from blast_env.physics.gas.probes import ARRIVAL_PA
 from blast_env.physics.gas.solver import Gas
 from blast_env.physics.scene import WALLS, WallName
 from blast_env.scenario import AnyStructure, Scenario
+from blast_env.scenario.sections import buildings_of
 from blast_env.units import MS_PER_S, PA_PER_KPA, PA_PER_PSI
 
 
@@ -111,9 +112,7 @@ class ReportedBuilding:
 
 def targets_of(scenario: Scenario) -> tuple[ReportedBuilding, ...]:
     """Return the buildings of a scenario, protected ones first."""
-    together: dict[str, list[AnyStructure]] = {}
-    for structure in scenario.structures:
-        together.setdefault(structure.building_name, []).append(structure)
+    together = buildings_of(scenario.structures)
     targets = [ReportedBuilding(name, tuple(parts)) for name, parts in together.items()]
     return tuple(sorted(targets, key=lambda each: not each.protected))
 

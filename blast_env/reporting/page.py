@@ -33,6 +33,7 @@ from blast_env.reporting.threats import other_places
 from blast_env.reporting.verdict import ReportVerdict, verdict_of
 from blast_env.response.buildings import BuildingDamage
 from blast_env.scenario import write_layout
+from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with import_extra("report", "reports"):
@@ -172,7 +173,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "layout_hash": sha256(layout_json.encode()).hexdigest()[:_HASH_DIGITS],
         "layout_words": layout_counts(study.layout),
         "texts": [layout_text(each.layout) for each in study.front],
-        "bill": study.bill.astype(object).where(study.bill.notna(), None).to_dict("records"),
+        "bill": table_records(study.bill),
     }
 
 

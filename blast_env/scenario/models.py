@@ -391,6 +391,11 @@ class Scenario(Section):
         """The sources that are vehicles."""
         return tuple(source for source in self.charge if isinstance(source, VehicleSource))
 
+    @property
+    def building_names(self) -> dict[str, str]:
+        """The building that each structure is a part of, by the structure's name."""
+        return {each.name: each.building_name for each in self.structures}
+
     def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
         """Return the structures that are still there with a layout."""
         away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)

@@ -5,7 +5,7 @@ heights are above the ground, which is flat. Last comes where on a map or drawin
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from itertools import chain
 from typing import Annotated, Any, Final, Literal, Self
@@ -633,3 +633,11 @@ class DrawingGeoreference(Georeference):
 
 
 AnyGeoreference = Annotated[MapGeoreference | DrawingGeoreference, Field(discriminator="kind")]
+
+
+def buildings_of(structures: Iterable[AnyStructure]) -> dict[str, list[AnyStructure]]:
+    """Return structures by the building that they are parts of, in their order."""
+    buildings: dict[str, list[AnyStructure]] = {}
+    for each in structures:
+        buildings.setdefault(each.building_name, []).append(each)
+    return buildings
