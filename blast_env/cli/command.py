@@ -206,12 +206,23 @@ class LazyCommand(TyperCommand):
 class LazyGroup(TyperGroup):
     """A group of commands that are imported one by one, when they are called.
 
+    Each is a class of a module of this package, both named after it: `SearchCommand` of `search`.
+
     Attributes:
-        places: Of each command where it is, as `module:Class`, and its summary.
+        summaries: The first sentence of the help of each command, by its name.
+        modules: Modules that have another name than their command.
     """
 
-    places: ClassVar[Mapping[str, tuple[str, str]]] = {}
+    summaries: ClassVar[Mapping[str, str]] = {}
+    modules: ClassVar[Mapping[str, str]] = {}
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        self.commands = {name: LazyCommand(name, *each) for name, each in self.places.items()}
+        self.commands = {
+            name: LazyCommand(
+                name,
+                f"{__package__}.{self.modules.get(name, name)}:{name.capitalize()}Command",
+                summary,
+            )
+            for name, summary in self.summaries.items()
+        }
