@@ -120,8 +120,8 @@ class Rectangle(NamedTuple):
 
         Args:
             start: Where all of them begin.
-            x: Of their ends.
-            y: Of their ends, likewise.
+            x: Of their ends, of any shape.
+            y: Of their ends, of the same shape.
         """
         enter, leave = np.zeros(x.shape), np.ones(x.shape)
         bounds = ((self.left, self.right, x), (self.bottom, self.top, y))

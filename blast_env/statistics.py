@@ -20,7 +20,7 @@ class Estimate(NamedTuple):
     Attributes:
         value: The estimate.
         low: Lower end; NaN with a single threat, which says nothing about the others.
-        high: Upper end; likewise.
+        high: Upper end; NaN with a single threat.
     """
 
     value: float

@@ -30,7 +30,7 @@ def whole_number(name: str, value: Any, least: int, most: int) -> int:
         name: What it is, for the error.
         value: What was given.
         least: Lower bound, which is allowed itself.
-        most: Upper bound, likewise.
+        most: Upper bound, which is allowed itself.
 
     Raises:
         BlastEnvError: If it is no integer or out of bounds.

@@ -266,7 +266,7 @@ class _View:
     Attributes:
         depth_m: How far a piece's centre is from the charge along the line (variants, rows,
             columns).
-        aside_m: How far it is from the line, positive to the left, likewise.
+        aside_m: How far it is from the line, positive to the left (variants, rows, columns).
         half_width_m: Half the width that each variant covers across the line (variants,).
         lies_along: Which variants are at least as long across the line as along it (variants,).
         between: Which pieces are available and lie between charge and structures (variants, rows,

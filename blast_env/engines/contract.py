@@ -52,7 +52,7 @@ class StructureLoad:
         in_range: Whether the calibration was made for this distance and charge.
         notes: Why not, a sentence each.
         response: What counts of the response of its bays, where the objective counts that.
-        worst_damage: The largest damage of its bays, likewise.
+        worst_damage: The largest damage of its bays, where that counts.
     """
 
     name: str

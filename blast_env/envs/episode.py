@@ -234,7 +234,7 @@ VISIBLE_REALISATIONS: Final = 2
 """Blasts for a visible charge unless an argument says otherwise (`studies.noise reward`)."""
 
 HIDDEN_THREATS: Final = 16
-"""Charges for a hidden threat, one blast each, unless an argument says otherwise; likewise."""
+"""Charges for a hidden threat, one blast each, unless an argument says otherwise."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -218,12 +218,12 @@ class Comparison:
 
     @property
     def unprotected_mean(self) -> Estimate:
-        """Mean load without a barrier, likewise."""
+        """Mean load without a barrier, over the same samples."""
         return mean_estimate(self._samples(self.unprotected))
 
     @property
     def cvar(self) -> float:
-        """Mean load of the worst cases (threats of a single one) with the layouts, likewise."""
+        """Mean load of the worst cases (threats of a single one) with the layouts."""
         return conditional_value_at_risk(self._samples(self.loads), self.cvar_level)
 
     @property

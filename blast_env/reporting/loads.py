@@ -178,7 +178,7 @@ class TargetLoad:
     Attributes:
         target: Its name.
         impulse_pa_s: Impulse of all positive phases, mean over the walls.
-        first_impulse_pa_s: Impulse of the first positive phase, likewise.
+        first_impulse_pa_s: Impulse of the first positive phase, mean over the walls.
         peak_pa: Largest overpressure on a face of a cell.
         arrival_s: When the wave comes; NaN if it does not.
         wall: The wall with the largest impulse.

@@ -24,7 +24,7 @@ class Alternatives:
         name: Name of the bay.
         structure: Name of its structure.
         glazing: The windows that it may have, by the name of their component.
-        wall: The wall panels that it may have, likewise.
+        wall: The wall panels that it may have, by the name of their component.
     """
 
     name: str

@@ -269,7 +269,7 @@ class Variant(NamedTuple):
         name: Its name; empty for the single module of a zone without a catalogue.
         turned: Whether its length runs upwards.
         rows: Rows of cells that it covers; 0 of a measure.
-        columns: Columns of cells that it covers; likewise.
+        columns: Columns of cells that it covers; 0 of a measure.
         height_m: Its height; `None` is as high as the air.
         cost: What a piece costs where no cost area says otherwise.
         stops_vehicles: Whether no vehicle gets past it.

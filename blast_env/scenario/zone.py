@@ -404,7 +404,7 @@ class EmptyZone:
             what the cost of an item is multiplied by there.
         fits: Where the cells under each variant may be used, by its lower left cell, shape
             (variants, rows, columns).
-        costs: What each variant costs there, likewise; infinite where it sticks out of the zone.
+        costs: What each variant costs there (variants, rows, columns); infinite outside.
     """
 
     catalogue: Catalogue

@@ -87,7 +87,7 @@ class Standings:
     Attributes:
         track: The track.
         results: One an entry.
-        unprotected: Load without a barrier, likewise (cases, held-out threats).
+        unprotected: Load without a barrier (cases, held-out threats).
         engine: Name of the engine, with the cells that it has.
 
     Raises:

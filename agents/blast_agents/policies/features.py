@@ -56,14 +56,14 @@ class LinesOfSight(NamedTuple):
     All attributes are (batch, places), lengths in squares.
 
     Attributes:
-        x: Where it begins.
-        y: Likewise.
-        along_x: Its direction, of length 1.
-        along_y: Likewise.
+        x: Where it begins, in squares.
+        y: Where it begins, in squares.
+        along_x: Its direction to the right; both together are of length 1.
+        along_y: Its direction upwards.
         distance: Its length, at least 1.
         left: How far aside of the line they reach to the left, over how far along it: the tangent
             of the angle at which they are seen.
-        right: Likewise to the right, where it is negative.
+        right: The same to the right, where it is negative.
     """
 
     x: Tensor
@@ -92,7 +92,7 @@ class LinesOfSight(NamedTuple):
 
         Args:
             x: In squares (batch, points).
-            y: Likewise.
+            y: In squares (batch, points).
 
         Returns:
             Two tensors (batch, places, points); to the left of the line is positive.
@@ -111,7 +111,7 @@ def stands_before(
         lines: From each place of the charge (batch, places).
         along: How far the points are along each line, in squares (batch, places, points).
         x: Of the points, in squares (batch, points).
-        y: Likewise.
+        y: Of the points, in squares (batch, points).
         target: The structures.
 
     Returns:
@@ -185,8 +185,8 @@ class Bearings(NamedTuple):
 
     Attributes:
         first: The first bearing of each cell (batch, places, cells).
-        last: The one after its last, likewise.
-        before: Which cells lie before the structures, 0 or 1, likewise.
+        last: The one after its last (batch, places, cells).
+        before: Which cells lie before the structures, 0 or 1 (batch, places, cells).
         of_facade: Share of the facade on each bearing (batch, places, BEARINGS).
         offset: How far from the facade's middle a cell is seen from the charge, in half widths of
             the facade; mean over the places (batch, cells).
@@ -213,8 +213,8 @@ class Bearings(NamedTuple):
         Args:
             lines: From each place of the charge (batch, places).
             along: How far the cells are along each line, in squares (batch, places, cells).
-            aside: How far they are aside of it, likewise.
-            before: Which of them lie before the structures, 0 or 1, likewise.
+            aside: How far they are aside of it, in squares (batch, places, cells).
+            before: Which of them lie before the structures, 0 or 1 (batch, places, cells).
         """
         half_facade = (lines.left - lines.right).clamp(min=1e-3)[..., None] / 2.0
         middle = (lines.left + lines.right)[..., None] / 2.0
@@ -312,12 +312,12 @@ class StaticCellFeatures(NamedTuple):
 
     Attributes:
         along: How far the cell is along the line of sight, over 10 m.
-        remaining: How far it is from there to the structures, likewise.
+        remaining: How far it is from there to the structures, over 10 m.
         along_share: `along` as a share of the whole way.
         aside: How far the cell is aside of the line, to the left, over 10 m.
         aside_size: The same without its sign.
         offset: See `Bearings`.
-        offset_size: Likewise.
+        offset_size: The same without its sign.
         cut: Share of the facade that a module hides, times 10.
     """
 
@@ -337,7 +337,7 @@ class ChangingCellFeatures(NamedTuple):
     Attributes:
         open_cut: Share of the facade that a module hides and nothing else does, times 10.
         covered: See `Occlusion`.
-        depth: Likewise.
+        depth: See `Occlusion`.
         cost: Cost of a module, from 0 to 1.
         free: Whether it may take a module, 0 or 1.
     """
@@ -359,9 +359,9 @@ class SiteFeatures(NamedTuple):
     Attributes:
         distance: From the middle of where the charge may be to that of the structures, over 20 m.
         half_facade: Half their width across the line of sight, over 10 m.
-        half_depth: Half their depth along it, likewise.
-        charge_half_length: Half of how far the places of the charge spread along it, likewise.
-        charge_half_width: Likewise across it.
+        half_depth: Half their depth along it, over 10 m.
+        charge_half_length: Half of how far the places of the charge spread along it, over 10 m.
+        charge_half_width: The same across it, over 10 m.
         charge: Largest value of the charge's plane.
     """
 

@@ -135,7 +135,7 @@ class AnnealingSearch(Search):
         draw: Draws the layouts to begin with.
         starting_share: Share of the exploration that goes into them.
         hot: Temperature at first, as a share of the impulse that it begins with.
-        cold: Temperature at the end, likewise.
+        cold: Temperature at the end, as the same share.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -210,7 +210,7 @@ class WinnersSearch(Search):
         exchanges: How often walkers are exchanged.
         exchanged_share: Share of the walkers that go on from the best ones' places then.
         hot: Temperature at first, as a share of the load that the best walker begins with.
-        cold: Temperature at the end, likewise.
+        cold: Temperature at the end, as the same share.
     """
 
     initial: tuple[Layout, ...] = ()

@@ -48,8 +48,8 @@ class Check(BaseModel):
     Attributes:
         layouts_rms: Root of the mean square error of the logarithm of a load, on layouts that were
             held out, of sites that were not.
-        layouts_rank: Rank correlation with the engine among the layouts of a case, likewise.
-        layouts_lost: What choosing by it costs, likewise: by how much the load behind the layout
+        layouts_rank: Rank correlation with the engine among the held-out layouts of a case.
+        layouts_lost: What choosing among these by it costs: by how much the load behind the layout
             that it likes best is above the least one of the case, as a share of the largest.
         sites_rms: The error on sites that were held out.
         sites_rank: The correlation on them.
@@ -78,7 +78,7 @@ class Fit(BaseModel):
         sites: Of how many sites.
         seconds: Time that the fit took, without the check.
         impulse: How far impulses are off, if that was told.
-        peak: How far peak overpressures are off, likewise.
+        peak: How far peak overpressures are off, if that was told.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -101,8 +101,9 @@ class Guess(NamedTuple):
         impulse_pa_s: Mean impulse on each protected structure (layouts, structures).
         spread: By how much its members differ about that, as a share of it: the standard deviation
             of the logarithm (layouts, structures).
-        peak_pa: Largest overpressure on each, likewise; `None` where the objective counts none.
-        peak_spread: By how much its members differ about that, likewise.
+        peak_pa: Largest overpressure on each (layouts, structures); `None` where the objective
+            counts none.
+        peak_spread: By how much its members differ about that (layouts, structures).
     """
 
     impulse_pa_s: FloatArray
@@ -192,7 +193,7 @@ class Surrogate:
     Attributes:
         mean: Of each feature that the networks are given: (FEATURES,), or (ALL_FEATURES,) with
             horizons.
-        scale: Its spread, likewise.
+        scale: Its spread, of the same shape.
         members: The networks that know impulses.
         peak_members: Those that know peak overpressures.
         fit: What they were fitted to.

@@ -97,7 +97,7 @@ class Approach:
         on_empty: Features of each point where no barrier stands (points, ALL_FEATURES): geometry,
             open ways without and with the barrier, horizons without and with it.
         log_impulse: Logarithm of Kingery and Bulmash's reflected impulse there, Pa s (points,).
-        log_peak: Of their reflected overpressure, Pa, likewise.
+        log_peak: Logarithm of their reflected overpressure there, Pa (points,).
         area_m2: What each point stands for (points,).
         kept: What surrogates say of the points where no barrier stands, by what said it.
     """

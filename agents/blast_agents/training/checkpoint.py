@@ -64,7 +64,7 @@ class CaseLabel:
     Attributes:
         layout: The layout, sorted; empty where nothing is better than nothing.
         load: With it, in the unit of the scenario's objective, one a threat of the case.
-        unprotected: Without a barrier, likewise.
+        unprotected: Without a barrier, one a threat of the case.
     """
 
     layout: Layout

@@ -122,7 +122,7 @@ WrapperName = Literal[
     "blast_agents.training.environments.RelativeReward",
     "blast_agents.training.environments.ThreatPool",
 ]
-"""Wrappers of the environment, likewise."""
+"""Wrappers of the environment by the names that RL Zoo imports them by."""
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -132,8 +132,8 @@ class PolicyArguments(BaseModel):
 
     Attributes:
         rows: Rows of the build zone; the scenario decides.
-        columns: Its columns; likewise.
-        item_channels: Names of the planes that its catalogue adds to the observation; likewise.
+        columns: Its columns; the scenario decides.
+        item_channels: Names of the planes that its catalogue adds to the observation.
         places: Places that stand for where the charge may be; unless given, 1 for a visible charge
             and 9 for a hidden one.
         width: Number of features of a cell.
@@ -244,8 +244,8 @@ class SelfLabellingHyperparameters(CommonHyperparameters):
         cases: How many cases there are: charges, or sites, to learn from.
         cases_per_round: How many of them, in turn, get new layouts in a round after the first.
         samples: Layouts that the policy draws for each of these.
-        neighbours: Layouts that are the best one so far, a little changed, likewise.
-        borrowed: Layouts that are the best ones of the nearest charges, likewise.
+        neighbours: Layouts for each of them that are the best one so far, a little changed.
+        borrowed: Layouts for each of them that are the best ones of the nearest charges.
         first_updates: Minibatches that the policy learns from after the first round, which has the
             layouts of the rules.
         updates: The same after each further round.

@@ -225,7 +225,7 @@ class RolloutRow:
         reduction: Mean over these episodes; or over these layouts.
         modules: Mean number of modules or pieces of the layouts.
         blasts: Blasts simulated since training began.
-        cache_hits: Loads that needed no blast, likewise.
+        cache_hits: Loads that needed no blast since training began.
         seconds: Time since training began.
     """
 

@@ -134,8 +134,8 @@ def imitation_loss(logits: Tensor, legal: Tensor, wanted: Tensor) -> Tensor:
 
     Args:
         logits: (batch, actions).
-        legal: Which actions are legal, likewise.
-        wanted: Which of them are wanted, at least one of each, likewise.
+        legal: Which actions are legal (batch, actions).
+        wanted: Which of them are wanted, at least one in a row (batch, actions).
     """
     likely = logits.masked_fill(~legal, -torch.inf).log_softmax(dim=1)
     shares = wanted / wanted.sum(dim=1, keepdim=True)

@@ -390,7 +390,7 @@ class WallSides:
             ball: Index of the ball.
             module: The module.
             centre: Where the centre of the ball is, from that of the module, units.
-            before: Where it was one step before, likewise.
+            before: Where it was one step before, from the same, units.
         """
         (x, y), (beside, above) = centre, (abs(centre[0]) - HALF, abs(centre[1]) - HALF)
         known = self._last.get(ball)
