@@ -30,7 +30,7 @@ _LOADS: Final = (
     Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases, mean over the area"),
     Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase, mean over the area"),
     Column(
-        "negative_impulse_pa_s", "Pa s", "impulse of all negative phases, 0 or below, as a mean"
+        "negative_impulse_pa_s", "Pa s", "impulse of the negative phases, 0 or below, as a mean"
     ),
     Column("peak_pa", "Pa", "largest overpressure anywhere on it"),
     Column("arrival_s", "s", "time at which 1 kPa is reached first, from the detonation"),
