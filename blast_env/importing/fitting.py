@@ -35,6 +35,8 @@ MOST_STRUCTURES: Final = 100
 
 _MOST_NAME: Final = 34  # letters, which leaves room for the letters of parts
 _BARRIER: Final = "barrier"
+_QUARTER_SIDES: Final = 4
+"""A circle is a polygon of 16 sides."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,7 @@ def _kept(site: PlacedSite, options: ImportOptions) -> tuple[list[Thing], list[s
         BlastEnvError: If an outline is not sound, or there are too many buildings, or too long.
     """
     things = site.of_role(Role.BUILDING)
-    outlines = np.array([each.geometry for each in things], dtype=object)
+    outlines = np.array(list(map(_outline, things)), dtype=object)
     unsound = np.flatnonzero(~shapely.is_valid(outlines))
     for index in unsound:
         outlines[index] = _put_right(site, things[index], options)
@@ -203,6 +205,13 @@ def _kept(site: PlacedSite, options: ImportOptions) -> tuple[list[Thing], list[s
     if len(unsound):
         notes.append(f"outlines that cross themselves, which were put right: {len(unsound)}")
     return kept, notes
+
+
+def _outline(thing: Thing) -> BaseGeometry:
+    """Return the outline of a building in site metres; a point with a diameter is a circle."""
+    if thing.diameter_m is None:
+        return thing.geometry
+    return shapely.buffer(thing.geometry, 0.5 * thing.diameter_m, quad_segs=_QUARTER_SIDES)
 
 
 def _together(parts: NDArray[np.object_]) -> BaseGeometry:

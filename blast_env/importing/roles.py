@@ -44,6 +44,7 @@ class Thing:
         protected: Whether the source says that its load counts.
         tnt_kg: Mass of a charge there, where the source has it.
         part_of: The building that it is a rectangle of, in what blast-env itself wrote.
+        diameter_m: Of a point that is a round building: a silo, a tank, a column.
     """
 
     role: Role
@@ -55,6 +56,7 @@ class Thing:
     tnt_kg: float | None = None
     part_of: str = ""
     base_m: float = 0.0
+    diameter_m: float | None = None
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,10 @@ _HEIGHT_KEYS: Final = ("height", "height_m", "building:height", "building_height
 _BASE_KEYS: Final = ("min_height", "building:min_height", "base_m")
 _BASE_LEVEL_KEYS: Final = ("building:min_level", "min_level")
 _LEVEL_KEYS: Final = ("building:levels", "levels", "storeys", "num_floors")
+_DIAMETER_KEYS: Final = ("diameter", "diameter_m")
+_ROUND: Final = frozenset({"chimney", "gasometer", "silo", "storage_tank", "water_tower"})
+"""Values of OpenStreetMap's `man_made` of buildings, most of them round."""
+
 _NAME_KEYS: Final = ("name", "addr:housename", "text")
 _LENGTH: Final = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*(m|ft|')?")
 _FOOT_M: Final = 0.3048
@@ -151,7 +157,9 @@ def things_of(
         height_m, note = _height_m(feature, level_height_m, height_key)
         notes += [note] if note else []
         base_m = _base_m(feature, level_height_m)
-        found.append(replace(_thing(feature, role, height_m), base_m=base_m))
+        diameter_m = _diameter_m(feature) if role is Role.BUILDING else None
+        thing = _thing(feature, role, height_m)
+        found.append(replace(thing, base_m=base_m, diameter_m=diameter_m))
     if not any(each.role is Role.BUILDING for each in found) and Role.BUILDING not in selectors:
         found += _untagged_outlines(site_map)
     return tuple(_closed(found)), tuple(dict.fromkeys(notes))
@@ -172,6 +180,8 @@ def _usual_role(feature: MapFeature) -> Role | None:
     if own in _KINDS:
         return _KINDS[own]
     if str(tags.get("building", "no")).lower() not in ("no", "false"):
+        return Role.BUILDING
+    if str(tags.get("man_made", "")).lower() in _ROUND:
         return Role.BUILDING
     is_tunnel = str(tags.get("tunnel", "no")).lower() not in ("no", "false")
     if str(tags.get("highway", "")).lower() in _ROADS and not is_tunnel:
@@ -223,6 +233,14 @@ def _base_m(feature: MapFeature, level_height_m: float) -> float:
         if number is not None:
             return number * unit_m
     return 0.0
+
+
+def _diameter_m(feature: MapFeature) -> float | None:
+    """Return the diameter of a point, where the source has one."""
+    if feature.geometry.geom_type != "Point":
+        return None
+    given = next((feature.tags[key] for key in _DIAMETER_KEYS if key in feature.tags), None)
+    return None if given is None else _length_m(given)
 
 
 def _length_m(value: str | float | bool) -> float | None:

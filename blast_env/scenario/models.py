@@ -42,6 +42,7 @@ from blast_env.scenario.checks import (
 from blast_env.scenario.facade import NamedBay, named_bays
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, ScenarioError, problems_from
+from blast_env.scenario.round import WithoutRound
 from blast_env.scenario.sections import (
     FOR_PEOPLE,
     AnyGeoreference,
@@ -281,13 +282,17 @@ class Scenario(Section):
         Raises:
             ScenarioError: If anything is wrong; all problems are in it.
         """
+        changed = WithoutRound.of(document)
         try:
-            return cls.model_validate(document)
+            scenario = cls.model_validate(changed.document)
+            if not changed.problems:
+                return scenario
+            problems: tuple[Problem, ...] = ()
         except ValidationError as error:
             problems = problems_from(error, cls)
         # Pydantic skips the checks between sections if any section is unsound.
-        problems += (*version_problems(document), *check_parts(sound_parts(document)))
-        raise ScenarioError(source, problems)
+        problems = changed.as_written((*problems, *check_parts(sound_parts(changed.document))))
+        raise ScenarioError(source, (*problems, *version_problems(document)))
 
     def at_stand_off(self, distance_m: float) -> "Scenario":
         """Return the scenario with the structure at another distance from the charge.

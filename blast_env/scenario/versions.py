@@ -25,7 +25,10 @@ NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """What version 2 added, by section; all of it has a default, which is what version 1 means."""
 
-NEW_KINDS: Final[Mapping[str, tuple[str, ...]]] = {"charge": ("vehicle",)}
+NEW_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "charge": ("vehicle",),
+    "structures": ("round",),
+}
 """Kinds of sections that version 2 added."""
 
 MAX_ITEMS: Final = 100
