@@ -16,7 +16,7 @@ from typing import Annotated, Final
 import numpy as np
 import typer
 from blast_agents.rules import random_layout
-from blast_agents.search import LayoutProblem, layouts_by_rule
+from blast_agents.search import LayoutProblem, find_proposer, layouts_by_rule
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,6 +25,7 @@ from matplotlib.lines import Line2D
 from blast_env.arrays import FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.engines.contract import Engine, find_engine
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.geometry import Layout
@@ -37,7 +38,6 @@ from blast_env.scenario import Placement, Scenario, ScenarioError, SegmentSource
 from blast_env.scenario.zone import distance_m, source_bounds_m
 from blast_env.sites import (
     FAMILIES,
-    ITEM_SITES,
     SITES,
     SiteCriterion,
     SiteMeasures,
@@ -62,6 +62,12 @@ LEAST_ADVANTAGE: Final = 0.1
 impulse, no layout takes more than that, and random layouts take so much less on average."""
 
 
+LEAST_OVER_RULES: Final = 0.03
+"""What was searched takes off so much more than every rule, where it matters to search."""
+
+
+_SEARCH: Final = "annealing_from_rules"
+
 QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 
@@ -78,6 +84,8 @@ class MeasuredSite:
         reduction: Share of the load that each of them takes off (1 + random,).
         rules: Share that the layout of each rule takes off, by name.
         has_vehicle: Whether a vehicle brings the charge.
+        name: Name of the site.
+        found: Share that the best layout of a search takes off; `None` without a search.
     """
 
     accepted: bool
@@ -87,6 +95,8 @@ class MeasuredSite:
     reduction: FloatArray
     rules: Mapping[str, float] = field(default_factory=dict)
     has_vehicle: bool = False
+    name: str = ""
+    found: float | None = None
 
     @property
     def made(self) -> float:
@@ -112,10 +122,20 @@ def measured(
     site: Scenario,
     random_layouts: int,
     threats: int,
-    engine: str,
+    engine: str | Engine,
     criterion: SiteCriterion | None = None,
+    search: int = 0,
 ) -> MeasuredSite:
-    """Measure a site with blasts of charges drawn from where they may be."""
+    """Measure a site with blasts of charges drawn from where they may be.
+
+    Args:
+        site: The site.
+        random_layouts: How many random layouts.
+        threats: Charges, or seeds of particles, of each layout.
+        engine: Runs the blasts.
+        criterion: Accepts the site or not.
+        search: Blasts of a search for the best layout; 0 searches none.
+    """
     rng = np.random.default_rng(0)
     lines = Visibility.of(site)
     layouts = [visibility_layout(site, lines)]
@@ -127,6 +147,10 @@ def measured(
     reduction = {
         layout: 1.0 - problem.load(layout) / bare for layout in (*layouts, *ruled.values())
     }
+    found = None
+    if search:
+        best = find_proposer(_SEARCH).propose(problem, search).layout
+        found = max(1.0 - problem.load(best) / bare, *reduction.values())
     return MeasuredSite(
         accepted=(criterion or VisibilityCriterion()).objection(site) is None,
         shares=SiteMeasures.of(site),
@@ -135,6 +159,8 @@ def measured(
         reduction=np.array([reduction[layout] for layout in layouts]),
         rules={name: reduction[layout] for name, layout in ruled.items()},
         has_vehicle=bool(site.vehicles),
+        name=site.name,
+        found=found,
     )
 
 
@@ -168,8 +194,10 @@ def main(
     threats: Annotated[int, typer.Option(min=1, help="Charges and seeds a layout.")] = 4,
     processes: int = 2,
     cluster: ClusterAddress = None,
-    family: Annotated[str, typer.Option(help="sites or item_sites.")] = SITES,
-    engine: Annotated[str | None, typer.Option(show_default="event, or gas for item_sites")] = None,
+    family: Annotated[str, typer.Option(help="sites, item_sites or large_sites.")] = SITES,
+    engine: Annotated[str | None, typer.Option(show_default="event, or gas with items")] = None,
+    cells: Annotated[str | None, typer.Option(help="Of gas: uniform, coarse or fine.")] = None,
+    search: Annotated[int, typer.Option(min=0, help="Blasts of a search, a site.")] = 0,
     rejected: Annotated[
         bool, typer.Option(help="Measure what the criterion rejected on the way, too.")
     ] = True,
@@ -182,7 +210,7 @@ def main(
         if family not in FAMILIES:
             raise UnknownNameError("family", family, FAMILIES)
         ranges = replace(FAMILIES[family], preset=preset, calibration=calibration)
-        run_by = engine or ("gas" if family == ITEM_SITES else "event")
+        run_by = find_engine(engine or ("event" if family == SITES else "gas"), cells=cells)
         seconds = [cpu_time_s(seed, ranges) for seed in range(sites)]
         generated = [generate_site(seed, ranges) for seed in range(sites)]
         of_seeds = [list(drawn_sites(seed, ranges)) for seed in range(sites)]
@@ -198,11 +226,14 @@ def main(
             threats=threats,
             engine=run_by,
             criterion=criterion_of(ranges),
+            search=search,
         )
         with progress_bar("blasts") as progress:
             results = run_all(measure, drawn, processes, progress=progress)
         print_measured([each for each in results if each.accepted])
         print_rules([each for each in results if each.accepted and each.rules])
+        if search:
+            print_searched([each for each in results if each.accepted])
         print_agreement(results)
 
 
@@ -282,6 +313,22 @@ def print_rules(results: Sequence[MeasuredSite]) -> None:
                 f"{words}: {len(own)} sites; random layouts {means[0]:.0f} %, visibility layout"
                 f" {means[1]:.0f} %, best rule {means[2]:.0f} %"
             )
+
+
+def print_searched(results: Sequence[MeasuredSite]) -> None:
+    """Print how far the best found is above the best rule, a site a row."""
+    print_row(
+        "site", "best rule", "takes off (%)", "best found (%)", "points more", "worth searching"
+    )
+    print_line("|---" * 6 + "|")
+    for each in results:
+        if each.found is None or not each.rules:
+            continue
+        name = max(each.rules, key=each.rules.__getitem__)
+        more = each.found - each.rules[name]
+        worth = each.found > LEAST_REDUCTION and more >= LEAST_OVER_RULES
+        percent = (f"{100.0 * share:.1f}" for share in (each.rules[name], each.found, more))
+        print_row(each.name, name, *percent, "yes" if worth else "no")
 
 
 def print_agreement(results: Sequence[MeasuredSite]) -> None:

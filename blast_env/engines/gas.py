@@ -190,7 +190,7 @@ class GasBlast:
                 result, in `run.solver.recorders`.
         """
         run = self.engine.start_on(self.site, recorders)
-        oblique = ObliqueLoads.begin(run, self.scenario.structures)
+        oblique = ObliqueLoads.begin(run, self.scenario.structures_with(self.layout))
         bays = BayLoads.begin(run, self.scenario.bays_with(self.layout), oblique)
         if bays.bays:
             run.record(bays.recorder)

@@ -227,7 +227,7 @@ class UnfoldingGas(Unfolding):
         from blast_env.engines.oblique_walls import ObliqueLoads
 
         self.run = blast.engine.start_on(blast.site)
-        self._oblique = ObliqueLoads.begin(self.run, blast.scenario.structures)
+        self._oblique = ObliqueLoads.begin(self.run, blast.scenario.structures_with(blast.layout))
         grid = self.run.grid
         margin = round(-grid.origin_m[0] / grid.cell_m)
         rows, columns = _plan_shape(blast.scenario, grid.cell_m)

@@ -284,7 +284,7 @@ def _walled(result: GasResult, name: str | None) -> _Walled:
     known = {each.name: (each,) for each in site.structures if each.cells is None}
     buildings = {
         building: tuple(outline for each in parts for outline in known[each.name])
-        for building, parts in buildings_of(scenario.structures).items()
+        for building, parts in buildings_of(scenario.structures_with(result.blast.layout)).items()
     }
     if name is None:
         table = result.buildings

@@ -7,7 +7,8 @@ from math import isqrt
 from blast_env.calibration import LoadUnit
 from blast_env.engines import BlastResult
 from blast_env.errors import BlastEnvError
-from blast_env.physics.structure import ModularObstacle
+from blast_env.geometry import Rectangle
+from blast_env.physics.structure import ModularObstacle, ModularPart
 from blast_env.plan import (
     BARRIER,
     INK,
@@ -38,6 +39,7 @@ from blast_env.rendering.style import (
     short_number,
     unit_interval,
 )
+from blast_env.units import MODULE_SIDE_M
 
 with render_extra():
     from matplotlib.axes import Axes
@@ -83,13 +85,13 @@ def heat_map(
 
     Args:
         result: The blast.
-        structure: The structure to enlarge. Without it these are the protected ones, or all if
-            none is protected; at most four, those with the largest impulses.
+        structure: The structure or building to enlarge. Without it these are the protected
+            buildings, or all if none is protected; at most four, those with the largest impulses.
         scale: The colour scale, for maps that are to be compared; see `common_scale`. Without it
             it ends at the largest load of what is enlarged, rounded up.
 
     Raises:
-        UnknownNameError: If there is no structure of that name.
+        UnknownNameError: If there is no structure or building of that name.
     """
     chosen = _chosen(result, structure)
     if scale is None:
@@ -108,8 +110,8 @@ def heat_map(
         (widths_in[1] - _COLOUR_BAR_IN) / columns - _PANEL_LABELS_IN,
         _PANELS_HEIGHT_IN / rows,
     )
-    for axes, obstacle in zip(panels, chosen, strict=True):
-        _draw_panel(axes, result, obstacle, scale, room_in)
+    for axes, building in zip(panels, chosen, strict=True):
+        _draw_panel(axes, result, building, scale, room_in)
     _add_colour_bar(figure, panels, scale, result)
     _add_legend(figure, result)
     title, subtitle = blast_title(result.blast)
@@ -129,7 +131,7 @@ def common_scale(results: Sequence[BlastResult], structure: str | None = None) -
         UnknownNameError: If there is no structure of that name.
     """
     loads = [
-        max(part.impulse for obstacle in _chosen(result, structure) for part in obstacle.parts)
+        max(part.impulse for each in _chosen(result, structure) for part in each.modules)
         for result in results
     ]
     largest = max(loads)
@@ -137,22 +139,62 @@ def common_scale(results: Sequence[BlastResult], structure: str | None = None) -
     return LoadScale(nice_ceiling(unit.factor * largest) if largest > 0.0 else 1.0, unit)
 
 
-def _chosen(result: BlastResult, structure: str | None) -> list[ModularObstacle]:
+@dataclass(frozen=True, eq=False)
+class _Building:
+    """A building, or a structure, that is enlarged.
+
+    Attributes:
+        name: Its name.
+        obstacles: The structures that it is of.
+    """
+
+    name: str
+    obstacles: tuple[ModularObstacle, ...]
+
+    @property
+    def protected(self) -> bool:
+        """Whether the load of one of them counts."""
+        return any(each.protected for each in self.obstacles)
+
+    @property
+    def impulse(self) -> float:
+        """Sum over them, simulation units."""
+        return sum(each.impulse for each in self.obstacles)
+
+    @property
+    def modules(self) -> tuple[ModularPart, ...]:
+        """Their modules."""
+        return tuple(part for each in self.obstacles for part in each.parts)
+
+    @property
+    def size_modules(self) -> tuple[float, float]:
+        """Columns and rows of modules around them."""
+        left, bottom, right, top = Rectangle.around([each.rectangle_m for each in self.obstacles])
+        return (right - left) / MODULE_SIDE_M, (top - bottom) / MODULE_SIDE_M
+
+
+def _chosen(result: BlastResult, structure: str | None) -> list[_Building]:
+    names = {each.name: each.building_name for each in result.blast.scenario.structures}
+    parts: dict[str, tuple[ModularObstacle, ...]] = {}
+    for each in result.obstacles:
+        if each.cells is None:
+            name = names[each.name]
+            parts[name] = (*parts.get(name, ()), each)
     if structure is not None:
-        return [result.obstacle(structure)]
-    structures = [obstacle for obstacle in result.obstacles if obstacle.cells is None]
-    protected = [obstacle for obstacle in structures if obstacle.protected]
-    by_impulse = sorted(protected or structures, key=lambda obstacle: -obstacle.impulse)
+        return [_Building(structure, parts.get(structure) or (result.obstacle(structure),))]
+    buildings = [_Building(name, each) for name, each in parts.items()]
+    protected = [each for each in buildings if each.protected]
+    by_impulse = sorted(protected or buildings, key=lambda each: -each.impulse)
     return by_impulse[:_MOST_PANELS]
 
 
 def _widths_in(
-    result: BlastResult, chosen: list[ModularObstacle], columns: int, rows: int
+    result: BlastResult, chosen: list[_Building], columns: int, rows: int
 ) -> tuple[float, float]:
     """Return widths for plan and panels that leave little empty beside them."""
     site = result.blast.scene.site
     plan = _PLAN_HEIGHT_IN * (site.right - site.left) / (site.top - site.bottom)
-    widest = max(obstacle.columns / obstacle.rows for obstacle in chosen)
+    widest = max(across / along for across, along in (each.size_modules for each in chosen))
     panels = _PANELS_HEIGHT_IN / rows * widest * columns
     plan, panels = (
         min(max(width, least), most)
@@ -175,40 +217,41 @@ def _features(result: BlastResult) -> tuple[Feature, ...]:
     return blast_features(blast.scenario, blast.layout, blast.scene.charge)
 
 
-def _total(result: BlastResult, obstacle: ModularObstacle) -> str:
-    """Return the load on a structure in words: its own in Pa s, where the calibration has one."""
-    try:
-        return f"{result.impulse(obstacle.name).pa_s:,.0f} Pa s"
-    except BlastEnvError:
-        return f"{obstacle.impulse:,.0f} in all"
+def _total(result: BlastResult, building: _Building) -> str:
+    """Return the load on a building in words: in Pa s for one part, where a calibration has it."""
+    if len(building.obstacles) == 1:
+        try:
+            return f"{result.impulse(building.obstacles[0].name).pa_s:,.0f} Pa s"
+        except BlastEnvError:
+            pass
+    return f"{building.impulse:,.0f} in all"
 
 
 def _draw_panel(
     axes: Axes,
     result: BlastResult,
-    obstacle: ModularObstacle,
+    building: _Building,
     scale: LoadScale,
     room_in: tuple[float, float],
 ) -> None:
-    draw_enlarged(axes, [obstacle], scale.norm, 0.6, scale.unit.factor)
-    hits = sum(part.hits for part in obstacle.parts)
+    draw_enlarged(axes, building.obstacles, scale.norm, 0.6, scale.unit.factor)
+    hits = sum(part.hits for part in building.modules)
     axes.set_title(
-        f"{obstacle.name}{' (protected)' if obstacle.protected else ''}\n"
-        f"{_total(result, obstacle)} from {count_of('hit', hits)}",
+        f"{building.name}{' (protected)' if building.protected else ''}\n"
+        f"{_total(result, building)} from {count_of('hit', hits)}",
         fontsize=11,
-        color=unit_interval(PROTECTED if obstacle.protected else INK),
+        color=unit_interval(PROTECTED if building.protected else INK),
     )
-    cell_pt = _POINTS_PER_IN * min(
-        room_in[0] / (obstacle.columns + 1.0), room_in[1] / (obstacle.rows + 1.0)
-    )
-    _write_numbers(axes, obstacle, scale, min(0.34 * cell_pt, _LARGEST_NUMBER_PT))
+    columns, rows = building.size_modules
+    cell_pt = _POINTS_PER_IN * min(room_in[0] / (columns + 1.0), room_in[1] / (rows + 1.0))
+    _write_numbers(axes, building, scale, min(0.34 * cell_pt, _LARGEST_NUMBER_PT))
 
 
-def _write_numbers(axes: Axes, obstacle: ModularObstacle, scale: LoadScale, size_pt: float) -> None:
+def _write_numbers(axes: Axes, building: _Building, scale: LoadScale, size_pt: float) -> None:
     """Write the impulse into every module that was hit, if there is room."""
     if size_pt < _SMALLEST_NUMBER_PT:
         return
-    for part in obstacle.parts:
+    for part in building.modules:
         if part.hits:
             load = scale.unit.factor * part.impulse
             dark = load > _DARK_SHARE * scale.full

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 from PIL import Image
 
-from blast_env.engines import BlastResult
+from blast_env.engines import Blast, BlastResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.recording.tables import faces_hit
 from blast_env.rendering.figures import (
@@ -19,6 +19,7 @@ from blast_env.rendering.figures import (
     save_figure,
 )
 from blast_env.rendering.style import short_number
+from blast_env.scenario import Scenario
 
 
 def modules_of(figure: Figure, panel: int) -> PolyCollection:
@@ -155,3 +156,19 @@ def test_another_suffix_is_refused(result: BlastResult, tmp_path: Path) -> None:
     with pytest.raises(BlastEnvError, match=r"'\.bmp', must be one of \.png, \.svg, \.pdf"):
         save_figure(model_scheme(result.blast.scene), tmp_path / "map.bmp")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_parts_of_a_building_are_one_on_the_heat_map(blast: Blast) -> None:
+    document = blast.scenario.model_dump(mode="json", exclude_none=True) | {"schema_version": 2}
+    for each in document["structures"]:
+        each["building"] = "town"
+    joined = replace(blast, scenario=Scenario.from_document(document, "joined")).run()
+    figure = heat_map(joined)
+    title, *_ = (axes.get_title() for axes in figure.axes[1:])
+    count = sum(each.hits for each in joined.obstacles if each.cells is None)
+    assert title.startswith("town (protected)\n")
+    assert f"{count} hits" in title
+    assert len(figure.axes) == 3  # the site, the building, the bar
+    assert heat_map(joined, "wall").axes[1].get_title().startswith("wall\n")
+    with pytest.raises(UnknownNameError, match="did you mean 'wall'"):
+        heat_map(joined, "walls")
