@@ -39,6 +39,7 @@ from blast_env.rendering.style import (
     short_number,
     unit_interval,
 )
+from blast_env.scenario.sections import buildings_of
 from blast_env.units import MODULE_SIDE_M
 
 with render_extra():
@@ -174,15 +175,16 @@ class _Building:
 
 
 def _chosen(result: BlastResult, structure: str | None) -> list[_Building]:
-    names = {each.name: each.building_name for each in result.blast.scenario.structures}
-    parts: dict[str, tuple[ModularObstacle, ...]] = {}
-    for each in result.obstacles:
-        if each.cells is None:
-            name = names[each.name]
-            parts[name] = (*parts.get(name, ()), each)
+    scenario = result.blast.scenario
+    together = buildings_of(scenario.structures_with(result.blast.layout))
+    if structure is not None and structure not in together:
+        return [_Building(structure, (result.obstacle(structure),))]
+    buildings = [
+        _Building(name, tuple(result.obstacle(each.name) for each in parts))
+        for name, parts in together.items()
+    ]
     if structure is not None:
-        return [_Building(structure, parts.get(structure) or (result.obstacle(structure),))]
-    buildings = [_Building(name, each) for name, each in parts.items()]
+        return [each for each in buildings if each.name == structure]
     protected = [each for each in buildings if each.protected]
     by_impulse = sorted(protected or buildings, key=lambda each: -each.impulse)
     return by_impulse[:_MOST_PANELS]

@@ -14,7 +14,7 @@ import numpy as np
 from blast_env.arrays import BoolArray, IntArray
 from blast_env.geometry import Rectangle
 from blast_env.physics.scene import WallName
-from blast_env.scenario.sections import AnyStructure
+from blast_env.scenario.sections import AnyStructure, buildings_of
 from blast_env.units import MODULE_SIDE_M
 
 LEAST_STEPS: Final = 3
@@ -58,14 +58,11 @@ def oblique_walls(structures: Iterable[AnyStructure]) -> tuple[ObliqueWall, ...]
     Args:
         structures: The structures; those of one building are looked at together, in plan.
     """
-    together: dict[str, list[Rectangle]] = {}
-    for each in structures:
-        together.setdefault(each.building_name, []).append(each.rectangle_m)
     return tuple(
         wall
-        for name, parts in together.items()
+        for name, parts in buildings_of(structures).items()
         if len(parts) >= LEAST_STEPS
-        for wall in _walls_of(name, parts)
+        for wall in _walls_of(name, [each.rectangle_m for each in parts])
     )
 
 
