@@ -97,26 +97,35 @@ def _numbers(found: FacadeResponse) -> FloatArray:
     return damage
 
 
-def triangular_damages(
-    bays: Sequence[Alternatives], peak_pa: float, impulse_pa_s: float
-) -> tuple[BayDamage, ...]:
-    """Return the damage of bays that all have one triangular load: a rough guess without histories.
+class TriangularLoads:
+    """Bays that all have one triangular load: a rough guess without histories.
 
     Args:
         bays: The bays.
-        peak_pa: The peak, reached at once; from there it falls straight to 0.
-        impulse_pa_s: The impulse, which says how long that takes.
     """
-    alike: dict[tuple[object, ...], Alternatives] = {}
-    for bay in bays:
-        alike.setdefault(_kind(bay), bay)
-    end_s = 2.0 * impulse_pa_s / peak_pa if peak_pa > 0.0 else 1e-3
-    time_s = np.array([0.0, end_s, 2.0 * end_s])
-    pressure_pa = np.tile([peak_pa, 0.0, 0.0], (len(alike), 1))
-    found = dict(zip(alike, bay_damages([*alike.values()], time_s, pressure_pa), strict=True))
-    return tuple(
-        BayDamage(bay.name, bay.structure, *_areas(bay), found[_kind(bay)].damage) for bay in bays
-    )
+
+    def __init__(self, bays: Sequence[Alternatives]) -> None:
+        self._bays = [(_kind(bay), bay, _areas(bay)) for bay in bays]
+        self._alike = {kind: bay for kind, bay, _ in reversed(self._bays)}
+
+    def damages(self, peak_pa: float, impulse_pa_s: float) -> tuple[BayDamage, ...]:
+        """Return the damage of the bays.
+
+        Args:
+            peak_pa: The peak, reached at once; from there it falls straight to 0.
+            impulse_pa_s: The impulse, which says how long that takes.
+        """
+        if not self._bays:
+            return ()
+        end_s = 2.0 * impulse_pa_s / peak_pa if peak_pa > 0.0 else 1e-3
+        time_s = np.array([0.0, end_s, 2.0 * end_s])
+        pressure_pa = np.tile([peak_pa, 0.0, 0.0], (len(self._alike), 1))
+        damages = bay_damages([*self._alike.values()], time_s, pressure_pa)
+        found = dict(zip(self._alike, damages, strict=True))
+        return tuple(
+            BayDamage(bay.name, bay.structure, *areas, found[kind].damage)
+            for kind, bay, areas in self._bays
+        )
 
 
 def _kind(bay: Alternatives) -> tuple[object, ...]:

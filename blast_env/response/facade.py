@@ -7,7 +7,7 @@ serves all that stands in it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import cbrt, floor
 from typing import Final
 
@@ -183,7 +183,7 @@ class FilledBay:
     @property
     def glazed_m2(self) -> float:
         """Area of its panes."""
-        return 0.0 if self.glazing is None else self.panes * self.glazing.pane.area_m2
+        return 0.0 if self.glazing is None else self.panes * _pane(self.glazing).area_m2
 
 
 @dataclass(frozen=True, eq=False)
@@ -349,17 +349,19 @@ def respond(
 
 def _panes(bays: Sequence[FilledBay]) -> list[Pane]:
     """Return a pane of each bay with windows; equal ones share one, whose curve is costly."""
-    made: dict[Glazing, Pane] = {}
-    for each in bays:
-        if each.glazing is not None and each.glazing not in made:
-            made[each.glazing] = each.glazing.pane
-    return [made[each.glazing] for each in bays if each.glazing is not None]
+    return [_pane(each.glazing) for each in bays if each.glazing is not None]
 
 
 def _panels(bays: Sequence[FilledBay]) -> list[Panel]:
     """Return the panel of each bay with a wall; equal ones share one."""
-    made: dict[tuple[Wall, float], Panel] = {}
-    for each in bays:
-        if each.wall is not None and (each.wall, each.bay.height_m) not in made:
-            made[each.wall, each.bay.height_m] = each.wall.panel(each.bay.height_m)
-    return [made[each.wall, each.bay.height_m] for each in bays if each.wall is not None]
+    return [_panel(each.wall, each.bay.height_m) for each in bays if each.wall is not None]
+
+
+@lru_cache(maxsize=256)
+def _pane(glazing: Glazing) -> Pane:
+    return glazing.pane
+
+
+@lru_cache(maxsize=256)
+def _panel(wall: Wall, height_m: float) -> Panel:
+    return wall.panel(height_m)

@@ -32,6 +32,7 @@ from blast_env.scenario.driving_steps import (
     IntArray32,
     Labels,
     all_arcs,
+    arcs_up_to,
     wide_places,
 )
 from blast_env.scenario.sections import Motion, PointM
@@ -82,7 +83,7 @@ class SpeedField:
             starts: Where it enters (rows, columns), and the direction into the site there.
         """
         # Here, because they import Numba, which takes half a second.
-        from blast_env.scenario.driving_kernels import passable_places, spread
+        from blast_env.scenario.driving_kernels import all_open, any_slow, spread
 
         def label(speed_km_h: float) -> float:
             return _run_up_m(motion, speed_km_h) / STEP_M
@@ -103,16 +104,15 @@ class SpeedField:
                         label(motion.entry_km_h) + LENGTHS[number], most[at]
                     )
         per_radius = _per_radius(motion)
-        arcs = all_arcs().up_to(top / per_radius)
+        arcs = arcs_up_to(top / per_radius)
         # What is beyond all open places takes time, and nothing else.
         box = _around(is_open)
         ground, whole = np.ascontiguousarray(is_open[box]), labels
         most, labels = np.ascontiguousarray(most[box]), np.ascontiguousarray(labels[:, *box])
-        passable = np.zeros((len(arcs.of), *ground.shape), dtype=bool)
-        slowed = np.zeros_like(passable) if motion.slow else np.zeros((1, len(ground), 0), bool)
-        passable_places(ground, True, arcs.first, arcs.points, passable)
+        passable = all_open(ground, arcs.first, arcs.points)
+        slowed = np.zeros((0, 0, 0), dtype=np.uint64)
         if motion.slow:
-            passable_places(most < top, False, arcs.first, arcs.points, slowed)
+            slowed = any_slow(most < top, arcs.first, arcs.points, passable)
         spread(
             ground,
             wide_places(ground),
@@ -138,9 +138,14 @@ class SpeedField:
         run_up_m = self.run_up_m.max(axis=0).astype(np.float64)
         return np.where(run_up_m < 0.0, np.nan, self._km_h(run_up_m))
 
-    def impact_km_h(self, rectangle: Rectangle) -> float | None:
-        """Return the largest speed at which the vehicle hits a rectangle; `None` if it does not."""
-        state = self._hit(rectangle)
+    def impact_km_h(self, rectangle: Rectangle, among: BoolArray | None = None) -> float | None:
+        """Return the largest speed at which the vehicle hits a rectangle; `None` if it does not.
+
+        Args:
+            rectangle: The rectangle, m.
+            among: From which places (rows, columns); all, unless given.
+        """
+        state = self._hit(rectangle, among)
         return None if state is None else self._hit_km_h(state)
 
     def way_to_impact(self, rectangle: Rectangle) -> tuple["WayPoint", ...]:
@@ -162,35 +167,28 @@ class SpeedField:
         row, column = max(y - 1, 0) + int(up), max(x - 1, 0) + int(right)
         return self._way(int(np.ravel_multi_index((int(number), row, column), (16, rows, columns))))
 
-    def _hit(self, rectangle: Rectangle) -> int | None:
+    def _hit(self, rectangle: Rectangle, among: BoolArray | None = None) -> int | None:
         """Return the state from which the vehicle hits a rectangle fastest."""
+        from blast_env.scenario.driving_kernels import fastest_into
+
         left, bottom, right, top = rectangle.grown(self.half_m)
         _, rows, columns = self.run_up_m.shape
         low, high = max(floor(bottom / STEP_M) - 3, 0), min(ceil(top / STEP_M) + 4, rows)
         first, after = max(floor(left / STEP_M) - 3, 0), min(ceil(right / STEP_M) + 4, columns)
         if low >= high or first >= after:
             return None
-        y = STEP_M * np.arange(low, high)[:, np.newaxis]
-        x = STEP_M * np.arange(first, after)[np.newaxis, :]
-        slack = STEP_M / 2.0 + _EPSILON_M
-        best, found = -1.0, None
-        for number, (dx, dy) in enumerate(DIRECTIONS):
-            inwards = np.zeros((high - low, after - first), dtype=bool)
-            if dx:
-                inwards |= (x <= left + slack) if dx > 0 else (x >= right - slack)
-            if dy:
-                inwards |= (y <= bottom + slack) if dy > 0 else (y >= top - slack)
-            end_x, end_y = x + STEP_M * dx, y + STEP_M * dy
-            inside = (end_x > left + _EPSILON_M) & (end_x < right - _EPSILON_M)
-            inside = inside & (end_y > bottom + _EPSILON_M) & (end_y < top - _EPSILON_M)
-            own = self.run_up_m[number, low:high, first:after]
-            values = np.where(inwards & inside & (own >= 0.0), own + STEP_M * LENGTHS[number], -1.0)
-            at = int(values.argmax())
-            if values.flat[at] > best:
-                best = float(values.flat[at])
-                row, column = divmod(at, after - first)
-                found = (number * rows + low + row) * columns + first + column
-        return found
+        found = fastest_into(
+            self.run_up_m,
+            self.is_open if among is None else among,
+            np.array((low, high, first, after)),
+            STEP_M * DIRECTIONS.astype(np.float64),
+            np.float32(STEP_M) * LENGTHS,
+            np.array((left, bottom, right, top)),
+            STEP_M,
+            STEP_M / 2.0 + _EPSILON_M,
+            _EPSILON_M,
+        )
+        return None if found < 0 else found
 
     def _hit_km_h(self, state: int) -> float:
         number = state // self.run_up_m[0].size

@@ -1,130 +1,228 @@
 """The search over the steps of a driving vehicle; compiled, and imported when a vehicle drives.
 
-Lengths and labels are those of `blast_env.scenario.driving_steps`.
+Lengths and labels are those of `blast_env.scenario.driving_steps`. Sets of places are bits, 64 of a
+row in a word: the first place of a row is the lowest bit of its first word.
 """
 
-import numpy as np
-from numba import njit
+from typing import Final
 
-from blast_env.arrays import BoolArray
+import numpy as np
+from numba import njit, uint64
+from numpy.typing import NDArray
+
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.scenario.driving_steps import NEVER, IntArray32, Labels
 
+Bits = NDArray[np.uint64]
 
-@njit(cache=True)
-def passable_places(
-    places: BoolArray, every: bool, first: IntArray32, points: IntArray32, found: BoolArray
-) -> None:
-    """Work out from which places every point of an arc, or any, is one of some places.
+_WORD: Final = 64
+_ONE: Final = np.uint64(1)
+
+_DE_BRUIJN: Final = 0x03F79D71B4CB0A89
+"""Any six bits of it in a row are different ones, which tells where a single bit stands."""
+
+_PLACE: Final = np.argsort(
+    [((_DE_BRUIJN << bit) & (2**_WORD - 1)) >> (_WORD - 6) for bit in range(_WORD)]
+)
+
+
+def packed(places: BoolArray, padding: int = 0) -> Bits:
+    """Return places as bits, with so many empty words before and after each row (rows, words)."""
+    rows, columns = places.shape
+    words = -(-columns // _WORD)
+    whole = np.zeros((rows, _WORD * (words + 2 * padding)), dtype=bool)
+    whole[:, _WORD * padding : _WORD * padding + columns] = places
+    bits: Bits = np.packbits(whole, axis=1, bitorder="little").view(np.uint64)
+    return bits
+
+
+def all_open(places: BoolArray, first: IntArray32, points: IntArray32) -> Bits:
+    """Return from where all points of each arc are among some places (arcs, rows, words).
 
     Args:
         places: The places (rows, columns).
-        every: Whether every point must be, or any.
         first: As in `Arcs`.
         points: As in `Arcs`.
-        found: The result (arcs, rows, columns); of arcs that leave the plane, false.
     """
-    rows, columns = places.shape
-    for arc in range(len(first) - 1):
-        own = points[first[arc] : first[arc + 1]]
-        low, high = max(0, -own[:, 1].min()), rows - max(0, own[:, 1].max())
-        left, right = max(0, -own[:, 0].min()), columns - max(0, own[:, 0].max())
-        found[arc] = False
-        if low >= high or left >= right:
-            continue
-        found[arc, low:high, left:right] = every
-        for at in range(len(own)):
-            x, y = own[at]
-            for row in range(low, high):
-                into, seen = found[arc, row, left:right], places[row + y, left + x : right + x]
-                if every:
-                    into &= seen
-                else:
-                    into |= seen
+    padding = _padding(points)
+    bits = packed(places, padding)
+    found = np.empty((len(first) - 1, len(bits), bits.shape[1] - 2 * padding), dtype=np.uint64)
+    _all_open(bits, padding, first, points, found)
+    return found
+
+
+def any_slow(places: BoolArray, first: IntArray32, points: IntArray32, passable: Bits) -> Bits:
+    """Return from where any point of each arc is among some places; arguments as for `all_open`.
+
+    Args:
+        places: As for `all_open`.
+        first: As for `all_open`.
+        points: As for `all_open`.
+        passable: From where arcs are asked about (arcs, rows, words); their points are all inside.
+    """
+    padding = _padding(points)
+    found = np.zeros_like(passable)
+    _any_slow(packed(places, padding), padding, first, points, passable, found)
+    return found
+
+
+def _padding(points: IntArray32) -> int:
+    """Return how many words beyond a row's ends points may reach."""
+    return int(np.abs(points[:, 0]).max()) // _WORD + 2
+
+
+@njit(cache=True, inline="always")
+def _from(row: Bits, word: int, by: int) -> np.uint64:
+    """Return a word of a row, seen from `by` places before."""
+    at, part = word + (by >> 6), by & 63
+    seen: np.uint64 = row[at] >> uint64(part)
+    if part:
+        seen |= row[at + 1] << uint64(_WORD - part)
+    return seen
 
 
 @njit(cache=True)
-def _straight(
-    labels: Labels, is_open: BoolArray, most: Labels, x: int, y: int, length: float
+def _all_open(bits: Bits, padding: int, first: IntArray32, points: IntArray32, found: Bits) -> None:
+    """Do what `all_open` says."""
+    arcs, rows, words = found.shape
+    for arc in range(arcs):
+        begin, end = first[arc], first[arc + 1]
+        y = points[begin:end, 1]
+        low, high = -min(y.min(), 0), rows - max(y.max(), 0)
+        found[arc] = 0
+        for row in range(low, high):
+            for word in range(words):
+                left = bits[row, padding + word]
+                at = begin
+                while left and at < end:
+                    left &= _from(bits[row + points[at, 1]], padding + word, points[at, 0])
+                    at += 1
+                found[arc, row, word] = left
+
+
+@njit(cache=True)
+def _any_slow(
+    bits: Bits,
+    padding: int,
+    first: IntArray32,
+    points: IntArray32,
+    passable: Bits,
+    found: Bits,
 ) -> None:
-    """Lead the labels of one direction straight on as far as the ground is open.
+    """Do what `any_slow` says."""
+    arcs, rows, words = found.shape
+    for arc in range(arcs):
+        for row in range(rows):
+            for word in range(words):
+                if passable[arc, row, word]:
+                    for at in range(first[arc], first[arc + 1]):
+                        found[arc, row, word] |= _from(
+                            bits[row + points[at, 1]], padding + word, points[at, 0]
+                        )
 
-    Args:
-        labels: Of the direction (rows, columns).
-        is_open: As in `spread`.
-        most: As in `spread`.
-        x: Columns of its step.
-        y: Rows of it.
-        length: Length of it.
-    """
-    rows, columns = labels.shape
-    for i in range(rows - abs(y)):
-        row = i if y >= 0 else rows - 1 - i
-        for j in range(columns - abs(x)):
-            column = j if x >= 0 else columns - 1 - j
-            up, right = row + y, column + x
-            value = min(labels[row, column] + length, most[up, right])
-            if labels[row, column] < 0.0 or not is_open[up, right] or value <= labels[up, right]:
-                continue
-            if abs(x) == 2:
-                middle = column + x // 2
-                if not (is_open[row, middle] or is_open[up, middle]):
-                    continue
-            elif abs(y) == 2:
-                middle = row + y // 2
-                if not (is_open[middle, column] or is_open[middle, right]):
-                    continue
-            labels[up, right] = value
+
+@njit(cache=True, inline="always")
+def _lowest(bits: np.uint64) -> int:
+    """Return the place of the lowest bit that is set."""
+    place: int = _PLACE[((bits & (~bits + _ONE)) * uint64(_DE_BRUIJN)) >> uint64(_WORD - 6)]
+    return place
 
 
 @njit(cache=True)
-def _turn(
-    one: Labels,
-    other: Labels,
-    passable: BoolArray,
-    slowed: BoolArray,
-    end: IntArray32,
+def _highest(bits: np.uint64) -> int:
+    """Return the place of the highest bit that is set."""
+    for by in (1, 2, 4, 8, 16, 32):
+        bits |= bits >> uint64(by)
+    return _lowest(bits ^ (bits >> _ONE))
+
+
+@njit(cache=True, inline="always")
+def _raise(
+    labels: Labels,
+    changed: Bits,
+    waiting: BoolArray,
+    number: int,
+    row: int,
+    column: int,
+    value: float,
+) -> None:
+    """Set a label, and note that steps from there are to be tried."""
+    labels[number, row, column] = value
+    changed[number, row, column >> 6] |= _ONE << uint64(column & 63)
+    waiting[number, row] = True
+
+
+@njit(cache=True)
+def _straight_and_spot(
+    number: int,
+    is_open: BoolArray,
+    is_wide: BoolArray,
+    most: Labels,
+    labels: Labels,
+    changed: Bits,
+    waiting: BoolArray,
+    spots: Labels,
+    step: IntArray32,
     length: float,
-    limit: float,
-    slow_limit: float,
-) -> bool:
-    """Lead the labels of one direction along an arc; return whether that raised any.
+    spot_limit: np.float32,
+) -> None:
+    """Lead changed labels of one direction straight on, and turn them on the spot.
+
+    Places come in the order in which the direction meets them, so that one pass leads a label on to
+    the end.
 
     Args:
-        one: Labels of the direction at its start (rows, columns).
-        other: Labels of the direction at its end.
-        passable: From where the arc is open.
-        slowed: From where it touches ground that slows the vehicle; empty if nothing does.
-        end: From its start to its end.
+        number: The direction.
+        is_open: As in `spread`.
+        is_wide: As in `spread`.
+        most: As in `spread`.
+        labels: As in `spread`.
+        changed: From where steps are to be tried (directions, rows, words).
+        waiting: In which rows there are some (directions, rows).
+        spots: The largest label of a turn on the spot so far (rows, columns).
+        step: The step of the direction.
         length: Its length.
-        limit: The largest label on it.
-        slow_limit: The largest label on it where it is slowed.
+        spot_limit: The largest label of a turn on the spot.
     """
-    rows, columns = one.shape
-    x, y = end
-    low, high = max(0, -y), rows - max(0, y)
-    left, right = max(0, -x), columns - max(0, x)
-    if left >= right:  # an end below 0 would count from the other side
-        return False
-    along, most, never = np.float32(length), np.float32(limit), NEVER
-    raised = np.float32(0.0)
-    for row in range(low, high):
-        starts, targets = one[row, left:right], other[row + y, left + x : right + x]
-        ways = passable[row, left:right]
-        if slowed.size == 0:  # no branch within: this loop takes most of the time
-            for column in range(len(starts)):
-                value = min(starts[column] + along, most)
-                value = value if ways[column] and starts[column] >= 0.0 else never
-                old = targets[column]
-                raised = max(raised, value - old)
-                targets[column] = max(value, old)
+    count, rows, columns = labels.shape
+    words = changed.shape[2]
+    x, y = step
+    for i in range(rows):
+        row = i if y >= 0 else rows - 1 - i
+        if not waiting[number, row]:
             continue
-        slow = slowed[row, left:right]
-        for column in range(len(starts)):
-            value = min(starts[column] + along, np.float32(slow_limit) if slow[column] else most)
-            if ways[column] and starts[column] >= 0.0 and value > targets[column]:
-                raised = np.float32(1.0)
-                targets[column] = value
-    return bool(raised > 0.0)
+        up = row + y
+        for j in range(words):
+            word = j if x >= 0 else words - 1 - j
+            done = uint64(0)
+            while True:
+                bits = changed[number, row, word] & ~done
+                if not bits:
+                    break
+                bit = _lowest(bits) if x >= 0 else _highest(bits)
+                done |= _ONE << uint64(bit)
+                column = _WORD * word + bit
+                label = labels[number, row, column]
+                if is_wide[row, column] and min(label, spot_limit) > spots[row, column]:
+                    spots[row, column] = spot = min(label, spot_limit)
+                    for other in range(count):
+                        if spot > labels[other, row, column]:
+                            _raise(labels, changed, waiting, other, row, column, spot)
+                right = column + x
+                if not (0 <= up < rows and 0 <= right < columns and is_open[up, right]):
+                    continue
+                value = min(label + length, most[up, right])
+                if value <= labels[number, up, right]:
+                    continue
+                if abs(x) == 2:
+                    middle = column + x // 2
+                    if not (is_open[row, middle] or is_open[up, middle]):
+                        continue
+                elif abs(y) == 2:
+                    middle = row + y // 2
+                    if not (is_open[middle, column] or is_open[middle, right]):
+                        continue
+                _raise(labels, changed, waiting, number, up, right, value)
 
 
 @njit(cache=True)
@@ -139,15 +237,16 @@ def spread(
     ends: IntArray32,
     arc_lengths: Labels,
     arc_most: Labels,
-    passable: BoolArray,
-    slowed: BoolArray,
+    passable: Bits,
+    slowed: Bits,
     slow_most: float,
     spot_most: float,
-) -> int:
-    """Raise labels until no step raises one any further; return in how many rounds.
+) -> None:
+    """Raise labels until no step raises one any further.
 
     A label is the run-up that a speed takes from standstill, v^2 / 2 a, in steps; below 0 where the
-    vehicle never is.
+    vehicle never is. Labels only rise, and no higher than any order of steps makes them: so the
+    order is one of speed alone. Only from labels that have changed are steps tried.
 
     Args:
         is_open: Which places are open (rows, columns).
@@ -161,41 +260,108 @@ def spread(
         ends: As in `Arcs`.
         arc_lengths: Lengths of the arcs.
         arc_most: The largest label on each arc.
-        passable: From where each arc is open (arcs, rows, columns).
-        slowed: From where it touches ground that slows the vehicle; (1, rows, 0) if none is.
+        passable: From where each arc is open (arcs, rows, words).
+        slowed: From where it touches ground that slows the vehicle; without words if none is.
         slow_most: The largest label on such ground.
         spot_most: The largest label of a turn on the spot.
     """
     count, rows, columns = labels.shape
-    changed = np.ones(count, dtype=np.bool_)
+    words = passable.shape[2]
+    changed = np.zeros((count, rows, words), dtype=np.uint64)
+    waiting = np.zeros((count, rows), dtype=np.bool_)
+    spots = np.full((rows, columns), NEVER)
     spot_limit = np.float32(spot_most)  # as labels are: else it would be above them for ever
-    rounds = 0
-    while changed.any():
-        rounds += 1
+    for number, row, column in np.argwhere(labels >= 0.0):
+        _raise(labels, changed, waiting, number, row, column, labels[number, row, column])
+    first = np.searchsorted(of[:, 0], np.arange(count + 1))
+    while waiting.any():
         for number in range(count):
-            if changed[number]:
-                x, y = directions[number]
-                _straight(labels[number], is_open, most, x, y, lengths[number])
-        going, changed = changed, np.zeros(count, dtype=np.bool_)
-        for arc in range(len(of)):
-            one, other = of[arc]
-            if going[one] and _turn(
-                labels[one],
-                labels[other],
-                passable[arc],
-                slowed[min(arc, len(slowed) - 1)],
-                ends[arc],
-                arc_lengths[arc],
-                arc_most[arc],
-                min(arc_most[arc], slow_most),
-            ):
-                changed[other] = True
-        for row in range(rows):
-            for column in range(columns):
-                if is_wide[row, column]:
-                    spot = min(labels[:, row, column].max(), spot_limit)
-                    for number in range(count):
-                        if spot > labels[number, row, column]:
-                            labels[number, row, column] = spot
-                            changed[number] = True
-    return rounds
+            if not waiting[number].any():
+                continue
+            _straight_and_spot(
+                number,
+                is_open,
+                is_wide,
+                most,
+                labels,
+                changed,
+                waiting,
+                spots,
+                directions[number],
+                lengths[number],
+                spot_limit,
+            )
+            for arc in range(first[number], first[number + 1]):
+                other, (x, y) = of[arc, 1], ends[arc]
+                length, limit = arc_lengths[arc], arc_most[arc]
+                slow_limit = np.float32(min(limit, slow_most))
+                for row in range(rows):
+                    if not waiting[number, row]:
+                        continue
+                    for word in range(words):
+                        bits = changed[number, row, word] & passable[arc, row, word]
+                        slow = slowed[arc, row, word] if slowed.size else uint64(0)
+                        while bits:
+                            bit = _lowest(bits)
+                            bits &= bits - _ONE
+                            column = _WORD * word + bit
+                            most_here = slow_limit if (slow >> uint64(bit)) & _ONE else limit
+                            value = min(labels[number, row, column] + length, most_here)
+                            if value > labels[other, row + y, column + x]:
+                                _raise(labels, changed, waiting, other, row + y, column + x, value)
+            changed[number] = 0
+            waiting[number] = False
+
+
+@njit(cache=True)
+def fastest_into(
+    run_up_m: Labels,
+    among: BoolArray,
+    box: IntArray,
+    steps_m: FloatArray,
+    lengths_m: Labels,
+    sides_m: FloatArray,
+    place_m: float,
+    slack_m: float,
+    epsilon_m: float,
+) -> int:
+    """Return the state whose next step is the fastest into a rectangle; -1 if there is none.
+
+    Args:
+        run_up_m: As in `SpeedField`.
+        among: From which places (rows, columns).
+        box: The first row and the one after the last, then columns, between which there may be one.
+        steps_m: The steps of directions (directions, 2).
+        lengths_m: Their lengths.
+        sides_m: Left, bottom, right and top of the rectangle, grown by half of the vehicle's width.
+        place_m: How far apart places are.
+        slack_m: How far inside of it a place may be that counts as outside.
+        epsilon_m: How far inside of it a step must end.
+    """
+    left, bottom, right, top = sides_m
+    _, rows, columns = run_up_m.shape
+    best, found = np.float32(-1.0), -1
+    for number in range(len(steps_m)):
+        step_x, step_y = steps_m[number]
+        for row in range(box[0], box[1]):
+            y = place_m * row
+            if not bottom + epsilon_m < y + step_y < top - epsilon_m:
+                continue
+            inwards_y = (step_y > 0.0 and y <= bottom + slack_m) or (
+                step_y < 0.0 and y >= top - slack_m
+            )
+            for column in range(box[2], box[3]):
+                own, x = run_up_m[number, row, column], place_m * column
+                if own < 0.0 or not among[row, column]:
+                    continue
+                if not left + epsilon_m < x + step_x < right - epsilon_m:
+                    continue
+                inwards = (
+                    inwards_y
+                    or (step_x > 0.0 and x <= left + slack_m)
+                    or (step_x < 0.0 and x >= right - slack_m)
+                )
+                value = own + lengths_m[number]
+                if inwards and value > best:
+                    best, found = value, (number * rows + row) * columns + column
+    return found

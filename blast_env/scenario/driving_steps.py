@@ -5,7 +5,7 @@ standstill, v^2 / 2 a. `blast_env.scenario.driving` says what it is for.
 """
 
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, lru_cache
 from itertools import product
 from math import acos, ceil, hypot, tan
 from typing import Final, NamedTuple
@@ -91,6 +91,12 @@ def wide_places(is_open: BoolArray) -> BoolArray:
         found.append((ahead | behind)[2:-2, 2:-2])
     wide: BoolArray = is_open & found[0] & found[1]
     return wide
+
+
+@lru_cache(maxsize=16)
+def arcs_up_to(radius: float) -> Arcs:
+    """Return `all_arcs().up_to(radius)`; for equal radii, the same object."""
+    return all_arcs().up_to(radius)
 
 
 @cache

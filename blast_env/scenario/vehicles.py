@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Element, Rectangle, stacked_runs, standing
 from blast_env.physics.scene import Charge, WallName
 from blast_env.scenario.catalogue import element_text
@@ -279,7 +279,9 @@ class Drive:
     @cached_property
     def speeds(self) -> SpeedField | None:
         """How fast it is where; `None` if it has no speed."""
-        return None if self.ground.source.motion is None else _speeds(self.ground, self.reach)
+        if self.ground.source.motion is None:
+            return None
+        return _speeds(self.ground, self.reach.near(*_places_shape(self.ground), STEP_M))
 
     @cached_property
     def impacts(self) -> tuple[Impact, ...]:
@@ -369,19 +371,31 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
         slow = _too_slow(slow, _free_speeds(ground))
     while True:
         reach = _reach(ground, obstacles, held, broken)
-        weak = _too_slow(slow, _speeds(ground, reach)) if slow else ()
+        weak: tuple[RatedPiece, ...] = ()
+        if slow:
+            is_open = reach.near(*_places_shape(ground), STEP_M)
+            weak = _too_slow(slow, _free_speeds(ground), is_open)
+            weak = weak and _too_slow(weak, _speeds(ground, is_open))
         if not weak:
             return Drive(ground, reach, held, broken)
         broken = (*broken, *weak)
         held, slow = (tuple(each for each in those if each not in weak) for those in (held, slow))
 
 
-def _too_slow(pieces: Iterable[RatedPiece], speeds: SpeedField) -> tuple[RatedPiece, ...]:
-    """Return the pieces that a vehicle hits faster than their crash ratings cover."""
+def _too_slow(
+    pieces: Iterable[RatedPiece], speeds: SpeedField, among: BoolArray | None = None
+) -> tuple[RatedPiece, ...]:
+    """Return the pieces that a vehicle hits faster than their crash ratings cover.
+
+    Args:
+        pieces: The pieces.
+        speeds: Its speeds.
+        among: From which places of those it hits them; from all, unless given.
+    """
     return tuple(
         each
         for each in pieces
-        if (speeds.impact_km_h(each.rectangle) or 0.0) > each.rating.speed_km_h
+        if (speeds.impact_km_h(each.rectangle, among) or 0.0) > each.rating.speed_km_h
     )
 
 
@@ -417,25 +431,35 @@ _INWARDS: Final[Mapping[WallName, tuple[int, int]]] = MappingProxyType(
 )
 
 
-def _speeds(ground: VehicleGround, reach: Reach) -> SpeedField:
-    """Work out how fast a vehicle with a speed is where it gets to."""
-    source, site = ground.source, ground.site
+def _places_shape(ground: VehicleGround) -> tuple[int, int]:
+    return places_shape(ground.site.width_m, ground.site.height_m)
+
+
+def _speeds(ground: VehicleGround, is_open: BoolArray) -> SpeedField:
+    """Work out how fast a vehicle with a speed is where it gets to; many layouts leave the same."""
+    return _speeds_on(ground, np.packbits(is_open).tobytes())
+
+
+@lru_cache(maxsize=16)
+def _speeds_on(ground: VehicleGround, bits: bytes) -> SpeedField:
+    source, shape = ground.source, _places_shape(ground)
     assert source.motion is not None
-    shape = places_shape(site.width_m, site.height_m)
+    is_open = np.unpackbits(np.frombuffer(bits, np.uint8), count=shape[0] * shape[1])
     half_m = source.width_m / 2.0
     starts = []
     for entry, side in ground.entries:
         start = np.zeros(shape, dtype=bool)
-        centres_m = entry.strip_m(site, side, source.width_m).grown(-half_m)
+        centres_m = entry.strip_m(ground.site, side, source.width_m).grown(-half_m)
         start[places_in(centres_m.grown(STEP_M / 2.0))] = True
         starts.append((start, _INWARDS[side]))
-    return SpeedField.of(source.motion, half_m, reach.near(*shape, STEP_M), starts)
+    return SpeedField.of(source.motion, half_m, is_open.reshape(shape).astype(bool), starts)
 
 
 @lru_cache(maxsize=8)
 def _free_speeds(ground: VehicleGround) -> SpeedField:
     """Work out the speeds on the site without barriers, with gates that give way."""
-    return _speeds(ground, _reach(ground, NOTHING, (), ground.rated_gates))
+    reach = _reach(ground, NOTHING, (), ground.rated_gates)
+    return _speeds(ground, reach.near(*_places_shape(ground), STEP_M))
 
 
 @lru_cache(maxsize=1024)

@@ -7,10 +7,10 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import (
     Alternatives,
+    TriangularLoads,
     bay_damages,
     fails_from,
     level_of,
-    triangular_damages,
 )
 from blast_env.response.facade import Bay, FilledBay, respond
 
@@ -61,7 +61,7 @@ def test_a_level_fails_from_where_the_damage_stops_allowing_it() -> None:
 
 def test_each_component_of_a_bay_gets_its_own_damage() -> None:
     bay = alternatives("window_annealed_6", "window_laminated_12", "brick_215")
-    (found,) = triangular_damages([bay], 30e3, 180.0)
+    (found,) = TriangularLoads([bay]).damages(30e3, 180.0)
     assert set(found.damage) == {"window_annealed_6", "window_laminated_12", "brick_215"}
     assert found.damage["window_laminated_12"] < 2.0 < found.damage["window_annealed_6"]
     assert (found.area_m2, found.glazed_m2) == pytest.approx((10.5, 2 * 1.2 * 1.5))

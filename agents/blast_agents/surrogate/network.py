@@ -14,12 +14,11 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from blast_agents.surrogate.walls import ALL_FEATURES, FEATURES, Approach, SurrogateSite
 from blast_env.arrays import FloatArray
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
-from blast_env.engines.contract import structure_response
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.physics.scene import Charge
-from blast_env.response.damage import BayDamage, triangular_damages
+from blast_env.response.damage import BayDamage
 
 IntArray = NDArray[np.int64]
 _PACKAGED: Final = Path(__file__).with_name("gas.json")
@@ -144,20 +143,16 @@ class Guess(NamedTuple):
         assert self.peak_pa is not None
         found: list[BayDamage] = []
         for column, structure in enumerate(site.protected):
-            own = [each for each in site.alternatives if each.structure == structure.name]
             peak_pa, impulse_pa_s = self.peak_pa[index, column], self.impulse_pa_s[index, column]
-            found += triangular_damages(own, float(peak_pa), float(impulse_pa_s)) if own else ()
+            found += site.bay_damages(structure.name, float(peak_pa), float(impulse_pa_s))
         return tuple(found)
 
     def _response(self, site: SurrogateSite, index: int, layout: Sequence[Element]) -> float:
-        scenario, found = site.scenario, self.bays(site, index)
-        named = scenario.named_bays(layout)
+        assert self.peak_pa is not None
+        loads = zip(self.peak_pa[index].tolist(), self.impulse_pa_s[index].tolist(), strict=True)
         return sum(
-            each.weight
-            * structure_response(
-                [bay for bay in found if bay.structure == each.name], named, scenario.objective
-            )[0]
-            for each in site.protected
+            each.weight * site.response(each.name, layout, *load)
+            for each, load in zip(site.protected, loads, strict=True)
         )
 
 

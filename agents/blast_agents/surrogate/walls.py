@@ -10,10 +10,13 @@ from blast_agents.surrogate.horizons import HORIZONS, horizons
 from blast_agents.surrogate.ways import SHARES, Ways
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.calibration import kingery_bulmash
+from blast_env.engines.contract import structure_response
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element, standing
+from blast_env.geometry import Element, Measure, standing
 from blast_env.physics.scene import Charge
+from blast_env.response.damage import BayDamage, TriangularLoads
 from blast_env.scenario import AnyStructure, Scenario
+from blast_env.scenario.facade import NamedBay
 
 _ALONG_M: Final = 1.0
 _UP_M: Final = 1.5
@@ -170,6 +173,14 @@ class SurrogateSite:
             WallPoints.on(*each, apart) for each in zip(self.protected, heights_m, strict=True)
         ]
         self._approaches: dict[Charge, tuple[Approach, ...]] = {}
+        self._triangular = {
+            each.name: TriangularLoads(
+                [bay for bay in self.alternatives if bay.structure == each.name]
+            )
+            for each in self.protected
+        }
+        self._responses: dict[tuple[str, frozenset[Element], float, float], float] = {}
+        self._named: dict[frozenset[Element], tuple[NamedBay, ...]] = {}
 
     def approaches(self, charge: Charge) -> tuple[Approach, ...]:
         """Return what comes from a charge to each protected structure on the empty site."""
@@ -177,6 +188,35 @@ class SurrogateSite:
             found = tuple(self._approach(charge, points) for points in self._points)
             self._approaches[charge] = found
         return self._approaches[charge]
+
+    def bay_damages(
+        self, structure: str, peak_pa: float, impulse_pa_s: float
+    ) -> tuple[BayDamage, ...]:
+        """Return the damage of the bays of a protected structure under one triangular load."""
+        return self._triangular[structure].damages(peak_pa, impulse_pa_s)
+
+    def response(
+        self, structure: str, layout: Sequence[Element], peak_pa: float, impulse_pa_s: float
+    ) -> float:
+        """Return what counts of the response of a protected structure to one triangular load.
+
+        Most layouts differ in what few structures get, so answers are kept.
+
+        Args:
+            structure: Its name.
+            layout: The layout, whose measures harden bays.
+            peak_pa: The peak.
+            impulse_pa_s: The impulse.
+        """
+        measures = frozenset(each for each in layout if isinstance(each, Measure))
+        asked = structure, measures, peak_pa, impulse_pa_s
+        if asked not in self._responses:
+            if measures not in self._named:
+                self._named[measures] = self.scenario.named_bays(measures)
+            bays = self.bay_damages(structure, peak_pa, impulse_pa_s)
+            objective = self.scenario.objective
+            self._responses[asked] = structure_response(bays, self._named[measures], objective)[0]
+        return self._responses[asked]
 
     def barrier(self, layout: Sequence[Element]) -> FloatArray:
         """Return left, bottom, right, top and height of what a layout sets down, m (pieces, 5).
