@@ -104,7 +104,10 @@ def propose(
     processes: int = 1,
     report: Report | None = None,
 ) -> SearchResult:
-    """Return the layout that the package proposes for a site, in seconds; see `chosen_for`.
+    """Return the layout that the package proposes for a site.
+
+    That takes seconds, but blasts for each rule, some minutes, where single modules are placed and
+    no weights were trained for the scenario; see `chosen_for`.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.

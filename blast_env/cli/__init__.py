@@ -32,7 +32,7 @@ class _Commands(LazyGroup):
             "Compare searches, rules and trained agents on the same held-out cases and seeds."
         ),
         "judge": "Play submissions to the benchmark again by gas dynamics, and show the standings.",
-        "propose": "Propose a layout for any site in a second or a few; no blast is run for it.",
+        "propose": "Propose a layout for any site, with a catalogue in seconds without a blast.",
         "report": "Report on a layout by gas dynamics: HTML that needs nothing else, and PDF.",
         "play": (
             "Place barriers by hand, with mouse and keyboard, and see what the blast makes of them."

@@ -38,13 +38,14 @@ _NOTHING: Final = "no barrier"
 
 @dataclass(frozen=True, kw_only=True)
 class ProposeCommand(ChargeOptions, ProcessOptions):
-    """Propose a layout for any site in a second or a few; no blast is run for it.
+    """Propose a layout for any site, with a catalogue in seconds without a blast.
 
     It comes from weights that were trained for the very scenario, if some come with the package; if
-    not, from the surrogate of gas dynamics, which was fitted to other sites. Where there is no
-    catalogue, of which the surrogate knows nothing, it is the best rule's layout, which takes a
-    blast of gas dynamics for each rule and threat. Without --charge it is for all places where the
-    charge may be.
+    not, from the surrogate of gas dynamics, which was fitted to other sites. That takes seconds,
+    and no blast. Where there is no catalogue, of which the surrogate knows nothing, it is the best
+    rule's layout: that takes a blast of gas dynamics for each rule and threat, some minutes, which
+    are told before; fewer with --budget. Without --charge it is for all places where the charge may
+    be.
     """
 
     scenario: str = argument(SCENARIO_HELP)
