@@ -71,7 +71,7 @@ def cost_words(costs: Sequence[CostGuess], with_films: bool = False) -> str:
     memory_gb = max(each.memory_bytes for each in costs) / 1e9
     return (
         f"{blasts} of gas: about {time_words(sum(each.seconds + drawn_s for each in costs))} on a"
-        f" free core, {memory_gb:.1f} GB"
+        f" busy core, {memory_gb:.1f} GB"
     )
 
 

@@ -1,8 +1,8 @@
 """What a blast by gas dynamics costs, told before it begins.
 
-A small model of the solver: the cells that the blast reaches, the steps until the loads are
-complete, and how many cells a core moves on in a second. docs/howto/app.md holds it against blasts
-that were run.
+A small model of the solver: the cells that the front has reached, if the charge is in the middle,
+the steps until the loads are complete, and how many cells a core moves on in a second.
+docs/howto/app.md holds it against blasts that were run.
 """
 
 from dataclasses import dataclass
@@ -10,22 +10,24 @@ from math import cbrt, ceil, prod
 from typing import Final
 
 from blast_env.errors import BlastEnvError
-from blast_env.physics.gas.settings import GasSettings
+from blast_env.physics.gas.settings import SOUND_M_S, SWING_S, WINDOW_S, GasSettings
 
 MOST_BYTES: Final = 8 * 2**30
 MOST_S: Final = 6 * 3600.0
 """Memory and time on a core beyond which a blast is refused."""
 
-_STEP_S_PER_M: Final = 0.9e-3
-"""Time step over the side of a cell, as the sound in the products allows it."""
+_STEP_S_PER_M: Final = (0.68e-3, 1.32e-3)
+"""Time step over the side of a cell: as the sound in hot products allows it, and afterwards."""
 
-_SETTLED_S: Final = 0.026
-"""How long loads come on after the front, over the cube root of the charge's mass in kg."""
+_AHEAD_M: Final = 14.0
+"""How far the front of 100 kg is ahead of sound that began with it, soon after."""
 
-_FRONT_M_S: Final = 390.0
-_CELLS_PER_S: Final = 50e6
-_BYTES_PER_CELL: Final = 26.0
-_PROCESS_BYTES: Final = 450e6
+_PARTS: Final = 100
+"""Of a run, in which what moves is counted."""
+
+_CELLS_PER_S: Final = 15e6
+_BYTES_PER_CELL: Final = 28.0
+_PROCESS_BYTES: Final = 270e6
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class CostGuess:
 
     @property
     def seconds(self) -> float:
-        """Time on a core that does nothing else; film and maps not included."""
+        """Time on a core beside a busy one, and half of it on an idle computer; without films."""
         return self.moved / _CELLS_PER_S
 
     def check(self, settings: GasSettings) -> None:
@@ -80,32 +82,38 @@ def cost_of_run(
         tnt_kg: Mass of the charge.
         far_m: How far it is from the farthest point that the run waits for.
     """
-    end_s = settings.until_s or _SETTLED_S * cbrt(tnt_kg) + far_m / _FRONT_M_S
-    cells, steps, moved, now_s = 0, 0, 0.0, 0.0
-    for k, run_m in enumerate((*settings.doubled_m, None)):
-        cell_m = 2.0**k * settings.smallest_m
-        reached_m = sides_m if run_m is None else _reached_m(sides_m, run_m)
-        there = _cells_in(reached_m, cell_m, settings)
-        cells = cells or _cells_in(sides_m, cell_m, settings)
-        until_s = end_s if run_m is None else min(run_m / _FRONT_M_S, end_s)
-        taken = ceil((until_s - now_s) / (_STEP_S_PER_M * cell_m))
-        steps, moved, now_s = steps + taken, moved + there * taken, until_s
-    return CostGuess(cells, steps, _PROCESS_BYTES + _BYTES_PER_CELL * cells, moved)
+    scale = cbrt(tnt_kg / 100.0)
+    end_s = settings.until_s or far_m / SOUND_M_S + (SWING_S + WINDOW_S) * scale
+    ahead_m, part_s, steps, moved = _AHEAD_M * scale, end_s / _PARTS, 0.0, 0.0
+    for part in range(_PARTS):
+        now_s = (part + 0.5) * part_s
+        front_m = SOUND_M_S * now_s + ahead_m
+        cell_m = settings.smallest_m * 2.0 ** sum(front_m > run_m for run_m in settings.doubled_m)
+        step_s = cell_m * _STEP_S_PER_M[now_s > settings.settled_s * scale]
+        x, y, z = _cells_in(sides_m, cell_m, settings, margin=False)
+        run = front_m / cell_m + 1.0
+        steps += part_s / step_s
+        moved += part_s / step_s * min(x, 2.0 * run) * min(y, 2.0 * run) * min(z, run)
+    cells = prod(_cells_in(sides_m, settings.smallest_m, settings, margin=True))
+    return CostGuess(cells, ceil(steps), _PROCESS_BYTES + _BYTES_PER_CELL * cells, moved)
 
 
-def _reached_m(sides_m: tuple[float, float, float], run_m: float) -> tuple[float, float, float]:
-    """Return the sides of what of a site a front has reached, if the charge is in its middle."""
-    width_m, depth_m, height_m = sides_m
-    return min(width_m, 2.0 * run_m), min(depth_m, 2.0 * run_m), min(height_m, run_m)
+def _cells_in(
+    sides_m: tuple[float, float, float], cell_m: float, settings: GasSettings, *, margin: bool
+) -> tuple[int, ...]:
+    """Return how many cells fill a site and what is around it, along x, y and z.
 
-
-def _cells_in(sides_m: tuple[float, float, float], cell_m: float, settings: GasSettings) -> int:
-    """Return how many cells fill a site and what is around it."""
+    Args:
+        sides_m: Width, depth and height of the air of the site.
+        cell_m: Side of a cell.
+        settings: How the blast is run.
+        margin: Whether those outside of all, which are not moved on, count too.
+    """
     # Here, because both import Numba, and whoever asks for the cost may never run a blast.
     from blast_env.physics.gas.grid import layers_to
     from blast_env.physics.gas.state import MARGIN
 
-    layers = layers_to(settings.border_m / cell_m)
-    around = ceil(settings.margin_m / cell_m) + layers + MARGIN
-    more = (2 * around, 2 * around, layers + 2 * MARGIN)
-    return prod(ceil(round(a / cell_m, 9)) + n for a, n in zip(sides_m, more, strict=True))
+    layers, outside = layers_to(settings.border_m / cell_m), MARGIN if margin else 0
+    around = ceil(settings.margin_m / cell_m) + layers + outside
+    more = (2 * around, 2 * around, layers + 2 * outside)
+    return tuple(ceil(round(a / cell_m, 9)) + n for a, n in zip(sides_m, more, strict=True))

@@ -26,6 +26,9 @@ from blast_env.physics.gas.probes import FaceLoads, Gauges
 from blast_env.physics.gas.settings import (
     CHECKED_CELLS,
     FACE_NAMES,
+    SOUND_M_S,
+    SWING_S,
+    WINDOW_S,
     GasSettings,
     is_complete,
     still_to_come,
@@ -42,13 +45,7 @@ from blast_env.physics.gas.tail import Tail
 from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
 
-_SOUND_M_S: Final = 340.0
-# A charge sends more than one wave: its products swing between too wide and too narrow. All times
-# are those of 100 kg, and grow with the cube root of the mass. A run ends at one of few times that
-# are the same for all layouts, so that their loads can be compared.
-_SWING_S: Final = 0.11  # after sound has come all over, in which the other waves follow
-_WINDOW_S: Final = 0.03
-_TIME_LIMIT_S: Final = 0.3  # for more windows
+_TIME_LIMIT_S: Final = 0.3  # for more windows after waves of 100 kg
 _HOTTEST: Final = 4.0  # that settled products are at most, in units of still air's temperature
 _SMALL_LOAD: Final = 0.05  # of the largest impulse: what counts at least
 
@@ -138,7 +135,7 @@ class GasRun:
         gauges = [each.position_m for each in site.gauges]
         places = [] if settings.until != "gauges" and watched else gauges
         self._waves_s = self._passed_s([*_corners_m(site, watched), *places])
-        self.tail = Tail(own, _WINDOW_S * scale, self._waves_s)
+        self.tail = Tail(own, WINDOW_S * scale, self._waves_s)
         asked = settings.until_s
         self.limit_s = self._waves_s + _TIME_LIMIT_S * scale if asked is None else asked
 
@@ -199,7 +196,7 @@ class GasRun:
         """Return when all waves of the charge have come to some places, if nothing is between."""
         x_m, y_m, _ = self.charge.position_m
         way_m = max((hypot(each[0] - x_m, each[1] - y_m) for each in places_m), default=0.0)
-        return way_m / _SOUND_M_S + _SWING_S * self._scale
+        return way_m / SOUND_M_S + SWING_S * self._scale
 
     def _are_complete(self, groups: Sequence[NDArray[np.int64]], least: float = 0.0) -> bool:
         """Return whether mean impulses on groups of faces are complete.

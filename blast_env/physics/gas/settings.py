@@ -37,6 +37,15 @@ _LARGEST_M: Final = 1.0
 CELLS: Final = (UNIFORM, *_GROWING)
 """What cells can be."""
 
+SOUND_M_S: Final = 340.0
+# A charge sends more than one wave: its products swing between too wide and too narrow. All times
+# are those of 100 kg, and grow with the cube root of the mass. A run ends at one of few times that
+# are the same for all layouts, so that their loads can be compared.
+SWING_S: Final = 0.11
+"""After sound has come all over, in which the other waves follow."""
+WINDOW_S: Final = 0.03
+"""From one such time to the next."""
+
 _MOST_REST: Final = 4.0
 """The sum of the series over what came last, at most: for a ratio of 0.8."""
 _WAITED_FOR: Final = ("structures", "walls", "gauges")
