@@ -93,7 +93,7 @@ BUILDING_COLUMNS: Final = (
     Column("building", "", "name of the building, or of the structure that is one by itself"),
     Column("parts", "", "names of its structures"),
     Column("protected", "", "whether the load of one of them counts"),
-    Column("stepped", "", "whether a wall of it is a staircase, as an oblique one is"),
+    Column("stepped", "", "whether it has an oblique wall, whose loads are along its own normal"),
     *_OF_COUNTING_WALLS,
 )
 """A row a building; its loads are means over the walls that count of all its parts."""

@@ -135,15 +135,10 @@ def _add_bays(
         share: How far the faces look along the normals of their walls, changed.
     """
     parts = {i: each for i, each in enumerate(owners) if each and _is_part(each, wall)}
-    of_building = np.isin(table.structure, list(parts)) & (table.face < len(WALLS))
-    chosen = [
-        index
-        for index in np.flatnonzero(of_building).tolist()
-        if _edge(table, index, wall) in wall.edges
-    ]
-    if not chosen:
+    of_building = np.flatnonzero(np.isin(table.structure, list(parts)) & (table.face < len(WALLS)))
+    own = of_building[[each in wall.edges for each in _edges(table, of_building, wall)]]
+    if not len(own):
         return
-    own = np.array(chosen)
     outwards = np.array([_OUTWARDS[FACE_NAMES[each]] for each in table.face[own].tolist()])
     normal = np.array(wall.normal)
     share[own] = outwards @ normal
@@ -170,11 +165,10 @@ def _is_part(structure: AnyStructure, wall: ObliqueWall) -> bool:
     return structure.building_name == wall.building
 
 
-def _edge(table: "FaceTable", index: int, wall: ObliqueWall) -> Edge:
-    """Return the side of a module that a face of a cell is on, in the plan of a building."""
-    x_m, y_m = table.centre_m[index, :2].tolist()
-    name = WALLS[table.face[index]]
-    inwards_x, inwards_y = (-0.5 * MODULE_SIDE_M * each for each in _OUTWARDS[name])
-    left_m, bottom_m = wall.corner_m
-    row = int((y_m + inwards_y - bottom_m) // MODULE_SIDE_M)
-    return Edge(row, int((x_m + inwards_x - left_m) // MODULE_SIDE_M), name)
+def _edges(table: "FaceTable", faces: NDArray[np.int64], wall: ObliqueWall) -> list[Edge]:
+    """Return the sides of modules that faces of cells are on, in the plan of a building."""
+    names = [WALLS[each] for each in table.face[faces].tolist()]
+    outwards = np.array([_OUTWARDS[each] for each in names]).reshape(-1, 2)
+    inside_m = table.centre_m[faces, :2] - 0.5 * MODULE_SIDE_M * outwards - wall.corner_m
+    columns, rows = np.floor(inside_m / MODULE_SIDE_M).astype(np.int64).T.tolist()
+    return [Edge(*each) for each in zip(rows, columns, names, strict=True)]
