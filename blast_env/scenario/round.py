@@ -52,15 +52,19 @@ class RoundSection(Section):
     centre_m: PointM
     diameter_m: Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=100.0)]
 
+    @property
+    def width_m(self) -> float:
+        """Its diameter in whole modules."""
+        return MODULE_SIDE_M * max(1, round(self.diameter_m / MODULE_SIDE_M))
+
     def parts(self, others: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Return its rectangles as tables of a file, which together weigh as much as one.
 
         Args:
             others: What is written of it beside the keys above.
         """
-        side = max(1, round(self.diameter_m / MODULE_SIDE_M))
-        rectangles, walls = disc(side)
-        corner_m = [round(each - 0.5 * side * MODULE_SIDE_M, 9) for each in self.centre_m]
+        rectangles, walls = disc(round(self.width_m / MODULE_SIDE_M))
+        corner_m = [round(each - 0.5 * self.width_m, 9) for each in self.centre_m]
         parts = []
         for number, (row, column, rows, columns) in enumerate(rectangles.tolist(), start=1):
             place = (corner_m[0] + column * MODULE_SIDE_M, corner_m[1] + row * MODULE_SIDE_M)
@@ -191,6 +195,13 @@ def _parts_of(
         section = RoundSection.model_validate(own)
     except ValidationError as error:
         return [table], (*problems, *problems_from(error, RoundSection, where))
+    x_m, y_m = section.centre_m
+    if min(x_m, y_m) < 0.5 * section.width_m:
+        message = (
+            f"is ({x_m:g}, {y_m:g}), must be at least {0.5 * section.width_m:g} from the left and"
+            " the lower border of the site"
+        )
+        problems = (*problems, Problem(f"structures[{index}].centre_m", message))
     others = {key: value for key, value in table.items() if key not in own}
     return ([table], problems) if problems else (list(section.parts(others)), ())
 

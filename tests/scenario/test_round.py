@@ -96,6 +96,7 @@ def test_measures_name_it_as_the_file_does() -> None:
     [
         ({"diameter_m": 0.2}, "structures[0].diameter_m: is 0.2, must be at least 0.5"),
         ({"centre_m": [1.0]}, "structures[0].centre_m"),
+        ({"centre_m": [0.5, 6.0]}, "structures[0].centre_m: is (0.5, 6), must be at least 1 from"),
         ({"rows": 3}, "structures[0].rows: unknown key"),
         ({"kind": "Round"}, "structures[0].kind: is 'Round', must be 'round'"),
         ({"hight_m": 3.0}, "structures[0].hight_m: unknown key, did you mean 'height_m'?"),
