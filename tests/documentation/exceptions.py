@@ -251,7 +251,7 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "python -m studies.check_sites --family item_sites --blasted 40 --random-layouts 3 --threats 1"
     " --no-rejected --picture docs/pictures/item_sites.png": (
-        "--sites 2 --blasted 2 --random-layouts 2"
+        "--sites 2 --blasted 2 --random-layouts 2 --search 1"
     ),
     "blast-env league --track known --run runs/courtyard --run runs/perimeter_gate --processes 2"
     " --out out/league": _LEAGUE,
@@ -463,6 +463,10 @@ NOT_RUN: Final[dict[str, str]] = {
     "blast-env --install-completion": "changes the shell of whoever runs it",
     "blast-env import FILE --out site.toml": "FILE is a placeholder; the page's next commands run",
     "blast-env validate FILE...": "FILE is a placeholder; docs/start.md has a file to validate",
+    "python -m studies.check_sites --family large_sites --cells coarse --sites 3 --blasted 3"
+    " --random-layouts 2 --threats 1 --no-rejected --processes 1 --search 14": (
+        "minutes a site; the page's command for item_sites runs the same, with a search"
+    ),
     "python -m studies.other_codes openfoam": "needs OpenFOAM; tests/studies/test_other_codes.py",
     "python -m studies.other_codes pyclaw --python PYTHON": (
         "needs clawpack; tests/studies/test_other_codes.py"
