@@ -50,6 +50,7 @@ from blast_env.values import path_of
 
 with render_extra():
     from matplotlib.axes import Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import EllipseCollection
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
@@ -336,6 +337,7 @@ __all__ = [
     "impulse_over_time",
     "initial_velocities",
     "model_scheme",
+    "png_of",
     "save_figure",
 ]
 
@@ -364,11 +366,25 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
             f"{path}: cannot save a figure with the suffix {path.suffix!r}, "
             f"must be one of {', '.join(FIGURE_SUFFIXES)}"
         )
-    buffer = BytesIO()  # a file that cannot be written would be left open
-    figure.savefig(buffer, format=suffix[1:], dpi=_DOTS_PER_IN)
+    if suffix == ".png":
+        content = png_of(figure, _DOTS_PER_IN)
+    else:
+        buffer = BytesIO()  # a file that cannot be written would be left open
+        figure.savefig(buffer, format=suffix[1:], dpi=_DOTS_PER_IN)
+        content = buffer.getvalue()
     with write_atomically(path) as temporary:
-        temporary.write_bytes(buffer.getbuffer())
+        temporary.write_bytes(content)
     return path
+
+
+def png_of(figure: Figure, dots_per_in: float) -> bytes:
+    """Return a figure as PNG; its own `savefig` draws everything twice to find the layout."""
+    before = figure.dpi
+    figure.set_dpi(dots_per_in)
+    buffer = BytesIO()
+    FigureCanvasAgg(figure).print_png(buffer)
+    figure.set_dpi(before)
+    return buffer.getvalue()
 
 
 def initial_velocities(parameters: SimulationParameters, count: int = 12) -> Figure:

@@ -22,6 +22,7 @@ from blast_env.plan import (
     without,
 )
 from blast_env.rendering.facade import damage_view, facade_picture
+from blast_env.rendering.figures import png_of
 from blast_env.rendering.gas import KINDS, Kind, facades
 from blast_env.rendering.ground_map import threshold_map
 from blast_env.rendering.pressure_film import record_planes, scale_end_kpa
@@ -65,9 +66,7 @@ Picture = tuple[str, bytes]
 
 def png(figure: Figure) -> bytes:
     """Return a figure as PNG."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DOTS_PER_IN)
-    return buffer.getvalue()
+    return png_of(figure, _DOTS_PER_IN)
 
 
 def _page(height_in: float) -> tuple[Figure, Axes]:
