@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import torch
 import typer
-from blast_agents.league import known_track
+from blast_agents.league import find_tracks, known_track
 from blast_agents.league.trained import TrainedRun, check_runs
 from blast_agents.rules import random_layout
 from blast_agents.search import SamplingAgent, layouts_by_rule
@@ -35,7 +35,7 @@ from blast_env.recording.parquet import read_frame
 from blast_env.runner import run_all
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, ITEM_SITES, generate_site
-from blast_env.statistics import mean_estimate, reductions
+from blast_env.statistics import Estimate, mean_estimate, reductions
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from blast_env.values import whole_number
@@ -236,13 +236,11 @@ def verdict(
     proposed = search.at_once(scenario, threat.charge)
     ms = MS_PER_S * (perf_counter() - began_s)
     case = Case(scenario, (threat,), charge=threat.charge)
-    assert search.surrogate is not None
-    bare, guessed = Guesses.of(search.surrogate, case).loads([(), proposed])
     rules = layouts_by_rule(scenario, threat.charge)
     reduction, *ruled = reductions_of(evaluator, case, [proposed, *rules.values()], processes)
     return LayoutsJudged(
         reduction=reduction,
-        promised=float(1.0 - guessed / bare),
+        promised=promise(search, proposed, case),
         rules=dict(zip(rules, ruled, strict=True)),
         ms=ms,
     )
@@ -293,6 +291,57 @@ def judge(
             rows.append(_verdict_row(scenario.name, found))
     headers = ("scenario", "surrogate", "it promised", "best rule each", "best single rule", "ms")
     print_line(markdown_table(headers, rows))
+
+
+@app.command()
+def compare(
+    surrogates: Annotated[list[Path], typer.Argument(help="What `fit` wrote; the first leads.")],
+    cases: Annotated[int, typer.Option(min=2, help="Sites of the league's item_sites.")] = 48,
+    threats: Annotated[int, typer.Option(min=1, help="Held-out threats of each.")] = 2,
+    changes: Annotated[int, typer.Option(min=0, help="Layouts that each looks at.")] = 300,
+    cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
+    processes: Processes = 2,
+) -> None:
+    """Let gas dynamics judge what surrogates propose on unseen sites, paired case by case."""
+    with user_errors():
+        searches = [LearntSearch(load_surrogate(each), changes=changes) for each in surrogates]
+        (track,) = find_tracks("item_sites", cases, threats, noisy=False)
+        found, promised = [], []
+        with progress_bar(track.title) as progress:
+            for case in track.cases:
+                evaluator = BlastEvaluator(case.scenario, "gas", cache=cache)
+                layouts = [search.at_once(case.scenario) for search in searches]
+                found.append(reductions_of(evaluator, case, layouts, processes))
+                promised.append(
+                    [promise(*each, case) for each in zip(searches, layouts, strict=True)]
+                )
+                progress(len(found) / len(track.cases))
+    percent = [*(100.0 * np.transpose(found))]
+    promises = 100.0 * np.mean(promised, axis=0)
+    rows = [
+        (
+            path.stem,
+            _interval(mean_estimate(own)),
+            f"{share:.1f} %",
+            f"{own.min():.1f} %",
+            _interval(mean_estimate(percent[0] - own)) if own is not percent[0] else "",
+        )
+        for path, own, share in zip(surrogates, percent, promises, strict=True)
+    ]
+    first = f"{surrogates[0].stem} less this"
+    headers = ("surrogate", "reduction", "it promised", "worst case", first)
+    print_line(markdown_table(headers, rows))
+
+
+def promise(search: LearntSearch, layout: Layout, case: Case) -> float:
+    """Return by which share a surrogate says that a layout lowers the load that counts."""
+    assert search.surrogate is not None
+    bare, guessed = Guesses.of(search.surrogate, case).loads([(), layout])
+    return float(1.0 - guessed / bare)
+
+
+def _interval(estimate: Estimate) -> str:
+    return f"{estimate.value:.1f} % ({estimate.low:.1f} to {estimate.high:.1f})"
 
 
 @app.command()
@@ -373,10 +422,11 @@ def reductions_of(
     evaluator: BlastEvaluator, case: Case, layouts: Sequence[Layout], processes: int
 ) -> list[float]:
     """Return by which share each layout lowers the load that counts, by gas dynamics."""
-    (threat,) = case.threats
-    loads = evaluator.loads_of_many([(each, threat) for each in ((), *layouts)], processes)
-    bare, *values = (each.load(case.scenario.objective) for each in loads)
-    return [float(each) for each in reductions(np.array(values), np.full(len(values), bare))]
+    asked = [(each, threat) for each in ((), *layouts) for threat in case.threats]
+    loads = evaluator.loads_of_many(asked, processes)
+    values = np.array([each.load(case.scenario.objective) for each in loads])
+    bare, *own = (case.combined(each) for each in values.reshape(-1, len(case.threats)))
+    return [float(each) for each in reductions(np.array(own), np.full(len(own), bare))]
 
 
 if __name__ == "__main__":

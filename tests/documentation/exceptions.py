@@ -228,6 +228,11 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "python -m studies.surrogate fit --out surrogate.json": "--epochs 1 --no-check",
     "python -m studies.surrogate_limits": "--seeds 1 --sites 4",
+    "python -m studies.surrogate fit --horizons --epochs 40 --data docs/data/site_blasts.parquet"
+    " --data docs/data/site_agent_blasts.parquet --no-check --out horizons.json": "--epochs 1",
+    "python -m studies.surrogate compare horizons.json agents/blast_agents/surrogate/gas.json": (
+        "--cases 2 --threats 1 --changes 0"
+    ),
     "blast-env league --engine gas --track item_sites --cases 48 --seeds 2 --methods best_rule"
     " --budgets 16 --surrogate surrogate.json --out out/league": (
         "--cases 1 --seeds 1 --budgets 2"
