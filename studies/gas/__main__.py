@@ -398,7 +398,8 @@ def refinement(
 
 @app.command()
 def growing(
-    length: Annotated[float, typer.Option(min=20.0, help="Of the site, m.")] = 100.0,
+    scenario: Annotated[str, typer.Option(help="In the place of a street with 500 kg.")] = "",
+    length: Annotated[float, typer.Option(min=20.0, help="Of the street, m.")] = 100.0,
     choices: Annotated[str, typer.Option(help="Sides in m, `coarse` and `fine`.")] = (
         "0.5,coarse,fine,0.25"
     ),
@@ -406,7 +407,7 @@ def growing(
 ) -> None:
     """Print what cells that grow with the blast change and cost, against the last choice."""
     with user_errors():
-        site = street(length)
+        site = load_scenario(scenario) if scenario else street(length)
         charge = draw_charge(site, 0)
         layouts = {"no barrier": (), "wall near the building": wall_near_building(site, charge)}
         engines = [engine_with(choice, until) for choice in choices.split(",")]
