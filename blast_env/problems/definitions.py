@@ -35,6 +35,9 @@ _PRACTICE_CHARGES: Final = 4
 _JUDGED_CHARGES: Final = 4
 """Places that the judge takes, others than those."""
 
+_JUDGED_UNSEEN: Final = 2
+"""The same on each of many unseen sites: more sites tell more than more places on one."""
+
 _DRAWS: Final = 16
 """Draws that find all places where there are but a few."""
 
@@ -110,7 +113,8 @@ class Definition:
         few = all(isinstance(each, PointSource) for each in scenario.charge) or bool(
             scenario.vehicles
         )
-        judged, met = (_DRAWS, _DRAWS) if few else (_JUDGED_CHARGES, _PRACTICE_CHARGES)
+        own = _JUDGED_UNSEEN if self.family == "unseen" else _JUDGED_CHARGES
+        judged, met = (_DRAWS, _DRAWS) if few else (own, _PRACTICE_CHARGES)
         threats = draw_threats(scenario, SeedRange.JUDGEMENT.seeds(0, judged))
         practice = practice_hidden(scenario, met, 1, 0)
         practice = replace(practice, threats=one_of_each_charge(practice.threats))
@@ -127,6 +131,9 @@ def _charge(threat: Threat) -> object:
 _STREETS: Final = ("control_room", "school_and_clinic", "visitor_entrance")
 _OPEN: Final = ("courtyard", "perimeter_gate", "street_junction")
 _PUBLIC_VEHICLES: Final = (5103,)
+_PUBLIC_SITES: Final = range(6100, 6115)
+"""Of the unseen family; a judge draws more of its kind with `secret_sites`."""
+
 _FACADES: Final = ("clinic_front", "guard_post", "school_wing", "ministry_kerb")
 
 
@@ -137,6 +144,7 @@ def _definitions() -> tuple[Definition, ...]:
         *(Definition(site, "hidden") for site in (*_STREETS, *_OPEN)),
         *(Definition(site, "vehicle") for site in ("hotel_forecourt", "shopping_street")),
         *(Definition(f"{_GENERATED}{seed}", "vehicle") for seed in _PUBLIC_VEHICLES),
+        *(Definition(f"{_GENERATED}{seed}", "unseen") for seed in _PUBLIC_SITES),
         *(Definition(site, "response") for site in _FACADES),
     )
 

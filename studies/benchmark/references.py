@@ -42,7 +42,8 @@ def known_layouts(definition: Definition, published: PublishedBlasts) -> dict[st
     if definition.family != "told" and path.exists():
         found["study of the scenarios"] = load_layout(path, scenario)
     if scenario.zone.items:
-        found["package"] = find_method("package")(make(definition, 0), 0)
+        for name in ("package", "surrogate"):
+            found[name] = find_method(name)(make(definition, 0), 0)
     return {name: tuple(sorted(layout)) for name, layout in found.items()}
 
 
