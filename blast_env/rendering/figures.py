@@ -382,7 +382,7 @@ def png_of(figure: Figure, dots_per_in: float) -> bytes:
     before = figure.dpi
     figure.set_dpi(dots_per_in)
     buffer = BytesIO()
-    FigureCanvasAgg(figure).print_png(buffer)
+    FigureCanvasAgg(figure).print_png(buffer)  # type: ignore[no-untyped-call]
     figure.set_dpi(before)
     return buffer.getvalue()
 
