@@ -408,6 +408,7 @@ SMALLER: Final[dict[str, str]] = {
     " --scenario shopping_street --scenario courtyard": "--repeats 1 --no-memory",
     "blast-env bench --site large": "--length 20",
     "python -m studies.gas growing --until 0.5": "--length 20 --choices coarse,0.5",
+    "python -m studies.gas growing --scenario car_park": "--choices coarse,0.5 --until 0.1",
     "python -m studies.gas refinement": "--scenario visitor_entrance --every 0.05",
     "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
     "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,
