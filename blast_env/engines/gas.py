@@ -417,9 +417,9 @@ class GasResult:
 
     def _scaled(self, index: int) -> ScaledImpulse:
         """Return the impulse on a structure, by its index into those of the site."""
-        on_walls = self._impulse_pa_s[self._walls(index)]
-        notes = self._notes(index)
-        pa_s = float(on_walls.mean()) if len(on_walls) else np.nan
+        own, notes = self._walls(index), self._notes(index)
+        share = None if self.oblique is None else self.oblique.share[own]
+        pa_s = float(np.average(self._impulse_pa_s[own], weights=share)) if len(own) else np.nan
         return ScaledImpulse(pa_s, not notes, notes)
 
     @cached_property

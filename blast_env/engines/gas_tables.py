@@ -161,15 +161,16 @@ def _add_tail(table: "pd.DataFrame") -> None:
 
 
 def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataFrame":
-    """Return impulses as means, peaks as the largest, arrivals as the first of each group."""
-    groups: Any = faces.groupby(keys, sort=False, observed=True)
+    """Return impulses as means over the area, peaks as the largest, arrivals as the first."""
     means = [each for each in map(str, faces) if each.endswith("_pa_s")]
+    weighed = faces.assign(**{each: faces[each] * faces["share"] for each in means})
+    groups: Any = weighed.groupby(keys, sort=False, observed=True)
+    table: pd.DataFrame = groups.agg({"peak_pa": "max", "arrival_s": "min"})
+    area = groups["share"].sum()
     # Of what came last a structure's are all there, or none.
-    how: Any = dict.fromkeys(means, "mean") | {"peak_pa": "max", "arrival_s": "min"}
-    table: pd.DataFrame = groups.agg(how)
+    table[means] = groups[means].sum(min_count=1).div(area, axis=0)
     _add_tail(table)
-    faces_of = groups["share"].sum() if "share" in faces else groups.size()
-    return table.assign(area_m2=faces_of * run.grid.cell_m**2).reset_index()
+    return table.assign(area_m2=area * run.grid.cell_m**2).reset_index()
 
 
 def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
@@ -179,7 +180,9 @@ def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
         run: The run.
         faces: Its `face_table`.
     """
-    table = _grouped(run, faces, ["structure", "module_id", "row", "column", "face"])
+    table = _grouped(
+        run, faces.assign(share=1.0), ["structure", "module_id", "row", "column", "face"]
+    )
     outlines = run.site.structures
     corners = {outline.name: outline.corner_m for outline in outlines}
     left, bottom = (table["structure"].map(lambda name, k=k: corners[name][k]) for k in (0, 1))
@@ -236,6 +239,20 @@ def structure_table(
     return table_of(rows, STRUCTURE_COLUMNS if buildings is None else BUILDING_COLUMNS)
 
 
+def mean_over_area(faces: "pd.DataFrame", column: str) -> float:
+    """Return the mean of a load over faces, each by its `share` of the area; NaN without any."""
+    if not len(faces):
+        return np.nan
+    return float((faces[column] * faces["share"]).sum(skipna=False) / faces["share"].sum())
+
+
+def means_by_wall(faces: "pd.DataFrame", column: str) -> "pd.Series[float]":
+    """Return the mean of a load over each wall that there is, as `mean_over_area`, by its name."""
+    groups = faces.assign(load=faces[column] * faces["share"]).groupby("face", observed=True)
+    means: pd.Series[float] = groups["load"].sum() / groups["share"].sum()
+    return means
+
+
 def _structure_row(
     run: "GasRun", faces: "pd.DataFrame", name: str, parts: Sequence[StructureOutline]
 ) -> dict[str, object]:
@@ -244,11 +261,10 @@ def _structure_row(
     counting = [(structure == each.name) & face.isin(each.faces) for each in parts]
     walls = faces[np.logical_or.reduce(counting)]
     roof = faces[structure.isin([each.name for each in parts]) & (face == ROOF)]
-    of_walls = walls.groupby("face")["positive_impulse_pa_s"].mean()
-    impulse_pa_s = walls["positive_impulse_pa_s"].mean()
-    to_come_pa_s = float(
-        still_to_come(walls["last_pa_s"].mean(skipna=False), walls["before_pa_s"].mean())
-    )
+    of_walls = means_by_wall(walls, "positive_impulse_pa_s")
+    impulse_pa_s = mean_over_area(walls, "positive_impulse_pa_s")
+    last_pa_s, before_pa_s = (mean_over_area(walls, f"{each}_pa_s") for each in ("last", "before"))
+    to_come_pa_s = float(still_to_come(last_pa_s, before_pa_s))
     return {
         "structure": name,
         "building": name,
@@ -259,8 +275,8 @@ def _structure_row(
         "faces": " ".join(wall for wall in WALLS if any(wall in each.faces for each in parts)),
         "area_m2": walls["share"].sum() * run.grid.cell_m**2,
         "positive_impulse_pa_s": impulse_pa_s,
-        "first_impulse_pa_s": walls["first_impulse_pa_s"].mean(),
-        "negative_impulse_pa_s": walls["negative_impulse_pa_s"].mean(),
+        "first_impulse_pa_s": mean_over_area(walls, "first_impulse_pa_s"),
+        "negative_impulse_pa_s": mean_over_area(walls, "negative_impulse_pa_s"),
         "peak_pa": walls["peak_pa"].max(),
         "arrival_s": walls["arrival_s"].min(),
         "to_come_pa_s": to_come_pa_s,

@@ -28,6 +28,7 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.engines.bays import LOADED_BAY_COLUMNS, BayTail, bay_rows
 from blast_env.engines.contract import Engine
+from blast_env.engines.gas_tables import means_by_wall
 from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout
@@ -442,10 +443,12 @@ def neighbours_of(scenario: Scenario, result: "GasResult", charge: Charge) -> li
         own = walls[walls["structure"].isin([each.name for each in parts])]
         if not len(own):
             continue
-        means = own.groupby("face", observed=True)[["positive_impulse_pa_s", "peak_pa"]].mean()
-        wall = str(means["positive_impulse_pa_s"].idxmax())
-        peak = side_on_peak_pa(means["peak_pa"][[wall]].to_numpy())
-        impulse = side_on_impulse_pa_s(means["positive_impulse_pa_s"][[wall]].to_numpy())
+        impulses, peaks = (
+            means_by_wall(own, each) for each in ("positive_impulse_pa_s", "peak_pa")
+        )
+        wall = str(impulses.idxmax())
+        peak = side_on_peak_pa(np.array([peaks[wall]]))
+        impulse = side_on_impulse_pa_s(np.array([impulses[wall]]))
         probability = {
             damage: building_damage_probability(damage, peak, impulse).item()
             for damage in BuildingDamage

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.engines.gas import NOT_COMPLETE, GasBlast, GasResult
+from blast_env.engines.gas_tables import mean_over_area, means_by_wall
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.gas.probes import ARRIVAL_PA
@@ -242,12 +243,12 @@ class MeasuredBlast:
         return tuple(dict.fromkeys(notes))
 
     def _load(self, target: ReportedBuilding, walls: pd.DataFrame) -> TargetLoad:
-        by_wall = walls.groupby("face", observed=True)["positive_impulse_pa_s"].mean()
+        by_wall = means_by_wall(walls, "positive_impulse_pa_s")
         wall = next(each for each in WALLS if each == by_wall.idxmax())
         arrivals = walls["arrival_s"].to_numpy()
         return TargetLoad(
             target=target.name,
-            impulse_pa_s=float(walls["positive_impulse_pa_s"].mean()),
+            impulse_pa_s=mean_over_area(walls, "positive_impulse_pa_s"),
             first_impulse_pa_s=float(walls["first_impulse_pa_s"].mean()),
             peak_pa=float(walls["peak_pa"].max()),
             arrival_s=float(np.nanmin(arrivals)) if np.isfinite(arrivals).any() else float("nan"),

@@ -10,6 +10,7 @@ import pytest
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import draw_threats
 from blast_env.evaluation.consequences import consequences
+from blast_env.physics.scene import WALLS
 from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
 from blast_env.scenario.staircase import STEPPED, oblique_walls, stepped_buildings
 from blast_env.units import MODULE_SIDE_M
@@ -121,6 +122,21 @@ def test_momentum_along_the_normal_is_kept(turned: GasResult) -> None:
         (share * oblique.along_normals(raw))[own].sum(), rel=1e-12
     )
     assert (oblique.along_normals(raw)[~own] == raw[~own]).all()
+
+
+def test_means_are_over_the_area_of_the_real_walls(turned: GasResult) -> None:
+    """Load times area is the momentum, on straight walls beside oblique ones, too."""
+    oblique = turned.oblique
+    assert oblique is not None
+    is_wall = turned.faces["face"].isin(WALLS).to_numpy()
+    raw = turned.run.loads.positive_impulse_pa_s
+    momentum = 0.25 * (oblique.share * raw)[is_wall].sum()
+    for table in (turned.structures, turned.walls[turned.walls["counts"]], turned.buildings):
+        load, area = table["positive_impulse_pa_s"], table["area_m2"]
+        assert (load * area).sum() == pytest.approx(momentum, rel=1e-12)
+    loads = {each.name: each.impulse_pa_s for each in turned.loads().structures}
+    told = turned.structures.set_index("structure")["positive_impulse_pa_s"]
+    assert loads == pytest.approx(told.to_dict())
 
 
 def test_steps_of_a_bay_have_one_history(turned: GasResult) -> None:
