@@ -73,6 +73,7 @@ class JudgeCommand(ProcessOptions, CacheOptions):
 
     def __call__(self) -> None:
         """Judge, and print the table."""
+        find_engine(JUDGE, self.cell_m)  # refuses what it cannot judge with before methods run
         if self.out is not None:
             make_folder(self.out)
         submitted = [_submission(path) for path in self.submissions]

@@ -116,8 +116,8 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
     ) -> "Contest":
         from blast_agents.league import Contest, standard_entries
 
-        budgets = _numbers("--budgets", self.budgets)
-        agent_budgets = _numbers("--agent-search", self.agent_search)
+        budgets = _budgets("--budgets", self.budgets)
+        agent_budgets = _budgets("--agent-search", self.agent_search)
         methods = [*_names(self.methods), *self._own_methods()]
         entries = standard_entries((case.scenario for case in track.cases), methods, budgets)
         if self.first_engine is not None:
@@ -189,15 +189,16 @@ def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def _numbers(flag: str, text: str) -> list[int]:
-    """Return the numbers of a list with commas.
+def _budgets(flag: str, text: str) -> list[int]:
+    """Return the budgets of a list with commas.
 
     Raises:
-        BlastEnvError: If one is no whole number.
+        BlastEnvError: If one is no whole number from 1 on, or is there twice.
     """
-    try:
-        return [int(number) for number in _names(text)]
-    except ValueError:
+    names = _names(text)
+    if any(not name.isdecimal() or int(name) < 1 for name in names) or len(set(names)) < len(names):
         raise BlastEnvError(
-            f"{flag} is {text!r}, must be whole numbers with commas between, e.g. 50,200"
-        ) from None
+            f"{flag} is {text!r}, must be different whole numbers from 1 on with commas between, "
+            "e.g. 50,200"
+        )
+    return [int(name) for name in names]

@@ -91,6 +91,16 @@ def test_a_surrogate_enters_by_itself_as_a_search_and_behind_an_agent(
     assert "none.json: there is no such file" in " ".join(result.output.split())
 
 
+@pytest.mark.parametrize("text", ["0", "-3", "50,50", "a", "1.5"])
+@pytest.mark.parametrize("flag", ["--budgets", "--agent-search"])
+def test_budgets_that_are_none(flag: str, text: str, tmp_path: Path) -> None:
+    site = ("--scenario", scenario_file(tmp_path), "--out", tmp_path / "out")
+    result = league(*SMALL, *site, f"{flag}={text}")
+    assert result.exit_code == 2
+    expected = f"{flag} is {text!r}, must be different whole numbers from 1 on with commas between"
+    assert expected in " ".join(result.output.split())
+
+
 def test_called_again_it_has_nothing_left_to_simulate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -141,8 +151,7 @@ def test_an_agent_for_none_of_the_tracks_is_refused(run: Path, tmp_path: Path) -
     [
         (("--track", "knwon"), "did you mean 'known'"),
         (("--methods", "genetik"), "did you mean 'genetic'"),
-        (("--budgets", "50;200"), "must be whole numbers with commas"),
-        (("--budgets", "0"), "budget is 0 blasts"),
+        (("--budgets", "50;200"), "must be different whole numbers from 1 on with commas"),
         (("--cases", "0"), "cases is 0"),
         (("--scenario", "cortyard"), "did you mean 'courtyard'"),
         (("--engine", "evnt"), "did you mean 'event'"),

@@ -173,3 +173,19 @@ def test_a_folder_goes_on_with_runs_of_the_same_method_only(tmp_path: Path) -> N
 def test_what_was_found_with_any_budget_is_shown() -> None:
     _, table = standings_tables([judged(run(13, 7))])
     assert [row[:2] for row in table.rows if row[0] == "own"] == [("own", "7")]
+
+
+def test_cells_that_the_judge_does_not_have_are_refused_before_a_method_runs(
+    tmp_path: Path,
+) -> None:
+    method = f"{__name__}:never_asked"
+    entry = ["judge", "--method", method, "--cell", "1.0", "--out", str(tmp_path / "entry")]
+    result = CliRunner().invoke(app, entry)
+    assert result.exit_code == 2
+    assert "cell_m is 1, must be 0.5 m, the side of a module, divided by" in result.output
+    assert not (tmp_path / "entry").exists()
+
+
+def never_asked(problem: BenchmarkProblem, seed: int) -> Layout:
+    """Fail where a method runs that should not."""
+    raise AssertionError(f"{problem.name}, {seed}")
