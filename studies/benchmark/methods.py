@@ -1,10 +1,12 @@
 """Methods of other libraries on the benchmark: each asks for a layout, and is told its share.
 
-The libraries are no dependencies: `pip install optuna nevergrad botorch` for those that are run.
+The libraries are no dependencies: `pip install optuna nevergrad botorch smac` for those that run.
 """
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -74,6 +76,35 @@ def nevergrad_ngopt(problem: BenchmarkProblem, seed: int, value: Value) -> None:
         optimizer.tell(asked, value(np.asarray(asked.value)))
 
 
+def _never_run(config: object, seed: int = 0) -> float:
+    """Stand for the function that SMAC wants to be given; it is asked and told instead."""
+    raise BlastEnvError(f"{config}, {seed}: nothing is run by SMAC itself")
+
+
+def smac_forest(problem: BenchmarkProblem, seed: int, value: Value) -> None:
+    """SMAC's Bayesian optimisation with a random forest, as it comes."""
+    from ConfigSpace import ConfigurationSpace, Float
+    from smac import HyperparameterOptimizationFacade, Scenario
+    from smac.runhistory.dataclasses import TrialValue
+
+    names = [f"key_{index:03}" for index in range(problem.space.keys)]
+    space = ConfigurationSpace(seed=seed)
+    space.add([Float(name, (0.0, 1.0)) for name in names])
+    with TemporaryDirectory() as folder:
+        settings = Scenario(
+            space,
+            n_trials=problem.budget,
+            deterministic=True,
+            seed=seed,
+            output_directory=Path(folder),
+        )
+        smac = HyperparameterOptimizationFacade(settings, _never_run, logging_level=False)
+        while True:
+            trial = smac.ask()
+            keys = np.array([trial.config[name] for name in names])
+            smac.tell(trial, TrialValue(cost=value(keys)))
+
+
 def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
     """Bayesian optimisation in a trust region (TuRBO's) with BoTorch: GP, Thompson samples."""
     import torch
@@ -136,6 +167,7 @@ _SEARCHES: Final[Mapping[str, Any]] = MappingProxyType(
     {
         "optuna_tpe": optuna_tpe,
         "nevergrad_ngopt": nevergrad_ngopt,
+        "smac_forest": smac_forest,
         "botorch_turbo": botorch_turbo,
         "annealing_on_keys": annealing_on_keys,
     }
