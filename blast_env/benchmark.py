@@ -29,6 +29,7 @@ from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # Numba takes half a second to import
     from blast_env.engines.gas import GasEngine
+    from blast_env.physics.gas.cost import CostGuess
 
 ENV_ID: Final = "BlastBarrier-v0"
 
@@ -176,48 +177,44 @@ def street(length_m: float) -> Scenario:
 
 @dataclass(frozen=True)
 class SiteCost:
-    """What a blast on a street of some length costs.
+    """What a blast by gas dynamics on a site costs, without a barrier, and what was told before.
 
     Attributes:
-        length_m: Length of the site.
-        cells: Its cells, for people.
-        count: The smallest cells that there are, those around the site included.
+        site: Name of the scenario.
+        cells: How its cells grow.
+        told: What was told before it began.
         steps: Steps.
         cell_updates: Cells moved on; a step counts as two.
-        told_s: What was told before.
         cpu_s: Processor time, from scenario to loads.
         memory_mb: Peak memory of the process.
     """
 
-    length_m: float
+    site: str
     cells: str
-    count: int
+    told: "CostGuess"
     steps: int
     cell_updates: int
-    told_s: float
     cpu_s: float
     memory_mb: float
 
 
-def site_cost(length_m: float, engine: "GasEngine") -> SiteCost:
-    """Run a blast on a street of some length, in a process of its own."""
+def site_cost(scenario: Scenario, engine: "GasEngine") -> SiteCost:
+    """Run a blast on a site, in a process of its own."""
     with get_context("spawn").Pool(1) as pool:
-        return pool.apply(_site_cost, (length_m, engine))
+        return pool.apply(_site_cost, (scenario, engine))
 
 
-def _site_cost(length_m: float, engine: "GasEngine") -> SiteCost:
+def _site_cost(scenario: Scenario, engine: "GasEngine") -> SiteCost:
     engine.blast(street(_SHORTEST_M)).run()  # compiles what is not on disk yet
     began = process_time()
-    result = engine.blast(street(length_m)).run()
+    result = engine.blast(scenario).run()
     cpu_s = process_time() - began
-    solver, told = result.run.solver, result.run.told
     return SiteCost(
-        length_m=length_m,
-        cells=engine.cell_words,
-        count=told.cells,
+        site=scenario.name,
+        cells=engine.cells,
+        told=result.run.told,
         steps=result.steps,
-        cell_updates=solver.cell_updates,
-        told_s=told.seconds,
+        cell_updates=result.run.solver.cell_updates,
         cpu_s=cpu_s,
         memory_mb=own_memory_mb(),
     )

@@ -97,18 +97,31 @@ def test_a_street_keeps_its_proportions() -> None:
     assert heavy_kg == pytest.approx(8.0 * light_kg)
 
 
-def test_the_cost_of_a_large_site_is_that_of_its_blast() -> None:
-    cost = site_cost(20.0, GasEngine())
-    assert (cost.length_m, cost.cells) == (20.0, "cells of 0.5 m")
+def test_the_cost_of_a_site_is_that_of_its_blast_and_what_was_told() -> None:
+    engine, scenario = GasEngine(), street(20.0)
+    cost = site_cost(scenario, engine)
+    assert (cost.site, cost.cells) == ("street_20_m", "uniform")
     assert 1e-6 * cost.cell_updates / cost.cpu_s > 1.0
     assert 100.0 < cost.memory_mb < 1000.0
-    assert 0.2 < cost.told_s / (cost.cell_updates / 2.0 / 50e6) < 5.0
+    assert cost.told == engine.cost(scenario, draw_charge(scenario, 0))
+    assert 0.5 < cost.told.steps / cost.steps < 2.0
+
+
+def test_the_command_prints_a_row_for_each_site_and_way_of_growing() -> None:
+    own = ("--site", "large", "--length", "20", "--site", "visitor_entrance")
+    result = CliRunner().invoke(app, ["bench", *own, "--cells", "coarse"])
+    assert result.exit_code == 0, result.output
+    rows = [line.split()[:2] for line in result.output.splitlines()]
+    assert ["street_20_m", "coarse"] in rows
+    assert ["visitor_entrance", "coarse"] in rows
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--site", "small"), "--site is 'small', must be 'large'"),
+        (("--site", "small"), "small: is 'small', there is no such bundled scenario"),
+        (("--cells", "fine"), "--cells needs --site"),
+        (("--site", "large", "--cells", "big"), "cells is 'big', must be"),
         (("--site", "large", "--length", "2"), "--length is 2, must be 20 to 200"),
         (("--length", "50"), "--length needs --site large"),
     ],

@@ -1,6 +1,6 @@
 """`blast-env bench`: how fast blasts and the environment are on this machine."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,11 +11,12 @@ from blast_env.benchmark import (
     environment_cost,
     hardware,
     site_cost,
+    street,
 )
 from blast_env.cli.command import Command, option
 from blast_env.cli.output import ResultTable, print_line, print_table, progress_bar, result_console
 from blast_env.engines import ENGINE_NAMES, find_engine
-from blast_env.errors import BlastEnvError, value_text
+from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.settings import CELLS, UNIFORM
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.units import MS_PER_S
@@ -42,13 +43,15 @@ _ENVIRONMENT_HEADERS: Final = (
 )
 
 _SITE_HEADERS: Final = (
-    "length (m)",
+    "site",
     "cells",
     "smallest",
+    "steps told",
     "steps",
+    "CPU told (s)",
     "CPU (s)",
-    "told (s)",
     "million cell updates per CPU s",
+    "memory told (MB)",
     "memory (MB)",
 )
 _LARGE: Final = "large"
@@ -76,8 +79,13 @@ class BenchCommand(Command):
     processes: int = option(2, "Processes that run blasts at once; 1: do not time them.", min=1)
     memory: bool = option(True, "Also measure the memory of a process that runs a blast.")
     environment: bool = option(True, "Also time `BlastBarrier-v0`.")
-    site: str | None = option(
-        None, "large: how the cost of gas dynamics grows with the site, and nothing else."
+    site: tuple[str, ...] = option(
+        (),
+        "What a blast by gas dynamics costs there, and what is told before, and nothing else: a "
+        "scenario, or `large` for streets; may be given several times.",
+    )
+    cells: tuple[str, ...] = option(
+        (), "With --site: how cells grow; may be given several times; else each way."
     )
     length_m: tuple[float, ...] = option(
         (),
@@ -86,11 +94,13 @@ class BenchCommand(Command):
 
     def __call__(self) -> None:
         """Print the tables."""
-        if self.site is not None:
+        if self.length_m and _LARGE not in self.site:
+            raise BlastEnvError("--length needs --site large")
+        if self.site:
             self._print_sites()
             return
-        if self.length_m:
-            raise BlastEnvError("--length needs --site large")
+        if self.cells:
+            raise BlastEnvError("--cells needs --site")
         scenarios = [load_scenario(each) for each in self.scenario or ("courtyard",)]
         engines = [find_engine(each).name for each in self.engine or ENGINE_NAMES]
         print_line(hardware())
@@ -106,35 +116,41 @@ class BenchCommand(Command):
         if self.environment:
             self._print_environments(pairs)
 
+    def _sites(self) -> Iterator[Scenario]:
+        for name in self.site:
+            if name != _LARGE:
+                yield load_scenario(name)
+                continue
+            for length_m in self.length_m or _LENGTHS_M:
+                if not _LENGTHS_M[0] <= length_m <= _LONGEST_M:
+                    bounds = f"{_LENGTHS_M[0]:g} to {_LONGEST_M:g}"
+                    raise BlastEnvError(f"--length is {length_m:g}, must be {bounds}")
+                yield street(length_m)
+
     def _print_sites(self) -> None:
-        if self.site != _LARGE:
-            raise BlastEnvError(f"--site is {value_text(self.site)}, must be {_LARGE!r}")
-        lengths_m = self.length_m or _LENGTHS_M
-        for length_m in lengths_m:
-            if not _LENGTHS_M[0] <= length_m <= _LONGEST_M:
-                bounds = f"{_LENGTHS_M[0]:g} to {_LONGEST_M:g}"
-                raise BlastEnvError(f"--length is {length_m:g}, must be {bounds}")
         from blast_env.engines.gas import GasEngine  # Numba takes half a second to import
 
-        print_line(hardware())
         pairs = [
-            (length_m, GasEngine(cells=cells))
-            for length_m in lengths_m
-            for cells in CELLS
-            if cells != UNIFORM or length_m <= _LONGEST_UNIFORM_M
+            (scenario, GasEngine(cells=cells))
+            for scenario in self._sites()
+            for cells in self.cells or CELLS
+            if cells != UNIFORM or scenario.site.width_m <= _LONGEST_UNIFORM_M
         ]
-        table = ResultTable("a blast on a street, by its length", _SITE_HEADERS, 2)
+        print_line(hardware())
+        table = ResultTable("a blast by gas dynamics, without a barrier", _SITE_HEADERS, 2)
         with progress_bar("blasts") as progress:
-            for done, (length_m, engine) in enumerate(pairs):
-                each = site_cost(length_m, engine)
+            for done, (scenario, engine) in enumerate(pairs):
+                each = site_cost(scenario, engine)
                 table.add_row(
-                    f"{each.length_m:g}",
+                    each.site,
                     each.cells,
-                    f"{each.count:,}",
+                    f"{each.told.cells:,}",
+                    f"{each.told.steps:,}",
                     f"{each.steps:,}",
+                    f"{each.told.seconds:.1f}",
                     f"{each.cpu_s:.1f}",
-                    f"{each.told_s:.1f}",
                     f"{1e-6 * each.cell_updates / each.cpu_s:.1f}",
+                    f"{1e-6 * each.told.memory_bytes:.0f}",
                     f"{each.memory_mb:.0f}",
                 )
                 progress((done + 1) / len(pairs))
