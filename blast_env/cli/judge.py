@@ -71,6 +71,12 @@ class JudgeCommand(ProcessOptions, CacheOptions):
 
     page: Path | None = option(None, "Write the standings as a page: .md.", writes=(".md",))
 
+    def how_to_resume(self) -> str:
+        """Return how to go on after Ctrl-C: with the runs that are written, if they are."""
+        kept = super().how_to_resume()
+        through = "the same command goes on with the runs that are through"
+        return kept if self.out is None or self.method is None else f"{through}; {kept}"
+
     def __call__(self) -> None:
         """Judge, and print the table."""
         find_engine(JUDGE, self.cell_m)  # refuses what it cannot judge with before methods run

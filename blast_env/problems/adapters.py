@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from blast_env.arrays import FloatArray
 from blast_env.errors import MissingExtraError
 from blast_env.problems.problem import BenchmarkProblem
 
@@ -84,11 +85,14 @@ def mcbo_task(problem: BenchmarkProblem) -> Any:
             return problem.name
 
         def evaluate(self, x: Any) -> Any:
-            return np.array([[problem.evaluate(self._layout(row))] for _, row in x.iterrows()])
+            layouts = [problem.space.from_keys(self.keys(row)) for _, row in x.iterrows()]
+            return np.array([[problem.evaluate(layout)] for layout in layouts])
 
-        def _layout(self, row: Any) -> Any:
-            keys = [(int(each) + 0.5) / sizes[index % 3] for index, each in enumerate(row)]
-            return problem.space.from_keys(keys)
+        def keys(self, row: Any) -> FloatArray:
+            """Return the random keys of a row of its search space."""
+            return np.array(
+                [(int(each) + 0.5) / sizes[index % 3] for index, each in enumerate(row)]
+            )
 
         def get_search_space_params(self) -> list[dict[str, Any]]:
             params: list[dict[str, Any]] = []

@@ -1,6 +1,8 @@
 """Methods of other libraries on the benchmark: each asks for a layout, and is told its share.
 
 The libraries are no dependencies: `pip install optuna nevergrad botorch smac` for those that run.
+MCBO wants an environment of its own: its folder from huawei-noah/HEBO on the path, and `pip install
+"gpytorch<1.9" "pandas<3" disjoint_set`.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,6 +19,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BudgetError
 from blast_env.geometry import Layout
 from blast_env.problems import BenchmarkProblem, Method
+from blast_env.problems.adapters import mcbo_task
 
 _REPEATS: Final = 200
 """Questions without a new blast after which a method is through."""
@@ -150,6 +153,20 @@ def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
         values = torch.cat([values, torch.tensor([[found]], dtype=torch.float64)])
 
 
+def mcbo_casmopolitan(problem: BenchmarkProblem, seed: int, value: Value) -> None:
+    """MCBO's Casmopolitan: what stands is nominal, where is whole numbers; in a trust region."""
+    from mcbo.optimizers.bo_builder import BO_ALGOS
+    from mcbo.utils.general_utils import set_random_seed
+
+    set_random_seed(seed)
+    task = mcbo_task(problem)
+    first = max(problem.budget // 5, 4)
+    bo = BO_ALGOS["Casmopolitan"].build_bo(task.get_search_space(), n_init=first)
+    while True:
+        asked = bo.suggest(1)
+        bo.observe(asked, np.array([[value(task.keys(asked.iloc[0]))]]))
+
+
 def annealing_on_keys(problem: BenchmarkProblem, seed: int, value: Value) -> None:
     """Plain Python: simulated annealing on the keys, a few of them drawn anew at a time."""
     rng = np.random.default_rng(seed)
@@ -169,6 +186,7 @@ _SEARCHES: Final[Mapping[str, Any]] = MappingProxyType(
         "nevergrad_ngopt": nevergrad_ngopt,
         "smac_forest": smac_forest,
         "botorch_turbo": botorch_turbo,
+        "mcbo_casmopolitan": mcbo_casmopolitan,
         "annealing_on_keys": annealing_on_keys,
     }
 )
