@@ -4,6 +4,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Annotated
 
+import numpy as np
 import typer
 from blast_agents.benchmark import find_method, reference_of
 from pydantic import TypeAdapter
@@ -23,12 +24,15 @@ from blast_env.problems import (
     make,
     play,
 )
-from blast_env.problems.references import cell_key
+from blast_env.problems.references import cell_key, stored_references
+from blast_env.statistics import mean_estimate
+from blast_env.tables import markdown_table
 from studies.benchmark.methods import OUTSIDE
 from studies.benchmark.references import known_layouts, published_before, submitted_layouts
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 _STORED = Path("blast_env/problems/data/references.json")
+_CELL = cell_key(0.5)
 _REFERENCES = TypeAdapter(dict[str, ScoreReference])
 
 
@@ -61,14 +65,36 @@ def references(
             more = known_layouts(definition, published) | found.get(name, {})
             if stored:
                 more = {stored.best.method: stored.best.layout} | more
-            known[name] = reference_of(definition, evaluator, more, cell_key(0.5))
+            known[name] = reference_of(definition, evaluator, more, _CELL)
             best, rule = known[name].best, known[name].rule
             print_line(
-                f"{name}: {rule.method} {rule.shares['0.5']:.3f}, {best.method} "
-                f"{best.shares['0.5']:.3f}, {evaluator.blasts} blasts"
+                f"{name}: {rule.method} {rule.shares[_CELL]:.3f}, {best.method} "
+                f"{best.shares[_CELL]:.3f}, {evaluator.blasts} blasts"
             )
             with write_atomically(out) as temporary:
                 temporary.write_bytes(_REFERENCES.dump_json(dict(sorted(known.items()))) + b"\n")
+
+
+@app.command()
+def headroom() -> None:
+    """Print by family how far the best layouts known are ahead of each problem's best rule.
+
+    That bounds from below what any method can gain, and with a search behind the layouts it is what
+    a method without a blast would have to find at once.
+    """
+    shares: dict[str, list[tuple[float, float]]] = {}
+    for name, each in stored_references().items():
+        rule, best = (100.0 * (1.0 - of.shares[_CELL]) for of in (each.rule, each.best))
+        shares.setdefault(DEFINITIONS[name].family, []).append((rule, best))
+    rows = []
+    for family, found in shares.items():
+        rules, best = np.array(found).T
+        points = mean_estimate(best - rules)
+        ahead = f"{points.value:.1f} ({points.low:.1f} to {points.high:.1f})"
+        more = f"{int((best > rules).sum())} of {len(found)}"
+        rows.append((family, f"{rules.mean():.1f}", f"{best.mean():.1f}", ahead, more))
+    headers = ("family", "best rule takes off (%)", "best known (%)", "points more", "problems")
+    print_line(markdown_table(headers, rows))
 
 
 @app.command("play")
