@@ -17,7 +17,7 @@ from blast_agents.search import (
     layouts_by_rule,
     proposers,
 )
-from blast_agents.search.methods import every_layout
+from blast_agents.search.methods import AnnealingSearch, WinnersSearch, every_layout
 from blast_agents.surrogate import LearntSearch
 
 from blast_env.errors import BlastEnvError, UnknownNameError
@@ -26,6 +26,7 @@ from blast_env.evaluation.cases import practice_hidden
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, Placement, Scenario
 from tests.agents.search_cases import WatchedEvaluator, ballistic, small_problem, small_scenario
+from tests.engines.shade import ShadeEngine
 
 ALL_BLASTS = 598
 DRAWN = ("random", "greedy", "annealing", "winners", "genetic", "nsga2")
@@ -330,3 +331,17 @@ def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
         )
         better_pa_s.append(drawn - genetic)
     assert sum(better_pa_s) > 0.0
+
+
+@pytest.mark.parametrize("share", [0.5, 0.0])
+def test_annealing_takes_what_is_far_better_and_ends_where_nothing_is_left(share: float) -> None:
+    """However cold it is; a wall that leaves nothing cannot be bettered, nor is it a scale."""
+    evaluator = BlastEvaluator(small_scenario(), ShadeEngine(share=share))
+    problem = small_problem(evaluator, realisations=1)
+    for search in (
+        AnnealingSearch(draw=lambda _, __: (), hot=1e-4, cold=1e-5),
+        WinnersSearch(draw=lambda _, __: (), hot=1e-4, cold=1e-5),
+    ):
+        result = search.propose(problem, 60, 0)
+        assert problem.load(result.layout) <= 0.5 ** len(result.layout) * problem.load(())
+        assert len(result.layout) > 1 or share == 0.0

@@ -154,14 +154,13 @@ class AnnealingSearch(Search):
         best = int(np.argmin(loads))
         layout, load = starts[best], float(loads[best])
         moves, cooling = Moves(scenario), Cooling(session, load, self.hot, self.cold)
-        while True:
+        while load > 0.0:
             temperature = cooling.temperature
             neighbour = moves.neighbour(layout, rng)
             (neighbour_load,) = session.assess([neighbour]).tolist()
             worse = neighbour_load - load
-            # Metropolis; never when all is cold.
-            likelihood = exp(-worse / temperature) if temperature > 0.0 else 0.0
-            if worse <= 0.0 or rng.random() < likelihood:
+            # Metropolis
+            if worse <= 0.0 or rng.random() < exp(-worse / temperature):
                 layout, load = neighbour, neighbour_load
 
 
@@ -237,7 +236,7 @@ class WinnersSearch(Search):
         moves, rng, exchanged = Moves(session.problem.scenario), session.rng, 0
         loads = session.assess(layouts)
         cooling = Cooling(session, float(loads.min()), self.hot, self.cold)
-        while True:
+        while loads.min() > 0.0:
             share, temperature = cooling.share, cooling.temperature
             neighbours = [moves.neighbour(layout, rng) for layout in layouts]
             worse = session.assess(neighbours) - loads
