@@ -298,13 +298,18 @@ def compare(
     surrogates: Annotated[list[Path], typer.Argument(help="What `fit` wrote; the first leads.")],
     cases: Annotated[int, typer.Option(min=2, help="Sites of the league's item_sites.")] = 48,
     threats: Annotated[int, typer.Option(min=1, help="Held-out threats of each.")] = 2,
-    changes: Annotated[int, typer.Option(min=0, help="Layouts that each looks at.")] = 300,
+    changes: Annotated[
+        list[int] | None, typer.Option(min=0, help="Layouts that each looks at; else 300.")
+    ] = None,
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
     processes: Processes = 2,
 ) -> None:
     """Let gas dynamics judge what surrogates propose on unseen sites, paired case by case."""
     with user_errors():
-        searches = [LearntSearch(load_surrogate(each), changes=changes) for each in surrogates]
+        loaded = [(path.stem, load_surrogate(path)) for path in surrogates]
+        pairs = [(*each, most) for each in loaded for most in changes or (300,)]
+        names = [f"{stem}, {most:,} changes" for stem, _, most in pairs]
+        searches = [LearntSearch(each, changes=most) for _, each, most in pairs]
         (track,) = find_tracks("item_sites", cases, threats, noisy=False)
         found, promised = [], []
         with progress_bar(track.title) as progress:
@@ -320,15 +325,15 @@ def compare(
     promises = 100.0 * np.mean(promised, axis=0)
     rows = [
         (
-            path.stem,
+            name,
             _interval(mean_estimate(own)),
             f"{share:.1f} %",
             f"{own.min():.1f} %",
             _interval(mean_estimate(percent[0] - own)) if own is not percent[0] else "",
         )
-        for path, own, share in zip(surrogates, percent, promises, strict=True)
+        for name, own, share in zip(names, percent, promises, strict=True)
     ]
-    first = f"{surrogates[0].stem} less this"
+    first = f"{names[0]}, less this"
     headers = ("surrogate", "reduction", "it promised", "worst case", first)
     print_line(markdown_table(headers, rows))
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
-from math import dist
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Final
 
@@ -46,7 +45,7 @@ from blast_env.physics.gas.settings import (
     FACE_NAMES,
     GasSettings,
 )
-from blast_env.physics.scene import WALLS, BlastSite
+from blast_env.physics.scene import WALLS, BlastSite, Charge
 from blast_env.provenance import versions
 from blast_env.response.damage import BayDamage
 from blast_env.response.facade import peak_factor
@@ -58,7 +57,7 @@ from blast_env.scenario import (
     VehicleCharge,
     find_scenario,
 )
-from blast_env.scenario.build_scene import build_site, draw_threat
+from blast_env.scenario.build_scene import build_site, draw_threat, outlines
 from blast_env.scenario.staircase import STEPPED, stepped_buildings
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.tables import table_of
@@ -92,7 +91,7 @@ class GasEngine(GasSettings, Engine):
     shown: ClassVar[str] = "blast_env.cli.simulate:ShownGas"
 
     name: str = "gas"
-    version: str = f"gas 4 (numba {version('numba')})"
+    version: str = f"gas 5 (numba {version('numba')})"
 
     def start_on(self, site: BlastSite, recorders: "Recorders" = lambda _: ()) -> "GasRun":
         """Return a run at time 0, independent of every other run.
@@ -121,23 +120,16 @@ class GasEngine(GasSettings, Engine):
 
     def cost(self, scenario: Scenario, charge: AnyCharge) -> CostGuess:
         """Return what a blast costs, about; nothing is built for it."""
-        site = scenario.site
-        sides_m = (site.width_m, site.height_m, scenario.air_height_m)
         if isinstance(charge, VehicleCharge):
-            tnt_kg, place_m = charge.source.tnt_kg, source_bounds_m(charge.source).centre
-        else:
-            tnt_kg, place_m = charge.tnt_kg, charge.position_m
-        protected = [each for each in scenario.structures if each.protected] or scenario.structures
-        far_m = max(
-            (
-                dist(place_m, (x_m, y_m))
-                for box in (each.rectangle_m for each in protected)
-                for x_m in (box.left, box.right)
-                for y_m in (box.bottom, box.top)
-            ),
-            default=dist((0.0, 0.0), sides_m[:2]),
+            source = charge.source
+            charge = Charge(source_bounds_m(source).centre, source.tnt_kg)
+        site = BlastSite(
+            site_m=scenario.site.rectangle_m,
+            charge=charge,
+            structures=outlines(scenario),
+            air_height_m=scenario.air_height_m,
         )
-        return cost_of_run(self, sides_m, tnt_kg, far_m)
+        return cost_of_run(self, site)
 
     @property
     def words(self) -> str:

@@ -124,9 +124,10 @@ class Block(NamedTuple):
 class StructureOutline:
     """What a structure is before any blast, in metres; attributes as in `ModularObstacle`.
 
-    Four more are for gas dynamics: `height_m`, `None` for as high as the air; `base_m`, where it
+    Five more are for gas dynamics: `height_m`, `None` for as high as the air; `base_m`, where it
     begins above the ground; `heights_m`, the heights of single cells, in the order of `cells`,
-    where they are not all `height_m`; and `faces`, the walls whose load counts.
+    where they are not all `height_m`; `faces`, the walls whose load counts; and `is_lasting`,
+    whether it stands with every layout.
     """
 
     kind: type[ModularObstacle]
@@ -143,6 +144,7 @@ class StructureOutline:
     heights_m: tuple[float | None, ...] | None = None
     pieces: tuple[str, ...] | None = None
     base_m: float = 0.0
+    is_lasting: bool = True
 
     @property
     def rectangle_m(self) -> Rectangle:

@@ -1,6 +1,6 @@
 """From a scenario to the site of one blast, and for particles to its scene."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -136,7 +136,7 @@ def build_site(
         _check_clear(scenario.with_charge(charge), placement)
     drawn = draw_threat(scenario, seed) if charge is None else charge
     charge = charge_against(scenario, placement.layout, drawn)
-    structures = tuple(map(_outline, scenario.structures_with(placement.layout)))
+    structures = outlines(scenario, placement.layout)
     barrier = standing(placement.layout)
     if barrier:
         structures += (barrier_outline(scenario.zone, barrier),)
@@ -253,7 +253,17 @@ def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]
     return rectangles
 
 
-def _outline(section: AnyStructure) -> StructureOutline:
+def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[StructureOutline, ...]:
+    """Return the outlines of the structures that are still there with a layout."""
+    zone = scenario.build_zone
+    may_go = frozenset() if zone is None else zone.may_be_taken_away
+    return tuple(
+        _outline(each, is_lasting=each.name not in may_go)
+        for each in scenario.structures_with(layout)
+    )
+
+
+def _outline(section: AnyStructure, *, is_lasting: bool) -> StructureOutline:
     is_square = isinstance(section, ConcreteSquareSection)
     return StructureOutline(
         kind=ConcreteSquare if is_square else ModularObstacle,
@@ -268,6 +278,7 @@ def _outline(section: AnyStructure) -> StructureOutline:
         height_m=section.height_m,
         faces=section.faces,
         base_m=section.base_m,
+        is_lasting=is_lasting,
     )
 
 

@@ -184,6 +184,11 @@ class BuildZone(Section):
         return frozenset(name for names in own for name in names)
 
     @property
+    def may_be_taken_away(self) -> frozenset[str]:
+        """The names of the structures that some layouts take away."""
+        return frozenset(name for each in self.removable for name in each.structures)
+
+    @property
     def highest_m(self) -> float | None:
         """Height of the highest barrier; `None` is as high as the air."""
         return max(item.height_m for item in self.items) if self.items else self.height_m

@@ -10,7 +10,9 @@ from math import cbrt, ceil, prod
 from typing import Final
 
 from blast_env.errors import BlastEnvError
-from blast_env.physics.gas.settings import SOUND_M_S, SWING_S, WINDOW_S, GasSettings
+from blast_env.physics.gas.settings import SOUND_M_S, WINDOW_S, GasSettings
+from blast_env.physics.gas.waves import watched_structures, waves_of
+from blast_env.physics.scene import BlastSite
 
 MOST_BYTES: Final = 8 * 2**30
 MOST_S: Final = 6 * 3600.0
@@ -21,6 +23,9 @@ _STEP_S_PER_M: Final = (0.68e-3, 1.32e-3)
 
 _AHEAD_M: Final = 14.0
 """How far the front of 100 kg is ahead of sound that began with it, soon after."""
+
+_ECHOES: Final = 2.5
+"""How many pauses between late echoes a run lasts on."""
 
 _PARTS: Final = 100
 """Of a run, in which what moves is counted."""
@@ -71,20 +76,20 @@ class CostGuess:
             )
 
 
-def cost_of_run(
-    settings: GasSettings, sides_m: tuple[float, float, float], tnt_kg: float, far_m: float
-) -> CostGuess:
+def cost_of_run(settings: GasSettings, site: BlastSite) -> CostGuess:
     """Return what a blast by gas dynamics costs, about; nothing is built for it.
 
     Args:
         settings: How it is run.
-        sides_m: Width, depth and height of the air of the site.
-        tnt_kg: Mass of the charge.
-        far_m: How far it is from the farthest point that the run waits for.
+        site: What stands where.
     """
-    scale = cbrt(tnt_kg / 100.0)
-    end_s = settings.until_s or far_m / SOUND_M_S + (SWING_S + WINDOW_S) * scale
-    ahead_m, part_s, steps, moved = _AHEAD_M * scale, end_s / _PARTS, 0.0, 0.0
+    scale = cbrt(site.charge.tnt_kg / 100.0)
+    waves = waves_of(site, watched_structures(site, settings.until))
+    end_s = waves.passed_s + WINDOW_S * scale + _ECHOES * waves.pause_s
+    part_s, ahead_m = (settings.until_s or end_s) / _PARTS, _AHEAD_M * scale
+    left_m, bottom_m, right_m, top_m = site.site_m
+    sides_m = (right_m - left_m, top_m - bottom_m, site.air_height_m)
+    steps, moved = 0.0, 0.0
     for part in range(_PARTS):
         now_s = (part + 0.5) * part_s
         front_m = SOUND_M_S * now_s + ahead_m

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
-from blast_env.physics.gas.cost import CostGuess, cost_of_run
+from blast_env.physics.gas.cost import cost_of_run
 from blast_env.physics.gas.doubling import DoublingSolver, shape_to_double
 from blast_env.physics.gas.faces import Faces, exposed_faces
 from blast_env.physics.gas.grid import GasGrid, layers_to
@@ -26,8 +26,6 @@ from blast_env.physics.gas.probes import FaceLoads, Gauges
 from blast_env.physics.gas.settings import (
     CHECKED_CELLS,
     FACE_NAMES,
-    SOUND_M_S,
-    SWING_S,
     WINDOW_S,
     GasSettings,
     is_complete,
@@ -42,10 +40,12 @@ from blast_env.physics.gas.source import (
     set_charge,
 )
 from blast_env.physics.gas.tail import Tail
+from blast_env.physics.gas.waves import corners_m, passed_after_s, watched_structures, waves_of
 from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
 
 _TIME_LIMIT_S: Final = 0.3  # for more windows after waves of 100 kg
+_MOST_ECHOES: Final = 5  # between facing walls, after that
 _HOTTEST: Final = 4.0  # that settled products are at most, in units of still air's temperature
 _SMALL_LOAD: Final = 0.05  # of the largest impulse: what counts at least
 
@@ -103,8 +103,8 @@ class GasRun:
         self, settings: GasSettings, site: BlastSite, recorders: Recorders = _none
     ) -> None:
         self.settings, self.site = settings, site
-        watched = _watched(site, settings.until)
-        self.told = _cost(settings, site, watched)
+        watched = watched_structures(site, settings.until)
+        self.told = cost_of_run(settings, site)
         self.told.check(settings)
         self.grid = _grid(settings, site)
         self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
@@ -134,10 +134,11 @@ class GasRun:
         self._groups = _groups(self.table, site, settings.until, watched)
         gauges = [each.position_m for each in site.gauges]
         places = [] if settings.until != "gauges" and watched else gauges
-        self._waves_s = self._passed_s([*_corners_m(site, watched), *places])
-        self.tail = Tail(own, WINDOW_S * scale, self._waves_s)
-        asked = settings.until_s
-        self.limit_s = self._waves_s + _TIME_LIMIT_S * scale if asked is None else asked
+        waves = waves_of(site, watched, places)
+        self._waves_s = waves.passed_s
+        self.tail = Tail(own, WINDOW_S * scale, waves.passed_s, waves.pause_s)
+        asked, most_s = settings.until_s, _TIME_LIMIT_S * scale + _MOST_ECHOES * waves.pause_s
+        self.limit_s = self._waves_s + most_s if asked is None else asked
 
     @property
     def time_s(self) -> float:
@@ -177,7 +178,7 @@ class GasRun:
 
     def has_passed(self, index: int) -> bool:
         """Return whether all waves of the charge have come to a structure, by its index."""
-        return self.solver.time_s >= self._passed_s(_corners_m(self.site, [index]))
+        return self.solver.time_s >= passed_after_s(self.site, corners_m(self.site, [index]))
 
     def is_complete(self, faces: NDArray[np.int64], index: int) -> bool:
         """Return whether the mean impulse on some faces of a structure is complete."""
@@ -188,15 +189,9 @@ class GasRun:
         """About what is still to come at each gauge (n,); NaN if not all waves have come to it."""
         if self.gauges is None:
             return np.empty(0)
-        passed_s = [self._passed_s([each.position_m]) for each in self.site.gauges]
+        passed_s = [passed_after_s(self.site, [each.position_m]) for each in self.site.gauges]
         to_come = still_to_come(*self.tail.came_pa_s(1))
         return np.where(self.solver.time_s >= np.array(passed_s), to_come, np.nan)
-
-    def _passed_s(self, places_m: Sequence[tuple[float, ...]]) -> float:
-        """Return when all waves of the charge have come to some places, if nothing is between."""
-        x_m, y_m, _ = self.charge.position_m
-        way_m = max((hypot(each[0] - x_m, each[1] - y_m) for each in places_m), default=0.0)
-        return way_m / SOUND_M_S + SWING_S * self._scale
 
     def _are_complete(self, groups: Sequence[NDArray[np.int64]], least: float = 0.0) -> bool:
         """Return whether mean impulses on groups of faces are complete.
@@ -240,15 +235,6 @@ class GasRun:
                 "take smaller cells"
             )
         return tuple(notes)
-
-
-def _cost(settings: GasSettings, site: BlastSite, watched: Sequence[int]) -> CostGuess:
-    """Return what a run costs, about."""
-    left, bottom, right, top = site.site_m
-    x_m, y_m = site.charge.position_m
-    ways_m = [hypot(x - x_m, y - y_m) for x, y in _corners_m(site, watched)]
-    sides_m = (right - left, top - bottom, site.air_height_m)
-    return cost_of_run(settings, sides_m, site.charge.tnt_kg, max(ways_m, default=0.0))
 
 
 def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
@@ -338,13 +324,6 @@ def _face_table(grid: GasGrid, site: BlastSite) -> FaceTable:
     return FaceTable(faces, structure, row, column, face, faces.centres_m(grid))
 
 
-def _watched(site: BlastSite, until: str | float) -> list[int]:
-    """Return the structures that a run waits for: those protected, or else all but the barrier."""
-    structures = [k for k, outline in enumerate(site.structures) if outline.cells is None]
-    protected = [k for k in structures if site.structures[k].protected]
-    return structures if until == "walls" else protected or structures
-
-
 def _groups(
     table: FaceTable, site: BlastSite, until: str | float, watched: Sequence[int]
 ) -> list[NDArray[np.int64]]:
@@ -365,16 +344,6 @@ def _faces_of(table: FaceTable, site: BlastSite, index: int) -> NDArray[np.int64
     counting = [FACE_NAMES.index(name) for name in site.structures[index].faces]
     chosen = own & np.isin(table.face, counting)
     return np.flatnonzero(chosen if chosen.any() else own)
-
-
-def _corners_m(site: BlastSite, structures: Sequence[int]) -> list[tuple[float, float]]:
-    """Return the corners of some structures in plan."""
-    return [
-        (x, y)
-        for left, bottom, right, top in (site.structures[k].rectangle_m for k in structures)
-        for x in (left, right)
-        for y in (bottom, top)
-    ]
 
 
 def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:
