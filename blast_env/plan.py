@@ -38,6 +38,7 @@ from blast_env.scenario.build_scene import (
 from blast_env.scenario.driving import WayPoint
 from blast_env.scenario.reach import squares_of
 from blast_env.scenario.sections import PointM, buildings_of
+from blast_env.scenario.terraces import ground_below_m, is_open_below
 from blast_env.scenario.vehicles import Impact
 from blast_env.scenario.worst_places import nearest_point_m
 from blast_env.units import MODULE_SIDE_M
@@ -162,6 +163,13 @@ class Kinds:
         2.2,
         Look(_WAY, 1.8, arrows=True, drawn_dashed=True, cad_colour=5),
     )
+    TERRACE: Final = FeatureKind(
+        "terrace",
+        "terrace that carries barriers",
+        1.3,
+        Look(STRUCTURE, 1.6, fill=STRUCTURE, opacity=0.15, cad_colour=34),
+        named="inside",
+    )
     TAKEN_AWAY: Final = FeatureKind(
         "taken_away",
         "structure that is taken away",
@@ -206,7 +214,7 @@ class Kinds:
     CHARGE: Final = FeatureKind("charge", "charge", 5.0, Look(EXPLOSIVE, 2.2, cad_colour=1))
 
 
-STANDING: Final = (Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE, Kinds.BARRIER)
+STANDING: Final = (Kinds.TERRACE, Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE, Kinds.BARRIER)
 """What stands on the ground and has a height."""
 
 SITE_KINDS: Final = tuple(each for each in vars(Kinds).values() if isinstance(each, FeatureKind))
@@ -232,6 +240,7 @@ class Feature:
         words: What legends call it, where that is more than its kind.
         label: What pictures write beside it.
         fill: The colour of its area, where things of its kind differ.
+        is_raised: Whether there is air below it.
     """
 
     kind: FeatureKind
@@ -241,14 +250,13 @@ class Feature:
     words: str = ""
     label: str = ""
     fill: Colour | None = None
+    is_raised: bool = False
 
     @property
     def look(self) -> Look:
-        """How it looks: as its kind does, with dashes if it begins above the ground."""
+        """How it looks: as its kind does, with dashes if there is air below it."""
         look = self.kind.look
-        return (
-            replace(look, dashed=True, drawn_dashed=True) if "base_m" in self.properties else look
-        )
+        return replace(look, dashed=True, drawn_dashed=True) if self.is_raised else look
 
     @property
     def title(self) -> str:
@@ -288,7 +296,7 @@ def site_features(
     found = [area_feature(Kinds.SITE, scenario.site.rectangle_m, scenario.name)]
     if zone is not None:
         found += zone_features(zone, [each.rectangle_m for each in there])
-        found += barrier_features(zone, layout)
+        found += barrier_features(scenario, layout)
     found += structure_features(there)
     found += (
         area_feature(Kinds.TAKEN_AWAY, each.rectangle_m, each.name, **_said_of(each))
@@ -428,31 +436,45 @@ def item_words(zone: BuildZone, layout: Sequence[Element]) -> Mapping[str, str]:
     }
 
 
-def barrier_features(zone: BuildZone, layout: Sequence[Element]) -> Iterator[Feature]:
-    """Yield the modules of a layout, or its pieces as wholes, with the names of the tables."""
+def barrier_features(scenario: Scenario, layout: Sequence[Element]) -> Iterator[Feature]:
+    """Yield the modules of a layout, or its pieces as wholes, with the names of the tables.
+
+    What stands on a terrace has the height of its top above the ground, and its `base_m`.
+    """
+    zone = scenario.zone
     colours, words = item_colours(zone), item_words(zone, layout)
     if zone.items:
         items = {item.name: item for item in zone.items}
         for piece in standing(layout):
             assert isinstance(piece, Piece)
             item = items[piece.item]
+            rectangle_m = zone.element_rectangle_m(piece)
             feature = area_feature(
                 Kinds.BARRIER,
-                zone.element_rectangle_m(piece),
+                rectangle_m,
                 zone.piece_name(piece),
                 **piece._asdict(),
-                height_m=item.height_m,
+                **_ends_of(scenario, rectangle_m, item.height_m),
                 unit_cost=item.cost,
                 stops_vehicles=item.stops_vehicles,
             )
             yield replace(feature, fill=colours[piece.item], words=words[piece.item])
         return
-    height = {} if zone.height_m is None else {"height_m": zone.height_m}
-    for part in barrier_outline(zone, tuple(layout)).build().parts:
+    for part in barrier_outline(scenario, tuple(layout)).build().parts:
         rectangle_m = zone.element_rectangle_m((part.row, part.column))
+        ends = _ends_of(scenario, rectangle_m, zone.height_m)
         cell = {"row": part.row, "column": part.column}
-        feature = area_feature(Kinds.BARRIER, rectangle_m, part.module_id, **cell, **height)
+        feature = area_feature(Kinds.BARRIER, rectangle_m, part.module_id, **cell, **ends)
         yield replace(feature, fill=colours[""], words=words[""])
+
+
+def _ends_of(
+    scenario: Scenario, rectangle_m: Rectangle, height_m: float | None
+) -> dict[str, float]:
+    """Return where a barrier ends above the ground and, on a terrace, where it begins."""
+    base_m = ground_below_m(scenario.structures, rectangle_m)
+    top = {} if height_m is None else {"height_m": base_m + height_m}
+    return {**top, "base_m": base_m} if base_m else top
 
 
 # Structures and charges.
@@ -460,15 +482,19 @@ def barrier_features(zone: BuildZone, layout: Sequence[Element]) -> Iterator[Fea
 
 def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
     """Yield the structures; of a building in several parts the largest one has the label."""
+    structures = tuple(structures)
     for name, parts in buildings_of(structures).items():
         largest = max(parts, key=lambda each: each.rows * each.columns)
         heights = [each.height_m for each in parts if each.height_m is not None]
         label = f"{name}\n{max(heights):g} m" if len(heights) == len(parts) else name
         for part in parts:
-            kind = Kinds.PROTECTED_STRUCTURE if part.protected else Kinds.STRUCTURE
+            kind = Kinds.TERRACE if part.carries else Kinds.STRUCTURE
+            kind = Kinds.PROTECTED_STRUCTURE if part.protected else kind
             outline = area_feature(kind, part.rectangle_m, part.name, **_said_of(part))
-            words = f"{kind.words} above the ground" if part.base_m > 0.0 else ""
-            yield replace(outline, label=label if part is largest else "", words=words)
+            is_raised = is_open_below(part, structures)
+            words = f"{kind.words} above the ground" if is_raised else ""
+            label_here = label if part is largest else ""
+            yield replace(outline, label=label_here, words=words, is_raised=is_raised)
 
 
 def _said_of(structure: AnyStructure) -> dict[str, str | float]:

@@ -19,6 +19,7 @@ from blast_env.physics.scene import WALLS
 from blast_env.physics.structure import module_name
 from blast_env.response.barriers import PieceResponses, RigidPiece, piece_responses
 from blast_env.scenario import Scenario
+from blast_env.scenario.terraces import ground_below_m
 from blast_env.scenario.zone import BuildZone
 from blast_env.tables import Column, table_of
 from blast_env.units import MODULE_SIDE_M
@@ -113,7 +114,7 @@ class PieceLoads:
                 owner[cell] = index
         table = run.table
         barrier = next(k for k, each in enumerate(run.site.structures) if each.cells is not None)
-        ways = tuple(_ways(zone, elements, run.grid.cell_m))
+        ways = tuple(_ways(scenario, elements, run.grid.cell_m))
         pushed = np.zeros((len(elements), len(WALLS)), dtype=bool)
         for way in ways:
             pushed[way.piece, way.low : way.low + 2] = True
@@ -234,15 +235,17 @@ class PieceLoads:
         }
 
 
-def _ways(zone: BuildZone, elements: Sequence[Element], cell_m: float) -> list[_Way]:
+def _ways(scenario: Scenario, elements: Sequence[Element], cell_m: float) -> list[_Way]:
     """Return along which axes pieces are pushed: across their length, square ones along both."""
-    west, south = WALLS.index("west"), WALLS.index("south")
+    zone, west, south = scenario.zone, WALLS.index("west"), WALLS.index("south")
     cells_a_module = round(MODULE_SIDE_M / cell_m)
     ways = []
     for index, element in enumerate(elements):
         variant = zone.catalogue.variant(element)
         assert variant.height_m is not None
-        layers = int(np.ceil(round(variant.height_m / cell_m - 0.5, 9)))
+        base_m = ground_below_m(scenario.structures, zone.element_rectangle_m(element))
+        ends = np.array([base_m, base_m + variant.height_m]) / cell_m
+        layers = int(np.diff(np.ceil(np.round(ends - 0.5, 9)))[0])
         if variant.rows >= variant.columns:
             ways.append(_Way(index, west, layers * variant.rows * cells_a_module))
         if variant.columns >= variant.rows:

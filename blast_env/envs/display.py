@@ -65,6 +65,9 @@ def _map(
     y, x = (up[:, np.newaxis] + 0.5) * MODULE_SIDE_M, (right + 0.5) * MODULE_SIDE_M
     characters = np.full((rows, columns), " ")
     zone, free, taken = scenario.zone, placement.open_ground, set(placement.cells)
+    for structure in scenario.structures:
+        if structure.carries:
+            characters[_inside(structure.rectangle_m, x, y)] = "S"
     for cell in zone.cells():
         sign = "M" if cell in taken else "." if free[cell] else "x"
         characters[_inside(zone.cell_rectangle_m(cell), x, y)] = sign
@@ -73,8 +76,9 @@ def _map(
         near = distances_m(source, (x, y, x, y)) <= scenario.charge_radius_m
         characters[near] = "*" if known else "~"
     for structure in scenario.structures:
-        sign = "P" if structure.protected else "S"
-        characters[_inside(structure.rectangle_m, x, y)] = sign
+        if not structure.carries:
+            sign = "P" if structure.protected else "S"
+            characters[_inside(structure.rectangle_m, x, y)] = sign
     return characters
 
 

@@ -28,6 +28,7 @@ from blast_env.scenario import (
 from blast_env.scenario.build_scene import vehicle_reach, worst_places
 from blast_env.scenario.reach import squares_of
 from blast_env.scenario.sections import PointM
+from blast_env.scenario.terraces import is_open_below
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 
@@ -585,7 +586,9 @@ def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane,
     weights = [structure.weight for structure in scenario.structures if structure.protected]
     for structure in scenario.structures:
         covered = grid.rectangle(structure.rectangle_m)
-        heights += np.float32(height_share(structure.height_m)) * covered
+        below = 0.0 if is_open_below(structure, scenario.structures) else structure.base_m
+        rise = height_share(structure.height_m) - height_share(below)  # on top of a terrace
+        heights += np.float32(rise) * covered
         if structure.protected:
             protected += np.float32(structure.weight / max(weights)) * covered
         else:

@@ -48,10 +48,9 @@ class LayoutPlan:
     @property
     def modules(self) -> tuple[ModularPart, ...]:
         """The modules, in the order of the layout, with the names that the blast's tables have."""
-        zone = self.scenario.build_zone
-        if zone is None:
+        if self.scenario.build_zone is None:
             return ()
-        return tuple(barrier_outline(zone, self.layout).build().parts)
+        return tuple(barrier_outline(self.scenario, self.layout).build().parts)
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:

@@ -340,8 +340,10 @@ def _barrier_texts(feature: Feature) -> list[str]:
     """Return what is said of a module or piece: its name, and for a piece its item and height."""
     if "item" not in feature.properties:
         return [feature.name]
-    height = f"{feature.properties['height_m']:g}"
-    return [feature.name, f"item={feature.properties['item']}", f"height_m={height}"]
+    top_m, base_m = (feature.properties.get(key, 0.0) for key in ("height_m", "base_m"))
+    assert isinstance(top_m, float)
+    assert isinstance(base_m, float)
+    return [feature.name, f"item={feature.properties['item']}", f"height_m={top_m - base_m:g}"]
 
 
 def _write(space: Modelspace, text: Text) -> None:

@@ -198,6 +198,8 @@ def _structures(building: FittedBuilding) -> list[dict[str, Any]]:
             part["height_m"] = building.height_m
         if building.base_m:
             part["base_m"] = building.base_m
+        if building.carries:
+            part["carries"] = True
         parts.append(part)
     return parts
 

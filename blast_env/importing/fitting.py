@@ -53,6 +53,7 @@ class FittedBuilding:
         height_m: Its height; `None` for as high as the air.
         base_m: How high it begins above the ground.
         protected: Whether its load counts.
+        carries: Whether it is a terrace.
         deviation: How far the modules are from the outline.
         block_m: Side of the blocks it was cut into; a module's side, unless that takes too many
             rectangles.
@@ -68,6 +69,7 @@ class FittedBuilding:
     height_m: float | None
     base_m: float
     protected: bool
+    carries: bool
     deviation: Deviation
     block_m: float
     is_cut: bool
@@ -105,10 +107,12 @@ def fit_buildings(
     kept, notes = _kept(site, options)
     if not kept:
         raise BlastEnvError(f"{site.path}: there is no building on the site{_hint(site)}")
-    kept = sorted(kept, key=lambda each: -each.geometry.area)
-    outlines = [each.geometry for each in kept]
-    owner = owners(outlines, site.shape)
-    cut = [_cut(site, index, thing, owner, options) for index, thing in enumerate(kept)]
+    kept = sorted(kept, key=lambda each: (each.carries, -each.geometry.area))
+    cut = []
+    for carries in (False, True):  # a building on a terrace takes no ground from it
+        level = [each for each in kept if each.carries == carries]
+        owner = owners([each.geometry for each in level], site.shape)
+        cut += [_cut(site, index, thing, owner, options) for index, thing in enumerate(level)]
     count = sum(len(rectangles) for rectangles, _ in cut)
     if count > MOST_STRUCTURES:
         raise _too_many(site, f"the buildings take {count} rectangles, must take")
@@ -126,6 +130,7 @@ def fit_buildings(
             height_m=height_m,
             base_m=_base_m(thing, height_m),
             protected=thing.protected,
+            carries=thing.carries,
             deviation=Deviation.between(thing.geometry, outline_of(rectangles)),
             block_m=block * MODULE_SIDE_M,
             is_cut=_touches_border(thing.geometry, site),
@@ -339,7 +344,8 @@ def _wall_areas(
     height = np.zeros((shape[0] + 2, shape[1] + 2), dtype=np.float32)
     for rectangles, top_m in zip(parts, tops_m, strict=True):
         for each in rectangles:
-            height[1:-1, 1:-1][each.cells] = top_m
+            here = height[1:-1, 1:-1][each.cells]
+            np.maximum(here, top_m, out=here)
     shares = []
     for rectangles, top_m in zip(parts, tops_m, strict=True):
         areas = np.array([_open_m2(each, top_m, height) for each in rectangles])

@@ -45,6 +45,7 @@ class Thing:
         tnt_kg: Mass of a charge there, where the source has it.
         part_of: The building that it is a rectangle of, in what blast-env itself wrote.
         diameter_m: Of a point that is a round building: a silo, a tank, a column.
+        carries: Whether it is a terrace in what blast-env itself wrote.
     """
 
     role: Role
@@ -57,6 +58,7 @@ class Thing:
     part_of: str = ""
     base_m: float = 0.0
     diameter_m: float | None = None
+    carries: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,13 +102,14 @@ class Selector:
 Selectors = Mapping[Role, tuple[Selector, ...]]
 """What the user chose, by role; what is not in it is found by the usual tags."""
 
-_OWN_STRUCTURES: Final = ("structure", "protected_structure")
+_OWN_STRUCTURES: Final = ("structure", "protected_structure", "terrace")
 
 _KINDS: Final[Mapping[str, Role]] = MappingProxyType(
     {
         "site": Role.SITE,
         "structure": Role.BUILDING,
         "protected_structure": Role.BUILDING,
+        "terrace": Role.BUILDING,
         "build_zone": Role.ZONE,
         "keep_out": Role.KEEP_OUT,
         "charge_place": Role.CHARGE,
@@ -203,6 +206,7 @@ def _thing(feature: MapFeature, role: Role, height_m: float | None) -> Thing:
         height_m=height_m,
         protected=own == "protected_structure" or tags.get("protected") in (True, "yes", "true"),
         part_of=str(tags.get("building", "")) if own in _OWN_STRUCTURES else "",
+        carries=own == "terrace" and height_m is not None,
         tnt_kg=float(tnt_kg) if isinstance(tnt_kg, int | float) and tnt_kg > 0.0 else None,
     )
 

@@ -112,21 +112,23 @@ class Block(NamedTuple):
     Attributes:
         name: Its name; empty for a single module.
         rectangle_m: Its plan.
-        height_m: Its height; `None` is as high as the air.
+        height_m: Height of its top; `None` is as high as the air.
+        base_m: Where it begins above the ground.
     """
 
     name: str
     rectangle_m: Rectangle
     height_m: float | None
+    base_m: float
 
 
 @dataclass(frozen=True)
 class StructureOutline:
     """What a structure is before any blast, in metres; attributes as in `ModularObstacle`.
 
-    Five more are for gas dynamics: `height_m`, `None` for as high as the air; `base_m`, where it
-    begins above the ground; `heights_m`, the heights of single cells, in the order of `cells`,
-    where they are not all `height_m`; `faces`, the walls whose load counts; and `is_lasting`,
+    Six more are for gas dynamics: `height_m`, of its top, `None` for as high as the air; `base_m`,
+    where it begins above the ground; `heights_m` and `bases_m`, the same of single cells, in the
+    order of `cells`, where they differ; `faces`, the walls whose load counts; and `is_lasting`,
     whether it stands with every layout.
     """
 
@@ -144,6 +146,7 @@ class StructureOutline:
     heights_m: tuple[float | None, ...] | None = None
     pieces: tuple[str, ...] | None = None
     base_m: float = 0.0
+    bases_m: tuple[float, ...] | None = None
     is_lasting: bool = True
 
     @property
@@ -163,18 +166,19 @@ class StructureOutline:
     def blocks(self) -> tuple[Block, ...]:
         """The whole structure; of a barrier its pieces, or its modules where it has none."""
         if self.cells is None:
-            return (Block(self.name, self.rectangle_m, self.height_m),)
+            return (Block(self.name, self.rectangle_m, self.height_m, self.base_m),)
         count = len(self.cells)
         heights_m = self.heights_m or (self.height_m,) * count
+        bases_m = self.bases_m or (self.base_m,) * count
         pieces = self.pieces or ("",) * count
-        groups: dict[str | Cell, list[tuple[Cell, float | None]]] = {}
-        for cell, piece, height_m in zip(self.cells, pieces, heights_m, strict=True):
-            groups.setdefault(piece or cell, []).append((cell, height_m))
+        groups: dict[str | Cell, list[tuple[Cell, float | None, float]]] = {}
+        for cell, piece, top_m, base_m in zip(self.cells, pieces, heights_m, bases_m, strict=True):
+            groups.setdefault(piece or cell, []).append((cell, top_m, base_m))
         return tuple(
             Block(
                 key if isinstance(key, str) else "",
-                self._around_m([cell for cell, _ in group]),
-                group[0][1],
+                self._around_m([cell for cell, *_ in group]),
+                *group[0][1:],
             )
             for key, group in groups.items()
         )

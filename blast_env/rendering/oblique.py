@@ -15,7 +15,8 @@ from blast_env.plan import INK, STANDING, Feature, Kinds, site_features, vehicle
 from blast_env.rendering.site_plan import draw_features
 from blast_env.rendering.style import nice_floor, render_extra, unit_interval
 from blast_env.scenario import Scenario
-from blast_env.scenario.zone import TOLERANCE_M, source_bounds_m
+from blast_env.scenario.boxes import TOLERANCE_M
+from blast_env.scenario.zone import source_bounds_m
 
 with render_extra():
     from matplotlib.axes import Axes

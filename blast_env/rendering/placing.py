@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.engines import Blast, BlastResult
+from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Element, Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.plan import (
@@ -56,7 +57,7 @@ class PlacingPainter:
         self._has_vehicles = any(isinstance(source, VehicleSource) for source in sources)
         given = without(site_features(scenario), Kinds.SITE, Kinds.CHARGE_PLACE)
         self._features = (*given, *source_features(sources))
-        blast_px = FramePainter(_fullest_blast(scenario), width_px=width_px).size_px[1]
+        blast_px = _particle_frames_px(scenario, width_px)
         site_m = build_site(scenario).site_m
         self._sheet = SiteSheet(site_m, width_px, self._handles(), False, blast_px)
         if scenario.build_zone is not None:
@@ -96,7 +97,7 @@ class PlacingPainter:
         zone = scenario.build_zone
         if zone is not None:
             found += cell_features(zone, placement.open_ground)
-            found += barrier_features(zone, layout)
+            found += barrier_features(scenario, layout)
         return in_order(found)
 
     def cell_at(self, place_px: tuple[int, int]) -> Cell | None:
@@ -127,7 +128,7 @@ class PlacingPainter:
         one_each = [catalogue.element_at(number, 0, 0) for number in numbers.values()]
         zone = self._scenario.zone
         full = cell_features(zone, np.zeros(zone.shape, dtype=bool))
-        barrier = barrier_features(zone, one_each)
+        barrier = barrier_features(self._scenario, one_each)
         return legend_of(without_counts((*self._of(placement), *full, *barrier)))
 
 
@@ -145,6 +146,14 @@ def sources_text(sources: Sequence[AnySource]) -> str:
     vehicles = all(isinstance(source, VehicleSource) for source in sources)
     what = "vehicle with" if vehicles else "hidden charge of"
     return f"{what} {' to '.join(f'{mass:g}' for mass in bounds)} kg TNT"
+
+
+def _particle_frames_px(scenario: Scenario, width_px: int) -> int:
+    """Return how high frames of particles are; 0 where particles cannot run the scenario."""
+    try:
+        return FramePainter(_fullest_blast(scenario), width_px=width_px).size_px[1]
+    except BlastEnvError:
+        return 0
 
 
 def _fullest_blast(scenario: Scenario) -> Blast:

@@ -21,7 +21,7 @@ from blast_env.geometry import Rectangle
 from blast_env.physics.gas.engine import GasRun
 from blast_env.physics.gas.opening import Opening
 from blast_env.physics.gas.probes import Snapshot
-from blast_env.physics.scene import BlastSite, StructureOutline
+from blast_env.physics.scene import BlastSite, Block, StructureOutline
 from blast_env.plan import (
     BARRIER,
     BORDER,
@@ -365,10 +365,9 @@ class PressurePainter:
         site, height_m = shot.result.run.site, shot.layer_m(0)
         self._add_image(number, 0)
         for outline in site.structures:
-            top_m = site.air_height_m if outline.height_m is None else outline.height_m
-            for rectangle in _parts(outline):
-                is_cut = outline.base_m < height_m < top_m
-                self._add_solid(axes, rectangle, outline, is_cut=is_cut)
+            for block in outline.blocks:
+                is_cut = block.base_m < height_m < _top_m(site, block)
+                self._add_solid(axes, block.rectangle_m, outline, is_cut=is_cut)
         self.sheet.let_move(draw_features(axes, _on_ground(shot)))
         line = axes.axhline if shot.section.axis == "y" else axes.axvline
         self.sheet.let_move([line(shot.layer_m(1), **_CUT_STYLE)])
@@ -392,10 +391,10 @@ class PressurePainter:
         along = 1 - shot.section.normal
         self._add_image(number, 1)
         for outline in site.structures:
-            top_m = site.air_height_m if outline.height_m is None else outline.height_m
-            for part in _parts(outline):
+            for block in outline.blocks:
+                part, top_m = block.rectangle_m, _top_m(site, block)
                 if part[shot.section.normal] < at_m < part[shot.section.normal + 2]:
-                    rectangle = Rectangle(part[along], outline.base_m, part[along + 2], top_m)
+                    rectangle = Rectangle(part[along], block.base_m, part[along + 2], top_m)
                     self._add_solid(axes, rectangle, outline, is_cut=True)
         charge = site.charge
         if abs(charge.position_m[shot.section.normal] - at_m) <= shot.result.run.grid.cell_m:
@@ -491,8 +490,5 @@ def _solids(site: BlastSite) -> list[Feature]:
     return found
 
 
-def _parts(outline: StructureOutline) -> list[Rectangle]:
-    """Return a structure's rectangle, or those of a barrier's modules, in metres."""
-    if outline.cells is None:
-        return [outline.rectangle_m]
-    return [part.rectangle_m for part in outline.build().parts]
+def _top_m(site: BlastSite, block: Block) -> float:
+    return site.air_height_m if block.height_m is None else block.height_m

@@ -13,7 +13,6 @@ from blast_env.physics.scene import BlastSite, Charge, Gauge, Scene, StructureOu
 from blast_env.physics.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
 from blast_env.scenario import (
     AnyCharge,
-    BuildZone,
     Placement,
     PointSource,
     Problem,
@@ -24,11 +23,13 @@ from blast_env.scenario import (
     check_layout,
     usable_cells,
 )
+from blast_env.scenario.boxes import TOLERANCE_M
 from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
 from blast_env.scenario.reach import Reach
+from blast_env.scenario.terraces import ground_below_m
 from blast_env.scenario.vehicles import NOTHING, Drive, Obstacles, obstacles_of
 from blast_env.scenario.worst_places import WorstPlaces
-from blast_env.scenario.zone import TOLERANCE_M, distance_m
+from blast_env.scenario.zone import distance_m, highest_top_m
 from blast_env.units import UNITS_PER_M, in_units
 from blast_env.values import checked_seed
 
@@ -109,7 +110,9 @@ def charge_against(scenario: Scenario, layout: Sequence[Element], charge: AnyCha
 
 
 def _obstacles(scenario: Scenario, layout: Sequence[Element]) -> Obstacles:
-    return NOTHING if not layout else obstacles_of(scenario.zone, layout)
+    if not layout:
+        return NOTHING
+    return obstacles_of(scenario.zone, layout, scenario.structures)
 
 
 def build_site(
@@ -139,14 +142,14 @@ def build_site(
     structures = outlines(scenario, placement.layout)
     barrier = standing(placement.layout)
     if barrier:
-        structures += (barrier_outline(scenario.zone, barrier),)
+        structures += (barrier_outline(scenario, barrier),)
     return BlastSite(
         site_m=scenario.site.rectangle_m,
         charge=charge,
         structures=structures,
         gauges=tuple(Gauge(each.name, each.position_m) for each in scenario.gauges),
         air_height_m=scenario.air_height_m,
-        build_zone=None if scenario.build_zone is None else _whole(scenario.build_zone),
+        build_zone=None if scenario.build_zone is None else _whole(scenario),
     )
 
 
@@ -169,12 +172,12 @@ def build_scene(
         LayoutError: If the layout does not fit the build zone, or the charge.
         ScenarioError: If the charge is not clear of a structure or the border, or over a roof:
             without heights it would be inside the structure; or a structure begins above the
-            ground.
+            ground, or is a terrace.
         BlastEnvError: If the parameters do not reach to the mass of the charge.
         ValueError: If the seed is negative.
     """
     base = build_site(scenario, layout, seed, charge)
-    if any(each.base_m for each in scenario.structures):
+    if any(each.base_m or each.carries for each in scenario.structures):
         scenario.check_for_particles()
     _check_not_over_a_roof(scenario, base.charge)
     parameters = _parameters_for(scenario, base.charge)
@@ -282,18 +285,26 @@ def _outline(section: AnyStructure, *, is_lasting: bool) -> StructureOutline:
     )
 
 
-def _whole(zone: BuildZone) -> StructureOutline:
+def _whole(scenario: Scenario) -> StructureOutline:
     """Return the barrier that would fill a whole zone, as high as one can be there."""
-    return replace(barrier_outline(zone, ()), cells=None, heights_m=None, pieces=None)
+    empty = barrier_outline(scenario, ())
+    return replace(empty, cells=None, heights_m=None, bases_m=None, pieces=None)
 
 
-def barrier_outline(zone: BuildZone, layout: Layout) -> StructureOutline:
-    """Return the barrier that the modules or pieces of a layout make.
+def barrier_outline(scenario: Scenario, layout: Layout) -> StructureOutline:
+    """Return the barrier that the modules or pieces of a layout make in the build zone.
 
     Raises:
+        BlastEnvError: If there is no build zone.
         LayoutError: If the catalogue has no such item, or it cannot be turned.
     """
-    modules = zone.modules(layout)
+    zone, modules = scenario.zone, scenario.zone.modules(layout)
+    terraces = [each for each in scenario.structures if each.carries]
+    bases_m = [ground_below_m(terraces, zone.cell_rectangle_m(each.cell)) for each in modules]
+    tops_m = [
+        None if module.height_m is None else base_m + module.height_m
+        for module, base_m in zip(modules, bases_m, strict=True)
+    ]
     return StructureOutline(
         kind=ModularObstacle,
         name=BARRIER_NAME,
@@ -304,7 +315,8 @@ def barrier_outline(zone: BuildZone, layout: Layout) -> StructureOutline:
         weight=1.0,
         cells=tuple(module.cell for module in modules),
         capacity=zone.module_capacity,
-        height_m=zone.highest_m,
-        heights_m=tuple(module.height_m for module in modules) if zone.items else None,
+        height_m=highest_top_m(zone, terraces),
+        heights_m=tuple(tops_m) if zone.items or any(bases_m) else None,
+        bases_m=tuple(bases_m) if any(bases_m) else None,
         pieces=tuple(module.piece for module in modules) if zone.items else None,
     )

@@ -16,6 +16,7 @@ from blast_env.physics.parameters import AirParameters, SimulationParameters, fo
 from blast_env.physics.particles import lattice_capacity
 from blast_env.physics.structure import BARRIER_NAME
 from blast_env.response.components import Component, Glazing, Wall
+from blast_env.scenario.boxes import TOLERANCE_M
 from blast_env.scenario.facade import facade_problems, hardening_problems
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, extent, unknown_name
@@ -31,10 +32,10 @@ from blast_env.scenario.sections import (
     Site,
     VehicleSource,
 )
+from blast_env.scenario.terraces import ground_below_m, terrace_problems
 from blast_env.scenario.vehicles import MOST_PLACES, Obstacles, RatedPiece, VehicleGround
 from blast_env.scenario.versions import MAX_ITEMS
 from blast_env.scenario.zone import (
-    TOLERANCE_M,
     BuildZone,
     EmptyZone,
     Surroundings,
@@ -141,6 +142,7 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
         *_gauge_problems(parts),
         *_facade_problems(parts),
         *_removable_problems(parts),
+        *terrace_problems(parts.structures),
         *_objective_problems(parts),
     )
 
@@ -172,6 +174,8 @@ def _removable_problems(parts: Parts) -> Iterator[Problem]:
                 yield Problem(where, f"is {name!r}, which is protected: it cannot be taken away")
             elif structures[name].facade is not None:
                 yield Problem(where, f"is {name!r}, which has a facade: it cannot be taken away")
+            elif structures[name].carries:
+                yield Problem(where, f"is {name!r}, a terrace: it cannot be taken away")
             elif used != where:
                 yield Problem(where, f"is {name!r}, which {used} takes away already")
 
@@ -462,9 +466,12 @@ def _height_problems(parts: Parts) -> Iterator[Problem]:
             )
             yield Problem(f"structures[{index}].base_m", message)
     if parts.build_zone is not None:
-        yield from _above_the_air(parts, "build_zone.height_m", parts.build_zone.height_m)
-        for index, item in enumerate(parts.build_zone.items):
-            yield from _above_the_air(parts, f"build_zone.items[{index}].height_m", item.height_m)
+        zone = parts.build_zone
+        ground = ground_below_m(parts.structures.values(), zone.rectangle_m)
+        yield from _above_the_air(parts, "build_zone.height_m", zone.height_m, ground)
+        for index, item in enumerate(zone.items):
+            where = f"build_zone.items[{index}].height_m"
+            yield from _above_the_air(parts, where, item.height_m, ground)
 
 
 def _gauge_problems(parts: Parts) -> Iterator[Problem]:
@@ -486,12 +493,15 @@ def _gauge_problems(parts: Parts) -> Iterator[Problem]:
                 yield Problem(key, message)
 
 
-def _above_the_air(parts: Parts, key: str, height_m: float | None) -> Iterator[Problem]:
-    """Yield a problem if a height is above the air."""
-    if height_m is not None and height_m > parts.air_height_m + TOLERANCE_M:
+def _above_the_air(
+    parts: Parts, key: str, height_m: float | None, ground_m: float = 0.0
+) -> Iterator[Problem]:
+    """Yield a problem if a height, from the ground of a terrace on, is above the air."""
+    if height_m is not None and ground_m + height_m > parts.air_height_m + TOLERANCE_M:
+        terrace = f" on a terrace of {ground_m:g}" if ground_m > 0.0 else ""
         message = (
-            f"is {height_m:g}, must be at most {parts.air_height_m:g}, the height of the air"
-            " (which site.air_height_m can raise)"
+            f"is {height_m:g}{terrace}, must be at most {parts.air_height_m:g}, the height of the"
+            " air (which site.air_height_m can raise)"
         )
         yield Problem(key, message)
 
@@ -531,7 +541,7 @@ def particle_problems(
     Args:
         parameters: Those of the particles; they must reach to the mass of every charge.
         sources: The sources of the charges.
-        structures: The structures; all must stand on the ground.
+        structures: The structures; all must stand on the ground, and none be a terrace.
     """
     for index, structure in enumerate(structures):
         if structure.base_m > 0.0:
@@ -540,6 +550,12 @@ def particle_problems(
                 f" nothing would pass below {structure.name!r}; engine 'gas' takes it"
             )
             yield Problem(f"structures[{index}].base_m", message)
+        if structure.carries:
+            message = (
+                "is true, must be false for particles: they know no heights, and nothing would"
+                f" stand on {structure.name!r}; engine 'gas' takes it"
+            )
+            yield Problem(f"structures[{index}].carries", message)
     for index, source in enumerate(sources):
         try:
             for_charge(parameters, source.tnt_kg)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.arrays import BoolArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell, Element, Layout, Measure, Piece
 from blast_env.scenario.access_way import closing_places, is_open
@@ -130,7 +130,7 @@ class Placement:
 
     def explain_vehicles(self) -> tuple[str, ...]:
         """Return a sentence for each vehicle: how near it comes now, by which way, how fast."""
-        obstacles = obstacles_of(self._zone, self.layout)
+        obstacles = obstacles_of(self._zone, self.layout, self.scenario.structures)
         return tuple(
             self.scenario.vehicle_ground(source, self.layout).explain(obstacles)
             for source in self.scenario.vehicles
@@ -208,6 +208,11 @@ class Placement:
         Shape (rows, columns). Neither what stands nor stock, budget and access way count here.
         """
         return self._empty_zone.usable
+
+    @property
+    def ground_m(self) -> FloatArray:
+        """How high the ground of each cell is, shape (rows, columns), read-only."""
+        return self._empty_zone.ground_m
 
     @property
     def module_costs(self) -> NDArray[np.float64]:
@@ -346,6 +351,8 @@ class Placement:
             return False
         if self._spendable < 0.0 or not self._empty_zone.usable[self._taken].all():
             return False
+        if len(self._empty_zone.levels) and any(map(self._straddles, self.layout)):
+            return False
         passable = self._empty_zone.passable & ~self._taken
         return zone.access_way is None or is_open(zone.access_way, passable)
 
@@ -369,7 +376,12 @@ class Placement:
             if not self._empty_zone.usable[cell]:
                 reason = reason_against(self._surroundings, cell)
                 return _of_cell(element, cell, reason)
-        return None
+        return "would straddle the edge of a terrace" if self._straddles(element) else None
+
+    def _straddles(self, element: Element) -> bool:
+        """Whether the ground below an element is of several heights."""
+        ground = self._empty_zone.ground_m
+        return len({ground[cell] for cell in self.catalogue.cells(element)}) > 1
 
     def _reason_against_taken(self, element: Element) -> str | None:
         """Return why something that stands already is in the way, or `None` if nothing is."""

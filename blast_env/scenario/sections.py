@@ -439,6 +439,8 @@ class StructureSection(Section):
         height_m: Height of its top above the ground; without it, as high as the air.
         base_m: Height of its underside: above 0 it is a canopy, or a storey over a passage. For gas
             dynamics only.
+        carries: Whether it is a terrace: solid from the ground, and barriers may stand on its top.
+            For gas dynamics only.
         faces: The walls whose load counts; a wall is named by the side that it looks to.
         building: The building that the structure is a part of, where several make one; for
             people and tables, no result depends on it.
@@ -453,6 +455,7 @@ class StructureSection(Section):
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
     height_m: Height | None = None
     base_m: Coordinate = 0.0
+    carries: StrictBool = False
     faces: Annotated[
         tuple[WallName, ...],
         Field(min_length=1, max_length=len(WALLS)),

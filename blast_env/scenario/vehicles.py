@@ -37,6 +37,7 @@ from blast_env.scenario.sections import (
     Site,
     VehicleSource,
 )
+from blast_env.scenario.terraces import ground_below_m
 from blast_env.scenario.worst_places import WorstPlaces, nearest_wall, worst_of
 from blast_env.scenario.zone import BuildZone
 from blast_env.units import MODULE_SIDE_M
@@ -138,19 +139,25 @@ NOTHING: Final = Obstacles()
 """The empty site."""
 
 
-def obstacles_of(zone: BuildZone, layout: Iterable[Element]) -> Obstacles:
+def obstacles_of(
+    zone: BuildZone, layout: Iterable[Element], structures: Sequence[AnyStructure]
+) -> Obstacles:
     """Return what a layout of a build zone puts in the way.
 
-    Single modules stop a vehicle; of the items of a catalogue, those that are said to.
+    Single modules stop a vehicle; of the items of a catalogue, those that are said to. What stands
+    on a terrace no vehicle meets.
 
     Raises:
         LayoutError: If there is no such item, or it cannot be turned.
     """
+    terraces = [each for each in structures if each.carries]
     stops: list[Rectangle] = []
     solid: list[Rectangle] = []
     rated: list[RatedPiece] = []
     for element in sorted(standing(layout)):
         variant, rectangle = zone.catalogue.variant(element), zone.element_rectangle_m(element)
+        if ground_below_m(terraces, rectangle) > 0.0:
+            continue
         if variant.crash_rating is not None:
             rated.append(RatedPiece(rectangle, variant.crash_rating, element_text(element)))
         else:

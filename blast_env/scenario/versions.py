@@ -18,7 +18,9 @@ NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "": ("gauges", "objective", "georeference", "components"),
     "site": ("air_height_m",),
     "charge": ("height_m",),
-    "structures": ("height_m", "base_m", "faces", "building", "peak_weight", "facade"),
+    "structures": (
+        *("height_m", "base_m", "carries", "faces", "building", "peak_weight", "facade"),
+    ),
     "objective": ("kind", "measure", "target"),
     "build_zone": ("height_m", "items", "hardening", "removable"),
     "build_zone.access_way": ("gate",),

@@ -25,6 +25,7 @@ from blast_env.geometry import Cell, Element, Piece, Rectangle, Removal
 from blast_env.physics.scene import WALLS
 from blast_env.response.barriers import RigidPiece
 from blast_env.scenario.access_way import AccessWay, any_in_windows, counts_before
+from blast_env.scenario.boxes import TOLERANCE_M, Boxes, box_distances_m, overlapping
 from blast_env.scenario.catalogue import (
     MOST_ITEMS,
     AnyMeasure,
@@ -50,6 +51,7 @@ from blast_env.scenario.sections import (
     Site,
     VehicleSource,
 )
+from blast_env.scenario.terraces import ground_below_m, ground_m, lie_wholly_on
 from blast_env.units import MODULE_SIDE_M
 
 BUDGET_TOLERANCE: Final = 1e-9
@@ -299,9 +301,6 @@ def _pieces_of(item: Any) -> int:
 NO_ZONE: Final = BuildZone.model_construct(corner_m=(0.0, 0.0), rows=0, columns=0, stock=0)
 """What stands for the zone of a scenario without one where that is no error: it has no cells."""
 
-Boxes = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-"""Left, bottom, right and top of many rectangles; the four arrays broadcast."""
-
 
 def source_bounds_m(source: AnySource) -> Rectangle:
     """Return the smallest rectangle around all the places that the charge's centre may be at.
@@ -336,19 +335,6 @@ def distance_m(source: AnySource, rectangle: Rectangle) -> float:
     return float(distances_m(source, (left, bottom, right, top)))
 
 
-def _gaps(box: Rectangle, boxes: Boxes) -> tuple[FloatArray, FloatArray]:
-    """Return the gaps along x and y between one rectangle and others; 0 where they overlap."""
-    left, bottom, right, top = boxes
-    along_x = np.maximum(0.0, np.maximum(left - box.right, box.left - right))
-    along_y = np.maximum(0.0, np.maximum(bottom - box.top, box.bottom - top))
-    return along_x, along_y
-
-
-def box_distances_m(box: Rectangle, boxes: Boxes) -> FloatArray:
-    """Return the distances between one rectangle and others."""
-    return np.hypot(*_gaps(box, boxes))
-
-
 def _segment_distances(start: PointM, end: PointM, boxes: Boxes) -> FloatArray:
     """Return the distances between a segment and rectangles.
 
@@ -372,10 +358,6 @@ def _segment_distances(start: PointM, end: PointM, boxes: Boxes) -> FloatArray:
     bounds = Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
     meets = both_sides & (box_distances_m(bounds, boxes) == 0.0)
     return np.where(meets, 0.0, nearest)
-
-
-TOLERANCE_M: Final = 1e-9
-"""Rectangles that overlap by less than this only touch, as in `Rectangle.overlaps`."""
 
 
 @dataclass(frozen=True)
@@ -405,6 +387,9 @@ class EmptyZone:
         catalogue: What can be placed.
         usable: Which cells may be used, shape (rows, columns).
         passable: Which cells no structure covers that stops people, shape (rows, columns).
+        ground_m: How high the ground of each cell is, shape (rows, columns).
+        levels: The cells of each height of the ground (heights, rows, columns); none where it is
+            flat.
         module_costs: What a module on each cell costs, shape (rows, columns); with a catalogue,
             what the cost of an item is multiplied by there.
         fits: Where the cells under each variant may be used, by its lower left cell, shape
@@ -415,12 +400,21 @@ class EmptyZone:
     catalogue: Catalogue
     usable: BoolArray
     passable: BoolArray
+    ground_m: FloatArray
+    levels: BoolArray
     module_costs: NDArray[np.float64]
     fits: BoolArray
     costs: NDArray[np.float64]
 
     def places(self, free: BoolArray) -> BoolArray:
-        """Return where each variant covers nothing but free cells, (variants, rows, columns)."""
+        """Return where each variant covers nothing but free cells, all of them on one level.
+
+        Shape (variants, rows, columns).
+        """
+        if len(self.levels):
+            flat = replace(self, levels=self.levels[:0])
+            anywhere: BoolArray = np.any([flat.places(free & own) for own in self.levels], axis=0)
+            return anywhere
         variants = self.catalogue.variants
         if len(variants) == 1 and variants[0].rows == variants[0].columns == 1:
             return free[np.newaxis]  # the usual case
@@ -446,13 +440,18 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
     passable = np.ones_like(usable)
     for structure in surroundings.structures:
         if not structure.lets_through:
-            passable &= ~_overlapping(structure.rectangle_m, boxes)
+            passable &= ~overlapping(structure.rectangle_m, boxes)
+    ground = ground_m(surroundings.structures, boxes)
+    heights_m = np.unique(ground)
+    levels = ground == heights_m[len(heights_m) == 1 :, np.newaxis, np.newaxis]
     module_costs = _module_costs(zone, boxes)
     catalogue = zone.catalogue
     costs = np.stack([_costs(variant, module_costs, zone) for variant in catalogue.variants])
-    cells = EmptyZone(catalogue, usable, passable, module_costs, usable[np.newaxis], costs)
+    cells = EmptyZone(
+        catalogue, usable, passable, ground, levels, module_costs, usable[np.newaxis], costs
+    )
     cells = replace(cells, fits=cells.places(usable))
-    for array in (usable, passable, module_costs, cells.fits, costs):
+    for array in (usable, passable, ground, levels, module_costs, cells.fits, costs):
         array.flags.writeable = False
     return cells
 
@@ -477,15 +476,19 @@ def _blocked(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, Bo
     """Yield each reason against cells, with the cells that it holds for."""
     zone, radius_m = surroundings.zone, surroundings.charge_radius_m
     for keep_out in zone.keep_outs:
-        yield f"must stay empty: {keep_out.reason}", _overlapping(keep_out.rectangle_m, boxes)
+        yield f"must stay empty: {keep_out.reason}", overlapping(keep_out.rectangle_m, boxes)
     for structure in surroundings.structures:
-        reason = f"overlaps the structure {structure.name!r}"
-        yield reason, _overlapping(structure.rectangle_m, boxes)
+        own = overlapping(structure.rectangle_m, boxes)
+        if structure.carries:
+            whole = lie_wholly_on(surroundings.structures, structure.height_m, boxes)
+            yield f"lies only partly on the terrace {structure.name!r}", own & ~whole
+        else:
+            yield f"overlaps the structure {structure.name!r}", own
     if zone.clearance_m > 0.0:
         yield from _too_close(surroundings, boxes)
     if zone.access_way is not None and zone.access_way.gate is not None:
         gate = zone.access_way.gate.rectangle_m
-        yield "is where the gate of the access way stands", _overlapping(gate, boxes)
+        yield "is where the gate of the access way stands", overlapping(gate, boxes)
     for index, source in enumerate(surroundings.sources):
         if isinstance(source, VehicleSource):
             yield (
@@ -507,15 +510,18 @@ def _on_entries(source: VehicleSource, site: Site | None, boxes: Boxes) -> BoolA
         for entry in source.entries:
             side = entry.side(site)
             if side is not None:
-                inside |= _overlapping(entry.strip_m(site, side, source.width_m), boxes)
+                inside |= overlapping(entry.strip_m(site, side, source.width_m), boxes)
     return inside
 
 
 def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, BoolArray]]:
     """Yield the cells without the clearance from each structure."""
     clearance_m = surroundings.zone.clearance_m
+    ground = ground_m(surroundings.structures, boxes)
     for structure in surroundings.structures:
         distances = box_distances_m(structure.rectangle_m, boxes)
+        if structure.carries:  # nothing keeps clear of what lies below it
+            distances = np.where(ground < (structure.height_m or inf), distances, inf)
         yield (
             f"is closer than {clearance_m:g} m to the structure {structure.name!r}"
             f" ({distances.min():g} m)",
@@ -530,7 +536,7 @@ def _module_costs(zone: BuildZone, boxes: Boxes) -> NDArray[np.float64]:
     """
     highest = np.zeros(zone.shape)
     for area in zone.cost_areas:
-        inside = _overlapping(area.rectangle_m, boxes)
+        inside = overlapping(area.rectangle_m, boxes)
         cost = area.cost_factor if zone.items else area.module_cost
         highest[inside] = np.maximum(highest[inside], 0.0 if cost is None else cost)
     return np.where(highest > 0.0, highest, 1.0 if zone.items else zone.module_cost)
@@ -559,14 +565,6 @@ def _costs(
     return costs
 
 
-def _overlapping(rectangle: Rectangle, boxes: Boxes) -> BoolArray:
-    """Return which squares overlap a rectangle; to touch is not to overlap."""
-    left, bottom, right, top = boxes
-    along_x = (left < rectangle.right - TOLERANCE_M) & (right > rectangle.left + TOLERANCE_M)
-    along_y = (bottom < rectangle.top - TOLERANCE_M) & (top > rectangle.bottom + TOLERANCE_M)
-    return along_x & along_y
-
-
 LEAST_AIR_HEIGHT_M: Final = 12.0
 """Height of the air over a site on which nothing is higher than half of it."""
 
@@ -579,10 +577,20 @@ def default_air_height_m(structures: Iterable[AnyStructure], zone: BuildZone | N
 
     12 m, or 6 m more than the highest structure or barrier if that is more.
     """
+    structures = tuple(structures)
     heights = [each.height_m for each in structures]
-    heights.append(None if zone is None else zone.highest_m)
+    heights.append(None if zone is None else highest_top_m(zone, structures))
     highest = max((height for height in heights if height is not None), default=0.0)
     return max(LEAST_AIR_HEIGHT_M, highest + AIR_ABOVE_M)
+
+
+def highest_top_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> float | None:
+    """Return the height above the ground of the highest barrier, on the highest terrace.
+
+    `None` is as high as the air.
+    """
+    own_m = zone.highest_m
+    return None if own_m is None else ground_below_m(structures, zone.rectangle_m) + own_m
 
 
 def air_height_m(site: Site, structures: Iterable[AnyStructure], zone: BuildZone | None) -> float:

@@ -8,10 +8,10 @@ import numpy as np
 from blast_env.arrays import BoolArray
 from blast_env.geometry import Rectangle
 from blast_env.scenario.access_way import AccessWay, closing_places, is_open
+from blast_env.scenario.boxes import TOLERANCE_M
 from blast_env.scenario.problems import Problem, extent
 from blast_env.scenario.sections import Area
 from blast_env.scenario.zone import (
-    TOLERANCE_M,
     BuildZone,
     EmptyZone,
     Surroundings,

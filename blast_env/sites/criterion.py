@@ -27,6 +27,7 @@ from blast_env.scenario import (
     usable_cells,
 )
 from blast_env.scenario.sections import PointM
+from blast_env.scenario.terraces import is_open_below
 from blast_env.units import MODULE_SIDE_M
 
 DIRECTIONS: Final = 360
@@ -47,13 +48,14 @@ class Visibility:
     balls of a charge do. Those that would meet a protected structure count, each by the weights
     of its source and of the structure. Where the structure has a height, each of them stands for
     several, which rise from the charge to the middle of its lower, middle and upper third: a low
-    wall cuts them near the charge, and the lower ones alone near the structure.
+    wall cuts them near the charge, and the lower ones alone near the structure. A terrace stops
+    those of them that it is higher than where they come to it.
 
     Attributes:
         weight: Weight of each line that no other structure stops (lines,).
         cut: Which lines an endlessly high module on each cell of the build zone would cut
             (lines, rows, columns).
-        height_m: How high each line is over each cell (lines, rows, columns).
+        height_m: How high each line is over the ground of each cell (lines, rows, columns).
         open_share: Share, by weight, of the lines that no other structure stops.
     """
 
@@ -75,15 +77,19 @@ class Visibility:
         scenario = find_scenario(scenario)
         origin, direction, source_weight = _all_lines(scenario)
         protected_m, other_m = np.full((2, len(origin)), np.inf)
-        weight, target_m = np.zeros((2, len(origin)))
+        weight, base_m, target_m = np.zeros((3, len(origin)))
+        terraces: list[tuple[FloatArray, float]] = []
         for structure in scenario.structures:
             entry_m = _entry_m(origin, direction, structure.rectangle_m)
             if structure.protected:
                 nearer = entry_m < protected_m
                 weight[nearer] = (structure.weight * source_weight)[nearer]
                 target_m[nearer] = structure.height_m or 0.0
+                base_m[nearer] = structure.base_m if structure.height_m else 0.0
                 protected_m = np.minimum(protected_m, entry_m)
-            elif not structure.base_m:  # below what begins higher one sees
+            elif structure.carries:
+                terraces.append((entry_m, structure.height_m or 0.0))
+            elif not is_open_below(structure, scenario.structures):  # else one sees below it
                 other_m = np.minimum(other_m, entry_m)
         free = (weight > 0.0) & (protected_m < other_m)
         open_share = float(weight[free].sum() / max(weight.sum(), 1e-300))
@@ -91,13 +97,17 @@ class Visibility:
         if not target_m.any():
             return cls(weight[free], cut, np.zeros(cut.shape), open_share)
         shares = (np.arange(TARGETS) + 0.5) / TARGETS
-        ends_m = (shares[:, np.newaxis] * target_m[free]).ravel()  # third by third
-        return cls(
-            np.tile(weight[free] / TARGETS, TARGETS),
-            np.tile(cut, (TARGETS, 1, 1)),
-            ends_m[:, np.newaxis, np.newaxis] * np.tile(along_share, (TARGETS, 1, 1)),
-            open_share,
-        )
+        rise_m = (target_m - base_m)[free]
+        ends_m = (base_m[free] + shares[:, np.newaxis] * rise_m).ravel()  # third by third
+        weight = np.tile(weight[free] / TARGETS, TARGETS)
+        over = np.ones(len(weight), dtype=bool)
+        for entry_m, high_m in terraces:
+            share = np.tile(np.minimum(entry_m[free] / protected_m[free], 1.0), TARGETS)
+            over &= (share == 1.0) | (ends_m == 0.0) | (share * ends_m >= high_m)
+        open_share *= float(weight[over].sum() / max(weight.sum(), 1e-300))
+        height_m = ends_m[:, np.newaxis, np.newaxis] * np.tile(along_share, (TARGETS, 1, 1))
+        height_m -= Placement.empty(scenario).ground_m
+        return cls(weight[over], np.tile(cut, (TARGETS, 1, 1))[over], height_m[over], open_share)
 
     def cut_by(self, height_m: float | None) -> BoolArray:
         """Return which lines a module of a height would cut on each cell (lines, rows, columns).

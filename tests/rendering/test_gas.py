@@ -423,7 +423,7 @@ def test_what_is_no_film_is_refused(
 
 def test_pieces_are_drawn_as_wholes_in_the_colours_of_their_items() -> None:
     axes = Figure().add_subplot()
-    features = list(barrier_features(yard().zone, PIECES))
+    features = list(barrier_features(yard(), PIECES))
     walls, post = draw_features(axes, features)
     assert isinstance(walls, PathPatch)
     assert isinstance(post, PathPatch)

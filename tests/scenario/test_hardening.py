@@ -134,7 +134,7 @@ def test_the_bill_has_measures_and_plans_have_not() -> None:
     assert bill.loc["glass", "cost"] == 5.0
     assert bill.loc["total", "cost"] == bill["cost"].drop("total").sum()
     assert set(element_table(plan)["item"]) == {"wall", "post"}
-    assert len(list(barrier_features(plan.scenario.zone, plan.layout))) == len(WALL)
+    assert len(list(barrier_features(plan.scenario, plan.layout))) == len(WALL)
 
 
 def test_hash_and_version_are_as_ever_where_nothing_of_it_is_used() -> None:

@@ -106,6 +106,7 @@ def test_new_keys_are_all_tried() -> None:
     listed = {(section, key) for section, keys in NEW_KEYS.items() for key in keys}
     own_tests = {
         "base_m",
+        "carries",
         "items",
         "components",
         "facade",

@@ -2,6 +2,7 @@
 
 from collections import Counter, deque
 from collections.abc import Collection
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ CORNER_M = (10.0, 10.0)
 
 SHAPES = ((1, 1), (3, 1), (1, 4), (2, 2))
 """Rows and columns of structures inside drawn zones."""
+
+TERRACES = ((4, 3), (8, 2), (3, 8))
+"""Rows and columns of terraces there."""
 
 
 def structure(name: str, x_m: float, y_m: float, rows: int, columns: int) -> Document:
@@ -123,9 +127,17 @@ def modules_may_stand(scenario: Scenario, cells: Collection[Cell]) -> bool:
         return False
     solids = [each.rectangle_m for each in scenario.structures]
     for square in squares:
-        if any(square.overlaps(solid) for solid in solids):
+        grounds = _grounds_m(scenario, square)
+        if len(grounds) > 1:
             return False
-        if any(_distance_m(square, solid) < zone.clearance_m - 1e-9 for solid in solids):
+        beside = [
+            each.rectangle_m
+            for each in scenario.structures
+            if not each.carries or (each.height_m or 0.0) > min(grounds)
+        ]
+        if any(square.overlaps(solid) for solid in beside):
+            return False
+        if any(_distance_m(square, solid) < zone.clearance_m - 1e-9 for solid in beside):
             return False
     if zone.access_way is None:
         return True
@@ -138,6 +150,18 @@ def modules_may_stand(scenario: Scenario, cells: Collection[Cell]) -> bool:
     ).reshape(zone.rows, zone.columns)
     turned = passable if zone.access_way.between == "left_right" else passable.T
     return can_cross(turned, round(zone.access_way.width_m / 0.5))
+
+
+def _grounds_m(scenario: Scenario, square: Rectangle) -> set[float]:
+    """The heights of the ground in the quarters of a cell, of which everything drawn consists."""
+    left, bottom, _, _ = square
+    heights_m = set()
+    for x_m, y_m in product((left + 0.125, left + 0.375), (bottom + 0.125, bottom + 0.375)):
+        quarter = Rectangle(x_m, y_m, x_m, y_m)
+        carrying = [each for each in scenario.structures if each.carries]
+        own = [each.height_m or 0.0 for each in carrying if each.rectangle_m.contains(quarter)]
+        heights_m.add(max(own, default=0.0))
+    return heights_m
 
 
 def can_cross(passable: np.ndarray, width: int) -> bool:
@@ -176,7 +200,10 @@ def _distance_m(one: Rectangle, other: Rectangle) -> float:
 
 @st.composite
 def catalogue_documents(draw: st.DrawFn) -> Document:
-    """Drawn zones with a catalogue of up to three items instead of single modules."""
+    """Drawn zones with a catalogue of up to three items instead of single modules.
+
+    They may have terraces, side by side, of the same height or not.
+    """
     document = draw(zone_documents())
     document["schema_version"] = 2
     zone = document["build_zone"]
@@ -197,6 +224,11 @@ def catalogue_documents(draw: st.DrawFn) -> Document:
         }
         for number in range(draw(st.integers(1, 3)))
     ]
+    x_m, y_m = (st.integers(-4, 2 * zone[key]).map(lambda n: n / 4) for key in ("columns", "rows"))
+    for number in range(draw(st.integers(0, 2))):
+        size, high_m = draw(st.sampled_from(TERRACES)), draw(st.sampled_from([1.0, 1.5]))
+        terrace = structure(f"terrace{number}", draw(x_m), draw(y_m), *size)
+        document["structures"].append(terrace | {"height_m": high_m, "carries": True})
     pieces = sum(item["stock"] for item in zone["items"])
     zone["stock"] = draw(st.integers(1, max(pieces, 1)))
     return document
@@ -220,6 +252,8 @@ def pieces_may_stand(scenario: Scenario, layout: Collection[Piece]) -> bool:
         ]
         cells += own
         squares = [zone.cell_rectangle_m(cell) for cell in own]
+        if len(set().union(*(_grounds_m(scenario, square) for square in squares))) > 1:
+            return False
         cost += item.cost * sum(_factor(zone, square) for square in squares) / len(own)
     of_items = Counter(piece.item for piece in layout)
     if any(of_items[name] > item.stock for name, item in items.items()):

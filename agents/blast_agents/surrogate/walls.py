@@ -17,6 +17,7 @@ from blast_env.physics.scene import Charge
 from blast_env.response.damage import BayDamage, TriangularLoads
 from blast_env.scenario import AnyStructure, Scenario
 from blast_env.scenario.facade import NamedBay
+from blast_env.scenario.terraces import ground_below_m, is_open_below
 
 _ALONG_M: Final = 1.0
 _UP_M: Final = 1.5
@@ -142,7 +143,8 @@ class Approach:
 class SurrogateSite:
     """A scenario as the surrogate sees it.
 
-    What begins above the ground stops nothing, as if it were not there: the surrogate never met it.
+    What begins above the ground, and on no terrace, stops nothing, as if it were not there: the
+    surrogate never met it. Nor was it fitted to terraces: they are boxes as other structures are.
 
     Args:
         scenario: The scenario.
@@ -164,7 +166,7 @@ class SurrogateSite:
             [
                 [*each.rectangle_m, each.height_m or air_m]
                 for each in scenario.structures
-                if not each.base_m
+                if not is_open_below(each, scenario.structures)
             ]
         ).reshape(-1, 5)
         heights_m = [each.height_m or air_m for each in self.protected]
@@ -225,10 +227,15 @@ class SurrogateSite:
             LayoutError: If the catalogue has no such piece.
         """
         zone, air_m = self.scenario.zone, self.scenario.air_height_m
-        rows = [
-            [*zone.element_rectangle_m(each), zone.catalogue.variant(each).height_m or air_m]
-            for each in standing(layout)
-        ]
+        terraces = [each for each in self.scenario.structures if each.carries]
+        rows = []
+        for each in standing(layout):
+            rectangle_m, own_m = (
+                zone.element_rectangle_m(each),
+                zone.catalogue.variant(each).height_m,
+            )
+            top_m = ground_below_m(terraces, rectangle_m) + own_m if own_m else air_m
+            rows.append([*rectangle_m, top_m])
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
     def _approach(self, charge: Charge, points: WallPoints) -> Approach:

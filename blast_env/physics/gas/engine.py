@@ -270,10 +270,9 @@ def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
 def _cells_of(outline: StructureOutline, grid: GasGrid, site: BlastSite) -> NDArray[np.bool_]:
     """Return the cells that a structure fills (nx, ny, nz)."""
     row, column = _modules_at(outline, grid)
-    height_m = _heights_m(outline, site.air_height_m, row, column)[:, :, np.newaxis]
+    base_m, top_m = _ends_m(outline, site.air_height_m)[:, row, column, np.newaxis]
     z_m = grid.centres_m(2)
-    filled = (z_m < height_m) & (z_m > outline.base_m)
-    return np.asarray((row >= 0)[:, :, np.newaxis] & filled)
+    return np.asarray((row >= 0)[:, :, np.newaxis] & (base_m <= z_m) & (z_m < top_m))
 
 
 def _modules_at(
@@ -292,19 +291,19 @@ def _modules_at(
     return np.where(here, row, -1), np.where(here, column, -1)
 
 
-def _heights_m(
-    outline: StructureOutline,
-    air_height_m: float,
-    row: NDArray[np.int64],
-    column: NDArray[np.int64],
-) -> FloatArray:
-    """Return how high an outline is at modules (nx, ny); where there is none, anything."""
-    whole_m = air_height_m if outline.height_m is None else outline.height_m
-    heights_m = np.full((outline.rows, outline.columns), whole_m)
-    if outline.cells is not None and outline.heights_m is not None:
-        of_cells = [air_height_m if each is None else each for each in outline.heights_m]
-        heights_m[tuple(np.array(outline.cells).T)] = of_cells
-    return np.asarray(heights_m[row, column])
+def _ends_m(outline: StructureOutline, air_height_m: float) -> FloatArray:
+    """Return where the modules of an outline begin and end (2, rows, columns).
+
+    Where there is no module, anything.
+    """
+    ends_m = np.empty((2, outline.rows, outline.columns))
+    both = (outline.base_m, outline.bases_m), (outline.height_m, outline.heights_m)
+    for end_m, (whole_m, of_cells_m) in zip(ends_m, both, strict=True):
+        end_m[...] = air_height_m if whole_m is None else whole_m
+        if outline.cells is not None and of_cells_m is not None:
+            known_m = [air_height_m if each is None else each for each in of_cells_m]
+            end_m[tuple(np.array(outline.cells).T)] = known_m
+    return ends_m
 
 
 def _face_table(grid: GasGrid, site: BlastSite) -> FaceTable:
@@ -314,8 +313,8 @@ def _face_table(grid: GasGrid, site: BlastSite) -> FaceTable:
     structure, row, column = np.full((3, len(faces)), -1)
     for index, outline in enumerate(site.structures):
         rows, columns = _modules_at(outline, grid)
-        height_m = _heights_m(outline, site.air_height_m, rows, columns)[behind[:2]]
-        own = (rows[behind[:2]] >= 0) & (z_m > outline.base_m) & (z_m < height_m)
+        base_m, top_m = _ends_m(outline, site.air_height_m)[:, rows, columns][:, *behind[:2]]
+        own = (rows[behind[:2]] >= 0) & (base_m <= z_m) & (z_m < top_m)
         structure[own] = index
         row[own], column[own] = (each[behind[:2]][own] for each in (rows, columns))
     # West, east, south, north by axis and side; what looks up is the roof, or else the underside.

@@ -94,7 +94,7 @@ def _last_echo(site: BlastSite, watched: Sequence[int]) -> tuple[float, float]:
 
 def _throws_at(wall: StructureOutline, other: StructureOutline) -> bool:
     height_m, least_m = (inf if each.height_m is None else each.height_m for each in (wall, other))
-    is_whole = wall.cells is None and wall.is_lasting and wall.base_m == 0.0
+    is_whole = wall.cells is None and wall.is_lasting and wall.base_m <= other.base_m
     return is_whole and (height_m == inf or height_m >= _LOW * least_m)
 
 

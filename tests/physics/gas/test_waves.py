@@ -85,6 +85,15 @@ def test_what_throws_nothing_back_is_not_waited_for(scenario: Scenario) -> None:
     assert found.passed_s == pytest.approx(direct_s())
 
 
+@pytest.mark.parametrize(("bases_m", "echoes"), [((1.0, 1.0), True), ((0.0, 1.0), False)])
+def test_walls_on_one_terrace_face_each_other(bases_m: tuple[float, float], echoes: bool) -> None:
+    """Below shops that begin higher than the office is air."""
+    site = lasting(build_site(yard()))
+    ends = zip(site.structures, (*bases_m, 0.0), strict=True)
+    raised = tuple(replace(each, base_m=base_m) for each, base_m in ends)
+    assert (waves(replace(site, structures=raised)) == waves(site)) == echoes
+
+
 def test_what_a_layout_may_take_away_is_waited_for_by_none() -> None:
     scenario = yard()
     standing, away = (build_site(scenario, layout) for layout in ((), (Removal.named("clear"),)))

@@ -1,0 +1,40 @@
+"""Many rectangles at once: how far they are from one, and whether they overlap it."""
+
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Rectangle
+
+TOLERANCE_M: Final = 1e-9
+"""Rectangles that overlap by less than this only touch, as in `Rectangle.overlaps`."""
+
+Boxes = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""Left, bottom, right and top of many rectangles; the four arrays broadcast."""
+
+
+def box_distances_m(box: Rectangle, boxes: Boxes) -> FloatArray:
+    """Return the distances between one rectangle and others."""
+    left, bottom, right, top = boxes
+    along_x = np.maximum(0.0, np.maximum(left - box.right, box.left - right))
+    along_y = np.maximum(0.0, np.maximum(bottom - box.top, box.bottom - top))
+    distances_m: FloatArray = np.hypot(along_x, along_y)
+    return distances_m
+
+
+def overlapping(rectangle: Rectangle, boxes: Boxes) -> BoolArray:
+    """Return which rectangles overlap one; to touch is not to overlap."""
+    left, bottom, right, top = boxes
+    along_x = (left < rectangle.right - TOLERANCE_M) & (right > rectangle.left + TOLERANCE_M)
+    along_y = (bottom < rectangle.top - TOLERANCE_M) & (top > rectangle.bottom + TOLERANCE_M)
+    return along_x & along_y
+
+
+def covered_m2(rectangle: Rectangle, boxes: Boxes) -> FloatArray:
+    """Return the area that rectangles have in common with one."""
+    left, bottom, right, top = boxes
+    along_x = np.minimum(right, rectangle.right) - np.maximum(left, rectangle.left)
+    along_y = np.minimum(top, rectangle.top) - np.maximum(bottom, rectangle.bottom)
+    area_m2: FloatArray = np.maximum(along_x, 0.0) * np.maximum(along_y, 0.0)
+    return area_m2

@@ -1,0 +1,68 @@
+"""Raised ground: terraces and podiums, on whose tops barriers and other structures stand."""
+
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Rectangle
+from blast_env.scenario.boxes import TOLERANCE_M, Boxes, covered_m2, overlapping
+from blast_env.scenario.problems import Problem
+from blast_env.scenario.sections import AnyStructure
+
+
+def terrace_problems(structures: Mapping[int, AnyStructure]) -> Iterator[Problem]:
+    """Yield what keeps structures from carrying barriers: each is solid, and has a top."""
+    for index, each in structures.items():
+        if each.carries and each.height_m is None:
+            message = "is true, needs the structure's height_m: barriers stand on its top"
+            yield Problem(f"structures[{index}].carries", message)
+        if each.carries and each.base_m > 0.0:
+            message = f"is {each.base_m:g}, must be 0: what carries barriers is solid"
+            yield Problem(f"structures[{index}].base_m", message)
+
+
+def ground_m(structures: Iterable[AnyStructure], boxes: Boxes) -> FloatArray:
+    """Return how high the ground below squares is, m: the highest terrace that each overlaps."""
+    ground = np.zeros(np.broadcast_shapes(*(side.shape for side in boxes)))
+    for terrace_m, height_m in _terraces(structures):
+        own = overlapping(terrace_m, boxes)
+        ground[own] = np.maximum(ground[own], height_m)
+    return ground
+
+
+def ground_below_m(structures: Iterable[AnyStructure], rectangle_m: Rectangle) -> float:
+    """Return how high the ground below one rectangle is, m; 0 beside all terraces."""
+    own_m = (high_m for plan_m, high_m in _terraces(structures) if plan_m.overlaps(rectangle_m))
+    return max(own_m, default=0.0)
+
+
+def lie_wholly_on(
+    structures: Iterable[AnyStructure], height_m: float | None, boxes: Boxes
+) -> BoolArray:
+    """Return which squares are covered without a gap by terraces of one height."""
+    left, bottom, right, top = boxes
+    open_m2 = (right - left) * (top - bottom)
+    for terrace_m, top_m in _terraces(structures):
+        if top_m == height_m:
+            open_m2 = open_m2 - covered_m2(terrace_m, boxes)
+    whole: BoolArray = open_m2 <= TOLERANCE_M
+    return whole
+
+
+def is_open_below(structure: AnyStructure, structures: Iterable[AnyStructure]) -> bool:
+    """Return whether a structure begins above the ground, and on no terrace either."""
+    boxes = _as_boxes(structure.rectangle_m)
+    return structure.base_m > 0.0 and not lie_wholly_on(structures, structure.base_m, boxes).all()
+
+
+def _terraces(structures: Iterable[AnyStructure]) -> Iterator[tuple[Rectangle, float]]:
+    """Yield plan and height of each terrace."""
+    for each in structures:
+        if each.carries and each.height_m is not None:
+            yield each.rectangle_m, each.height_m
+
+
+def _as_boxes(rectangle: Rectangle) -> Boxes:
+    left, bottom, right, top = (np.array([side]) for side in rectangle)
+    return left, bottom, right, top
