@@ -637,7 +637,9 @@ def test_surrogates_are_compared_case_by_case_on_the_same_blasts(
     options = ["compare", *names, "--changes", "0", "--processes", "1"]
     done = CliRunner().invoke(studies.surrogate.app, options, catch_exceptions=False)
     one, same, other = (line.split("|")[1:-1] for line in done.output.splitlines()[-3:])
-    assert [each[0].strip() for each in (one, same, other)] == ["one", "same", "other"]
+    assert [each[0].strip() for each in (one, same, other)] == [
+        f"{each}, 0 changes" for each in ("one", "same", "other")
+    ]
     assert same[1:4] == one[1:4]
     assert same[4].strip() == "0.0 % (0.0 to 0.0)"
     lead, behind, gap = (float(each.split("%")[0]) for each in (one[1], other[1], other[4]))
