@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
+from itertools import combinations
 from math import cbrt, isnan
 from pathlib import Path
 from typing import Annotated, Final
@@ -440,7 +440,9 @@ def cells(
     endless: Annotated[bool, typer.Option(help="Everything as high as the air.")] = False,
     charges: Annotated[int, typer.Option(min=1, help="Charges, those of seeds from 0.")] = 1,
     random_layouts: Annotated[int, typer.Option(min=0)] = 2,
-    sizes: Annotated[str, typer.Option(help="Sides of cells, m, all layouts.")] = "0.5,0.25",
+    sizes: Annotated[
+        str, typer.Option(help="Sides in m, `coarse` and `fine`, from coarse to fine; all layouts.")
+    ] = "0.5,0.25",
     finest: Annotated[
         float | None, typer.Option(help="m, for none and the first three layouts only.")
     ] = None,
@@ -456,7 +458,7 @@ def cells(
         for seed in range(charges):
             charge = draw_charge(site, seed)
             run = partial(cell_loads, site, charge=charge, until_s=until, processes=processes)
-            _print_cells(site, charge, random_layouts, (_numbers(sizes), finest), run)
+            _print_cells(site, charge, random_layouts, (sizes.split(","), finest), run)
 
 
 def _cells_site(scenario: str, endless: bool) -> Scenario:
@@ -471,7 +473,7 @@ def _print_cells(
     site: Scenario,
     charge: Charge,
     random_layouts: int,
-    sizes: tuple[list[float], float | None],
+    sizes: tuple[list[str], float | None],
     run: Callable[..., CellLoads],
 ) -> None:
     rules: dict[str, Callable[[Scenario, Charge], Layout]] = {
@@ -483,11 +485,12 @@ def _print_cells(
     all_sizes, finest = sizes
     jobs = [(size, list(layouts.values())) for size in all_sizes]
     if finest is not None:
-        jobs.append((finest, list(layouts.values())[:3]))
+        jobs.append((str(finest), list(layouts.values())[:3]))
     found = []
     for size, tried in jobs:
-        with progress_bar(f"{site.name}, {size:g} m") as progress:
-            found.append(run(tried, cell_m=size, progress=progress))
+        engine = engine_with(size)
+        with progress_bar(f"{site.name}, {engine.cell_words}") as progress:
+            found.append(run(tried, engine=engine, progress=progress))
     x_m, y_m = charge.position_m
     print_line(f"{site.name}, {charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m")
     rows = [
@@ -498,13 +501,13 @@ def _print_cells(
         ),
         ("CPU time of a blast (s)", *(f"{each.cpu_s:.1f}" for each in found)),
     ]
-    print_line(markdown_table(("", *(f"{each.cell_m:g} m" for each in found)), rows) + "\n")
+    print_line(markdown_table(("", *(each.cells for each in found)), rows) + "\n")
     rows = []
-    for coarse, fine in pairwise(found):
+    for coarse, fine in combinations(found, 2):
         apart = difference(coarse, fine)
         rows.append(
             (
-                f"{coarse.cell_m:g} m less {fine.cell_m:g} m",
+                f"{coarse.cells} less {fine.cells}",
                 f"{100.0 * apart.impulse:+.2f} %",
                 f"{100.0 * apart.reduction:+.2f}",
                 f"{100.0 * apart.largest:+.2f}",

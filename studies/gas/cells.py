@@ -20,16 +20,16 @@ from studies.gas.loads import impulse_until, protected_impulse_pa_s
 
 @dataclass(frozen=True, eq=False)
 class CellLoads:
-    """Loads of layouts with cells of one size.
+    """Loads of layouts with one choice of cells.
 
     Attributes:
-        cell_m: Side of a cell.
+        cells: The choice, for people.
         unprotected_pa_s: Impulse without a barrier.
         impulse_pa_s: Impulse with each layout (layouts,).
         cpu_s: Mean CPU time of a blast.
     """
 
-    cell_m: float
+    cells: str
     unprotected_pa_s: float
     impulse_pa_s: FloatArray
     cpu_s: float
@@ -62,7 +62,7 @@ def cell_loads(
     scenario: Scenario,
     layouts: Sequence[Layout],
     charge: Charge,
-    cell_m: float,
+    engine: GasEngine,
     until_s: float | None = None,
     processes: int = 1,
     progress: Callable[[float], None] | None = None,
@@ -73,14 +73,14 @@ def cell_loads(
         scenario: The scenario.
         layouts: The layouts.
         charge: The charge.
-        cell_m: Side of a cell.
+        engine: Has the cells.
         until_s: When loads are looked at; at the end of the run unless given.
         processes: Worker processes.
         progress: Called with the share of the blasts that is done.
     """
-    run = partial(_load, scenario, charge, GasEngine(cell_m=cell_m), until_s)
+    run = partial(_load, scenario, charge, engine, until_s)
     loads, times_s = np.array(run_all(run, [(), *layouts], processes, progress)).T
-    return CellLoads(cell_m, float(loads[0]), loads[1:], float(times_s.mean()))
+    return CellLoads(engine.cell_words, float(loads[0]), loads[1:], float(times_s.mean()))
 
 
 def _load(
@@ -95,7 +95,7 @@ def _load(
 
 
 def difference(coarse: CellLoads, fine: CellLoads) -> CellDifference:
-    """Return how far two sizes are apart, on the layouts that both have (the first ones)."""
+    """Return how far two choices are apart, on the layouts that both have (the first ones)."""
     count = min(len(coarse.impulse_pa_s), len(fine.impulse_pa_s))
     one, other = coarse.impulse_pa_s[:count], fine.impulse_pa_s[:count]
     off = np.append(one / other, coarse.unprotected_pa_s / fine.unprotected_pa_s) - 1.0

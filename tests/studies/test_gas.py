@@ -123,8 +123,8 @@ def test_borders_farther_away_change_loads_little(site: Scenario) -> None:
 
 def test_loads_of_layouts_by_processes_are_the_same(site: Scenario) -> None:
     charge = draw_charge(site, 0)
-    one = cell_loads(site, [WALL], charge, 0.5, until_s=0.03)
-    two = cell_loads(site, [WALL], charge, 0.5, until_s=0.03, processes=2)
+    one = cell_loads(site, [WALL], charge, GasEngine(), until_s=0.03)
+    two = cell_loads(site, [WALL], charge, GasEngine(), until_s=0.03, processes=2)
     assert one.unprotected_pa_s == two.unprotected_pa_s
     assert one.impulse_pa_s.tolist() == two.impulse_pa_s.tolist()
     assert 0.0 < one.reduction[0] < 0.4
@@ -133,19 +133,19 @@ def test_loads_of_layouts_by_processes_are_the_same(site: Scenario) -> None:
 
 def test_without_a_time_loads_are_those_of_the_end() -> None:
     site = hut()
-    at_end = cell_loads(site, [], draw_charge(site, 0), 0.5)
+    at_end = cell_loads(site, [], draw_charge(site, 0), GasEngine())
     assert at_end.unprotected_pa_s == protected_impulse_pa_s(GasBlast(site).run())
 
 
 def test_differences_of_cells_by_hand() -> None:
-    coarse = CellLoads(0.5, 100.0, np.array([90.0, 80.0, 60.0]), 1.0)
-    fine = CellLoads(0.25, 100.0, np.array([90.0, 60.0, 80.0]), 16.0)
+    coarse = CellLoads("0.5 m", 100.0, np.array([90.0, 80.0, 60.0]), 1.0)
+    fine = CellLoads("0.25 m", 100.0, np.array([90.0, 60.0, 80.0]), 16.0)
     found = difference(coarse, fine)
     assert found.impulse == pytest.approx((0.0 + 0.0 + 1.0 / 3.0 - 0.25) / 4.0)
     assert found.reduction == pytest.approx(0.0)
     assert abs(found.largest) == pytest.approx(0.2)
     assert found.rank == pytest.approx(0.5)
-    few = difference(coarse, CellLoads(0.125, 50.0, np.array([45.0]), 256.0))
+    few = difference(coarse, CellLoads("0.125 m", 50.0, np.array([45.0]), 256.0))
     assert few.impulse == pytest.approx(1.0)
     assert few.reduction == pytest.approx(0.0)
     assert np.isnan(few.rank)
