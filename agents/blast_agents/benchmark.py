@@ -21,6 +21,11 @@ def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layou
     return result.layout
 
 
+def method_of(proposer: Proposer) -> Method:
+    """Return a proposer of the package as a method that a problem is given to."""
+    return partial(_proposed, proposer)
+
+
 def find_method(name: str) -> Method:
     """Return a method by the name of a proposer, or by `module:object`.
 
@@ -29,7 +34,7 @@ def find_method(name: str) -> Method:
         BlastEnvError: If there is no such module or object, or it cannot be called.
     """
     if ":" not in name:
-        return partial(_proposed, find_proposer(name))
+        return method_of(find_proposer(name))
     try:
         found = load_plugin(name)
     except (ImportError, AttributeError, ValueError) as error:
