@@ -20,6 +20,7 @@ from blast_env.scenario import (
     VehicleSource,
 )
 from blast_env.scenario.sections import PointM
+from blast_env.scenario.terraces import ground_below_m
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 
@@ -65,6 +66,12 @@ _SINGLE: Final = (ThingKind.SITE, ThingKind.ZONE)
 NOWHERE: Final = (ThingKind.SITE, ThingKind.ITEM, ThingKind.MEASURE)
 """Kinds without a place of their own on the plan."""
 
+_DRAWN: Final = (
+    *(ThingKind.GAUGE, ThingKind.CHARGE, ThingKind.STRUCTURE),
+    *(ThingKind.KEEP_OUT, ThingKind.COST_AREA, ThingKind.ZONE),
+)
+"""The other kinds, what is drawn on top first."""
+
 _BETTER_GLASS: Final = "window_laminated_6"
 
 
@@ -100,8 +107,8 @@ def things(scenario: Scenario) -> Iterator[tuple[SiteThing, str]]:
         f"site, {scenario.site.width_m:g} x {scenario.site.height_m:g} m",
     )
     for index, structure in enumerate(scenario.structures):
-        protected = ", protected" if structure.protected else ""
-        yield SiteThing(ThingKind.STRUCTURE, index), f"{structure.name}{protected}"
+        role = ", protected" if structure.protected else ", terrace" if structure.carries else ""
+        yield SiteThing(ThingKind.STRUCTURE, index), f"{structure.name}{role}"
     for index, source in enumerate(scenario.charge):
         yield SiteThing(ThingKind.CHARGE, index), f"charge {index + 1}, {source.tnt_kg:g} kg"
     zone = scenario.build_zone
@@ -160,26 +167,27 @@ def thing_at(scenario: Scenario, x_m: float, y_m: float, reach_m: float) -> Site
         y_m: The place.
         reach_m: How far beside a point or a line one may point.
     """
-    for kind, grown_m in (
-        (ThingKind.GAUGE, reach_m),
-        (ThingKind.CHARGE, reach_m),
-        (ThingKind.STRUCTURE, 0.0),
-        (ThingKind.KEEP_OUT, 0.0),
-        (ThingKind.COST_AREA, 0.0),
-        (ThingKind.ZONE, 0.0),
-    ):
-        own = [each for each, _ in things(scenario) if each.kind is kind]
-        for thing in reversed(own):
-            left, bottom, right, top = rectangle_of(scenario, thing).grown(grown_m)
-            if not (left <= x_m <= right and bottom <= y_m <= top):
-                continue
-            if (
-                kind is ThingKind.CHARGE
-                and _beside(scenario.charge[thing.number], x_m, y_m) > reach_m
-            ):
-                continue
-            return thing
+    for thing in _from_the_top(scenario):
+        grown_m = reach_m if thing.kind in (ThingKind.GAUGE, ThingKind.CHARGE) else 0.0
+        left, bottom, right, top = rectangle_of(scenario, thing).grown(grown_m)
+        if not (left <= x_m <= right and bottom <= y_m <= top):
+            continue
+        is_charge = thing.kind is ThingKind.CHARGE
+        if is_charge and _beside(scenario.charge[thing.number], x_m, y_m) > reach_m:
+            continue
+        return thing
     return None
+
+
+def _from_the_top(scenario: Scenario) -> list[SiteThing]:
+    """Return what has a place on the plan, terraces last: they are below what they carry."""
+
+    def depth(thing: SiteThing) -> tuple[bool, int, int]:
+        is_structure = thing.kind is ThingKind.STRUCTURE
+        carries = is_structure and scenario.structures[thing.number].carries
+        return carries, _DRAWN.index(thing.kind), -thing.number
+
+    return sorted((each for each, _ in things(scenario) if each.kind in _DRAWN), key=depth)
 
 
 def _beside(source: AnySource, x_m: float, y_m: float) -> float:
@@ -308,7 +316,7 @@ def added(
     A charge is a point where both places are the same, else a line; with `is_area` it may be
     anywhere between them. A build zone takes the place of the one there is, and keeps what holds in
     it. A structure is `height_m` high, a storey unless said otherwise; `None` for as high as the
-    air.
+    air. It stands on the terrace that it is drawn on.
 
     Raises:
         ScenarioError: If it cannot be there.
@@ -404,6 +412,7 @@ def _free_name(word: str, things: Iterable[Any]) -> str:
 
 
 def _structure(scenario: Scenario, area: Rectangle, height_m: float | None) -> Document:
+    base_m = ground_below_m(scenario.structures, area)
     return {
         "kind": "ModularObstacle",
         "name": _free_name("structure", scenario.structures),
@@ -411,7 +420,8 @@ def _structure(scenario: Scenario, area: Rectangle, height_m: float | None) -> D
         "rows": max(round((area.top - area.bottom) / MODULE_SIDE_M), 1),
         "columns": max(round((area.right - area.left) / MODULE_SIDE_M), 1),
         "protected": not any(each.protected for each in scenario.structures),
-        **({} if height_m is None else {"height_m": height_m}),
+        **({"base_m": base_m} if base_m else {}),
+        **({} if height_m is None else {"height_m": base_m + height_m}),
     }
 
 

@@ -11,6 +11,7 @@ from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario, ScenarioError, load_scenario
 from tests.gas_sites import hut
+from tests.test_terraces import HALL, TERRACE, terraced
 
 COURTYARD = load_scenario("courtyard")
 BUILDING = SiteThing(ThingKind.STRUCTURE)
@@ -135,3 +136,21 @@ def test_every_thing_has_a_rectangle() -> None:
         assert scenario.site.rectangle_m.contains(edits.rectangle_of(scenario, thing))
     with pytest.raises(BlastEnvError, match="has no gauge 7"):
         edits.rectangle_of(scenario, SiteThing(ThingKind.GAUGE, 7))
+
+
+def test_a_terrace_is_below_all_that_stands_on_it() -> None:
+    site = terraced(structures=[HALL, TERRACE])
+    places = {(9.0, 5.0): (ThingKind.STRUCTURE, 0), (6.5, 5.0): (ThingKind.ZONE, 0)}
+    places[12.75, 9.5] = (ThingKind.STRUCTURE, 1)
+    for place, thing in places.items():
+        assert edits.thing_at(site, *place, 0.5) == thing
+    assert dict(edits.things(site))[SiteThing(ThingKind.STRUCTURE, 1)] == "podium, terrace"
+
+
+def test_what_is_drawn_on_a_terrace_stands_on_it() -> None:
+    site = terraced()
+    after, thing = edits.added(site, ThingKind.STRUCTURE, (8.5, 8.5), (10.5, 9.5), 2.5)
+    hut_there = after.structures[thing.number]
+    assert (hut_there.base_m, hut_there.height_m) == (1.0, 3.5)
+    beside, thing = edits.added(site, ThingKind.STRUCTURE, (8.5, 10.5), (10.5, 11.5), 2.5)
+    assert (beside.structures[-1].base_m, beside.structures[-1].height_m) == (0.0, 2.5)

@@ -4,6 +4,7 @@ import asyncio
 import logging
 import signal
 import sys
+import tomllib
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
@@ -17,21 +18,24 @@ from nicegui.testing import User
 from nicegui.testing.user_simulation import user_simulation
 
 from blast_env.app import offers
+from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
 from blast_env.app.page import uploads
+from blast_env.app.page.fields import fields_of
 from blast_env.app.records import EngineRecord
 from blast_env.app.server import MOST_PAGES, add_pages
 from blast_env.app.session import Sessions
 from blast_env.app.work import read_status, write_status
 from blast_env.errors import BlastEnvError
 from blast_env.reading import Reading
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.scenario import Scenario, load_scenario, save_scenario
 from tests.app.here import Here
 from tests.app.test_work import CELLS
 from tests.gas_sites import WALL, hut
 from tests.importing.maps import BLOCK
 from tests.scenarios import BALLISTIC_COURTYARD
+from tests.test_terraces import TERRACE, solid, terraced
 
 Story = Callable[[User, Sessions], Awaitable[None]]
 
@@ -233,6 +237,58 @@ def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
         assert session.scenario.structures[0].facade is None
 
     play(tmp_path, story)
+
+
+def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
+    """From a file, edited in the fields, and saved."""
+    canopy = solid("canopy", 2.0, 9.0, 2, 4, base_m=2.5, height_m=3.0)
+    site = terraced(TERRACE, canopy)
+    path = tmp_path / "site.toml"
+    save_scenario(site, path)
+
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        choose(user, "site from a file, into this design")
+        (element,) = user.find(kind=ui.upload).elements
+        with user:
+            await element.handle_uploads(
+                [SmallFileUpload(name=path.name, content_type="", _data=path.read_bytes())]
+            )
+        await user.should_see("podium", retries=200)
+        assert session.scenario == site
+        fields = {each.label: each for each in fields_of(site, SiteThing(ThingKind.STRUCTURE))}
+        for label in ("begins at (m)", "terrace"):
+            assert fields[label].hint
+
+        def shown(kind: type[Any], label: str) -> Any:
+            found = user.find(kind=kind).elements
+            return next(
+                each
+                for each in found
+                if label in (each.props.get("label"), getattr(each, "text", ""))
+            )
+
+        chooser = shown(ui.select, "selected")
+        chooser.value = "structure 1"
+        assert shown(ui.switch, "terrace").value is True
+        shown(ui.switch, "terrace").value = False
+        assert not session.scenario.structures[1].carries
+        shown(ui.switch, "terrace").value = True
+        chooser.value = "structure 2"
+        assert shown(ui.switch, "terrace").value is False
+        shown(ui.switch, "terrace").value = True
+        await user.should_see("must be 0: what carries barriers is solid")
+        begins = shown(ui.number, "begins at (m)")
+        assert begins.value == 2.5
+        begins.value = 2.0
+        user.find("begins at (m)").trigger("blur")
+        choose(user, "site: scenario file (.toml)")
+        saved = (await user.download.next()).content.decode()
+        assert Scenario.from_document(tomllib.loads(saved), "saved") == terraced(
+            TERRACE, canopy | {"base_m": 2.0}
+        )
+
+    play(tmp_path / "designs", story)
 
 
 def test_an_unknown_design_leads_to_the_list_with_a_message(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ class FormField(NamedTuple):
         part: Number of the coordinate, where the key holds several.
         optional: Whether it may be empty: then the rule of the file format holds.
         inside: Key of the table in which the key is, if it is a further one.
+        hint: What it does, where its label does not say so.
     """
 
     label: str
@@ -28,6 +29,7 @@ class FormField(NamedTuple):
     part: int | None = None
     optional: bool = False
     inside: str = ""
+    hint: str = ""
 
 
 _CORNER: Final = (
@@ -105,7 +107,20 @@ _OF_CHARGE: Final[Mapping[str, tuple[FormField, ...]]] = {
 
 _OF_STRUCTURE: Final = (
     FormField("protected", "protected", "switch"),
-    FormField("height (m)", "height_m", optional=True),
+    FormField("height (m)", "height_m", optional=True, hint="of its top above the ground"),
+    FormField(
+        "begins at (m)",
+        "base_m",
+        optional=True,
+        hint="height of its underside: 0 on the ground; on a terrace, the terrace's height;"
+        " else there is air below it, as below a canopy",
+    ),
+    FormField(
+        "terrace",
+        "carries",
+        "switch",
+        hint="barriers and buildings may stand on its top; it needs a height, and begins at 0",
+    ),
     *_CORNER,
 )
 _OF_STRUCTURES: Final[Mapping[str, tuple[FormField, ...]]] = {
@@ -141,6 +156,8 @@ def value_of(section: Document, field: FormField) -> Any:
     value = section.get(field.key)
     if field.form == "walls":
         return list(value or WALLS)
+    if field.form == "switch":
+        return bool(value)
     return value if field.part is None or value is None else value[field.part]
 
 

@@ -99,7 +99,7 @@ class FilesMenu:
     def _save_site(self) -> None:
         scenario = self._session.scenario
         text = tomli_w.dumps(scenario.model_dump(mode="json", exclude_none=True))
-        ui.download.content(text, f"{scenario.name}.toml")
+        ui.download.content(text.encode(), f"{scenario.name}.toml")
 
     def _save_layout(self, suffix: str) -> None:
         session = self._session

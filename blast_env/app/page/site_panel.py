@@ -86,9 +86,10 @@ class SitePanel:
         self._filling = False
 
     def _input(self, field: FormField) -> Any:
-        if field.form == "switch":
-            return ui.switch(field.label, on_change=lambda e: self._put(field, e.value))
         element: Any
+        if field.form == "switch":
+            element = ui.switch(field.label, on_change=lambda e: self._put(field, e.value))
+            return element.tooltip(field.hint) if field.hint else element
         if field.form == "walls":
             element = ui.select([*WALLS], label=field.label, multiple=True)
         elif field.form == "side":
@@ -109,7 +110,7 @@ class SitePanel:
             empty = "none" if field.form in ("glazing", "wall") else "by rule"
             element.props(f'placeholder="{empty}" clearable stack-label')
         element.props("dense outlined").classes("w-full")
-        return element
+        return element.tooltip(field.hint) if field.hint else element
 
     def _components(self, kind: str) -> dict[str, str]:
         known = {**catalogue(), **self._editor.session.scenario.components}
