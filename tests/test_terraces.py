@@ -24,6 +24,7 @@ from blast_env.scenario import Placement, Scenario, ScenarioError, load_scenario
 from blast_env.scenario.build_scene import build_site, vehicle_drive
 from blast_env.sites import Visibility
 from tests.catalogue_sites import item
+from tests.importing.maps import charge, outline, rectangle, written
 from tests.scenario.test_driving import LORRY
 from tests.vehicle_sites import gate_site, vehicle_document, vehicle_of
 
@@ -418,6 +419,17 @@ def test_what_is_exported_comes_back(name: str, tmp_path: Path) -> None:
     again = import_site(path, ImportOptions(stock=6)).scenario
     found = {(each.carries, each.base_m, each.height_m, each.rows) for each in again.structures}
     assert found == {(True, 0.0, 1.0, 16), (False, 1.0, 4.0, 10)}
+
+
+@pytest.mark.parametrize("said", [True, "yes"])
+def test_a_map_says_what_is_a_terrace_in_the_words_of_the_format(said: Any, tmp_path: Path) -> None:
+    hall = outline(rectangle(20.0, 0.0, 8.0, 6.0), height_m=9.0, base_m=1.0, protected=True)
+    podium = outline(rectangle(16.0, -2.0, 14.0, 10.0), carries=said, height_m=1.0)
+    topless = outline(rectangle(16.0, 12.0, 14.0, 4.0), carries=said)
+    imported = import_site(written(tmp_path, hall, podium, topless, charge(5.0, 5.0)))
+    found = {(each.carries, each.base_m, each.height_m) for each in imported.scenario.structures}
+    assert found == {(False, 1.0, 9.0), (True, 0.0, 1.0), (False, 0.0, None)}
+    assert "terraces without a height, on which nothing stands: 1" in imported.notes
 
 
 def test_walls_of_a_building_on_it_weigh_as_on_the_ground(tmp_path: Path) -> None:

@@ -107,7 +107,15 @@ def fit_buildings(
     kept, notes = _kept(site, options)
     if not kept:
         raise BlastEnvError(f"{site.path}: there is no building on the site{_hint(site)}")
-    kept = sorted(kept, key=lambda each: (each.carries, -each.geometry.area))
+    said = sum(each.carries for each in kept)
+    kept = [
+        replace(each, carries=each.carries and _height_m(each, options) is not None)
+        for each in kept
+    ]
+    topless = said - sum(each.carries for each in kept)
+    if topless:
+        notes.append(f"terraces without a height, on which nothing stands: {topless}")
+    kept.sort(key=lambda each: (each.carries, -each.geometry.area))
     cut = []
     for carries in (False, True):  # a building on a terrace takes no ground from it
         level = [each for each in kept if each.carries == carries]
@@ -116,7 +124,7 @@ def fit_buildings(
     count = sum(len(rectangles) for rectangles, _ in cut)
     if count > MOST_STRUCTURES:
         raise _too_many(site, f"the buildings take {count} rectangles, must take")
-    heights = _heights(kept, options)
+    heights = [_height_m(each, options) for each in kept]
     titles = [each.name for each in kept]
     walls = _wall_areas([rectangles for rectangles, _ in cut], heights, site.shape)
     buildings = [
@@ -314,13 +322,10 @@ def _check_deviation(site: PlacedSite, building: FittedBuilding, options: Import
         )
 
 
-def _heights(things: Sequence[Thing], options: ImportOptions) -> list[float | None]:
-    """Return the heights in whole modules; `None` where nobody knows one."""
-    heights = (each.height_m or options.default_height_m for each in things)
-    return [
-        None if height_m is None else max(round(height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
-        for height_m in heights
-    ]
+def _height_m(thing: Thing, options: ImportOptions) -> float | None:
+    """Return the height of a building in whole modules; `None` where nobody knows one."""
+    height_m = thing.height_m or options.default_height_m
+    return None if height_m is None else max(round(height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
 
 
 def _base_m(thing: Thing, height_m: float | None) -> float:

@@ -45,7 +45,7 @@ class Thing:
         tnt_kg: Mass of a charge there, where the source has it.
         part_of: The building that it is a rectangle of, in what blast-env itself wrote.
         diameter_m: Of a point that is a round building: a silo, a tank, a column.
-        carries: Whether it is a terrace in what blast-env itself wrote.
+        carries: Whether the source says that it is a terrace.
     """
 
     role: Role
@@ -133,6 +133,7 @@ _ROUND: Final = frozenset({"chimney", "gasometer", "silo", "storage_tank", "wate
 """Values of OpenStreetMap's `man_made` of buildings, most of them round."""
 
 _NAME_KEYS: Final = ("name", "addr:housename", "text")
+_YES: Final = (True, "yes", "true")
 _LENGTH: Final = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*(m|ft|')?")
 _FOOT_M: Final = 0.3048
 
@@ -204,9 +205,9 @@ def _thing(feature: MapFeature, role: Role, height_m: float | None) -> Thing:
         name=next((str(tags[key]) for key in _NAME_KEYS if tags.get(key)), ""),
         place=feature.place,
         height_m=height_m,
-        protected=own == "protected_structure" or tags.get("protected") in (True, "yes", "true"),
+        protected=own == "protected_structure" or tags.get("protected") in _YES,
         part_of=str(tags.get("building", "")) if own in _OWN_STRUCTURES else "",
-        carries=own == "terrace" and height_m is not None,
+        carries=own == "terrace" or tags.get("carries") in _YES,
         tnt_kg=float(tnt_kg) if isinstance(tnt_kg, int | float) and tnt_kg > 0.0 else None,
     )
 
