@@ -28,12 +28,26 @@ COMPLETE: Final = 0.02
 """Share of an impulse that may still come where it counts as complete."""
 
 UNIFORM: Final = "uniform"
-_GROWING: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
-    {"coarse": (0.5, 90.0), "fine": (0.25, 130.0)}
+
+
+@dataclass(frozen=True)
+class _Growth:
+    """How cells grow (docs/engineers/gas.md).
+
+    Attributes:
+        smallest_m: Side of the cells that a blast begins with.
+        run: How many cells the front runs before they are doubled.
+        largest_m: Side of the last ones.
+    """
+
+    smallest_m: float
+    run: float
+    largest_m: float
+
+
+_GROWING: Final[Mapping[str, _Growth]] = MappingProxyType(
+    {"coarse": _Growth(0.5, 90.0, 1.0), "fine": _Growth(0.25, 130.0, 0.5)}
 )
-"""Side of the smallest cells, m, and how many of its cells the front runs before they are doubled
-(docs/engineers/gas.md)."""
-_LARGEST_M: Final = 1.0
 CELLS: Final = (UNIFORM, *_GROWING)
 """What cells can be."""
 
@@ -60,9 +74,8 @@ class GasSettings:
     Attributes:
         cell_m: Side of a cell; a module's side must be a whole number of them.
         cells: "uniform", or how cells grow with the blast: until its front has run so many of them,
-            then they are twice as large, up to 1 m. "coarse", for search on large sites, begins
-            with 0.5 m, "fine", for final statements there, with 0.25 m; or with `cell_m` if that is
-            less.
+            then they are twice as large. "coarse", for search on large sites, goes from 0.5 to 1 m,
+            "fine", for final statements there, from 0.25 to 0.5 m; from `cell_m` if that is less.
         margin_m: How far the cells keep their size outside the site.
         border_m: How far the open borders are beyond that, and above the air, at least; the cells
             between grow outwards.
@@ -113,15 +126,18 @@ class GasSettings:
     @property
     def smallest_m(self) -> float:
         """Side of the smallest cells."""
-        return min(self.cell_m, _GROWING[self.cells][0]) if self.is_growing else self.cell_m
+        if not self.is_growing:
+            return self.cell_m
+        return min(self.cell_m, _GROWING[self.cells].smallest_m)
 
     @property
     def doubled_m(self) -> tuple[float, ...]:
         """How far the front has run in the open when cells become twice as large."""
         if not self.is_growing:
             return ()
-        count = floor(log2(_LARGEST_M / self.smallest_m) + 1e-9)
-        return tuple(_GROWING[self.cells][1] * self.smallest_m * 2.0**k for k in range(count))
+        growth = _GROWING[self.cells]
+        count = floor(log2(growth.largest_m / self.smallest_m) + 1e-9)
+        return tuple(growth.run * self.smallest_m * 2.0**k for k in range(count))
 
     @property
     def cell_words(self) -> str:
