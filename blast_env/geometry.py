@@ -1,7 +1,7 @@
 """Axis-parallel rectangles, the only plane figure that sites are made of; cells of a grid."""
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from math import hypot
 from typing import NamedTuple
 
@@ -135,6 +135,93 @@ class Rectangle(NamedTuple):
                 leave = np.where(along, leave, -1.0)
         met: BoolArray = enter < leave
         return met
+
+
+Place = tuple[float, float]
+"""x and y."""
+
+Side = tuple[Place, Place]
+"""From where to where a part of an outline runs."""
+
+_DIGITS = 9  # of a coordinate: what is beyond is rounding
+
+
+def open_sides(rectangles: Sequence[Rectangle]) -> list[list[Side]]:
+    """Return the parts of each rectangle's sides that no other one touches, counterclockwise.
+
+    Args:
+        rectangles: Rectangles that do not overlap.
+    """
+    exact = [Rectangle(*(round(value, _DIGITS) for value in each)) for each in rectangles]
+    return [list(_open_sides(each, exact)) for each in exact]
+
+
+def _open_sides(own: Rectangle, all_of_them: Sequence[Rectangle]) -> Iterator[Side]:
+    left, bottom, right, top = own
+    along_x = [(each.left, each.right, each) for each in all_of_them]
+    along_y = [(each.bottom, each.top, each) for each in all_of_them]
+    for low, high in _gaps(left, right, [(a, b) for a, b, each in along_x if each.top == bottom]):
+        yield (low, bottom), (high, bottom)
+    for low, high in _gaps(bottom, top, [(a, b) for a, b, each in along_y if each.left == right]):
+        yield (right, low), (right, high)
+    for low, high in _gaps(left, right, [(a, b) for a, b, each in along_x if each.bottom == top]):
+        yield (high, top), (low, top)
+    for low, high in _gaps(bottom, top, [(a, b) for a, b, each in along_y if each.right == left]):
+        yield (left, high), (left, low)
+
+
+def _gaps(low: float, high: float, taken: Iterable[Place]) -> Iterator[Place]:
+    """Yield what intervals leave of one, the lowest first."""
+    for begin, end in sorted(taken):
+        if begin > low:
+            yield low, min(begin, high)
+        low = max(low, end)
+        if low >= high:
+            return
+    yield low, high
+
+
+def outlines(rectangles: Sequence[Rectangle]) -> list[tuple[Place, ...]]:
+    """Return the corners of the outlines of all rectangles together.
+
+    Outer ones run counterclockwise, those of holes clockwise.
+
+    Args:
+        rectangles: Rectangles that do not overlap.
+    """
+    ends: dict[Place, list[Place]] = defaultdict(list)
+    for sides in open_sides(rectangles):
+        for start, end in sides:
+            ends[start].append(end)
+    found = []
+    while ends:
+        first = here = next(iter(ends))
+        ring: list[Place] = []
+        way = (0.0, 0.0)
+        while not ring or here != first:
+            there = max(ends[here], key=lambda end: _turn(way, here, end))
+            ends[here].remove(there)
+            if not ends[here]:
+                del ends[here]
+            new = _way(here, there)
+            if new != way:
+                ring.append(here)
+            here, way = there, new
+        if _way(*ring[:2]) == way:
+            del ring[0]  # in the middle of a side
+        found.append(tuple(ring))
+    return found
+
+
+def _way(start: Place, end: Place) -> Place:
+    """Return the direction of a side along one of the axes."""
+    return float(np.sign(end[0] - start[0])), float(np.sign(end[1] - start[1]))
+
+
+def _turn(way: Place, here: Place, there: Place) -> float:
+    """Return 1 for a side to the left of a direction, -1 for one to its right."""
+    x, y = _way(here, there)
+    return way[0] * y - way[1] * x
 
 
 def stacked_runs(cells: BoolArray) -> IntArray:

@@ -17,7 +17,7 @@ from typing import Final, Literal
 import numpy as np
 
 from blast_env.arrays import BoolArray
-from blast_env.geometry import Element, Piece, Rectangle, stacked_runs, standing
+from blast_env.geometry import Element, Piece, Rectangle, outlines, stacked_runs, standing
 from blast_env.physics.scene import Charge
 from blast_env.physics.structure import Colour
 from blast_env.scenario import (
@@ -241,6 +241,7 @@ class Feature:
         label: What pictures write beside it.
         fill: The colour of its area, where things of its kind differ.
         is_raised: Whether there is air below it.
+        part_of: What it is a rectangle of, where it is drawn without lines between the parts.
     """
 
     kind: FeatureKind
@@ -251,6 +252,7 @@ class Feature:
     label: str = ""
     fill: Colour | None = None
     is_raised: bool = False
+    part_of: str = ""
 
     @property
     def look(self) -> Look:
@@ -299,7 +301,7 @@ def site_features(
         found += barrier_features(scenario, layout)
     found += structure_features(there)
     found += (
-        area_feature(Kinds.TAKEN_AWAY, each.rectangle_m, each.name, **_said_of(each))
+        _structure_feature(Kinds.TAKEN_AWAY, each)
         for each in scenario.structures
         if each not in there
     )
@@ -329,6 +331,18 @@ def in_order(features: Iterable[Feature]) -> tuple[Feature, ...]:
 def without(features: Iterable[Feature], *kinds: FeatureKind) -> tuple[Feature, ...]:
     """Return the features that are of other kinds."""
     return tuple(each for each in features if each.kind not in kinds)
+
+
+def outlines_of(areas: Iterable[Feature]) -> Iterator[tuple[PointM, ...]]:
+    """Yield the outlines of areas of one look; parts of one thing have theirs together."""
+    wholes: dict[str, list[Rectangle]] = {}
+    for area in areas:
+        if area.part_of:
+            wholes.setdefault(area.part_of, []).append(area.bounds_m)
+        else:
+            yield area.places_m
+    for parts in wholes.values():
+        yield from outlines(parts)
 
 
 def without_counts(features: Iterable[Feature]) -> tuple[Feature, ...]:
@@ -490,11 +504,18 @@ def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
         for part in parts:
             kind = Kinds.TERRACE if part.carries else Kinds.STRUCTURE
             kind = Kinds.PROTECTED_STRUCTURE if part.protected else kind
-            outline = area_feature(kind, part.rectangle_m, part.name, **_said_of(part))
+            outline = _structure_feature(kind, part)
             is_raised = is_open_below(part, structures)
             words = f"{kind.words} above the ground" if is_raised else ""
             label_here = label if part is largest else ""
             yield replace(outline, label=label_here, words=words, is_raised=is_raised)
+
+
+def _structure_feature(kind: FeatureKind, structure: AnyStructure) -> Feature:
+    said = _said_of(structure)
+    feature = area_feature(kind, structure.rectangle_m, structure.name, **said)
+    parts_end = [said.get(key) for key in ("building", "base_m", "height_m")]
+    return replace(feature, part_of=" ".join(map(str, parts_end)) if structure.building else "")
 
 
 def _said_of(structure: AnyStructure) -> dict[str, str | float]:

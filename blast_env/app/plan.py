@@ -28,6 +28,7 @@ from blast_env.plan import (
     Look,
     cell_features,
     in_order,
+    outlines_of,
     site_features,
     vehicle_features,
     without,
@@ -194,7 +195,9 @@ def draw_features(view: PixelView, features: Iterable[Feature]) -> Iterator[str]
     for (kind, look, colour, corners), group in groupby(
         features, key=lambda each: (each.kind, each.look, each.colour, min(len(each.places_m), 3))
     ):
-        places = [[view.pixel(*place) for place in each.places_m] for each in group]
+        alike = list(group)
+        shapes = outlines_of(alike) if corners == 3 else (each.places_m for each in alike)
+        places = [[view.pixel(*place) for place in shape] for shape in shapes]
         if corners == 3:
             yield from _areas(kind, look, colour, places)
         elif corners == 2:

@@ -1,6 +1,6 @@
 """The oblique view of a site: isometric, so that lengths, widths and heights have one scale."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, radians, sin, tan
 from types import MappingProxyType
@@ -10,7 +10,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.geometry import Element, Rectangle
+from blast_env.geometry import Element, Place, Rectangle, Side, open_sides, outlines
 from blast_env.plan import INK, STANDING, Feature, Kinds, site_features, vehicle_features, without
 from blast_env.rendering.site_plan import draw_features
 from blast_env.rendering.style import nice_floor, render_extra, unit_interval
@@ -139,6 +139,9 @@ class Box(NamedTuple):
         edge: Colour of its edges.
         tiles: Parts of its walls.
         base_m: How high it begins.
+        sides: The parts of its outline that have a line, counterclockwise; not those where it goes
+            on into another box.
+        corners: Where walls meet, and have an upright line.
     """
 
     rectangle_m: Rectangle
@@ -147,6 +150,8 @@ class Box(NamedTuple):
     edge: Colour
     tiles: Sequence[Tile] = ()
     base_m: float = 0.0
+    sides: Sequence[Side] = ()
+    corners: Collection[Place] = ()
 
 
 def painted_order(
@@ -210,10 +215,10 @@ def draw_oblique(
     site_m = scenario.site.rectangle_m
     view = ObliqueView(site_m, corner or corner_towards(scenario))
     features = (*_raised(scenario, layout), *vehicle_features(scenario, layout))
+    standing = [each for each in features if each.kind in STANDING]
     boxes = [
-        _box_of(each)._replace(tiles=tiles.get(each.name, ()))
-        for each in features
-        if each.kind in STANDING
+        box._replace(tiles=tiles.get(each.name, ()))
+        for box, each in zip(_boxes_of(standing), standing, strict=True)
     ]
     _set_up(axes, view, boxes)
     draw_features(axes, without(features, *STANDING), view)
@@ -224,7 +229,7 @@ def draw_oblique(
 
 def boxes_of(scenario: Scenario, layout: Sequence[Element] = ()) -> list[Box]:
     """Return what stands on a site: the structures, then each module or piece of the layout."""
-    return [_box_of(each) for each in _raised(scenario, layout) if each.kind in STANDING]
+    return _boxes_of([each for each in _raised(scenario, layout) if each.kind in STANDING])
 
 
 def _raised(scenario: Scenario, layout: Sequence[Element]) -> tuple[Feature, ...]:
@@ -234,6 +239,21 @@ def _raised(scenario: Scenario, layout: Sequence[Element]) -> tuple[Feature, ...
         replace(each, properties={**air, **each.properties}) if each.kind in STANDING else each
         for each in site_features(scenario, layout)
     )
+
+
+def _boxes_of(features: Sequence[Feature]) -> list[Box]:
+    """Return features as boxes; those that are parts of one thing have no lines between them."""
+    wholes: dict[object, list[int]] = {}
+    for number, feature in enumerate(features):
+        whole = (feature.kind, feature.look, feature.part_of) if feature.part_of else number
+        wholes.setdefault(whole, []).append(number)
+    boxes = [_box_of(each) for each in features]
+    for numbers in wholes.values():
+        plans = [boxes[number].rectangle_m for number in numbers]
+        corners = frozenset(place for outline in outlines(plans) for place in outline)
+        for number, sides in zip(numbers, open_sides(plans), strict=True):
+            boxes[number] = boxes[number]._replace(sides=sides, corners=corners)
+    return boxes
 
 
 def _box_of(feature: Feature) -> Box:
@@ -273,22 +293,45 @@ def _draw_boxes(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
     polygons: list[FloatArray] = []
     colours: list[Colour] = []
     edges: list[Colour] = []
+
+    def paint(shape: FloatArray, colour: Colour, edge: Colour) -> None:
+        polygons.append(shape)
+        colours.append(colour)
+        edges.append(edge)
+
     bases_m = [box.base_m for box in boxes]
     for number in painted_order(view, [box.rectangle_m for box in boxes], bases_m):
         box = boxes[number]
-        polygons += view.faces(box.rectangle_m, box.height_m, box.base_m)
-        for bright in (_RIGHT_SIDE, _LEFT_SIDE, _TOP):
-            red, green, blue = box.colour
-            colours.append((bright * red, bright * green, bright * blue))
-            edges.append(box.edge)
+        faces = view.faces(box.rectangle_m, box.height_m, box.base_m)
+        for face, bright in zip(faces, (_RIGHT_SIDE, _LEFT_SIDE, _TOP), strict=True):
+            red, green, blue = (bright * part for part in box.colour)
+            paint(face, (red, green, blue), (red, green, blue))
+        for line in _lines_of(view, box):
+            paint(line, box.edge, box.edge)
         for tile in box.tiles:
             if tile.wall in view.corner:  # "southwest": its south and west walls are seen
-                polygons.append(view.places(tile.corners_m))
-                colours.append(tile.colour)
-                edges.append(box.edge)
-    faces = PolyCollection(polygons, facecolor=colours, edgecolor=edges, linewidth=0.5, zorder=3.0)
-    faces.set_joinstyle("round")
-    axes.add_collection(faces, autolim=False)
+                paint(view.places(tile.corners_m), tile.colour, box.edge)
+    shapes = PolyCollection(polygons, facecolor=colours, edgecolor=edges, linewidth=0.5, zorder=3.0)
+    shapes.set_joinstyle("round")
+    axes.add_collection(shapes, autolim=False)
+
+
+def _lines_of(view: ObliqueView, box: Box) -> Iterator[FloatArray]:
+    """Yield the lines that one sees of a box: round its top, below and between its walls."""
+    low_m, high_m = box.base_m, box.height_m
+    for start, end in box.sides:
+        yield view.places(np.array([(*start, high_m), (*end, high_m)]))
+        if _wall_of(start, end) in view.corner:
+            yield view.places(np.array([(*start, low_m), (*end, low_m)]))
+            for place in {start, end} & {*box.corners}:
+                yield view.places(np.array([(*place, low_m), (*place, high_m)]))
+
+
+def _wall_of(start: Place, end: Place) -> str:
+    """Return which wall a side of a counterclockwise outline is."""
+    if start[1] == end[1]:
+        return "south" if end[0] > start[0] else "north"
+    return "east" if end[1] > start[1] else "west"
 
 
 def _draw_scale(axes: Axes, view: ObliqueView) -> None:

@@ -22,8 +22,10 @@ from blast_env.plan import (
     Kinds,
     Look,
     area_feature,
+    outlines_of,
 )
 from blast_env.rendering.style import number_on_axis, render_extra, unit_interval
+from blast_env.scenario.sections import PointM
 
 with render_extra():
     from matplotlib import patheffects
@@ -127,18 +129,18 @@ def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) ->
         What was drawn, the lowest first.
     """
     drawn: list[Artist] = []
-    areas: dict[tuple[FeatureKind, Look, object], list[Path]] = {}
+    areas: dict[tuple[FeatureKind, Look, object], list[Feature]] = {}
     for feature in features:
-        places = _places(feature, view)
         if len(feature.places_m) > 2:
-            outline = Path(np.vstack([places, places[:1]]), closed=True)
-            areas.setdefault((feature.kind, feature.look, feature.colour), []).append(outline)
+            areas.setdefault((feature.kind, feature.look, feature.colour), []).append(feature)
         elif len(feature.places_m) == 2:
-            drawn.append(_line(feature, places))
+            drawn.append(_line(feature, _places(feature, view)))
         else:
-            drawn += _sign(feature, places, view)
-    for (kind, look, fill), paths in areas.items():
+            drawn += _sign(feature, _places(feature, view), view)
+    for (kind, look, fill), alike in areas.items():
         # One patch, so that neighbours have no seam.
+        rings = [view.places(_at_height(ring)) for ring in outlines_of(alike)]
+        paths = (Path(np.vstack([ring, ring[:1]]), closed=True) for ring in rings)
         patch = PathPatch(Path.make_compound_path(*paths))
         patch.set(**_area_style(look, fill), zorder=kind.level)
         drawn.append(patch)
@@ -150,7 +152,11 @@ def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) ->
 
 def _places(feature: Feature, view: View) -> FloatArray:
     height_m = feature.above_ground_m if len(feature.places_m) == 1 else 0.0
-    return view.places(np.array([(*place_m, height_m) for place_m in feature.places_m]))
+    return view.places(_at_height(feature.places_m, height_m))
+
+
+def _at_height(places_m: Iterable[PointM], height_m: float = 0.0) -> FloatArray:
+    return np.array([(*place_m, height_m) for place_m in places_m])
 
 
 def _area_style(look: Look, fill: object) -> dict[str, Any]:

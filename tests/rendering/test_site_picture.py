@@ -5,14 +5,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
 from typer.testing import CliRunner
 
 from blast_env.cli import app
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
-from blast_env.plan import item_colours
+from blast_env.plan import Kinds, item_colours
 from blast_env.rendering.oblique import (
     CORNERS,
     ObliqueView,
@@ -93,8 +95,13 @@ def test_nothing_is_painted_over_what_stands_before_it(
 
 
 def faces(figure: Figure) -> Sequence[np.ndarray]:
-    (found,) = (each for each in figure.axes[0].collections if isinstance(each, PolyCollection))
-    return [np.asarray(path.vertices) for path in found.get_paths()]
+    """Return the faces of the boxes, each with its first corner again; not their lines."""
+    return [shape for shape in shapes(figure.axes[0]) if len(shape) == 5]
+
+
+def shapes(axes: Axes) -> Sequence[np.ndarray]:
+    found = (each for each in axes.collections if isinstance(each, PolyCollection))
+    return [np.asarray(path.vertices) for each in found for path in each.get_paths()]
 
 
 def test_heights_of_structures_and_pieces_are_to_scale() -> None:
@@ -108,6 +115,29 @@ def test_heights_of_structures_and_pieces_are_to_scale() -> None:
         if number % 3 < 2
     )
     assert heights == [1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.5, 2.5]
+
+
+SILO = {"kind": "round", "name": "silo", "centre_m": [8.5, 2.0], "diameter_m": 2.0}
+"""A cross: three rectangles of modules, with twelve corners."""
+
+
+def test_a_round_structure_has_one_outline() -> None:
+    document = yard_document()
+    document["structures"].append(SILO | {"height_m": 5.0})
+    site = Scenario.from_document(document, "yard")
+    assert len(site.structures) == 1 + 3
+    plan, oblique = site_picture(site, corner="southwest").axes
+    (silo,) = (
+        each.get_path()
+        for each in plan.patches
+        if isinstance(each, PathPatch) and each.get_zorder() == Kinds.STRUCTURE.level
+    )
+    ends = np.asarray(silo.vertices).round(6).tolist()
+    assert len({tuple(place) for place in ends}) == 12
+    lines = [shape for shape in shapes(oblique) if len(shape) == 3]
+    hut = 4 + 2 + 3  # round the roof, below the walls that are seen, and between walls
+    silo_lines = 12 + 6 + 9
+    assert len({tuple(each.round(6).ravel()) for each in lines}) == hut + silo_lines
 
 
 def test_what_has_no_height_is_as_high_as_the_air() -> None:
