@@ -38,7 +38,7 @@ from blast_env.scenario.build_scene import (
 from blast_env.scenario.driving import WayPoint
 from blast_env.scenario.reach import squares_of
 from blast_env.scenario.sections import PointM, buildings_of
-from blast_env.scenario.terraces import ground_below_m, is_open_below
+from blast_env.scenario.terraces import ground_below_m, is_open_below, levels_of
 from blast_env.scenario.vehicles import Impact
 from blast_env.scenario.worst_places import nearest_point_m
 from blast_env.units import MODULE_SIDE_M
@@ -217,6 +217,9 @@ class Kinds:
 STANDING: Final = (Kinds.TERRACE, Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE, Kinds.BARRIER)
 """What stands on the ground and has a height."""
 
+_ON_LEVELS: Final = (Kinds.COST_AREA, Kinds.KEEP_OUT, Kinds.BUILD_ZONE)
+"""What lies on the ground, or on terraces."""
+
 SITE_KINDS: Final = tuple(each for each in vars(Kinds).values() if isinstance(each, FeatureKind))
 """All kinds, the lowest first."""
 
@@ -279,9 +282,17 @@ class Feature:
     @property
     def above_ground_m(self) -> float:
         """How high above the ground a place is."""
-        height_m = self.properties.get("above_ground_m", 0.0)
-        assert isinstance(height_m, float)
-        return height_m
+        return self._metres("above_ground_m")
+
+    @property
+    def base_m(self) -> float:
+        """How high it begins above the ground."""
+        return self._metres("base_m")
+
+    def _metres(self, key: str) -> float:
+        value_m = self.properties.get(key, 0.0)
+        assert isinstance(value_m, float)
+        return value_m
 
 
 def site_features(
@@ -343,6 +354,26 @@ def outlines_of(areas: Iterable[Feature]) -> Iterator[tuple[PointM, ...]]:
             yield area.places_m
     for parts in wholes.values():
         yield from outlines(parts)
+
+
+def on_levels(features: Iterable[Feature], structures: Sequence[AnyStructure]) -> Iterator[Feature]:
+    """Yield features, those of the build zone cut where the ground changes its height.
+
+    Parts on a terrace have its height as their `base_m`.
+
+    Args:
+        features: The features.
+        structures: Those of the site, terraces among them.
+    """
+    for number, feature in enumerate(features):
+        if feature.kind not in _ON_LEVELS:
+            yield feature
+            continue
+        for height_m, parts in levels_of(structures, feature.bounds_m).items():
+            said = {**feature.properties, **({"base_m": height_m} if height_m else {})}
+            for part in parts:
+                area = area_feature(feature.kind, part, feature.name, **said)
+                yield replace(area, label=feature.label, part_of=f"{number} {height_m:g}")
 
 
 def without_counts(features: Iterable[Feature]) -> tuple[Feature, ...]:

@@ -7,6 +7,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from blast_agents.surrogate import packaged_surrogate, site_of
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from blast_env.app.solids import boxes
@@ -15,11 +17,12 @@ from blast_env.engines.gas import GasEngine, GasResult
 from blast_env.envs.observations import GridObservation
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.export import LayoutPlan, export_layout
-from blast_env.geometry import Layout, Piece
+from blast_env.export.dxf import drawing
+from blast_env.geometry import Layout, Piece, Rectangle
 from blast_env.importing import ImportOptions, import_site
 from blast_env.physics.scene import Charge
-from blast_env.plan import Kinds, site_features
-from blast_env.rendering.oblique import boxes_of
+from blast_env.plan import Kinds, on_levels, site_features
+from blast_env.rendering.oblique import boxes_of, draw_oblique
 from blast_env.scenario import Placement, Scenario, ScenarioError, load_scenario, save_scenario
 from blast_env.scenario.build_scene import build_site, vehicle_drive
 from blast_env.sites import Visibility
@@ -375,6 +378,59 @@ def test_pictures_draw_what_stands_on_it_at_its_height() -> None:
     walls = [each for each in boxes(terraced(), WALL) if each.name == "wall"]
     assert [each.centre_m[2] for each in walls] == [1.5, 1.5]
     assert [each.size_m[2] for each in walls] == [1.0, 1.0]
+
+
+def test_views_in_three_dimensions_draw_the_zone_on_it() -> None:
+    """Its western half, 2 m wide, lies on the ground, its eastern half on the terrace."""
+    scenario = terraced()
+    zone = {
+        (each.centre_m[0], round(each.centre_m[2] - each.size_m[2] / 2.0, 9))
+        for each in boxes(scenario, ())
+        if each.name == "build zone"
+    }
+    assert zone == {(5.0, 0.0), (7.0, 1.0)}
+    axes = Figure().subplots()
+    view, _ = draw_oblique(axes, scenario, WALL, "southwest")
+    (outline,) = (each for each in axes.collections if isinstance(each, LineCollection))
+    places = {tuple(place) for line in outline.get_segments() for place in np.round(line, 9)}
+    corners = view.on_ground(Rectangle(6.0, 2.5, 8.0, 9.5), 1.0)
+    assert places == {tuple(place) for place in corners.round(9)}
+    before, walls = (each for each in axes.collections if isinstance(each, PolyCollection))
+    assert before.get_zorder() < outline.get_zorder() < walls.get_zorder()
+    faces = view.faces(Rectangle(6.0, 4.0, 6.5, 6.0), 2.0, 1.0)
+    assert all(
+        any(np.allclose(np.asarray(path.vertices)[0], face[0]) for path in walls.get_paths())
+        for face in faces
+    )
+
+
+def test_the_zone_is_cut_where_the_ground_changes_its_height() -> None:
+    higher = TERRACE | {"name": "upper", "corner_m": [7.0, 2.0], "columns": 3, "rows": 4}
+    document = site_document(TERRACE | {"rows": 12, "corner_m": [6.0, 4.0]}, higher)
+    document["structures"][2] |= {"height_m": 2.0}
+    document["build_zone"]["keep_outs"] = [
+        {"corner_m": [7.0, 3.0], "size_m": [1.0, 2.0], "reason": "pit"}
+    ]
+    scenario = Scenario.from_document(document, "terraced")
+    areas: dict[tuple[str, float], float] = {}
+    for part in on_levels(site_features(scenario), scenario.structures):
+        if part.kind in (Kinds.BUILD_ZONE, Kinds.KEEP_OUT):
+            left, bottom, right, top = part.bounds_m
+            key = part.kind.name, part.base_m
+            areas[key] = areas.get(key, 0.0) + (right - left) * (top - bottom)
+    high, low = 1.0 * 1.5, 2.0 * 5.5
+    zone = {0.0: 4.0 * 7.0 - high - low, 1.0: low, 2.0: high}
+    expected = {("build_zone", height_m): area for height_m, area in zone.items()}
+    assert areas == expected | {("keep_out", 1.0): 1.0, ("keep_out", 2.0): 1.0}
+
+
+def test_a_drawing_has_the_zone_on_the_terrace_that_it_lies_wholly_on(tmp_path: Path) -> None:
+    document = site_document()
+    for corner_m, elevation_m in (([6.0, 2.5], 1.0), ([4.0, 2.5], 0.0)):
+        document["build_zone"] |= {"corner_m": corner_m, "columns": 4 if elevation_m else 8}
+        scenario = Scenario.from_document(document, "terraced")
+        (zone,) = drawing(LayoutPlan(scenario, ())).query('LWPOLYLINE[layer=="BUILD_ZONE"]')
+        assert zone.dxf.elevation == elevation_m
 
 
 def test_the_window_of_a_gas_environment_shows_it() -> None:

@@ -5,12 +5,13 @@ from typing import Final, NamedTuple
 
 from blast_env.geometry import Layout, Rectangle
 from blast_env.physics.structure import Colour
-from blast_env.plan import EXPLOSIVE, STANDING, Feature, Kinds, site_features
+from blast_env.plan import EXPLOSIVE, STANDING, Feature, Kinds, on_levels, site_features
 from blast_env.scenario import Scenario
 
 _GROUND: Final[Colour] = (223, 228, 234)
 _ZONE: Final[Colour] = (185, 217, 195)
 _GROUND_M: Final = 0.1
+_ZONE_M: Final = 0.04
 _LINE_M: Final = 0.3
 _SIGN_M: Final = 0.6
 SEE_THROUGH: Final = 0.45
@@ -37,12 +38,13 @@ class SolidBox(NamedTuple):
 
 def boxes(scenario: Scenario, layout: Layout) -> Iterator[SolidBox]:
     """Yield a site with what stands on it; what has no height goes up to the air, see-through."""
-    for feature in site_features(scenario, layout):
+    for feature in on_levels(site_features(scenario, layout), scenario.structures):
         bounds_m = feature.bounds_m
         if feature.kind is Kinds.SITE:
             yield _box(bounds_m, -_GROUND_M, 0.0, _GROUND, 1.0, "site")
         elif feature.kind is Kinds.BUILD_ZONE:
-            yield _box(bounds_m, 0.0, 0.04, _ZONE, 1.0, feature.name)
+            base_m = feature.base_m
+            yield _box(bounds_m, base_m, base_m + _ZONE_M, _ZONE, 1.0, feature.name)
         elif feature.kind in STANDING:
             yield _standing(feature, scenario.air_height_m)
         elif feature.kind in (Kinds.CHARGE_PLACE, Kinds.GAUGE):
@@ -56,9 +58,7 @@ def _standing(feature: Feature, air_m: float) -> SolidBox:
     name = str(feature.properties.get("item", feature.name))
     top_m = height_m if isinstance(height_m, float) else air_m
     opacity = 1.0 if known else SEE_THROUGH
-    base_m = feature.properties.get("base_m", 0.0)
-    assert isinstance(base_m, float)
-    return _box(feature.bounds_m, base_m, top_m, colour or EXPLOSIVE, opacity, name)
+    return _box(feature.bounds_m, feature.base_m, top_m, colour or EXPLOSIVE, opacity, name)
 
 
 def _place(feature: Feature) -> Iterator[SolidBox]:

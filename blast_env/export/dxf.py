@@ -13,7 +13,7 @@ from blast_env.export.bill import LayoutPlan
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
 from blast_env.labels import Label, settled_labels
-from blast_env.plan import SITE_KINDS, Feature, FeatureKind, Kinds
+from blast_env.plan import SITE_KINDS, Feature, FeatureKind, Kinds, on_levels
 from blast_env.scenario import BuildZone, Placement
 from blast_env.scenario.sections import PointM
 from blast_env.units import MODULE_SIDE_M
@@ -296,7 +296,8 @@ def drawing(plan: LayoutPlan) -> Drawing:
         document.layers.add(layer, color=style.colour, linetype=style.line_type)
     space = document.modelspace()
     for feature in plan.features:
-        _draw(space, feature)
+        parts = tuple(on_levels((feature,), plan.scenario.structures))
+        _draw(space, parts[0] if len(parts) == 1 else feature)  # across an edge, on the ground
     _draw_clearance(space, plan)
     height_m = text_height_m(plan)
     for text in texts_of(plan, height_m):
@@ -326,12 +327,10 @@ def _draw(space: Modelspace, feature: Feature) -> None:
         space.add_line(*places, attributes)
     else:
         outline = space.add_lwpolyline(places, close=True, dxfattribs=attributes)
+        outline.dxf.elevation = feature.base_m
         height_m = feature.properties.get("height_m")
         if isinstance(height_m, float):
-            base_m = feature.properties.get("base_m", 0.0)
-            assert isinstance(base_m, float)
-            outline.dxf.thickness = height_m - base_m  # what stands is drawn as high as it is
-            outline.dxf.elevation = base_m
+            outline.dxf.thickness = height_m - feature.base_m  # what stands is as high as it is
         if feature.kind is Kinds.BARRIER:
             outline.set_xdata(APPLICATION, [(_STRING, text) for text in _barrier_texts(feature)])
 
@@ -340,10 +339,10 @@ def _barrier_texts(feature: Feature) -> list[str]:
     """Return what is said of a module or piece: its name, and for a piece its item and height."""
     if "item" not in feature.properties:
         return [feature.name]
-    top_m, base_m = (feature.properties.get(key, 0.0) for key in ("height_m", "base_m"))
+    top_m = feature.properties["height_m"]
     assert isinstance(top_m, float)
-    assert isinstance(base_m, float)
-    return [feature.name, f"item={feature.properties['item']}", f"height_m={top_m - base_m:g}"]
+    height = f"height_m={top_m - feature.base_m:g}"
+    return [feature.name, f"item={feature.properties['item']}", height]
 
 
 def _write(space: Modelspace, text: Text) -> None:

@@ -11,8 +11,17 @@ import numpy as np
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Element, Place, Rectangle, Side, open_sides, outlines
-from blast_env.plan import INK, STANDING, Feature, Kinds, site_features, vehicle_features, without
-from blast_env.rendering.site_plan import draw_features
+from blast_env.plan import (
+    INK,
+    STANDING,
+    Feature,
+    Kinds,
+    on_levels,
+    site_features,
+    vehicle_features,
+    without,
+)
+from blast_env.rendering.site_plan import area_style, draw_features
 from blast_env.rendering.style import nice_floor, render_extra, unit_interval
 from blast_env.scenario import Scenario
 from blast_env.scenario.boxes import TOLERANCE_M
@@ -20,13 +29,17 @@ from blast_env.scenario.zone import source_bounds_m
 
 with render_extra():
     from matplotlib.axes import Axes
-    from matplotlib.collections import PolyCollection
+    from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Polygon
 
 CORNERS: Final = ("southwest", "southeast", "northeast", "northwest")
 """Over which corner of a site one looks at it; south is towards smaller y, west smaller x."""
 
 _ACROSS, _UP = cos(radians(30.0)), sin(radians(30.0))
+
+_LEAST_M = 1e-6  # between things that lie on each other
+_BOXES_LEVEL, _LEVEL_STEP = 3.0, 1e-4  # of the boxes among what else is drawn
 
 _TOP, _RIGHT_SIDE, _LEFT_SIDE = 1.0, 0.82, 0.66
 """How bright the three faces are that one sees of a box."""
@@ -154,6 +167,27 @@ class Box(NamedTuple):
     corners: Collection[Place] = ()
 
 
+class Lid(NamedTuple):
+    """A part of the build zone, or of an area in it, that lies on a terrace.
+
+    Attributes:
+        rectangle_m: Its plan.
+        height_m: The height of the terrace.
+        feature: What it is.
+        sides: The parts of its outline that have a line.
+    """
+
+    rectangle_m: Rectangle
+    height_m: float
+    feature: Feature
+    sides: Sequence[Side]
+
+    @property
+    def base_m(self) -> float:
+        """Where it lies for the order of painting: below all that stands there."""
+        return self.height_m - _LEAST_M * (Kinds.CHARGE.level - self.feature.kind.level)
+
+
 def painted_order(
     view: ObliqueView, rectangles_m: Sequence[Rectangle], bases_m: Sequence[float] | None = None
 ) -> list[int]:
@@ -220,9 +254,11 @@ def draw_oblique(
         box._replace(tiles=tiles.get(each.name, ()))
         for box, each in zip(_boxes_of(standing), standing, strict=True)
     ]
+    flat = without(features, *STANDING)
+    lids = [each for each in flat if each.base_m > 0.0]
     _set_up(axes, view, boxes)
-    draw_features(axes, without(features, *STANDING), view)
-    _draw_boxes(axes, view, boxes)
+    draw_features(axes, [each for each in flat if each.base_m == 0.0], view)
+    _draw_boxes(axes, view, boxes, _lids_of(lids))
     _draw_scale(axes, view)
     return view, features
 
@@ -237,23 +273,41 @@ def _raised(scenario: Scenario, layout: Sequence[Element]) -> tuple[Feature, ...
     air = {"height_m": scenario.air_height_m}
     return tuple(
         replace(each, properties={**air, **each.properties}) if each.kind in STANDING else each
-        for each in site_features(scenario, layout)
+        for each in on_levels(site_features(scenario, layout), scenario.structures)
     )
+
+
+def _outlined(features: Sequence[Feature]) -> list[tuple[list[Side], frozenset[Place]]]:
+    """Return the sides of each feature that have a line, and the corners of what it is part of."""
+    wholes: dict[object, list[int]] = {}
+    for number, each in enumerate(features):
+        whole = (each.kind, each.look, each.part_of) if each.part_of else number
+        wholes.setdefault(whole, []).append(number)
+    found: dict[int, tuple[list[Side], frozenset[Place]]] = {}
+    for numbers in wholes.values():
+        plans = [features[number].bounds_m for number in numbers]
+        corners = frozenset(place for outline in outlines(plans) for place in outline)
+        found |= {
+            number: (sides, corners)
+            for number, sides in zip(numbers, open_sides(plans), strict=True)
+        }
+    return [found[number] for number in range(len(features))]
 
 
 def _boxes_of(features: Sequence[Feature]) -> list[Box]:
     """Return features as boxes; those that are parts of one thing have no lines between them."""
-    wholes: dict[object, list[int]] = {}
-    for number, feature in enumerate(features):
-        whole = (feature.kind, feature.look, feature.part_of) if feature.part_of else number
-        wholes.setdefault(whole, []).append(number)
-    boxes = [_box_of(each) for each in features]
-    for numbers in wholes.values():
-        plans = [boxes[number].rectangle_m for number in numbers]
-        corners = frozenset(place for outline in outlines(plans) for place in outline)
-        for number, sides in zip(numbers, open_sides(plans), strict=True):
-            boxes[number] = boxes[number]._replace(sides=sides, corners=corners)
-    return boxes
+    return [
+        _box_of(each)._replace(sides=sides, corners=corners)
+        for each, (sides, corners) in zip(features, _outlined(features), strict=True)
+    ]
+
+
+def _lids_of(features: Sequence[Feature]) -> list[Lid]:
+    """Return what lies on terraces."""
+    return [
+        Lid(each.bounds_m, each.base_m, each, sides)
+        for each, (sides, _) in zip(features, _outlined(features), strict=True)
+    ]
 
 
 def _box_of(feature: Feature) -> Box:
@@ -263,9 +317,7 @@ def _box_of(feature: Feature) -> Box:
         colour = unit_interval(feature.colour or INK)
     else:
         colour = _lighter(unit_interval(feature.kind.look.line or INK))
-    base_m = feature.properties.get("base_m", 0.0)
-    assert isinstance(base_m, float)
-    return Box(feature.bounds_m, height_m, colour, unit_interval(INK), base_m=base_m)
+    return Box(feature.bounds_m, height_m, colour, unit_interval(INK), base_m=feature.base_m)
 
 
 def scale_length_m(site_m: Rectangle) -> float:
@@ -289,31 +341,68 @@ def _set_up(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
     axes.axis("off")
 
 
-def _draw_boxes(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
-    polygons: list[FloatArray] = []
-    colours: list[Colour] = []
-    edges: list[Colour] = []
+class _Shapes:
+    """Polygons in the order in which they are painted."""
 
-    def paint(shape: FloatArray, colour: Colour, edge: Colour) -> None:
-        polygons.append(shape)
-        colours.append(colour)
-        edges.append(edge)
+    def __init__(self) -> None:
+        self._shapes: list[FloatArray] = []
+        self._colours: list[Colour] = []
+        self._edges: list[Colour] = []
 
-    bases_m = [box.base_m for box in boxes]
-    for number in painted_order(view, [box.rectangle_m for box in boxes], bases_m):
-        box = boxes[number]
-        faces = view.faces(box.rectangle_m, box.height_m, box.base_m)
-        for face, bright in zip(faces, (_RIGHT_SIDE, _LEFT_SIDE, _TOP), strict=True):
-            red, green, blue = (bright * part for part in box.colour)
-            paint(face, (red, green, blue), (red, green, blue))
-        for line in _lines_of(view, box):
-            paint(line, box.edge, box.edge)
-        for tile in box.tiles:
-            if tile.wall in view.corner:  # "southwest": its south and west walls are seen
-                paint(view.places(tile.corners_m), tile.colour, box.edge)
-    shapes = PolyCollection(polygons, facecolor=colours, edgecolor=edges, linewidth=0.5, zorder=3.0)
-    shapes.set_joinstyle("round")
-    axes.add_collection(shapes, autolim=False)
+    def paint(self, shape: FloatArray, colour: Colour, edge: Colour) -> None:
+        """Take one more."""
+        self._shapes.append(shape)
+        self._colours.append(colour)
+        self._edges.append(edge)
+
+    def draw(self, axes: Axes, level: float) -> None:
+        """Draw them, at a level among what else is drawn."""
+        shapes = PolyCollection(self._shapes, facecolor=self._colours, edgecolor=self._edges)
+        shapes.set(linewidth=0.5, zorder=level, joinstyle="round")
+        axes.add_collection(shapes, autolim=False)
+
+
+def _draw_boxes(
+    axes: Axes, view: ObliqueView, boxes: Sequence[Box], lids: Sequence[Lid] = ()
+) -> None:
+    things: list[Box | Lid] = [*boxes, *lids]
+    shapes, level = _Shapes(), _BOXES_LEVEL
+    bases_m = [each.base_m for each in things]
+    for number in painted_order(view, [each.rectangle_m for each in things], bases_m):
+        thing = things[number]
+        if isinstance(thing, Box):
+            _paint_box(shapes, view, thing)
+            continue
+        shapes.draw(axes, level)
+        _draw_lid(axes, view, thing, level + 0.5 * _LEVEL_STEP)
+        shapes, level = _Shapes(), level + _LEVEL_STEP
+    shapes.draw(axes, level)
+
+
+def _paint_box(shapes: _Shapes, view: ObliqueView, box: Box) -> None:
+    faces = view.faces(box.rectangle_m, box.height_m, box.base_m)
+    for face, bright in zip(faces, (_RIGHT_SIDE, _LEFT_SIDE, _TOP), strict=True):
+        red, green, blue = (bright * part for part in box.colour)
+        shapes.paint(face, (red, green, blue), (red, green, blue))
+    for line in _lines_of(view, box):
+        shapes.paint(line, box.edge, box.edge)
+    for tile in box.tiles:
+        if tile.wall in view.corner:  # "southwest": its south and west walls are seen
+            shapes.paint(view.places(tile.corners_m), tile.colour, box.edge)
+
+
+def _draw_lid(axes: Axes, view: ObliqueView, lid: Lid, level: float) -> None:
+    look = lid.feature.look
+    if look.hatched or lid.feature.colour is not None:
+        area = Polygon(view.on_ground(lid.rectangle_m, lid.height_m))
+        area.set(**area_style(look, lid.feature.colour) | {"linewidth": 0.0}, zorder=level)
+        axes.add_patch(area)
+    if look.line is not None:
+        ends = [np.array([(*place, lid.height_m) for place in side]) for side in lid.sides]
+        style = "--" if look.dashed else "-"
+        lines = LineCollection([view.places(each) for each in ends], linestyles=style)
+        lines.set(color=unit_interval(look.line), linewidth=look.width, zorder=level)
+        axes.add_collection(lines, autolim=False)
 
 
 def _lines_of(view: ObliqueView, box: Box) -> Iterator[FloatArray]:

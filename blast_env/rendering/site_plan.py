@@ -142,7 +142,7 @@ def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) ->
         rings = [view.places(_at_height(ring)) for ring in outlines_of(alike)]
         paths = (Path(np.vstack([ring, ring[:1]]), closed=True) for ring in rings)
         patch = PathPatch(Path.make_compound_path(*paths))
-        patch.set(**_area_style(look, fill), zorder=kind.level)
+        patch.set(**area_style(look, fill), zorder=kind.level)
         drawn.append(patch)
     drawn.sort(key=lambda artist: artist.get_zorder())
     for artist in drawn:
@@ -159,7 +159,8 @@ def _at_height(places_m: Iterable[PointM], height_m: float = 0.0) -> FloatArray:
     return np.array([(*place_m, height_m) for place_m in places_m])
 
 
-def _area_style(look: Look, fill: object) -> dict[str, Any]:
+def area_style(look: Look, fill: object) -> dict[str, Any]:
+    """Return matplotlib's style of areas of a look, with a colour of their own or none."""
     line = QUIET_INK if look.line is None else look.line
     style: dict[str, Any] = {
         "facecolor": (*unit_interval(fill), look.opacity) if isinstance(fill, tuple) else "none",
@@ -219,7 +220,7 @@ def _legend_entry(feature: Feature) -> Artist:
     kind, look = feature.kind, feature.look
     entry: Artist
     if len(feature.places_m) > 2:
-        entry = Patch(**_area_style(look, feature.colour))
+        entry = Patch(**area_style(look, feature.colour))
     elif len(feature.places_m) == 1:
         entry = Line2D([], [], **_sign_style(kind))
     else:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Rectangle, stacked_runs
 from blast_env.scenario.boxes import TOLERANCE_M, Boxes, covered_m2, overlapping
 from blast_env.scenario.problems import Problem
 from blast_env.scenario.sections import AnyStructure
@@ -24,8 +24,12 @@ def terrace_problems(structures: Mapping[int, AnyStructure]) -> Iterator[Problem
 
 def ground_m(structures: Iterable[AnyStructure], boxes: Boxes) -> FloatArray:
     """Return how high the ground below squares is, m: the highest terrace that each overlaps."""
+    return _highest(_terraces(structures), boxes)
+
+
+def _highest(terraces: Iterable[tuple[Rectangle, float]], boxes: Boxes) -> FloatArray:
     ground = np.zeros(np.broadcast_shapes(*(side.shape for side in boxes)))
-    for terrace_m, height_m in _terraces(structures):
+    for terrace_m, height_m in terraces:
         own = overlapping(terrace_m, boxes)
         ground[own] = np.maximum(ground[own], height_m)
     return ground
@@ -35,6 +39,26 @@ def ground_below_m(structures: Iterable[AnyStructure], rectangle_m: Rectangle) -
     """Return how high the ground below one rectangle is, m; 0 beside all terraces."""
     own_m = (high_m for plan_m, high_m in _terraces(structures) if plan_m.overlaps(rectangle_m))
     return max(own_m, default=0.0)
+
+
+def levels_of(
+    structures: Iterable[AnyStructure], rectangle_m: Rectangle
+) -> dict[float, list[Rectangle]]:
+    """Return a rectangle cut where the ground below it changes its height, by that height, m."""
+    terraces = [each for each in _terraces(structures) if each[0].overlaps(rectangle_m)]
+    left, bottom, right, top = rectangle_m
+    plans = [each for each, _ in terraces]
+    xs = sorted({left, right, *(x for each in plans for x in each[::2] if left < x < right)})
+    ys = sorted({bottom, top, *(y for each in plans for y in each[1::2] if bottom < y < top)})
+    across, up = np.array(xs)[np.newaxis], np.array(ys)[:, np.newaxis]
+    ground = _highest(terraces, (across[:, :-1], up[:-1], across[:, 1:], up[1:]))
+    return {
+        float(height_m): [
+            Rectangle(xs[column], ys[row], xs[column + columns], ys[row + rows])
+            for row, column, rows, columns in stacked_runs(ground == height_m).tolist()
+        ]
+        for height_m in np.unique(ground)
+    }
 
 
 def lie_wholly_on(
