@@ -25,6 +25,7 @@ from blast_env.plan import Kinds, on_levels, site_features
 from blast_env.rendering.oblique import boxes_of, draw_oblique
 from blast_env.scenario import Placement, Scenario, ScenarioError, load_scenario, save_scenario
 from blast_env.scenario.build_scene import build_site, vehicle_drive
+from blast_env.scenario.heights import highest_top_m
 from blast_env.sites import Visibility
 from tests.catalogue_sites import item
 from tests.importing.maps import charge, outline, rectangle, written
@@ -205,6 +206,36 @@ def test_the_air_is_high_enough_for_what_stands_on_it() -> None:
     document["structures"][0] = HALL | {"base_m": 8.0, "height_m": 9.0}
     del document["site"]["air_height_m"]
     assert Scenario.from_document(document, "high").air_height_m == 8.0 + 1.5 + 6.0
+
+
+@pytest.mark.parametrize(
+    ("columns", "keep_outs", "tops_m"),
+    [
+        (14, [], (8.0 + 5.0, 8.0 + 1.5)),
+        (1, [], (5.0, 8.0 + 1.5)),  # too narrow for the block
+        (14, [{"corner_m": [6.0, 2.0], "size_m": [2.0, 8.0], "reason": "pipes"}], (5.0, 1.5)),
+    ],
+)
+def test_the_air_is_as_high_as_what_can_stand_there_needs(
+    columns: int, keep_outs: list[dict[str, Any]], tops_m: tuple[float, float]
+) -> None:
+    terrace = TERRACE | {"height_m": 8.0, "columns": columns}
+    document = site_document(terrace)
+    document["structures"][0] = HALL | {"base_m": 8.0, "height_m": 8.5}
+    document["build_zone"] |= {
+        "items": [item("block", 2, 2, 5.0), item("post", 1, 1, 1.5)],
+        "keep_outs": keep_outs,
+    }
+    del document["site"]["air_height_m"]
+    scenario = Scenario.from_document(document, "high")
+    assert highest_top_m(scenario.zone, scenario.structures) == max(tops_m)
+    assert scenario.air_height_m == max(*tops_m, 8.5) + 6.0
+    document["site"]["air_height_m"] = max(*tops_m, 8.5) - 0.25
+    with pytest.raises(ScenarioError) as error:
+        Scenario.from_document(document, "low")
+    highest = tops_m.index(max(tops_m))
+    too_high = [f"items[{number}].height_m" in str(error.value) for number in range(2)]
+    assert too_high == [number == highest and max(tops_m) > 8.5 for number in range(2)]
 
 
 # --- Where something may stand.

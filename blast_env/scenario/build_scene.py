@@ -24,12 +24,13 @@ from blast_env.scenario import (
     usable_cells,
 )
 from blast_env.scenario.boxes import TOLERANCE_M
+from blast_env.scenario.heights import highest_top_m
 from blast_env.scenario.models import AnyStructure, ConcreteSquareSection
 from blast_env.scenario.reach import Reach
 from blast_env.scenario.terraces import ground_below_m
 from blast_env.scenario.vehicles import NOTHING, Drive, Obstacles, obstacles_of
 from blast_env.scenario.worst_places import WorstPlaces
-from blast_env.scenario.zone import distance_m, highest_top_m
+from blast_env.scenario.zone import distance_m
 from blast_env.units import UNITS_PER_M, in_units
 from blast_env.values import checked_seed
 
@@ -315,7 +316,7 @@ def barrier_outline(scenario: Scenario, layout: Layout) -> StructureOutline:
         weight=1.0,
         cells=tuple(module.cell for module in modules),
         capacity=zone.module_capacity,
-        height_m=highest_top_m(zone, terraces),
+        height_m=highest_top_m(zone, scenario.structures),
         heights_m=tuple(tops_m) if zone.items or any(bases_m) else None,
         bases_m=tuple(bases_m) if any(bases_m) else None,
         pieces=tuple(module.piece for module in modules) if zone.items else None,

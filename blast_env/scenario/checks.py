@@ -18,6 +18,12 @@ from blast_env.physics.structure import BARRIER_NAME
 from blast_env.response.components import Component, Glazing, Wall
 from blast_env.scenario.boxes import TOLERANCE_M
 from blast_env.scenario.facade import facade_problems, hardening_problems
+from blast_env.scenario.heights import (
+    air_height_m,
+    depth_inside_m,
+    highest_grounds_m,
+    is_over_or_below,
+)
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, extent, unknown_name
 from blast_env.scenario.reach import places_on
@@ -32,18 +38,15 @@ from blast_env.scenario.sections import (
     Site,
     VehicleSource,
 )
-from blast_env.scenario.terraces import ground_below_m, terrace_problems
+from blast_env.scenario.terraces import terrace_problems
 from blast_env.scenario.vehicles import MOST_PLACES, Obstacles, RatedPiece, VehicleGround
 from blast_env.scenario.versions import MAX_ITEMS
 from blast_env.scenario.zone import (
     BuildZone,
     EmptyZone,
     Surroundings,
-    air_height_m,
-    depth_inside_m,
     distance_m,
     empty_zone,
-    is_over_or_below,
     source_bounds_m,
 )
 from blast_env.scenario.zone_checks import build_zone_problems
@@ -467,11 +470,11 @@ def _height_problems(parts: Parts) -> Iterator[Problem]:
             yield Problem(f"structures[{index}].base_m", message)
     if parts.build_zone is not None:
         zone = parts.build_zone
-        ground = ground_below_m(parts.structures.values(), zone.rectangle_m)
-        yield from _above_the_air(parts, "build_zone.height_m", zone.height_m, ground)
+        grounds_m = highest_grounds_m(zone, parts.structures.values())
+        yield from _above_the_air(parts, "build_zone.height_m", zone.height_m, grounds_m[0])
         for index, item in enumerate(zone.items):
             where = f"build_zone.items[{index}].height_m"
-            yield from _above_the_air(parts, where, item.height_m, ground)
+            yield from _above_the_air(parts, where, item.height_m, grounds_m[index])
 
 
 def _gauge_problems(parts: Parts) -> Iterator[Problem]:

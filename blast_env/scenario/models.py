@@ -40,6 +40,7 @@ from blast_env.scenario.checks import (
     vehicle_ground,
 )
 from blast_env.scenario.facade import NamedBay, named_bays
+from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, ScenarioError, problems_from
 from blast_env.scenario.round import WithoutRound
@@ -76,9 +77,6 @@ from blast_env.scenario.versions import (
 from blast_env.scenario.zone import (
     BuildZone,
     KeepOut,
-    air_height_m,
-    default_air_height_m,
-    height_notes,
 )
 from blast_env.units import MODULE_SIDE_M
 

@@ -1,9 +1,6 @@
-"""The build zone: its cells, and which of them may take a module or a piece.
+"""The build zone: its cells, and which of them may take a module or a piece."""
 
-Below it the heights of the air and of what stands in it, and who heeds them.
-"""
-
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf
@@ -22,7 +19,6 @@ from pydantic import (
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Cell, Element, Piece, Rectangle, Removal
-from blast_env.physics.scene import WALLS
 from blast_env.response.barriers import RigidPiece
 from blast_env.scenario.access_way import AccessWay, any_in_windows, counts_before
 from blast_env.scenario.boxes import TOLERANCE_M, Boxes, box_distances_m, overlapping
@@ -42,7 +38,6 @@ from blast_env.scenario.sections import (
     AnyStructure,
     Area,
     Count,
-    GaugeSection,
     Height,
     PointM,
     PointSource,
@@ -51,7 +46,7 @@ from blast_env.scenario.sections import (
     Site,
     VehicleSource,
 )
-from blast_env.scenario.terraces import ground_below_m, ground_m, lie_wholly_on
+from blast_env.scenario.terraces import ground_m, lie_wholly_on
 from blast_env.units import MODULE_SIDE_M
 
 BUDGET_TOLERANCE: Final = 1e-9
@@ -190,11 +185,6 @@ class BuildZone(Section):
         """The names of the structures that some layouts take away."""
         return frozenset(name for each in self.removable for name in each.structures)
 
-    @property
-    def highest_m(self) -> float | None:
-        """Height of the highest barrier; `None` is as high as the air."""
-        return max(item.height_m for item in self.items) if self.items else self.height_m
-
     def modules(self, layout: Iterable[Element]) -> tuple[PlacedModule, ...]:
         """Return the modules of a layout, piece by piece.
 
@@ -251,6 +241,11 @@ class BuildZone(Section):
     def shape(self) -> tuple[int, int]:
         """Number of rows and of columns."""
         return self.rows, self.columns
+
+    @property
+    def boxes(self) -> Boxes:
+        """The squares of all cells, as arrays that broadcast to (rows, columns)."""
+        return _boxes(self, np.arange(self.rows), np.arange(self.columns))
 
     @property
     def centres_m(self) -> tuple[FloatArray, FloatArray]:
@@ -433,10 +428,7 @@ class EmptyZone:
 def empty_zone(surroundings: Surroundings) -> EmptyZone:
     """Return what holds for the cells; for the same surroundings, the same object."""
     zone = surroundings.zone
-    boxes = _boxes(zone, np.arange(zone.rows), np.arange(zone.columns))
-    usable = np.ones(zone.shape, dtype=bool)
-    for _, blocked in _blocked(surroundings, boxes):
-        usable &= ~blocked
+    boxes, usable = zone.boxes, usable_cells(surroundings)
     passable = np.ones_like(usable)
     for structure in surroundings.structures:
         if not structure.lets_through:
@@ -454,6 +446,14 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
     for array in (usable, passable, ground, levels, module_costs, cells.fits, costs):
         array.flags.writeable = False
     return cells
+
+
+def usable_cells(surroundings: Surroundings) -> BoolArray:
+    """Return which cells may be used, shape (rows, columns)."""
+    usable = np.ones(surroundings.zone.shape, dtype=bool)
+    for _, blocked in _blocked(surroundings, surroundings.zone.boxes):
+        usable &= ~blocked
+    return usable
 
 
 def reason_against(surroundings: Surroundings, cell: Cell) -> str | None:
@@ -563,83 +563,3 @@ def _costs(
         )
         costs[:rows, :columns] = variant.cost * (factors / (variant.rows * variant.columns))
     return costs
-
-
-LEAST_AIR_HEIGHT_M: Final = 12.0
-"""Height of the air over a site on which nothing is higher than half of it."""
-
-AIR_ABOVE_M: Final = 6.0
-"""Air above the highest thing on the site: what the blast needs to go over it."""
-
-
-def default_air_height_m(structures: Iterable[AnyStructure], zone: BuildZone | None) -> float:
-    """Return how high the air is where a scenario does not say it.
-
-    12 m, or 6 m more than the highest structure or barrier if that is more.
-    """
-    structures = tuple(structures)
-    heights = [each.height_m for each in structures]
-    heights.append(None if zone is None else highest_top_m(zone, structures))
-    highest = max((height for height in heights if height is not None), default=0.0)
-    return max(LEAST_AIR_HEIGHT_M, highest + AIR_ABOVE_M)
-
-
-def highest_top_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> float | None:
-    """Return the height above the ground of the highest barrier, on the highest terrace.
-
-    `None` is as high as the air.
-    """
-    own_m = zone.highest_m
-    return None if own_m is None else ground_below_m(structures, zone.rectangle_m) + own_m
-
-
-def air_height_m(site: Site, structures: Iterable[AnyStructure], zone: BuildZone | None) -> float:
-    """Return how high the air is."""
-    if site.air_height_m is not None:
-        return site.air_height_m
-    return default_air_height_m(structures, zone)
-
-
-def is_over_or_below(height_m: float, structure: AnyStructure) -> bool:
-    """Whether a height is above the roof of a structure, if it has one, or below its underside."""
-    is_over = structure.height_m is not None and height_m > structure.height_m
-    return is_over or height_m < structure.base_m
-
-
-def depth_inside_m(position_m: tuple[float, float, float], structure: AnyStructure) -> float:
-    """Return how far it is from a place to the nearest air beside, above or below a structure.
-
-    Negative or 0 outside.
-    """
-    x_m, y_m, z_m = position_m
-    left, bottom, right, top = structure.rectangle_m
-    depth_m = min(x_m - left, right - x_m, y_m - bottom, top - y_m)
-    if structure.base_m > 0.0:
-        depth_m = min(depth_m, z_m - structure.base_m)
-    return depth_m if structure.height_m is None else min(depth_m, structure.height_m - z_m)
-
-
-def height_notes(
-    structures: Iterable[AnyStructure],
-    sources: Iterable[AnySource],
-    zone: BuildZone | None,
-    gauges: Sequence[GaugeSection],
-) -> tuple[str, ...]:
-    """Return what an engine without heights leaves aside, in sentences."""
-    structures = tuple(structures)
-    walls = any(each.height_m is not None for each in structures)
-    walls |= zone is not None and zone.highest_m is not None
-    raised = any(source.height_m > 0.0 for source in sources)
-    notes = []
-    if walls:
-        notes.append(
-            "The model has no heights: every structure and module counts as endlessly high, so"
-            " that nothing goes over it and barriers seem to protect more than they do."
-        )
-    if raised:
-        notes.append("The model has no heights: the charge counts as if it lay on the ground.")
-    if any(each.faces != WALLS for each in structures):
-        notes.append("The load on all walls counts, not only on those that the scenario names.")
-    if gauges:
-        notes.append("The model has no air pressure: the scenario's gauges record nothing.")
-    return tuple(notes)

@@ -1,0 +1,118 @@
+"""Heights of the air and of what stands in it, and who heeds them."""
+
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from blast_env.physics.scene import WALLS
+from blast_env.scenario.access_way import any_in_windows, counts_before
+from blast_env.scenario.sections import AnySource, AnyStructure, GaugeSection, Site
+from blast_env.scenario.terraces import ground_m
+from blast_env.scenario.zone import BuildZone, Surroundings, usable_cells
+
+LEAST_AIR_HEIGHT_M: Final = 12.0
+"""Height of the air over a site on which nothing is higher than half of it."""
+
+AIR_ABOVE_M: Final = 6.0
+"""Air above the highest thing on the site: what the blast needs to go over it."""
+
+
+def default_air_height_m(structures: Iterable[AnyStructure], zone: BuildZone | None) -> float:
+    """Return how high the air is where a scenario does not say it.
+
+    12 m, or 6 m more than the highest structure or barrier if that is more.
+    """
+    structures = tuple(structures)
+    heights = [each.height_m for each in structures]
+    heights.append(None if zone is None else highest_top_m(zone, structures))
+    highest = max((height for height in heights if height is not None), default=0.0)
+    return max(LEAST_AIR_HEIGHT_M, highest + AIR_ABOVE_M)
+
+
+def highest_top_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> float | None:
+    """Return how high above the ground the top of a barrier can be; `None` is as high as the air.
+
+    It is the largest sum of an item's height and of the highest ground that it can stand on.
+    """
+    grounds_m = highest_grounds_m(zone, structures)
+    if not zone.items:
+        return None if zone.height_m is None else zone.height_m + grounds_m[0]
+    return max(item.height_m + ground for item, ground in zip(zone.items, grounds_m, strict=True))
+
+
+def highest_grounds_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> tuple[float, ...]:
+    """Return the highest ground that each item can stand on, m; without items, single modules.
+
+    Where charges and vehicles may be is left aside. What fits nowhere has 0.
+    """
+    structures = tuple(structures)
+    here = (each.rectangle_m.overlaps(zone.rectangle_m) for each in structures if each.carries)
+    return _grounds_m(zone, structures) if any(here) else (0.0,) * max(len(zone.items), 1)
+
+
+@lru_cache(maxsize=16)
+def _grounds_m(zone: BuildZone, structures: tuple[AnyStructure, ...]) -> tuple[float, ...]:
+    free = usable_cells(Surroundings(zone, structures, (), 0.0, None))
+    ground = ground_m(structures, zone.boxes)
+    variants = [each for each in zone.catalogue.variants if not each.is_measure]
+    found = [0.0] * max(len(zone.items), 1)
+    for height_m in np.unique(ground[free]).tolist():  # the lowest first
+        taken = counts_before(~free | (ground != height_m))
+        for variant in variants:
+            if not any_in_windows(taken, variant.rows, variant.columns).all():
+                found[variant.item] = height_m
+    return tuple(found)
+
+
+def air_height_m(site: Site, structures: Iterable[AnyStructure], zone: BuildZone | None) -> float:
+    """Return how high the air is."""
+    if site.air_height_m is not None:
+        return site.air_height_m
+    return default_air_height_m(structures, zone)
+
+
+def is_over_or_below(height_m: float, structure: AnyStructure) -> bool:
+    """Whether a height is above the roof of a structure, if it has one, or below its underside."""
+    is_over = structure.height_m is not None and height_m > structure.height_m
+    return is_over or height_m < structure.base_m
+
+
+def depth_inside_m(position_m: tuple[float, float, float], structure: AnyStructure) -> float:
+    """Return how far it is from a place to the nearest air beside, above or below a structure.
+
+    Negative or 0 outside.
+    """
+    x_m, y_m, z_m = position_m
+    left, bottom, right, top = structure.rectangle_m
+    depth_m = min(x_m - left, right - x_m, y_m - bottom, top - y_m)
+    if structure.base_m > 0.0:
+        depth_m = min(depth_m, z_m - structure.base_m)
+    return depth_m if structure.height_m is None else min(depth_m, structure.height_m - z_m)
+
+
+def height_notes(
+    structures: Iterable[AnyStructure],
+    sources: Iterable[AnySource],
+    zone: BuildZone | None,
+    gauges: Sequence[GaugeSection],
+) -> tuple[str, ...]:
+    """Return what an engine without heights leaves aside, in sentences."""
+    structures = tuple(structures)
+    walls = any(each.height_m is not None for each in structures)
+    walls |= zone is not None and bool(zone.items or zone.height_m)
+    raised = any(source.height_m > 0.0 for source in sources)
+    notes = []
+    if walls:
+        notes.append(
+            "The model has no heights: every structure and module counts as endlessly high, so"
+            " that nothing goes over it and barriers seem to protect more than they do."
+        )
+    if raised:
+        notes.append("The model has no heights: the charge counts as if it lay on the ground.")
+    if any(each.faces != WALLS for each in structures):
+        notes.append("The load on all walls counts, not only on those that the scenario names.")
+    if gauges:
+        notes.append("The model has no air pressure: the scenario's gauges record nothing.")
+    return tuple(notes)
