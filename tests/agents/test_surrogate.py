@@ -235,6 +235,22 @@ def test_a_guess_is_the_same_alone_and_among_others() -> None:
         assert alone.impulse_pa_s[0] == pytest.approx(together.impulse_pa_s[number], rel=1e-12)
 
 
+@pytest.mark.parametrize("points", [0, 1, 2, 63, 64, 65, 66, 128, 129, 400])
+def test_a_network_says_of_each_of_many_points_what_its_layers_are(points: int) -> None:
+    member = packaged_surrogate().members[0]
+    features = np.random.default_rng(points).normal(size=(points, len(member.first)))
+    said = features
+    for weights, bias in (
+        (member.first, member.first_bias),
+        (member.second, member.second_bias),
+        (member.last, member.last_bias),
+    ):
+        said = np.einsum("pi,io->po", said, weights) + bias
+        if weights is not member.last:
+            said = said / (1.0 + np.exp(-said))
+    np.testing.assert_allclose(member(features), said[:, 0], rtol=1e-12, atol=1e-12)
+
+
 def test_horizons_are_the_angles_of_the_highest_edges() -> None:
     """Ahead of the charge, behind it, and before the point; a quarter of a turn changes nothing."""
     assert (horizons(CHARGE_M, POINT_M, NOTHING) == 0.0).all()

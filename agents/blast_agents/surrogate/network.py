@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from itertools import pairwise
 from math import prod
 from pathlib import Path
 from typing import Annotated, Final, Literal, NamedTuple, Self
@@ -32,8 +33,12 @@ IMPULSE_POWER: Final = 1.0
 PEAK_POWER: Final = 16.0
 """The peak on a structure is nearly the largest: a mean of so high a power."""
 
-_AT_ONCE: Final = 512
-"""Points of which a network is asked at a time: as many as stay in a processor's cache."""
+_AT_ONCE: Final = 64
+"""Points of which a network is asked at a time.
+
+So few stay in a processor's cache, and are multiplied by one thread: with more of them OpenBLAS
+wakes others, which wait in a loop for most of the time, or for ever where processors are taken.
+"""
 
 
 def shapes(features: int) -> tuple[tuple[int, ...], ...]:
@@ -173,8 +178,10 @@ class Member(NamedTuple):
             features: Of points, less their mean, over their scale (points, features).
         """
         differs = np.empty(len(features))
-        for start in range(0, len(features), _AT_ONCE):
-            few = slice(start, start + _AT_ONCE)
+        # No point is left alone: a single row is multiplied in another order than several are.
+        starts = range(0, max(len(features) - 1, 1), _AT_ONCE)
+        for start, end in pairwise((*starts, len(features))):
+            few = slice(start, end)
             hidden = _silu(features[few] @ self.first + self.first_bias)
             hidden = _silu(hidden @ self.second + self.second_bias)
             differs[few] = (hidden @ self.last + self.last_bias)[:, 0]
@@ -395,4 +402,8 @@ def _numbers(array: FloatArray) -> list[float]:
 
 
 def _silu(values: FloatArray) -> FloatArray:
-    return values / (1.0 + np.exp(-values))
+    below = np.negative(values)
+    np.exp(below, out=below)
+    below += 1.0
+    silu: FloatArray = np.divide(values, below, out=below)
+    return silu
