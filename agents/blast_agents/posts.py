@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 from math import ceil, floor
 from typing import Final, NamedTuple
@@ -54,7 +54,7 @@ def line_of_posts(
     Raises:
         BlastEnvError: If the scenario has no build zone or no vehicle.
     """
-    return _line_of_posts(find_scenario(scenario)).layout
+    return _line_on(_TheVery(find_scenario(scenario))).layout
 
 
 def posts_and_wall(
@@ -74,13 +74,29 @@ def posts_and_wall(
         BlastEnvError: As for `line_of_posts`.
     """
     found = find_scenario(scenario)
-    posts = _line_of_posts(found)
+    posts = _line_on(_TheVery(found))
     source = min(found.vehicles, key=lambda each: _Vehicles.scaled_m(found, each, posts.layout))
     place = worst_places(found, source, posts.layout).charge(0)
     return wall_added_to(posts, place.position_m, NEAR_CHARGE).layout
 
 
-def _line_of_posts(scenario: Scenario) -> Placement:
+@dataclass(frozen=True, eq=False)
+class _TheVery:
+    """A scenario as a key: equal to no other one, for to compare two takes long."""
+
+    scenario: Scenario
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _TheVery) and other.scenario is self.scenario
+
+    def __hash__(self) -> int:
+        return id(self.scenario)
+
+
+@lru_cache(maxsize=4)
+def _line_on(very: _TheVery) -> Placement:
+    """Return the line of posts of a scenario, which two rules need."""
+    scenario = very.scenario
     scenario.zone  # noqa: B018  # refuses a scenario without one
     if not scenario.vehicles:
         raise BlastEnvError(
@@ -113,13 +129,6 @@ class _Post(NamedTuple):
     variant: int
     length: int
 
-    def is_legal(self, placement: Placement, cell: Cell) -> bool:
-        """Whether it may be set down now with its first module there."""
-        if not placement.scenario.zone.has(cell):
-            return False
-        # One answer, not the mask of all actions: on a large zone that takes a thousand times less.
-        return placement.explain(placement.catalogue.element_at(self.variant, *cell)) is None
-
 
 @dataclass(frozen=True)
 class _Vehicles:
@@ -145,6 +154,11 @@ class _Vehicles:
         if without_speed:
             sources = self._without_speed
         return min(self.scaled_m(self.scenario, source, placement.layout) for source in sources)
+
+    @cached_property
+    def _empty(self) -> Placement:
+        """The placement of nothing."""
+        return Placement.empty(self.scenario)
 
     @cached_property
     def _without_speed(self) -> tuple[VehicleSource, ...]:
@@ -189,22 +203,21 @@ class _Vehicles:
 
     def items(self) -> list[int]:
         """Return the numbers of the items that stop vehicles, or that of the single module."""
-        variants = Placement.empty(self.scenario).catalogue.variants
+        variants = self._empty.catalogue.variants
         return sorted({each.item for each in variants if each.stops_vehicles})
 
     def with_posts(self, line: Line, item: int) -> Placement | None:
         """Return as few posts as close a line, or `None` if they do not."""
-        placement = Placement.empty(self.scenario)
+        placement = self._empty
         for run in line:
             post = self._along(item, run)
             end = 0  # of what closes the run so far
-            for index in range(len(run) + 1):
-                if index < len(run) and not self._is_closed(placement, run[index]):
-                    continue
+            for index in self._closed_along(run, placement):
                 while index - end >= self.width - _TOLERANCE:
                     latest = min(ceil(end + self.width - _TOLERANCE) - 1, index - post.length)
                     tried = range(latest, end - 1, -1)
-                    at = next((at for at in tried if post.is_legal(placement, run[at])), None)
+                    may = (at for at in tried if self._is_legal(post, placement, run[at]))
+                    at = next(may, None)
                     if at is None:
                         return None
                     element = placement.catalogue.element_at(post.variant, *run[at])
@@ -231,7 +244,7 @@ class _Vehicles:
     def _along(self, item: int, run: tuple[Cell, ...]) -> "_Post":
         """Return an item with as much of its length along a run as it may have."""
         is_row = run[0][0] == run[-1][0]
-        variants = Placement.empty(self.scenario).catalogue.variants
+        variants = self._empty.catalogue.variants
         posts = [
             _Post(number, each.columns if is_row else each.rows)
             for number, each in enumerate(variants)
@@ -239,13 +252,22 @@ class _Vehicles:
         ]
         return max(posts, key=lambda post: post.length)
 
-    def _is_closed(self, placement: Placement, square: Cell) -> bool:
-        """Whether something closes a square to every vehicle: what stands there, or a post."""
+    def _is_legal(self, post: _Post, placement: Placement, cell: Cell) -> bool:
+        """Whether a post may be set down now with its first module there."""
+        on_empty = self.scenario.zone.has(cell) and self._empty.legal[post.variant, *cell]
+        if not on_empty:  # nor may it beside anything else
+            return False
+        # One answer, not the mask of all actions: on a large zone that takes a thousand times less.
+        return placement.explain(placement.catalogue.element_at(post.variant, *cell)) is None
+
+    def _closed_along(self, run: tuple[Cell, ...], placement: Placement) -> list[int]:
+        """Return where something closes a run to every vehicle, and its end."""
         rows, columns = self.span
-        return bool(
-            self.closed[square[0] - rows.start, square[1] - columns.start]
-            or square in placement.cells
-        )
+        row, column = np.transpose(run)
+        closed = self.closed[row - rows.start, column - columns.start]
+        if placement.layout:  # of another run, which may cross this one
+            closed |= [cell in placement.cells for cell in run]
+        return [*np.flatnonzero(closed).tolist(), len(run)]
 
     def _ring(self, inner_m: Rectangle) -> Line:
         """Return the runs of squares just outside of a rectangle, where there are any."""
