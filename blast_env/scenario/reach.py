@@ -2,10 +2,11 @@
 
 All of it is worked out without a grid, on the places of the vehicle's centre: obstacles grow by
 half of the width on all sides, and cut the plane into rectangles, edges and corners, each of which
-is open to the centre as a whole or not at all. Lengths are whole micrometres there.
+is open to the centre as a whole or not at all. Lengths are whole micrometres there. Places of the
+charge are closer together than these cuts; each is looked up in the part of the plane it lies in.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
@@ -24,6 +25,10 @@ _PER_M: Final = 1_000_000
 
 _MOST_STEPS: Final = 1000
 """Most places along a side of the site at which the charge may go off, obstacles aside."""
+
+
+Steps = NDArray[np.int64]
+"""Lengths in micrometres."""
 
 
 def places_on(site: Site) -> int:
@@ -54,6 +59,8 @@ class Reach:
         start: Where its centre is when it has just entered (2 rows - 1, 2 columns - 1).
         reached: Where its centre can get to, of the same shape.
         clear: Where it would cover nothing that it can drive over, of the same shape.
+        lattice_x_m: Where along x its charge may go off, rising; all cuts are among it.
+        lattice_y_m: The same along y.
     """
 
     width_m: float
@@ -62,6 +69,8 @@ class Reach:
     start: BoolArray
     reached: BoolArray
     clear: BoolArray
+    lattice_x_m: FloatArray
+    lattice_y_m: FloatArray
 
     @property
     def enters(self) -> bool:
@@ -70,17 +79,20 @@ class Reach:
 
     @cached_property
     def places_m(self) -> FloatArray:
-        """Places where its charge may go off, (places, 2): corners that are clear."""
-        return self._corners_m(self.reached & self.clear)
+        """Places where its charge may go off, (places, 2): those of the lattice that are clear."""
+        return self._places_m(self.reached & self.clear)
 
     @property
     def starts_m(self) -> FloatArray:
         """Those of the places where it has just entered, (places, 2)."""
-        return self._corners_m(self.start)
+        return self._places_m(self.start)
 
-    def _corners_m(self, where: BoolArray) -> FloatArray:
-        rows, columns = np.nonzero(where[::2, ::2])
-        return np.column_stack((self.x_m[columns], self.y_m[rows]))
+    def _places_m(self, where: BoolArray) -> FloatArray:
+        """Return the places of the lattice that lie in some parts of the plane, (places, 2)."""
+        of_row = _parts(self.y_m, self.lattice_y_m)
+        of_column = _parts(self.x_m, self.lattice_x_m)
+        rows, columns = np.nonzero(where[of_row[:, np.newaxis], of_column])
+        return np.column_stack((self.lattice_x_m[columns], self.lattice_y_m[rows]))
 
     def near(self, rows: int, columns: int, step_m: float) -> BoolArray:
         """Return which points of a lattice have a place that is reached within half a step.
@@ -144,6 +156,12 @@ class Reach:
         return covered
 
 
+def _parts(cuts_m: FloatArray, values_m: FloatArray) -> NDArray[np.intp]:
+    """Return in which part of a direction values lie: at a cut, or between two."""
+    before = np.searchsorted(cuts_m, values_m, side="left")
+    return before + np.searchsorted(cuts_m, values_m, side="right") - 1
+
+
 def _inner_parts(cuts_m: FloatArray, low_m: float, high_m: float) -> slice:
     """Return the parts of a direction strictly between two cuts."""
     first = 2 * int(np.searchsorted(cuts_m, low_m + 1e-6)) - 1
@@ -204,6 +222,8 @@ class ReachQuery:
             start=start,
             reached=connected[labels],
             clear=~plane.covering(self.solid_m),
+            lattice_x_m=plane.lattice_x / _PER_M,
+            lattice_y_m=plane.lattice_y / _PER_M,
         )
 
 
@@ -214,44 +234,54 @@ class _Plane:
     Attributes:
         x: Cuts along x, rising; the first and the last are where it touches the border.
         y: Cuts along y.
+        lattice_x: Where along x its charge may go off, rising; cuts are among it.
+        lattice_y: The same along y.
         half: Half of its width.
     """
 
-    x: NDArray[np.int64]
-    y: NDArray[np.int64]
+    x: Steps
+    y: Steps
+    lattice_x: Steps
+    lattice_y: Steps
     half: int
 
     @classmethod
     def of(cls, query: ReachQuery) -> "_Plane":
         half = steps_of(query.width_m) // 2
-        grown = [_grown(each, half) for each in (*query.closed_m, *query.solid_m)]
-        inner = [_grown(strip_m, -half) for strip_m in query.entries_m]
-        # Nearest to a structure are places that touch it, or that are level with its corners.
-        level = [_grown(each, 0) for each in query.level_m]
-        width, height = steps_of(query.site.width_m), steps_of(query.site.height_m)
-        boxes = (*grown, *inner, *level)
-        return cls(
-            x=_cuts([edge for box in boxes for edge in box[0::2]], half, width),
-            y=_cuts([edge for box in boxes for edge in box[1::2]], half, height),
-            half=half,
+        boxes = np.concatenate(
+            (_grown((*query.closed_m, *query.solid_m), half), _grown(query.entries_m, -half))
         )
+        # Nearest to a structure are places that touch it, or that are level with its corners.
+        level = _grown(query.level_m, 0)
+        cuts, lattices = [], []
+        for axis, side_m in enumerate((query.site.width_m, query.site.height_m)):
+            end = steps_of(side_m)
+            last = max(end - half, half)
+            regular = np.arange(half, last + 1, _step(end), dtype=np.int64)
+            cut = _within(boxes[:, axis::2], half, last)
+            cuts.append(cut)
+            lattices.append(
+                np.unique(np.concatenate((cut, regular, _within(level[:, axis::2], half, last))))
+            )
+        return cls(cuts[0], cuts[1], lattices[0], lattices[1], half)
 
     def covering(self, rectangles_m: Iterable[Rectangle]) -> BoolArray:
         """Return where the vehicle would cover any of the rectangles; to touch is not to cover."""
         covered = np.zeros((2 * len(self.y) - 1, 2 * len(self.x) - 1), dtype=bool)
-        for rectangle in rectangles_m:
-            left, bottom, right, top = _grown(rectangle, self.half)
-            covered[_between(self.y, bottom, top), _between(self.x, left, right)] = True
+        left, bottom, right, top = _grown(rectangles_m, self.half).T
+        # What is strictly between; a value that is no cut lies beyond all of them.
+        low = np.maximum(2 * np.searchsorted(self.y, bottom, side="right") - 1, 0)
+        high = 2 * np.searchsorted(self.y, top, side="left")
+        first = np.maximum(2 * np.searchsorted(self.x, left, side="right") - 1, 0)
+        after = 2 * np.searchsorted(self.x, right, side="left")
+        for own in zip(*map(np.ndarray.tolist, (low, high, first, after)), strict=True):
+            covered[own[0] : own[1], own[2] : own[3]] = True
         return covered
 
     def start(self, strip_m: Rectangle) -> tuple[slice, slice]:
         """Return where the vehicle stands within the strip behind an entry."""
-        left, bottom, right, top = _grown(strip_m, -self.half)
-        return _within(self.y, bottom, top), _within(self.x, left, right)
-
-
-Box = tuple[int, int, int, int]
-"""Left, bottom, right and top in micrometres."""
+        ((left, bottom, right, top),) = _grown((strip_m,), -self.half)
+        return _from_to(self.y, bottom, top), _from_to(self.x, left, right)
 
 
 def steps_of(length_m: float) -> int:
@@ -259,23 +289,18 @@ def steps_of(length_m: float) -> int:
     return round(length_m * _PER_M)
 
 
-def _grown(rectangle: Rectangle, by: int) -> Box:
-    left, bottom, right, top = map(steps_of, rectangle)
-    return left - by, bottom - by, right + by, top + by
+def _grown(rectangles_m: Iterable[Rectangle], by: int) -> Steps:
+    """Return left, bottom, right and top of rectangles, grown on all sides (rectangles, 4)."""
+    sides_m = np.array([*rectangles_m], dtype=np.float64).reshape(-1, 4)
+    steps = np.rint(sides_m * _PER_M).astype(np.int64)  # as `steps_of`
+    grown: Steps = steps + np.array((-by, -by, by, by))
+    return grown
 
 
-def _cuts(edges: Sequence[int], half: int, end: int) -> NDArray[np.int64]:
-    """Return where a direction is cut: at edges, and at regular places of the charge.
-
-    Args:
-        edges: Of what has grown by half of the width.
-        half: Half of the width.
-        end: Where the site ends.
-    """
-    last = max(end - half, half)
-    regular = np.arange(half, last + 1, _step(end), dtype=np.int64)
-    cuts = np.concatenate((regular, np.array([*edges, half, last], dtype=np.int64)))
-    return np.unique(cuts[(cuts >= half) & (cuts <= last)])
+def _within(edges: Steps, first: int, last: int) -> Steps:
+    """Return the edges between two ends, and these; rising, none twice."""
+    inside = edges[(edges > first) & (edges < last)]
+    return np.unique(np.append(inside, (first, last)))
 
 
 def _step(end: int) -> int:
@@ -284,17 +309,7 @@ def _step(end: int) -> int:
     return module * ceil(end / module / _MOST_STEPS)
 
 
-def _between(cuts: NDArray[np.int64], low: int, high: int) -> slice:
-    """Return the parts of a direction that lie strictly between two values.
-
-    A value that is no cut lies beyond all of them.
-    """
-    first = 2 * int(np.searchsorted(cuts, low, side="right")) - 1
-    after = 2 * int(np.searchsorted(cuts, high, side="left"))
-    return slice(max(first, 0), after)
-
-
-def _within(cuts: NDArray[np.int64], low: int, high: int) -> slice:
+def _from_to(cuts: Steps, low: int, high: int) -> slice:
     """Return the parts of a direction from one cut to another one, both within the site."""
     first, last = np.searchsorted(cuts, np.clip([low, high], cuts[0], cuts[-1]))
     return slice(2 * int(first), 2 * int(last) + 1)

@@ -212,7 +212,9 @@ class VehicleGround:
             *self.standing_m,
             *(area.rectangle_m for area in self.source.keep_outs),
             *self.gates,
-            *_outside(self.site.rectangle_m, [each.rectangle_m for each in self.source.drivable]),
+            *_outside(
+                self.site.rectangle_m, tuple(each.rectangle_m for each in self.source.drivable)
+            ),
         )
 
     def drive(self, obstacles: Obstacles = NOTHING) -> "Drive":
@@ -347,13 +349,12 @@ class Drive:
             beyond_m = max(piece.rating.penetration_m, radius_m)
             left, bottom, right, top = piece.rectangle
             sides = (right + beyond_m, top + beyond_m, left - beyond_m, bottom - beyond_m)
-            for number, is_hit in enumerate(self.reach.touches(piece.rectangle)):
+            for number in np.flatnonzero(self.reach.touches(piece.rectangle)):
                 low, high = (bottom, top) if number % 2 == 0 else (left, right)
                 along = np.linspace(low, high, max(round((high - low) / MODULE_SIDE_M), 1) + 1)
                 across = np.full_like(along, sides[number])
                 places = np.column_stack((across, along) if number % 2 == 0 else (along, across))
-                clear = [is_hit and self._is_clear(place, radius_m, standing) for place in places]
-                yield places[clear]
+                yield places[[self._is_clear(place, radius_m, standing) for place in places]]
 
     def _is_clear(self, place: FloatArray, radius_m: float, standing: Sequence[Rectangle]) -> bool:
         """Return whether a charge fits there."""
@@ -475,10 +476,11 @@ def _worst_places(ground: VehicleGround, obstacles: Obstacles) -> WorstPlaces:
     return ground.drive(obstacles).worst
 
 
-def _outside(site: Rectangle, inside: Sequence[Rectangle]) -> Iterator[Rectangle]:
-    """Yield rectangles that cover the site but for some of it; nothing if that is all of it."""
+@lru_cache(maxsize=64)
+def _outside(site: Rectangle, inside: tuple[Rectangle, ...]) -> tuple[Rectangle, ...]:
+    """Return rectangles that cover the site but for some of it; none if that is all of it."""
     if not inside:
-        return
+        return ()
     xs = np.unique([site.left, site.right, *(x for each in inside for x in each[0::2])])
     ys = np.unique([site.bottom, site.top, *(y for each in inside for y in each[1::2])])
     outside = np.ones((len(ys) - 1, len(xs) - 1), dtype=bool)
@@ -492,6 +494,8 @@ def _outside(site: Rectangle, inside: Sequence[Rectangle]) -> Iterator[Rectangle
             for cuts, high in ((xs, right), (ys, top))
         )
         outside[first_y:after_y, first_x:after_x] = False
-    for row, (bottom, top) in enumerate(pairwise(ys.tolist())):
-        for _, first, _, count in stacked_runs(outside[row : row + 1]):
-            yield Rectangle(float(xs[first]), bottom, float(xs[first + count]), top)
+    return tuple(
+        Rectangle(float(xs[first]), bottom, float(xs[first + count]), top)
+        for row, (bottom, top) in enumerate(pairwise(ys.tolist()))
+        for _, first, _, count in stacked_runs(outside[row : row + 1])
+    )

@@ -107,16 +107,14 @@ def nearest_wall(
         structures: Of them, the protected ones count.
     """
     nearest_m, middle_m, most_m = np.full((3, len(places_m)), np.inf)
-    # Many places share few coordinates; so it is cheap to tell to which ones a structure is near.
-    x_m, column = np.unique(places_m[:, 0], return_inverse=True)
-    y_m, row = np.unique(places_m[:, 1], return_inverse=True)
+    x_m, y_m = np.ascontiguousarray(places_m.T)
     protected = [each for each in structures if each.protected]
 
     def least_m(structure: AnyStructure) -> FloatArray:
         left, bottom, right, top = structure.rectangle_m
         across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
         along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
-        distances_m: FloatArray = np.sqrt((across_m**2)[column] + (along_m**2)[row])
+        distances_m: FloatArray = np.sqrt(across_m**2 + along_m**2)
         return distances_m
 
     for structure in protected:

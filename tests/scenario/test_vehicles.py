@@ -69,7 +69,7 @@ def whole_places(reach: Reach, width_m: float) -> set[tuple[int, int]]:
 places = st.tuples(st.integers(0, SIDE - 1), st.integers(0, SIDE - 1))
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 @given(stops=st.frozensets(places, max_size=40), width=st.integers(1, 4))
 @example(stops=frozenset((row, 5) for row in range(0, SIDE, 3)), width=2)  # just fits
 @example(stops=frozenset((row, 5) for row in range(0, SIDE, 3)), width=3)  # half a metre too wide
