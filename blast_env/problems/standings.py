@@ -49,9 +49,12 @@ def standings_page(judged: Sequence[JudgedSubmission]) -> str:
     parts = [_HEAD]
     for table in standings_tables(judged):
         parts += [f"## {table.title}\n", markdown_table(table.headers, table.rows) + "\n"]
-    notes = [(each.method, each.note) for each in judged if each.note]
+    methods: dict[str, list[str]] = {}
+    for each in judged:
+        methods.setdefault(each.note, []).append(each.method)
+    notes = [(", ".join(names), note) for note, names in methods.items() if note]
     if notes:
-        parts += ["## Methods\n", markdown_table(("method", "note"), notes) + "\n"]
+        parts += ["## Methods\n", markdown_table(("methods", "note"), notes) + "\n"]
     return "\n".join(parts)
 
 

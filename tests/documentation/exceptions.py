@@ -305,10 +305,6 @@ SMALLER: Final[dict[str, str]] = {
     " --run out/street_on_ppo --surrogate street_on.json --out out/street_league": (
         "--cases 1 --budgets 2 --agent-search 2"
     ),
-    "blast-env league --engine gas --track known --scenario studies/school_street.toml --cases 3"
-    " --seeds 1 --methods best_rule,random,greedy,nsga2,genetic,annealing --budgets 50,200"
-    " --agent-search 50 --run out/street_on_ppo --surrogate street_on.json"
-    " --out out/street_league": "--cases 1 --methods best_rule --budgets 2 --agent-search 2",
     "python -m studies.surrogate draws out/street_ppo --surrogate street.json --cases 16"
     " --counts 16,64,256": "--cases 2 --counts 2 --changes 2 --top 1",
     "blast-env train --algo maskable_ppo --engine street.json --scenario"
@@ -407,8 +403,12 @@ SMALLER: Final[dict[str, str]] = {
     " --scenario control_room --scenario school_and_clinic --scenario hotel_forecourt"
     " --scenario shopping_street --scenario courtyard": "--repeats 1 --no-memory",
     "blast-env bench --site large": "--length 20",
-    "python -m studies.gas growing --until 0.5": "--length 20 --choices coarse,0.5",
-    "python -m studies.gas growing --scenario car_park": "--choices coarse,0.5 --until 0.1",
+    "python -m studies.gas growing --scenario street_front --until 0.45": (
+        "--choices coarse,0.5 --until 0.05"
+    ),
+    "python -m studies.gas growing --scenario car_park --until 0.3": (
+        "--choices coarse,0.5 --until 0.1"
+    ),
     "python -m studies.gas refinement": "--scenario visitor_entrance --every 0.05",
     "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
     "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,
@@ -424,18 +424,9 @@ SMALLER: Final[dict[str, str]] = {
     " --out out/league": _LEAGUE,
     "blast-env league --track sites --cases 24 --seeds 16 --budgets 50 --methods genetic"
     " --run out/runs/maskable_sites --run out/runs/ppo_sites --out out/league": _LEAGUE,
-    "blast-env league --seeds 16 --out out/league --track known --scenario courtyard --cases 8"
-    " --budgets 50,200,1000 --run out/runs/maskable_courtyard --run out/runs/ppo_courtyard": (
-        _LEAGUE
-    ),
-    "blast-env league --seeds 16 --out out/league --track known --scenario perimeter_gate --cases 6"
-    " --budgets 50,200,1000 --run out/runs/maskable_perimeter_gate"
-    " --run out/runs/ppo_perimeter_gate": _LEAGUE,
     "blast-env league --seeds 16 --out out/league --track hidden --scenario courtyard"
     " --budgets 50,200,1000 --run out/runs/maskable_courtyard_hidden"
     " --run out/runs/ppo_courtyard_hidden": _LEAGUE,
-    "blast-env league --seeds 16 --out out/league --track sites --cases 10 --budgets 50,200,1000"
-    " --run out/runs/maskable_sites --run out/runs/ppo_sites": _LEAGUE,
     "blast-env calibrate --name ballistic_kb_100kg --reference reflected_impulse"
     " --distances 8,10,12.5,16,20,25,32,40 --seeds 32": "--seeds 2 --distances 8,16,32",
     "blast-env calibrate --name collisional_kb --preset collisional --reference reflected_impulse"
