@@ -287,7 +287,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
             impulses = own[own.structure == obstacle.name][column]
             for part, impulse in zip(obstacle.parts, impulses, strict=True):
                 part.impulse, part.hits = float(impulse), int(impulse > 0.0)
-        draw_enlarged(axes, obstacles, scale, 0.4)
+        draw_enlarged(axes, obstacles, scale, 0.4, features=site_features(evaluation.scenario))
         pa_s = float(np.average(parts[column.replace("_sim", "_pa_s")], weights=parts.weight))
         axes.set_title(
             f"{name} {words} barrier\n{pa_s:,.0f} Pa·s",

@@ -30,7 +30,7 @@ from blast_env.recording.tables import faces_hit
 from blast_env.rendering.heat_map import LoadScale, common_scale, heat_map
 from blast_env.rendering.site_plan import (
     draw_loads,
-    draw_outline,
+    draw_outlines,
     draw_site,
     write_heading,
     write_names,
@@ -99,7 +99,7 @@ def _feature_of(outline: StructureOutline) -> Feature:
 def _draw_obstacles(axes: Axes, scene: Scene) -> None:
     for outline in scene.structures:
         draw_loads(axes, outline.build(), Normalize(0.0, 1.0), 0.3)
-        draw_outline(axes, outline)
+    draw_outlines(axes, scene.structures)
 
 
 def _draw_balls(axes: Axes, scene: Scene) -> None:

@@ -25,7 +25,7 @@ from blast_env.rendering.canvas import Frame, SiteSheet
 from blast_env.rendering.site_plan import (
     draw_features,
     draw_loads,
-    draw_outline,
+    draw_outlines,
     legend_of,
     load_colours,
     show_loads,
@@ -121,7 +121,8 @@ class FramePainter:
             )
         )
         self._balls: dict[tuple[int, int], Line2D] = {}
-        self._loads: dict[str, tuple[tuple[PolyCollection, LineCollection], Sequence[Artist]]] = {}
+        self._loads: dict[str, tuple[PolyCollection, LineCollection]] = {}
+        self._features, self._outlines = features, list[Artist]()
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -144,8 +145,10 @@ class FramePainter:
             note: A remark under the time, e.g. the real-time factor of a film.
         """
         lines = (f"{time_s * MS_PER_S:.2f} ms", note, self._so_far(obstacles))
-        standing = (artist for each in obstacles for artist in self._standing(each))
-        return self.sheet.frame(lines, (*self._flying(balls), *standing))
+        loads = [artist for each in obstacles for artist in self._loads_on(each)]
+        if not self._outlines:
+            self._outlines = draw_outlines(self.sheet.axes, obstacles, self._features)
+        return self.sheet.frame(lines, (*self._flying(balls), *loads, *self._outlines))
 
     def _so_far(self, obstacles: Sequence[ModularObstacle]) -> str:
         """Return the loads on what is protected at this moment."""
@@ -153,14 +156,14 @@ class FramePainter:
         loads = [f"{each.name} {self._unit.of_structure(each)}" for each in protected]
         return f"so far: {', '.join(loads)}" if loads else ""
 
-    def _standing(self, obstacle: ModularObstacle) -> list[Artist]:
-        """Return the modules in the colours of their loads, and the outline that tells the role."""
-        axes, known = self.sheet.axes, self._loads.get(obstacle.name)
+    def _loads_on(self, obstacle: ModularObstacle) -> tuple[Artist, Artist]:
+        """Return the modules in the colours of their loads, and the crosses on destroyed ones."""
+        known = self._loads.get(obstacle.name)
         if known is None:
-            loads = draw_loads(axes, obstacle, Normalize(0.0, self.full_impulse), 0.3)
-            known = self._loads[obstacle.name] = (loads, draw_outline(axes, obstacle))
-        show_loads(known[0], obstacle)
-        return [*known[0], *known[1]]
+            scale = Normalize(0.0, self.full_impulse)
+            known = self._loads[obstacle.name] = draw_loads(self.sheet.axes, obstacle, scale, 0.3)
+        show_loads(known, obstacle)
+        return known
 
     def _flying(self, balls: BallStates) -> Iterator[Artist]:
         """Yield the air, and the explosive balls over it."""

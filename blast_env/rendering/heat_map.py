@@ -23,7 +23,7 @@ from blast_env.rendering.site_plan import (
     add_bar,
     draw_enlarged,
     draw_loads,
-    draw_outline,
+    draw_outlines,
     draw_plan,
     legend_of,
     load_colours,
@@ -207,10 +207,11 @@ def _widths_in(
 
 def _draw_overview(axes: Axes, result: BlastResult, scale: LoadScale) -> None:
     # Modules have the colours of their loads in the place of a fill.
-    draw_plan(axes, without(_features(result), *STANDING))
+    features = _features(result)
+    draw_plan(axes, without(features, *STANDING))
     for obstacle in result.obstacles:
         draw_loads(axes, obstacle, scale.norm, 0.25, scale.unit.factor)
-        draw_outline(axes, obstacle)
+    draw_outlines(axes, result.obstacles, features)
     axes.set_title("Site", fontsize=11)
 
 
@@ -236,7 +237,8 @@ def _draw_panel(
     scale: LoadScale,
     room_in: tuple[float, float],
 ) -> None:
-    draw_enlarged(axes, building.obstacles, scale.norm, 0.6, scale.unit.factor)
+    features = _features(result)
+    draw_enlarged(axes, building.obstacles, scale.norm, 0.6, scale.unit.factor, features)
     hits = sum(part.hits for part in building.modules)
     axes.set_title(
         f"{building.name}{' (protected)' if building.protected else ''}\n"

@@ -35,6 +35,7 @@ from blast_env.plan import (
     Kinds,
     area_feature,
     blast_features,
+    structure_features,
     without,
 )
 from blast_env.rendering.canvas import BAR_LABELS_PX, Frame, Sheet
@@ -46,7 +47,7 @@ from blast_env.rendering.gas import (
 from blast_env.rendering.site_plan import (
     draw_features,
     legend_of,
-    rectangle_patch,
+    outline_path,
 )
 from blast_env.rendering.style import barrier_text, render_extra, unit_interval
 from blast_env.units import MS_PER_S
@@ -59,6 +60,7 @@ with render_extra():
     from matplotlib.colors import AsinhNorm
     from matplotlib.image import AxesImage
     from matplotlib.lines import Line2D
+    from matplotlib.patches import PathPatch
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 _FINER: Final = 4  # pixels drawn along a cell
@@ -364,10 +366,9 @@ class PressurePainter:
         axes, shot = self._axes[number][0], self.shots[number]
         site, height_m = shot.result.run.site, shot.layer_m(0)
         self._add_image(number, 0)
-        for outline in site.structures:
-            for block in outline.blocks:
-                is_cut = block.base_m < height_m < _top_m(site, block)
-                self._add_solid(axes, block.rectangle_m, outline, is_cut=is_cut)
+        for outline, blocks in _wholes(shot):
+            is_cut = blocks[0].base_m < height_m < _top_m(site, blocks[0])
+            self._add_solid(axes, [each.rectangle_m for each in blocks], outline, is_cut=is_cut)
         self.sheet.let_move(draw_features(axes, _on_ground(shot)))
         line = axes.axhline if shot.section.axis == "y" else axes.axvline
         self.sheet.let_move([line(shot.layer_m(1), **_CUT_STYLE)])
@@ -390,12 +391,14 @@ class PressurePainter:
         site, at_m = shot.result.run.site, shot.layer_m(1)
         along = 1 - shot.section.normal
         self._add_image(number, 1)
-        for outline in site.structures:
-            for block in outline.blocks:
+        for outline, blocks in _wholes(shot):
+            cut = []
+            for block in blocks:
                 part, top_m = block.rectangle_m, _top_m(site, block)
                 if part[shot.section.normal] < at_m < part[shot.section.normal + 2]:
-                    rectangle = Rectangle(part[along], block.base_m, part[along + 2], top_m)
-                    self._add_solid(axes, rectangle, outline, is_cut=True)
+                    cut.append(Rectangle(part[along], block.base_m, part[along + 2], top_m))
+            if cut:
+                self._add_solid(axes, cut, outline, is_cut=True)
         charge = site.charge
         if abs(charge.position_m[shot.section.normal] - at_m) <= shot.result.run.grid.cell_m:
             place_m = (charge.position_m[along], charge.height_m)
@@ -430,10 +433,10 @@ class PressurePainter:
         self._images.append(_Picture(number, plane, image, Smooth(air), distances_m))
 
     def _add_solid(
-        self, axes: Axes, rectangle: Rectangle, outline: StructureOutline, *, is_cut: bool
+        self, axes: Axes, parts: Sequence[Rectangle], outline: StructureOutline, *, is_cut: bool
     ) -> None:
         """Draw what stands: filled where the plane cuts it, its outline where it is below."""
-        patch = rectangle_patch(rectangle)
+        patch = PathPatch(outline_path(parts))
         if outline.cells is not None:
             patch.set(edgecolor=unit_interval(BARRIER), linewidth=0.8)
             colour = unit_interval(BARRIER)
@@ -475,6 +478,19 @@ def _on_ground(shot: PressureShot) -> tuple[Feature, ...]:
     blast = shot.result.blast
     features = blast_features(blast.scenario, (), shot.result.run.site.charge)
     return without(features, Kinds.SITE, *STANDING)
+
+
+def _wholes(shot: PressureShot) -> list[tuple[StructureOutline, list[Block]]]:
+    """Return what stands, the lowest first: parts of one thing together, and the first of them."""
+    site, features = shot.result.run.site, structure_features(shot.result.blast.scenario.structures)
+    whole = {each.name: each.part_of for each in features if each.part_of}
+    found: dict[object, tuple[StructureOutline, list[Block]]] = {}
+    for outline in site.structures:
+        for block in outline.blocks:
+            alone = (outline.name, block) if outline.cells is not None else outline.name
+            key = whole.get(outline.name, alone), outline.protected
+            found.setdefault(key, (outline, []))[1].append(block)
+    return sorted(found.values(), key=lambda each: each[1][0].base_m)
 
 
 def _solids(site: BlastSite) -> list[Feature]:

@@ -6,7 +6,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Rectangle, outlines
 from blast_env.labels import labels_of, settled_labels
 from blast_env.physics.scene import StructureOutline
 from blast_env.physics.structure import LoadColours, ModularObstacle
@@ -139,9 +139,7 @@ def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) ->
             drawn += _sign(feature, _places(feature, view), view)
     for (kind, look, fill), alike in areas.items():
         # One patch, so that neighbours have no seam.
-        rings = [view.places(_at_height(ring)) for ring in outlines_of(alike)]
-        paths = (Path(np.vstack([ring, ring[:1]]), closed=True) for ring in rings)
-        patch = PathPatch(Path.make_compound_path(*paths))
+        patch = PathPatch(_path_of(outlines_of(alike), view))
         patch.set(**area_style(look, fill), zorder=kind.level)
         drawn.append(patch)
     drawn.sort(key=lambda artist: artist.get_zorder())
@@ -247,14 +245,40 @@ def write_legend(figure: Figure, handles: Sequence[Artist]) -> int:
     return lines
 
 
-def draw_outline(axes: Axes, obstacle: Obstacle) -> list[Artist]:
-    """Draw the outline of a structure in the colour of its role; a barrier has none."""
-    if obstacle.cells is not None:
-        return []
-    colour = PROTECTED if obstacle.protected else STRUCTURE
-    width = 2.4 if obstacle.protected else 1.6
-    style = {"edgecolor": unit_interval(colour), "linewidth": width, "zorder": 3}
-    return [add_outline(axes, obstacle.rectangle_m, **style)]
+def outline_path(rectangles: Sequence[Rectangle], view: View = PLAN) -> Path:
+    """Return the outline of rectangles that do not overlap, all together."""
+    return _path_of(outlines(rectangles), view)
+
+
+def _path_of(rings: Iterable[Sequence[PointM]], view: View) -> Path:
+    places = [view.places(_at_height(ring)) for ring in rings]
+    closed = (Path(np.vstack([each, each[:1]]), closed=True) for each in places)
+    return Path.make_compound_path(*closed)
+
+
+def draw_outlines(
+    axes: Axes, obstacles: Iterable[Obstacle], features: Iterable[Feature] = ()
+) -> list[Artist]:
+    """Draw the outlines of structures in the colours of their roles; a barrier has none.
+
+    Args:
+        axes: The axes, in metres.
+        obstacles: The structures and the barrier.
+        features: What is on the site: those of the structures say which are parts of one thing.
+    """
+    whole = {each.name: each.part_of for each in features if each.part_of}
+    alike: dict[tuple[str, bool], list[Rectangle]] = {}
+    for each in obstacles:
+        if each.cells is None:
+            key = whole.get(each.name, each.name), each.protected
+            alike.setdefault(key, []).append(each.rectangle_m)
+    drawn: list[Artist] = []
+    for (_, protected), rectangles in alike.items():
+        patch = PathPatch(outline_path(rectangles), fill=False, zorder=3.0)
+        patch.set_edgecolor(unit_interval(PROTECTED if protected else STRUCTURE))
+        patch.set_linewidth(2.4 if protected else 1.6)
+        drawn.append(axes.add_patch(patch))
+    return drawn
 
 
 def draw_loads(
@@ -299,11 +323,15 @@ def draw_enlarged(
     scale: Normalize,
     linewidth: float,
     factor: float = 1.0,
+    features: Iterable[Feature] = (),
 ) -> None:
-    """Draw the loads on the modules of structures as large as axes are; see `draw_loads`."""
+    """Draw the loads on the modules of structures as large as axes are.
+
+    See `draw_loads`, and for the features `draw_outlines`.
+    """
     for each in obstacles:
         draw_loads(axes, each, scale, linewidth, factor)
-        draw_outline(axes, each)
+    draw_outlines(axes, obstacles, features)
     left, bottom, right, top = Rectangle.around([each.rectangle_m for each in obstacles])
     reach = 0.25
     axes.set(xlim=(left - reach, right + reach), ylim=(bottom - reach, top + reach))

@@ -29,7 +29,7 @@ from blast_env.plan import (
 from blast_env.rendering.site_plan import (
     draw_features,
     draw_loads,
-    draw_outline,
+    draw_outlines,
     draw_plan,
     draw_site,
     legend_of,
@@ -146,11 +146,12 @@ def _draw_plan(
                 part.impulse = impulse[part.module_id]
                 part.hits = int(part.impulse > 0.0)
             draw_loads(axes, obstacle, scale, linewidth=0.2)
-            draw_outline(axes, obstacle)
             continue
         colour = unit_interval(STRUCTURE if obstacle.cells is None else BARRIER)
         parts = [rectangle_patch(part.rectangle_m) for part in obstacle.parts]
         axes.add_collection(PatchCollection(parts, color=colour, linewidth=0.3, zorder=4))
+    protected = [each for each in scene.structures if each.protected]
+    draw_outlines(axes, protected, site_features(scenario))
     share = 1.0 / sum(source.weight for source in scenario.charge)
     for source in scenario.charge:
         _draw_source(axes, source, share * source.weight)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
@@ -19,7 +20,7 @@ from blast_env.calibration.references import kingery_bulmash
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.physics.gas.probes import GroundMap
-from blast_env.plan import barrier_features
+from blast_env.plan import STRUCTURE, barrier_features
 from blast_env.rendering.figures import save_figure
 from blast_env.rendering.film import plan_until
 from blast_env.rendering.gas import facades, full_load, gauge_history
@@ -38,10 +39,11 @@ from blast_env.rendering.pressure_frames import (
     default_section,
 )
 from blast_env.rendering.site_plan import draw_features, legend_of
+from blast_env.rendering.style import unit_interval
 from blast_env.scenario import Scenario
 from tests.catalogue_sites import WALL as PIECES
 from tests.catalogue_sites import yard
-from tests.gas_sites import WALL, hut
+from tests.gas_sites import WALL, hut, site_document
 
 HEIGHT_M, CUT = 0.75, VerticalSection("y", 4.25)
 
@@ -356,6 +358,22 @@ def test_the_blast_goes_out_from_the_charge(shots: list[PressureShot]) -> None:
     frames = [painter.paint(share * end_s).astype(int) for share in (0.1, 0.5, 1.0, 1.5)]
     red = [(frame[..., 0] - frame[..., 2] > 60).sum() for frame in frames]
     assert all(before < after for before, after in pairwise(red))
+
+
+def test_parts_of_a_round_structure_have_one_outline_in_plan_and_section() -> None:
+    """A cross of three rectangles, and the upright rectangle of a section through all of them."""
+    silo = {"kind": "round", "name": "silo", "centre_m": [8.0, 1.5], "diameter_m": 2.0}
+    scenario = hut(structures=[*site_document()["structures"], silo | {"height_m": 3.0}])
+    short = GasBlast(scenario, (), engine=GasEngine(margin_m=1.0, until=4e-3))
+    shot = record_planes(short, HEIGHT_M, VerticalSection("x", 8.25))
+    corners = []
+    for axes in PressurePainter([shot], 200.0, 480).sheet.figure.axes[:2]:
+        solids = [each for each in axes.patches if isinstance(each, PathPatch)]
+        solids = [
+            each for each in solids if each.get_edgecolor() == to_rgba(unit_interval(STRUCTURE))
+        ]
+        corners.append([len(np.asarray(each.get_path().vertices)) - 1 for each in solids])
+    assert corners == [[12], [4]]
 
 
 def test_the_section_points_to_what_is_protected(blast: GasBlast) -> None:

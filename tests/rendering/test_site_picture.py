@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from blast_env.cli import app
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
-from blast_env.plan import Kinds, item_colours
+from blast_env.plan import Kinds, item_colours, site_features
 from blast_env.rendering.oblique import (
     CORNERS,
     ObliqueView,
@@ -24,7 +24,9 @@ from blast_env.rendering.oblique import (
     painted_order,
 )
 from blast_env.rendering.site_picture import site_picture
+from blast_env.rendering.site_plan import draw_outlines
 from blast_env.scenario import Scenario, save_scenario, write_layout
+from blast_env.scenario.build_scene import build_site
 from tests.catalogue_sites import WALL, yard, yard_document
 from tests.vehicle_sites import POSTS, gate_site, site_document
 
@@ -134,6 +136,8 @@ def test_a_round_structure_has_one_outline() -> None:
     )
     ends = np.asarray(silo.vertices).round(6).tolist()
     assert len({tuple(place) for place in ends}) == 12
+    outlines, features = build_site(site).structures, site_features(site)
+    assert [len(draw_outlines(plan, outlines, each)) for each in (features, ())] == [2, 4]
     lines = [shape for shape in shapes(oblique) if len(shape) == 3]
     hut = 4 + 2 + 3  # round the roof, below the walls that are seen, and between walls
     silo_lines = 12 + 6 + 9
