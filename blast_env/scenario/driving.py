@@ -11,7 +11,8 @@ tighter than 3.5 m is a turn on the spot, no faster than on that radius. Everyth
 that speeds come out too high rather than too low: a place counts as open if any place within 0.25 m
 is, a radius as the next larger one of the table, and a run-up is longer by one step.
 
-More obstacles leave fewer steps, so they never make any speed larger.
+More obstacles leave fewer steps, so they never make any speed larger. Nor do fewer arcs: a search
+with few of them tells soon, and for certain, of most pieces that a vehicle hits too fast.
 """
 
 from collections import deque
@@ -73,6 +74,7 @@ class SpeedField:
         half_m: float,
         is_open: BoolArray,
         starts: Sequence[tuple[BoolArray, PointM]],
+        arc_step: int = 1,
     ) -> "SpeedField":
         """Work the speeds out.
 
@@ -81,6 +83,8 @@ class SpeedField:
             half_m: Half of its width.
             is_open: Which places are open to its centre (rows, columns).
             starts: Where it enters (rows, columns), and the direction into the site there.
+            arc_step: One arc of so many is taken, see `Arcs.every`; speeds are exact with all of
+                them, and no larger with fewer.
         """
         # Here, because they import Numba, which takes half a second.
         from blast_env.scenario.driving_kernels import all_open, any_slow, spread
@@ -93,22 +97,21 @@ class SpeedField:
         for area in motion.slow:
             inside = places_in(area.rectangle_m.grown(-STEP_M / 2.0))
             most[inside] = np.minimum(most[inside], label(area.speed_km_h))
-        labels = np.full((len(DIRECTIONS), *is_open.shape), NEVER)
+        # What is beyond all open places takes time, and nothing else.
+        box = _around(is_open)
+        ground, most = np.ascontiguousarray(is_open[box]), np.ascontiguousarray(most[box])
+        labels = np.full((len(DIRECTIONS), *ground.shape), NEVER)
         entered = np.zeros_like(is_open)
         for start, inwards in starts:
-            at = start & is_open
-            entered |= at
+            entered |= start & is_open
+            at = start[box] & ground
             for number, step in enumerate(DIRECTIONS):
                 if step @ inwards > 0:
                     labels[number][at] = np.minimum(
                         label(motion.entry_km_h) + LENGTHS[number], most[at]
                     )
         per_radius = _per_radius(motion)
-        arcs = arcs_up_to(top / per_radius)
-        # What is beyond all open places takes time, and nothing else.
-        box = _around(is_open)
-        ground, whole = np.ascontiguousarray(is_open[box]), labels
-        most, labels = np.ascontiguousarray(most[box]), np.ascontiguousarray(labels[:, *box])
+        arcs = arcs_up_to(top / per_radius, arc_step)
         passable = all_open(ground, arcs.first, arcs.points)
         slowed = np.zeros((0, 0, 0), dtype=np.uint64)
         if motion.slow:
@@ -129,8 +132,10 @@ class SpeedField:
             max((label(area.speed_km_h) for area in motion.slow), default=top),
             min(SPOT * per_radius, top),
         )
-        whole[:, *box] = labels
-        return cls(motion, half_m, np.float32(STEP_M) * whole, is_open, entered)
+        step_m = np.float32(STEP_M)
+        run_up_m = np.full((len(DIRECTIONS), *is_open.shape), step_m * NEVER)
+        np.multiply(step_m, labels, out=run_up_m[:, *box])
+        return cls(motion, half_m, run_up_m, is_open, entered)
 
     @property
     def places_km_h(self) -> FloatArray:

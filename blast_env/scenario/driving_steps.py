@@ -69,6 +69,19 @@ class Arcs(NamedTuple):
         kept = np.ones(len(self.of), dtype=bool)
         same = (self.of[1:] == self.of[:-1]).all(axis=1)
         kept[1:] = ~same | (self.radii[:-1] < radius)
+        return self._only(kept)
+
+    def every(self, step: int) -> "Arcs":
+        """Return one of so many arcs that follow each other by radius, from the widest on.
+
+        That is done for each pair of directions.
+        """
+        number = np.arange(len(self.of))
+        ends = np.append((self.of[1:] != self.of[:-1]).any(axis=1), True)
+        last = np.minimum.accumulate(np.where(ends, number, len(number))[::-1])[::-1]
+        return self._only((last - number) % step == 0)
+
+    def _only(self, kept: BoolArray) -> "Arcs":
         points = [self.points[self.first[arc] : self.first[arc + 1]] for arc in kept.nonzero()[0]]
         first = np.concatenate(([0], np.cumsum([len(each) for each in points])))
         return Arcs(
@@ -94,9 +107,9 @@ def wide_places(is_open: BoolArray) -> BoolArray:
 
 
 @lru_cache(maxsize=16)
-def arcs_up_to(radius: float) -> Arcs:
-    """Return `all_arcs().up_to(radius)`; for equal radii, the same object."""
-    return all_arcs().up_to(radius)
+def arcs_up_to(radius: float, step: int = 1) -> Arcs:
+    """Return `all_arcs().up_to(radius).every(step)`; for equal arguments, the same object."""
+    return all_arcs().up_to(radius).every(step)
 
 
 @cache

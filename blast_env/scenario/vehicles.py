@@ -383,7 +383,8 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
         if slow:
             is_open = reach.near(*_places_shape(ground), STEP_M)
             weak = _too_slow(slow, _free_speeds(ground), is_open)
-            weak = weak and _too_slow(weak, _speeds(ground, is_open))
+            if weak and _too_slow(weak, _speeds(ground, is_open, _FEW_ARCS)) != weak:
+                weak = _too_slow(weak, _speeds(ground, is_open))
         if not weak:
             return Drive(ground, reach, held, broken)
         broken = (*broken, *weak)
@@ -443,13 +444,17 @@ def _places_shape(ground: VehicleGround) -> tuple[int, int]:
     return places_shape(ground.site.width_m, ground.site.height_m)
 
 
-def _speeds(ground: VehicleGround, is_open: BoolArray) -> SpeedField:
+_FEW_ARCS: Final = 6
+"""Of so many arcs one is taken for a first look: their radii grow by a factor of three, about."""
+
+
+def _speeds(ground: VehicleGround, is_open: BoolArray, arc_step: int = 1) -> SpeedField:
     """Work out how fast a vehicle with a speed is where it gets to; many layouts leave the same."""
-    return _speeds_on(ground, np.packbits(is_open).tobytes())
+    return _speeds_on(ground, np.packbits(is_open).tobytes(), arc_step)
 
 
 @lru_cache(maxsize=16)
-def _speeds_on(ground: VehicleGround, bits: bytes) -> SpeedField:
+def _speeds_on(ground: VehicleGround, bits: bytes, arc_step: int) -> SpeedField:
     source, shape = ground.source, _places_shape(ground)
     assert source.motion is not None
     is_open = np.unpackbits(np.frombuffer(bits, np.uint8), count=shape[0] * shape[1])
@@ -460,7 +465,9 @@ def _speeds_on(ground: VehicleGround, bits: bytes) -> SpeedField:
         centres_m = entry.strip_m(ground.site, side, source.width_m).grown(-half_m)
         start[places_in(centres_m.grown(STEP_M / 2.0))] = True
         starts.append((start, _INWARDS[side]))
-    return SpeedField.of(source.motion, half_m, is_open.reshape(shape).astype(bool), starts)
+    return SpeedField.of(
+        source.motion, half_m, is_open.reshape(shape).astype(bool), starts, arc_step
+    )
 
 
 @lru_cache(maxsize=8)

@@ -162,6 +162,56 @@ def test_more_obstacles_never_make_a_vehicle_faster(boxes: list[tuple[int, int, 
     assert (more <= fewer).all()
 
 
+@settings(max_examples=10, deadline=None)
+@given(boxes=boxes, arc_step=st.sampled_from([2, 6, 50]))
+def test_fewer_arcs_never_make_a_vehicle_faster(
+    boxes: list[tuple[int, int, int, int]], arc_step: int
+) -> None:
+    yard = ground(45.0, 30.0, (10.0, 20.0), [], entry_speed_km_h=30.0)
+    stops = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
+    every = speeds_of(yard, Obstacles(stops))
+    start = np.zeros_like(every.is_open)
+    start[20:41, :4] = True
+    some = [
+        SpeedField.of(every.motion, every.half_m, every.is_open, [(start, (1.0, 0.0))], step)
+        for step in (1, arc_step)
+    ]
+    assert (some[1].run_up_m <= some[0].run_up_m).all()
+    assert np.isnan(some[1].places_km_h).sum() == np.isnan(some[0].places_km_h).sum()
+
+
+@settings(max_examples=20, deadline=None)
+@given(boxes=boxes, over_km_h=st.lists(st.sampled_from([-0.1, 0.1]), min_size=5, max_size=5))
+def test_what_gives_way_is_what_a_full_search_of_every_round_says(
+    boxes: list[tuple[int, int, int, int]], over_km_h: list[float]
+) -> None:
+    """Ratings are just above or below the speed of a hit while all pieces stand."""
+    yard = ground(45.0, 30.0, (10.0, 20.0), [], entry_speed_km_h=30.0)
+    rectangles = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
+    every = speeds_of(yard, Obstacles(rectangles))
+    held = tuple(
+        RatedPiece(each, CrashRating(mass_kg=7200.0, speed_km_h=km_h + over), f"piece {number}")
+        for number, (each, over) in enumerate(zip(rectangles, over_km_h, strict=False))
+        if (km_h := every.impact_km_h(each)) is not None
+    )
+    drive = yard.drive(Obstacles(rated=held))
+    broken: tuple[RatedPiece, ...] = ()
+    while True:
+        stops, solid = (tuple(each.rectangle for each in some) for some in (held, broken))
+        speeds = speeds_of(yard, Obstacles(stops, solid))
+        hits_km_h = [speeds.impact_km_h(each.rectangle) or 0.0 for each in held]
+        weak = [
+            each
+            for each, km_h in zip(held, hits_km_h, strict=True)
+            if km_h > each.rating.speed_km_h
+        ]
+        if not weak:
+            break
+        broken = (*broken, *weak)
+        held = tuple(each for each in held if each not in weak)
+    assert (drive.held, drive.broken) == (held, broken)
+
+
 def shifted(places: np.ndarray, x: int, y: int, outside: Any) -> np.ndarray:
     """Return what is at the places that are x columns and y rows on; outside of all, a value."""
     found = np.full_like(places, outside)
