@@ -15,6 +15,9 @@ from blast_env.scenario.sections import AnyStructure, PointM, VehicleSource
 _EQUAL_M: Final = 1e-6
 """Distances that differ by less are equal."""
 
+_NEAR_M: Final = 1e-3
+"""Places that are further away than the nearest one by more are not the worst."""
+
 
 @dataclass(frozen=True)
 class WorstPlaces:
@@ -57,23 +60,38 @@ def worst_of(
         places_m: Places where its charge may go off, at least one (places, 2).
         structures: The structures.
     """
-    distance_m, middle_m = nearest_wall(places_m, structures)
+    rough_m = _rough_distance_m(places_m, structures)
     left = np.ones(len(places_m), dtype=bool)
-    chosen: list[int] = []
+    chosen: list[PointM] = []
+    distances_m: list[float] = []
     while left.any() and len(chosen) < source.places:
-        # np.nonzero keeps the order of the places: by y, then by x.
-        best = np.nonzero(left)[0]
-        for measure in (distance_m, middle_m, places_m[:, 0], places_m[:, 1]):
+        # Only of the nearest ones is the rest asked. Their order stays: by y, then by x.
+        near = np.flatnonzero(left & (rough_m <= rough_m[left].min() + _NEAR_M))
+        distance_m, middle_m = nearest_wall(places_m[near], structures)
+        best = np.arange(len(near))
+        for measure in (distance_m, middle_m, places_m[near, 0], places_m[near, 1]):
             values = measure[best]
             best = best[values <= values.min() + _EQUAL_M]
-        chosen.append(int(best[0]))
-        apart_m = np.hypot(*(places_m - places_m[best[0]]).T)
-        left &= apart_m >= source.least_apart_m - _EQUAL_M
-    return WorstPlaces(
-        source=source,
-        places_m=tuple((float(x), float(y)) for x, y in places_m[chosen]),
-        distances_m=tuple(float(distance_m[index]) for index in chosen),
-    )
+        x_m, y_m = places_m[near[best[0]]]
+        chosen.append((float(x_m), float(y_m)))
+        distances_m.append(float(distance_m[best[0]]))
+        if len(chosen) < source.places:
+            apart_m = np.hypot(places_m[:, 0] - x_m, places_m[:, 1] - y_m)
+            left &= apart_m >= source.least_apart_m - _EQUAL_M
+    return WorstPlaces(source, tuple(chosen), tuple(distances_m))
+
+
+def _rough_distance_m(places_m: FloatArray, structures: Iterable[AnyStructure]) -> FloatArray:
+    """Return the distance of `nearest_wall`, but for rounding (places,)."""
+    x_m, y_m = np.ascontiguousarray(places_m.T)
+    square_m2 = np.full(len(places_m), np.inf)
+    for structure in structures:
+        if structure.protected:
+            for left, bottom, right, top in _walls(structure):
+                across_m, along_m = x_m - x_m.clip(left, right), y_m - y_m.clip(bottom, top)
+                np.minimum(square_m2, across_m**2 + along_m**2, out=square_m2)
+    distance_m: FloatArray = np.sqrt(square_m2)
+    return distance_m
 
 
 def stand_off_m(structures: Iterable[AnyStructure], position_m: PointM) -> float:
