@@ -271,8 +271,12 @@ def spread(
     waiting = np.zeros((count, rows), dtype=np.bool_)
     spots = np.full((rows, columns), NEVER)
     spot_limit = np.float32(spot_most)  # as labels are: else it would be above them for ever
-    for number, row, column in np.argwhere(labels >= 0.0):
-        _raise(labels, changed, waiting, number, row, column, labels[number, row, column])
+    for number in range(count):
+        for row in range(rows):
+            for column in range(columns):
+                if labels[number, row, column] >= 0.0:
+                    label = labels[number, row, column]
+                    _raise(labels, changed, waiting, number, row, column, label)
     first = np.searchsorted(of[:, 0], np.arange(count + 1))
     while waiting.any():
         for number in range(count):

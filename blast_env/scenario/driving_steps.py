@@ -172,5 +172,8 @@ def _arc(before: IntArray32, after: IntArray32, radius: float) -> tuple[IntArray
     for begin, end in ((np.zeros(2), arc[0]), (arc[-1], before + after)):
         parts.append(np.linspace(begin, end, 4 * ceil(np.hypot(*(end - begin))) + 2))
     points = np.unique(np.rint(np.concatenate(parts)).astype(np.int32), axis=0)
+    # What is farthest from the middle is the first that is not open.
+    off = np.hypot(*(points - points.mean(axis=0)).T)
+    points = points[np.argsort(-off, kind="stable")]
     length = hypot(*before) + hypot(*after) - 2.0 * tangent + radius * angle
     return points, float(length)

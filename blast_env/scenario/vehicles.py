@@ -383,8 +383,7 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
         if slow:
             is_open = reach.near(*_places_shape(ground), STEP_M)
             weak = _too_slow(slow, _free_speeds(ground), is_open)
-            if weak and _too_slow(weak, _speeds(ground, is_open, _FEW_ARCS)) != weak:
-                weak = _too_slow(weak, _speeds(ground, is_open))
+            weak = weak and _weak_on(ground, _as_bits(is_open), weak)
         if not weak:
             return Drive(ground, reach, held, broken)
         broken = (*broken, *weak)
@@ -448,13 +447,33 @@ _FEW_ARCS: Final = 6
 """Of so many arcs one is taken for a first look: their radii grow by a factor of three, about."""
 
 
-def _speeds(ground: VehicleGround, is_open: BoolArray, arc_step: int = 1) -> SpeedField:
-    """Work out how fast a vehicle with a speed is where it gets to; many layouts leave the same."""
-    return _speeds_on(ground, np.packbits(is_open).tobytes(), arc_step)
+@lru_cache(maxsize=256)
+def _weak_on(
+    ground: VehicleGround, bits: bytes, pieces: tuple[RatedPiece, ...]
+) -> tuple[RatedPiece, ...]:
+    """Return which pieces give way to a vehicle that gets to some places; many layouts leave these.
+
+    Args:
+        ground: The vehicle, and what it meets.
+        bits: The places.
+        pieces: The pieces.
+    """
+    if _too_slow(pieces, _speeds_on(ground, bits, _FEW_ARCS)) == pieces:
+        return pieces
+    return _too_slow(pieces, _speeds_on(ground, bits))
+
+
+def _speeds(ground: VehicleGround, is_open: BoolArray) -> SpeedField:
+    """Work out how fast a vehicle with a speed is where it gets to."""
+    return _speeds_on(ground, _as_bits(is_open))
+
+
+def _as_bits(is_open: BoolArray) -> bytes:
+    return np.packbits(is_open).tobytes()
 
 
 @lru_cache(maxsize=16)
-def _speeds_on(ground: VehicleGround, bits: bytes, arc_step: int) -> SpeedField:
+def _speeds_on(ground: VehicleGround, bits: bytes, arc_step: int = 1) -> SpeedField:
     source, shape = ground.source, _places_shape(ground)
     assert source.motion is not None
     is_open = np.unpackbits(np.frombuffer(bits, np.uint8), count=shape[0] * shape[1])
