@@ -179,7 +179,7 @@ def problem_of(
     scenario: AnyScenario,
     charge: AnyCharge | None,
     processes: int = 1,
-    cache: str | Path | None = None,
+    engine: str | Engine = JUDGE,
 ) -> LayoutProblem:
     """Return what a proposal is asked and judged by: gas dynamics, and threats nobody has met.
 
@@ -195,4 +195,4 @@ def problem_of(
     else:
         threats = draw_threats(found, range(first, first + HIDDEN_THREATS))
         case = Case(found, one_of_each_charge(threats))
-    return LayoutProblem(BlastEvaluator(found, JUDGE, cache=cache), case, processes)
+    return LayoutProblem(BlastEvaluator(found, engine), case, processes)

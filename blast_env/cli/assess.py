@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import (
     CELL_HELP,
+    CELLS_HELP,
     SCENARIO_HELP,
     TARGET_HELP,
     ChargeOptions,
@@ -76,6 +77,7 @@ class AssessCommand(ChargeOptions):
     target: str | None = option(None, TARGET_HELP.format("low"))
     charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
     cell_m: float | None = option(None, CELL_HELP)
+    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
     without_fallen: bool = option(
         False, "Take pieces away that overturn before a blast is over, and run it again."
     )
@@ -101,7 +103,7 @@ class AssessCommand(ChargeOptions):
             layout = tuple(load_layout(self.layout, scenario))
             layouts[layout_counts(layout, "barrier")] = layout
         charges = self._charges(scenario)
-        engine = find_engine(JUDGE, self.cell_m)
+        engine = find_engine(JUDGE, self.cell_m, cells=self.cells)
         found = {}
         for name, layout in layouts.items():
             with progress_bar(f"{len(charges)} blasts, {name}") as progress:
@@ -225,7 +227,7 @@ class AssessCommand(ChargeOptions):
         pieces = piece_table(found)
         if len(pieces):
             tables.append(SheetTable("Pieces", pieces, (*CASE_COLUMNS, *PIECE_COLUMNS)))
-        engine = find_engine(JUDGE, self.cell_m)
+        engine = find_engine(JUDGE, self.cell_m, cells=self.cells)
         record: dict[str, str | int | float] = {
             "scenario": scenario.name,
             "scenario hash": scenario.content_hash,

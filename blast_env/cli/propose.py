@@ -11,7 +11,7 @@ from blast_agents.rules import expected_charge
 from blast_agents.search import LayoutProblem, Progress, SearchResult, layouts_by_rule
 
 from blast_env.cli.command import argument, option
-from blast_env.cli.options import SCENARIO_HELP, ChargeOptions, ProcessOptions
+from blast_env.cli.options import CELLS_HELP, SCENARIO_HELP, ChargeOptions, ProcessOptions
 from blast_env.cli.output import (
     ResultTable,
     print_line,
@@ -22,6 +22,7 @@ from blast_env.cli.output import (
     save_pictures,
 )
 from blast_env.cli.search import print_cost
+from blast_env.engines import JUDGE, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case
 from blast_env.geometry import Layout, layout_counts
@@ -57,6 +58,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         show_default="all that there are to run",
         min=2,
     )
+    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
     out: Path | None = option(
         None, "JSON file for the layout; its picture is drawn beside it.", writes=(".json",)
     )
@@ -65,7 +67,8 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         """Propose, judge the proposal if that is asked for, and write it."""
         scenario = load_scenario(self.scenario)
         scenario.zone  # noqa: B018  # refuses a scenario without one
-        problem = problem_of(scenario, self._charge(scenario), self.processes)
+        engine = find_engine(JUDGE, cells=self.cells)
+        problem = problem_of(scenario, self._charge(scenario), self.processes, engine)
         chosen, result = self._proposed(problem)
         placement = Placement.of(scenario, result.layout)
         cost = "" if scenario.zone.budget is None else f", cost {placement.cost:g}"

@@ -22,6 +22,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import (
     CELL_HELP,
+    CELLS_HELP,
     CVAR_HELP,
     ENGINE_HELP,
     SCENARIO_HELP,
@@ -107,6 +108,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
     cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
     engine: str = option(JUDGE, ENGINE_HELP)
     cell_m: float | None = option(None, CELL_HELP)
+    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
     start_from: tuple[Path, ...] = option((), "Layout file to begin with; more than one will do.")
     surrogate: Path | None = option(
         None,
@@ -121,7 +123,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
     def __call__(self) -> None:
         """Search, check the result, and write what came of it."""
         with running_on(self.cluster):
-            engine = find_engine(self.engine, self.cell_m)
+            engine = find_engine(self.engine, self.cell_m, cells=self.cells)
             evaluator = BlastEvaluator(load_scenario(self.scenario), engine, cache=self.cache)
             if self.out is not None:
                 make_folder(self.out)

@@ -1,4 +1,4 @@
-"""`--cell` in training and league: it reaches the environments and what judges."""
+"""`--cell` and `--cells`: they reach the environments and what judges."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 from blast_env.cli import app
 from blast_env.engines.gas import GasEngine
 from blast_env.scenario import save_scenario
-from tests.gas_sites import hut
+from tests.gas_sites import glazed_hut, hut
 
 COARSE = 0.5
 
@@ -66,6 +66,32 @@ def test_a_league_uses_the_cells(site: Path, tmp_path: Path, cells: set[float]) 
     assert result.exit_code == 0, result.output
     assert cells == {0.25}
     assert "cells of 0.25 m" in result.stdout
+
+
+def test_growing_cells_are_those_of_every_command_that_runs_gas(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = tmp_path / "glazed.toml"
+    save_scenario(glazed_hut(), site)
+    used: set[str] = set()
+    start_on = GasEngine.start_on
+
+    def watched(self: GasEngine, *arguments: Any) -> Any:
+        used.add(self.cells)
+        return start_on(self, *arguments)
+
+    monkeypatch.setattr(GasEngine, "start_on", watched)
+    searched = ("--scenario", site, "--engine", "gas", "--method", "random", "--budget", 1)
+    for arguments in (
+        ("simulate", site, "--engine", "gas"),
+        ("search", *searched, "--held-out", 1, "--out", tmp_path / "found"),
+        ("assess", site),
+        ("propose", site, "--verify", "--budget", 2),
+    ):
+        used.clear()
+        result = run(*arguments, "--cells", "coarse")
+        assert result.exit_code == 0, result.output
+        assert used == {"coarse"}, arguments[0]
 
 
 def test_cells_are_for_gas_alone(site: Path, tmp_path: Path) -> None:

@@ -188,6 +188,11 @@ SMALLER: Final[dict[str, str]] = {
     # docs/engineers/gas.md, docs/howto/pictures.md
     "blast-env simulate courtyard --engine gas --cell 0.25 --excel loads.xlsx": "--cell 0.5",
     "blast-env search --scenario my_site.toml --engine gas --budget 50": "--budget 2 --held-out 1",
+    "blast-env search --scenario my_site.toml --engine gas --cells coarse --out found": (
+        "--budget 2 --held-out 1"
+    ),
+    "blast-env evaluate --layout found/layout.json --scenario my_site.toml --engine gas"
+    " --cells fine": "--seeds 1 --cells coarse",
     "blast-env evaluate --layout wall.json --scenario my_site.toml --engine gas --seeds 8": (
         "--seeds 1"
     ),

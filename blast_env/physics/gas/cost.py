@@ -53,7 +53,7 @@ class CostGuess:
 
     @property
     def seconds(self) -> float:
-        """Time on a core beside a busy one, and half of it on an idle computer; without films."""
+        """Time on a busy or old core, without films; a fast one takes half to four fifths of it."""
         return self.moved / _CELLS_PER_S
 
     def check(self, settings: GasSettings) -> None:
